@@ -20,8 +20,7 @@ from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.identification.close import LoopResult, close_loop
 from xosc_lateral.identification.identify import usable_columns
 from xosc_lateral.identification.regression import Coarse
-from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.selection import ERROR_BUDGET, Accepted, select
+from xosc_lateral.identification.selection import ERROR_BUDGET, Accepted, Search, select
 from xosc_lateral.identification.timeline import join_drives
 
 BENDS = {"curvature", "crossfall", "speed"}

@@ -9,7 +9,7 @@ from tests.identification.made_coarse import coarse_of, movement, wander
 from xosc_lateral.driver.effects import Acts, Linear
 from xosc_lateral.identification.cross_validation import held_out_gain
 from xosc_lateral.identification.regression import Coarse, fit_model
-from xosc_lateral.identification.terms.mean import MeanTerm
+from xosc_lateral.identification.terms.column import MeanTerm
 
 SECONDS = 1200.0
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from xosc_lateral.driver.effects import Step
-from xosc_lateral.identification.close import describe_finding, population_finding, spectrum_finding
+from xosc_lateral.identification.close import _finding, describe_finding
 from xosc_lateral.identification.core_model import TIMES_S, DriverVariance, SpectrumShape
 from xosc_lateral.identification.held_out import HeldOut
 from xosc_lateral.identification.selection import Accepted
@@ -21,7 +21,7 @@ COMPARED = HeldOut(None, REAL, BEFORE, AFTER, np.zeros(0), np.zeros(0), [])  # t
 def test_an_accepted_term_is_told_with_its_errors_on_held_out_rows() -> None:
     accepted = Accepted(StepTerm(at=300), 1e-6)
     effects = (Step(size=0.2, size_error=0.02, at_s=285.0),)
-    found = describe_finding(accepted, "step 0", None, effects, COMPARED)  # type: ignore[arg-type]
+    found = describe_finding(accepted, "step 0", effects, None, COMPARED)  # type: ignore[arg-type]
     assert (found.effect, found.kind, found.shape) == ("step", "step", "at 285 s")
     assert (found.size_m, found.size_error, found.p_value) == (0.2, 0.02, 1e-6)
     assert (found.error_before, found.error_after) == pytest.approx((0.1, 0.0))
@@ -29,13 +29,14 @@ def test_an_accepted_term_is_told_with_its_errors_on_held_out_rows() -> None:
 
 
 def test_a_group_that_nobody_described_has_no_error() -> None:
-    found = describe_finding(Accepted(StepTerm(at=300), 1e-6), "step 7", None, (Step(size=0.2),), COMPARED)  # type: ignore[arg-type]
+    found = describe_finding(Accepted(StepTerm(at=300), 1e-6), "step 7", (Step(size=0.2),), None, COMPARED)  # type: ignore[arg-type]
     assert (found.error_before, found.error_after) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize(("ratio", "worst"), [((1.0, 1.1, 0.5, 1.0, 1.0), 2), ((1.0, 3.0, 0.5, 1.0, 1.0), 1)])
 def test_memory_is_told_by_the_band_that_is_farthest_off_either_way(ratio: tuple[float, ...], worst: int) -> None:
-    found = spectrum_finding(SpectrumShape(TIMES_S, np.array(ratio), 1e-5), COMPARED)
+    lack = SpectrumShape(TIMES_S, np.array(ratio), 1e-5)
+    found = _finding(lack.described(), COMPARED, kind=lack.KIND, p_value=lack.p_value)
     assert found.size_m == ratio[worst]
     assert f"within {TIMES_S[worst]:g} s is {ratio[worst]:.2f} times" in found.shape
     # 0.3 off in one of two cells that both know; the third was never measured
@@ -44,7 +45,8 @@ def test_memory_is_told_by_the_band_that_is_farthest_off_either_way(ratio: tuple
 
 
 def test_drivers_that_differ_are_told_with_the_error_of_their_spread() -> None:
-    found = population_finding(DriverVariance(50, 0.15, 0.2, 1e-4), COMPARED)
+    lack = DriverVariance(50, 0.15, 0.2, 1e-4)
+    found = _finding(lack.described(), COMPARED, kind=lack.KIND, p_value=lack.p_value)
     assert found.size_m == 0.15
     assert found.size_error == pytest.approx(0.15 / np.sqrt(100.0))
     assert found.shape == "50 drives; their spreads scatter by a factor of 1.22"

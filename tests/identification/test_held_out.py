@@ -12,12 +12,11 @@ from xosc_lateral.driver.profile import Provenance
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.identification.columns import Column, Values
 from xosc_lateral.identification.cross_validation import Nested, _over_blocks
-from xosc_lateral.identification.held_out import _frequency, _quantities, estimate_all, fit_without
+from xosc_lateral.identification.held_out import _quantities, fit_without
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.selection import Accepted, Gain, Selection
 from xosc_lateral.identification.terms.base import Term
-from xosc_lateral.identification.terms.cycle import CycleTerm
-from xosc_lateral.identification.terms.mean import MeanTerm
+from xosc_lateral.identification.terms.column import MeanTerm
 from xosc_lateral.identification.terms.time import StepTerm
 
 SECONDS = 900.0
@@ -52,7 +51,7 @@ def nested(coarse: Coarse) -> Nested:
     folds = [blocks % 3 == fold for fold in range(3)]
     picked = ((X,), (X, IDLE), (X,))
     selections = tuple(chosen(coarse.only(~held), *terms) for held, terms in zip(folds, picked, strict=True))
-    return Nested(selections, tuple((held, coarse) for held in folds), blocks)
+    return Nested(selections, coarse, blocks)
 
 
 def test_what_acts_gains_on_rows_that_it_was_not_fitted_on(nested: Nested) -> None:
@@ -79,7 +78,7 @@ def test_terms_together_gain_what_the_start_lacks(nested: Nested) -> None:
 def test_a_gain_is_the_mean_over_blocks_with_its_standard_error(coarse: Coarse) -> None:
     blocks = np.arange(len(coarse)) // 60
     rows = np.random.default_rng(1).normal(size=len(coarse))
-    found = _over_blocks(rows, blocks, [(coarse.valid, coarse)], 2)
+    found = _over_blocks(rows, blocks, coarse.valid, 2)
     sums = np.array([rows[blocks == block].sum() for block in np.unique(blocks[coarse.valid])])
     assert found.mean == pytest.approx(sums.mean())
     assert found.error == pytest.approx(sums.std(ddof=1) / np.sqrt(len(sums)))
@@ -99,7 +98,7 @@ def test_only_a_loss_by_a_standard_error_vetoes_a_term_and_being_found_in_no_fol
 
 def test_a_fold_is_scored_with_its_own_version_of_what_was_kept(coarse: Coarse) -> None:
     fold = chosen(coarse, X, IDLE)
-    nested = Nested((fold,), ((coarse.valid, coarse),), np.zeros(len(coarse), dtype=np.intp))
+    nested = Nested((fold,), coarse, np.zeros(len(coarse), dtype=np.intp))
     assert nested.only((mean_term("x"), mean_term("idle"))).selections[0].final is fold.final
     assert nested.only((mean_term("x"),)).selections[0].final.terms == (X,)
     assert nested.only(()).selections[0].final.terms == ()
@@ -108,9 +107,9 @@ def test_a_fold_is_scored_with_its_own_version_of_what_was_kept(coarse: Coarse) 
 def test_a_base_is_fitted_to_what_is_left_without_the_effects(coarse: Coarse) -> None:
     fitted = fit_model(coarse, (X,))
     used = np.ones(len(coarse.timeline), dtype=bool)
-    with_it = fit_without(fitted, estimate_all(fitted), used, ModelKind.TWO_LEVEL, "after", Provenance(source="here"))
+    with_it = fit_without(fitted, used, ModelKind.TWO_LEVEL, "after", Provenance(source="here"))
     bare = fit_model(coarse, ())
-    without = fit_without(bare, estimate_all(bare), used, ModelKind.TWO_LEVEL, "before", None)
+    without = fit_without(bare, used, ModelKind.TWO_LEVEL, "before", None)
     assert [effect.columns for effect in with_it.effects] == [("x",)]
     assert without.effects == ()
     assert (with_it.name, with_it.provenance.source) == ("after", "here")
@@ -124,21 +123,16 @@ def test_without_a_run_of_ten_seconds_there_is_no_base(coarse: Coarse) -> None:
     fitted = fit_model(coarse, ())
     nothing = np.zeros(len(coarse.timeline), dtype=bool)
     with pytest.raises(NotEnoughDataError, match="no run of 10 s is left"):
-        fit_without(fitted, estimate_all(fitted), nothing, ModelKind.TWO_LEVEL, "before", None)
+        fit_without(fitted, nothing, ModelKind.TWO_LEVEL, "before", None)
 
 
 def test_the_residual_is_cut_by_every_column_and_by_what_was_found(coarse: Coarse) -> None:
     columns = [Column("idle", Values.NUMBER, False), Column("wind", Values.ANGLE, False, period=360.0)]
-    quantities = _quantities(chosen(coarse, X, StepTerm(at=300)), columns)
+    quantities = _quantities(chosen(coarse, X, StepTerm(at=300)).final, columns)
     assert list(quantities) == ["idle", "sin(wind)", "cos(wind)", "effect: mean 0", "effect: step 0"]
     np.testing.assert_allclose(quantities["sin(wind)"] ** 2 + quantities["cos(wind)"] ** 2, 1.0)
     step = quantities["effect: step 0"]
     assert (step[1499], step[1500]) == (0.0, 1.0)
-
-
-def test_a_cycle_s_frequency_is_known_where_there_is_one(coarse: Coarse) -> None:
-    assert _frequency(fit_model(coarse, (X,))) is None
-    assert _frequency(fit_model(coarse, (CycleTerm(1.0 / 12.0),))) == 1.0 / 12.0
 
 
 def test_a_population_s_base_holds_what_its_trucks_do_to_the_rest() -> None:
@@ -149,8 +143,8 @@ def test_a_population_s_base_holds_what_its_trucks_do_to_the_rest() -> None:
     moved = movement(rng, drives * seconds, 3.0) * np.where(truck > 0.0, 0.5, 1.0)
     fitted = fit_model(coarse_of(moved, {"is_truck": truck}, drives=drives), ())
     used = np.ones(len(fitted.coarse.timeline), dtype=bool)
-    with_place = fit_without(fitted, {}, used, ModelKind.AUTOREGRESSIVE, "after", None)
+    with_place = fit_without(fitted, used, ModelKind.AUTOREGRESSIVE, "after", None)
     spread = [effect for effect in with_place.effects if effect.acts is Acts.SPREAD]  # type: ignore[union-attr]
     assert [effect.columns for effect in spread] == [("is_truck",)]
     assert np.exp(spread[0].coefficients[0]) == pytest.approx(0.5, rel=0.25)  # type: ignore[union-attr]
-    assert fit_without(fitted, {}, used, ModelKind.TWO_LEVEL, "before", None).effects == ()
+    assert fit_without(fitted, used, ModelKind.TWO_LEVEL, "before", None).effects == ()

@@ -16,8 +16,7 @@ from xosc_lateral.drives.drive import Drive
 from xosc_lateral.identification.identify import CLOCK, initial_terms, usable_columns
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.terms.between import BetweenTerm
-from xosc_lateral.identification.terms.mean import MeanTerm
-from xosc_lateral.identification.terms.spread import SpreadTerm
+from xosc_lateral.identification.terms.column import MeanTerm, SpreadTerm
 from xosc_lateral.identification.terms.time import TimeMeanTerm, TimeSpreadTerm
 from xosc_lateral.identification.timeline import Timeline, join_drives
 

@@ -18,10 +18,9 @@ from xosc_lateral.driver.profile import DriverProfile, file_type
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.formats.profiles import read_profile, write_profile
 from xosc_lateral.identification import selection, terms
-from xosc_lateral.identification.held_out import estimate_all, removal_of
+from xosc_lateral.identification.held_out import removal_of
 from xosc_lateral.identification.regression import Coarse
-from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.selection import STAGES, TERMS, in_stages, shared_among
+from xosc_lateral.identification.selection import STAGES, TERMS, Search, in_stages, shared_among
 from xosc_lateral.identification.significance import BUDGET, MANY_DRIVES
 from xosc_lateral.identification.terms.base import Stage, Term
 from xosc_lateral.plugins import defined_in
@@ -138,10 +137,10 @@ def test_it_takes_its_part_of_the_error_budget_from_all_others(added: type[Term]
 def test_the_loop_finds_it_where_it_acts_sizes_and_removes_it(added: type[Term], tmp_path: Path) -> None:
     found = found_in(ramping(0.25, 31))
     assert [type(one.term) for one in found.accepted] == [added]
-    estimates = estimate_all(found.final)
+    estimates = found.final.estimates
     (effect,) = estimates["ramp 0"][1]
     assert effect.size == pytest.approx(0.25, abs=3.0 * effect.size_error)
-    removed = removal_of(found.final, estimates).location
+    removed = removal_of(found.final).location
     assert removed[-100] - removed[100] == pytest.approx(effect.size, rel=0.05)
     write_profile(DriverProfile("ramping", make_profile().model, (effect,)), tmp_path / "p.json")
     again = read_profile(tmp_path / "p.json")

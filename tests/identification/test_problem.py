@@ -7,9 +7,9 @@ import pytest
 from scipy.signal import lfilter
 
 from tests.identification.made_coarse import coarse_of, movement
+from xosc_lateral.identification.innovations import Squares, of_squares
 from xosc_lateral.identification.regression import Coarse, fit_model
-from xosc_lateral.identification.squares import Squares, of_squares
-from xosc_lateral.identification.terms.mean import MeanTerm
+from xosc_lateral.identification.terms.column import MeanTerm
 
 SECONDS = 900.0
 
@@ -22,7 +22,8 @@ def coarse() -> Coarse:
 def test_rows_of_valid_seconds_are_those_of_the_whole_grid(coarse: Coarse) -> None:
     """Put side by side without what is cut out, they whiten to the same numbers."""
     problem = MeanTerm.problem(fit_model(coarse, ()))
-    np.testing.assert_allclose(problem.observed, problem.whitener.rows(problem.series)[problem.valid], atol=1e-10)
+    white = problem.whitener.rows(problem.series)[problem.whitener.valid]
+    np.testing.assert_allclose(problem.observed, white, atol=1e-10)
     assert problem.known.shape == (int(coarse.valid.sum()), 0)
 
 

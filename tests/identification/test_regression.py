@@ -9,8 +9,7 @@ from tests.identification.made_coarse import SPREAD, coarse_of, movement, wander
 from xosc_lateral.driver.effects import Acts, Linear, Magnitude
 from xosc_lateral.identification import regression
 from xosc_lateral.identification.regression import Coarse, fit_model
-from xosc_lateral.identification.terms.mean import MeanTerm
-from xosc_lateral.identification.terms.spread import SpreadTerm
+from xosc_lateral.identification.terms.column import MeanTerm, SpreadTerm
 
 SECONDS = 900.0
 SIZE = 0.15
@@ -114,7 +113,7 @@ def test_the_unit_of_the_offset_scales_the_sizes_and_nothing_else(
     monkeypatch.setattr(regression, "FLOOR", abs(factor) * regression.FLOOR)
     other = fit_model(planted(5, scale=factor), (mean_term(),))
     np.testing.assert_allclose(other.sizes, factor * one.sizes, rtol=1e-6)
-    np.testing.assert_allclose(other.rows, np.sign(factor) * one.rows, atol=1e-6)
+    np.testing.assert_allclose(other.innovations, np.sign(factor) * one.innovations, atol=1e-6)
 
 
 def test_the_order_of_terms_does_not_matter() -> None:
@@ -176,5 +175,5 @@ def test_a_drive_that_stands_still_is_fitted_with_nothing_left(place: float) -> 
     """Without a warning, which the tests take for an error."""
     fitted = fit_model(coarse_of(np.full(4500, place)), ())
     assert fitted.levels[0] == pytest.approx(place)
-    assert np.isfinite(fitted.rows).all()
+    assert np.isfinite(fitted.innovations).all()
     assert np.abs(fitted.movement).max() < 1e-9

@@ -15,7 +15,7 @@ from xosc_lateral.identification.candidates import FINE_SCALES, Family, candidat
 from xosc_lateral.identification.columns import Column, Values
 from xosc_lateral.identification.refinement import Refinement
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
-from xosc_lateral.identification.terms.mean import MeanTerm
+from xosc_lateral.identification.terms.column import MeanTerm
 from xosc_lateral.identification.timeline import join_drives, on_fine_grid
 
 LAG, RESPONSE, SIZE = -0.6, 1.7, 0.25
@@ -103,21 +103,21 @@ def test_a_finer_choice_pays_for_its_number() -> None:
     for family in Family:
         members = [one for one in candidates if one.family is family]
         np.testing.assert_allclose([one.cost for one in members], 2.0 * np.log(len(members)))
-    shapes = shapes_of(columns[0], distance, curves=False)
-    scales = {one.scale for one in shapes.bent if isinstance(one, Proximity)}
+    _, bent, finer = shapes_of(columns[0], distance, curves=False)
+    scales = {one.scale for one in bent if isinstance(one, Proximity)}
     median = float(np.nanmedian(distance))
     assert {round(share * median, 9) for share in FINE_SCALES} <= {round(scale, 9) for scale in scales}
     coarse = sum(one.family is Family.BENT and one.columns == ("gap",) for one in candidates)
-    assert shapes.finer == len(shapes.bent) / coarse
+    assert finer == len(bent) / coarse
 
 
 def test_a_column_that_mostly_has_one_of_two_values_has_limits_in_between() -> None:
     """A crossfall: -2.5 or 2.5 % nearly always, and on its way from one to the other for a tenth of the time."""
     way = np.linspace(-2.5, 2.5, 100)
     crossfall = np.concatenate([np.full(600, -2.5), way, np.full(200, 2.5), way[::-1]])
-    shapes = shapes_of(Column("crossfall", Values.NUMBER, False), crossfall, curves=True)
-    limits = {shape.at for shape in shapes.bent if isinstance(shape, Threshold)}
+    _, bent, _ = shapes_of(Column("crossfall", Values.NUMBER, False), crossfall, curves=True)
+    limits = {shape.at for shape in bent if isinstance(shape, Threshold)}
     assert len(limits) > 10
     assert min(np.abs(list(limits))) < 0.2
-    middles = {shape.middle for shape in shapes.bent if isinstance(shape, Saturating)}
+    middles = {shape.middle for shape in bent if isinstance(shape, Saturating)}
     assert max(np.abs(list(middles))) < 0.2

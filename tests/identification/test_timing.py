@@ -9,10 +9,10 @@ from msgspec import structs
 from tests.identification.made_coarse import coarse_of, movement, wander
 from xosc_lateral.driver.effects import Acts, Factor, Form, Linear, Product
 from xosc_lateral.driver.effects.response import respond
-from xosc_lateral.identification.dictionary import respond_by_second
+from xosc_lateral.identification.dictionary import beside, respond_by_second
 from xosc_lateral.identification.regression import fit_model
-from xosc_lateral.identification.terms.mean import MeanTerm
-from xosc_lateral.identification.timing import NEAR_SCALES, _beside, _profile, _shapes, widening
+from xosc_lateral.identification.terms.column import MeanTerm
+from xosc_lateral.identification.timing import NEAR_SCALES, _profile, _shapes, widening
 
 
 @pytest.mark.parametrize("response_s", [0.6, 1.5, 4.0])
@@ -30,7 +30,7 @@ def test_a_size_beside_known_columns_is_that_of_least_squares() -> None:
     known, rows, series = rng.normal(size=(200, 3)), rng.normal(size=(200, 2)), rng.normal(size=200)
     others, _ = np.linalg.qr(known)
     contrast = np.array([1.0, -0.5])
-    explained, size, variance = _profile(_beside(others, rows), _beside(others, series), contrast)
+    explained, size, variance = _profile(beside(others, rows), beside(others, series), contrast)
     both = np.column_stack([known, rows])
     sizes, left, *_ = np.linalg.lstsq(both, series, rcond=None)
     _, alone, *_ = np.linalg.lstsq(known, series, rcond=None)

@@ -8,6 +8,8 @@ References
 ----------
 .. [1] F. Corsi, "A simple approximate long-memory model of realized volatility", J. Financial Econometrics 7, 2009.
 .. [2] P. Brockwell, R. Davis, "Time Series: Theory and Methods", 1991, section 5.2.
+.. [3] C. Gourieroux, P. Phillips, J. Yu, "Indirect inference for dynamic panel models", J. Econometrics 157, 2010.
+.. [4] A. C. Aitken, "On least squares and linear combination of observations", Proc. R. Soc. Edinburgh 55, 1936.
 """
 
 from __future__ import annotations
@@ -198,10 +200,6 @@ def unbiased(
     A level takes part of the slow movement with it, so that the process looks less persistent than it is (Nickell's
     bias: the errors of effects in runs of a minute come out an eighth too small). The same is done to drives simulated
     from the fitted process, and the difference taken off: indirect inference for panels [3]_.
-
-    References
-    ----------
-    .. [3] C. Gourieroux, P. Phillips, J. Yu, "Indirect inference for dynamic panel models", J. Econometrics 157, 2010.
     """
     if process.order == 0:
         return process
@@ -306,3 +304,26 @@ class Whitener:
     def rows(self, values: FloatArray) -> FloatArray:
         """Whitened, levels out; shape of `values` [m], the rows of variance 1. [-]"""
         return self.without_levels(self.white(values))
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """One linear regression, whitened: an ordinary one [4]_."""
+
+    whitener: Whitener  # For series and columns.
+    series: FloatArray  # shape (n,): With what the model has of this component still in.
+    columns: FloatArray  # shape (n, k): What the model has already.
+
+    @cached_property
+    def observed(self) -> FloatArray:
+        """White series, levels out, shape (seconds,), valid ones only. [-]"""
+        return self.rows(self.series)
+
+    @cached_property
+    def known(self) -> FloatArray:
+        """White columns, shape (seconds, k). [-]"""
+        return self.rows(self.columns)
+
+    def rows(self, values: FloatArray) -> FloatArray:
+        """White rows [-] of series or columns, shape (n,) or (n, k); valid ones only."""
+        return self.whitener.compact.rows(values[self.whitener.valid])

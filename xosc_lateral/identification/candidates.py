@@ -11,10 +11,10 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from itertools import chain, combinations
+from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,50 +83,50 @@ def candidates_of(columns: Sequence[Column], context: Mapping[str, FloatArray], 
 
     Beyond `most` columns, products are of those whose role is known before any others.
     """
-    plain = [shape for column in columns for shape in _plain(column, context[column.name])]
-    bent = [shape for column in columns for shape in _bent(column, context[column.name])]
     known_first = sorted(columns, key=lambda column: column.role is Role.UNKNOWN)[:most]
     paired = [column for column in columns if column in known_first]
     factors = {column.name: _factors(column, context[column.name]) for column in columns}
-    pairs: list[tuple[ColumnEffect, tuple[float, ...]]] = [
-        (Product(acts=Acts.LOCATION, factors=pair), (1.0,))
-        for first, second in combinations(paired, 2)
-        for pair in _pairs(first, second, factors)
-    ]
-    families = {Family.PLAIN: plain, Family.BENT: bent, Family.PRODUCT: pairs}
-    return [
-        Candidate(effect, family, 2.0 * float(np.log(len(members))), contrast)
-        for family, members in families.items()
-        for effect, contrast in members
-    ]
+    families: dict[Family, list[ColumnEffect]] = {
+        Family.PLAIN: [shape for column in columns for shape in _plain(column, context[column.name])],
+        Family.BENT: [shape for column in columns for shape in _bent(column, context[column.name])],
+        Family.PRODUCT: [
+            Product(acts=Acts.LOCATION, factors=pair)
+            for first, second in combinations(paired, 2)
+            for pair in _pairs(first, second, factors)
+        ],
+    }
+    found = []
+    for family, effects in families.items():
+        members = [(effect, contrast) for effect in effects for contrast in _contrasts(effect, context)]
+        found += [Candidate(effect, family, 2.0 * float(np.log(len(members))), one) for effect, one in members]
+    return found
 
 
-@dataclass(frozen=True, slots=True)
-class Shapes:
-    """Shapes of one column for refinement."""
-
-    plain: list[ColumnEffect]  # Bent ones with a fine choice of limits and scales.
-    bent: list[ColumnEffect]  # Bent ones with a fine choice of limits and scales.
-    finer: float  # How many times as many bent ones as the dictionary has. [-]
+def _contrasts(effect: ColumnEffect, context: Mapping[str, FloatArray]) -> list[tuple[float, ...]]:
+    """Weights of its components with which an effect is tried."""
+    if isinstance(effect, Angular):
+        return [(float(np.sin(phase)), float(np.cos(phase))) for phase in PHASES]
+    return [(1.0,) * effect.quantity({name: context[name][:1] for name in effect.columns}).shape[1]]
 
 
-def shapes_of(column: Column, values: FloatArray, *, curves: bool) -> Shapes:
-    """Every shape of one column; `values` on the road-following rows alone."""
-    plain = _unique(_plain(column, values))
-    looked_at = _unique(_bent(column, values))
-    bent = _unique(chain(_bent(column, values, FINE_LIMITS), _fading(column, values)))
+def shapes_of(
+    column: Column, values: FloatArray, *, curves: bool
+) -> tuple[list[ColumnEffect], list[ColumnEffect], float]:
+    """Plain shapes of one column, bent ones with a fine choice of limits and scales, and how many times as many bent
+    ones as the dictionary has; `values` on the road-following rows alone."""
+    bent = _unique((*_bent(column, values, FINE_LIMITS), *_fading(column, values)))
     bent += _curves(column, values) if curves else []
-    return Shapes(plain, bent, len(bent) / max(1, len(looked_at)))
+    return _unique(_plain(column, values)), bent, len(bent) / max(1, len(_unique(_bent(column, values))))
 
 
-def _fading(column: Column, values: FloatArray) -> Iterator[tuple[ColumnEffect, tuple[float, ...]]]:
+def _unique(shapes: Iterable[ColumnEffect]) -> list[ColumnEffect]:
+    return list({repr(effect): effect for effect in shapes}.values())
+
+
+def _fading(column: Column, values: FloatArray, shares: Sequence[float] = FINE_SCALES) -> Iterator[ColumnEffect]:
     if column.gaps and column.values is Values.NUMBER and (scale := _scale(values, 0.5)) > 0.0:
-        for share in FINE_SCALES:
-            yield Proximity(acts=Acts.LOCATION, column=column.name, scale=share * scale), (1.0,)
-
-
-def _unique(shapes: Iterator[tuple[ColumnEffect, tuple[float, ...]]]) -> list[ColumnEffect]:
-    return list({repr(effect): effect for effect, _ in shapes}.values())
+        for share in shares:
+            yield Proximity(acts=Acts.LOCATION, column=column.name, scale=share * scale)
 
 
 def _curves(column: Column, values: FloatArray) -> list[ColumnEffect]:
@@ -134,56 +134,43 @@ def _curves(column: Column, values: FloatArray) -> list[ColumnEffect]:
     if column.values is not Values.NUMBER or column.gaps:
         return []
     knots = np.unique(_quantiles(values[np.isfinite(values)], KNOTS)).tolist()
-    return [
-        Piecewise(acts=Acts.LOCATION, column=column.name, knots=some)
-        for number in (1, 2)
-        for some in combinations(knots, number)
-    ]
+    several = (some for number in (1, 2) for some in combinations(knots, number))
+    return [Piecewise(acts=Acts.LOCATION, column=column.name, knots=some) for some in several]
 
 
-def _plain(column: Column, values: FloatArray) -> Iterator[tuple[ColumnEffect, tuple[float, ...]]]:
+def _plain(column: Column, values: FloatArray) -> Iterator[ColumnEffect]:
     name = column.name
     if column.values is Values.ANGLE:
-        angular = Angular(acts=Acts.LOCATION, column=name, period=column.period)
-        yield from ((angular, (float(np.sin(phase)), float(np.cos(phase)))) for phase in PHASES)
+        yield Angular(acts=Acts.LOCATION, column=name, period=column.period)
         return
     if _varies(values):
-        yield Linear(acts=Acts.LOCATION, column=name), (1.0,)
+        yield Linear(acts=Acts.LOCATION, column=name)
     if column.gaps:
-        yield Nearness(acts=Acts.LOCATION, column=name, presence=True), (1.0,)
-        if column.values is Values.NUMBER and (scale := _scale(values, 0.5)) > 0.0:
-            yield Proximity(acts=Acts.LOCATION, column=name, scale=scale), (1.0,)
+        yield Nearness(acts=Acts.LOCATION, column=name, presence=True)
+        yield from _fading(column, values, (1.0,))
 
 
-def _bent(
-    column: Column, values: FloatArray, limits: Sequence[float] = LIMITS
-) -> Iterator[tuple[ColumnEffect, tuple[float, ...]]]:
+def _bent(column: Column, values: FloatArray, limits: Sequence[float] = LIMITS) -> Iterator[ColumnEffect]:
     name, seen = column.name, values[np.isfinite(values)]
-    for effect in offered_effects(name, values):
-        yield effect, (1.0,) * effect.quantity({name: values[:1]}).shape[1]
+    yield from offered_effects(name, values)
     if column.values is Values.LEVELS:
-        for level in column.levels:
-            yield Levels(acts=Acts.LOCATION, column=name, levels=(level,)), (1.0,)
+        yield from (Levels(acts=Acts.LOCATION, column=name, levels=(level,)) for level in column.levels)
     if column.values is not Values.NUMBER or not _varies(values):
         return
-    for at in np.unique(_quantiles(seen, limits)):
+    for at in np.unique(_quantiles(seen, limits)).tolist():
         if seen.min() < at < seen.max():
-            yield Threshold(acts=Acts.LOCATION, column=name, at=float(at)), (1.0,)
-            yield Threshold(acts=Acts.LOCATION, column=name, at=float(at), jump=False), (1.0,)
-    low, middle, high = _quantiles(seen, (0.1, 0.5, 0.9))
+            yield Threshold(acts=Acts.LOCATION, column=name, at=at)
+            yield Threshold(acts=Acts.LOCATION, column=name, at=at, jump=False)
+    low, middle, high = _quantiles(seen, (0.1, 0.5, 0.9)).tolist()
     if high > low:
         for width in (0.2, 0.5):
-            yield (
-                Saturating(acts=Acts.LOCATION, column=name, middle=float(middle), scale=float(width * (high - low))),
-                (1.0,),
-            )
+            yield Saturating(acts=Acts.LOCATION, column=name, middle=middle, scale=width * (high - low))
     if seen.min() < 0.0 < seen.max():
-        yield Magnitude(acts=Acts.LOCATION, column=name), (1.0,)
-    if column.gaps:
-        for share in SCALES:
-            if (scale := _scale(values, share)) > 0.0:
-                yield Proximity(acts=Acts.LOCATION, column=name, scale=0.5 * scale), (1.0,)
-                yield Proximity(acts=Acts.LOCATION, column=name, scale=scale), (1.0,)
+        yield Magnitude(acts=Acts.LOCATION, column=name)
+    for share in SCALES if column.gaps else ():
+        if (scale := _scale(values, share)) > 0.0:
+            yield Proximity(acts=Acts.LOCATION, column=name, scale=0.5 * scale)
+            yield Proximity(acts=Acts.LOCATION, column=name, scale=scale)
 
 
 def _factors(column: Column, values: FloatArray) -> list[Factor]:
@@ -193,32 +180,24 @@ def _factors(column: Column, values: FloatArray) -> list[Factor]:
         return [Factor(column=name, form=form, at=column.period) for form in (Form.SINE, Form.COSINE)]
     if column.values is Values.LEVELS:
         return [Factor(column=name, form=Form.EQUALS, at=level) for level in column.levels]
-    found = []
     if column.values is Values.SWITCH:
-        high = max(column.levels)
-        return [
-            Factor(column=name, form=Form.EQUALS, at=high)
-            if high != 1.0 or min(column.levels) != 0.0
-            else Factor(column=name)
-        ]
+        low, high = min(column.levels), max(column.levels)
+        of_its_own = Factor(column=name, form=Form.EQUALS, at=high)
+        return [Factor(column=name) if (low, high) == (0.0, 1.0) else of_its_own]
     if column.gaps:
-        found.append(Factor(column=name, form=Form.PRESENCE))
-        if (scale := _scale(values, 0.5)) > 0.0:
-            found.append(Factor(column=name, form=Form.PROXIMITY, at=scale))
-    elif _varies(values):
-        low, middle, high = np.quantile(values[np.isfinite(values)], [0.1, 0.5, 0.9])
-        found.append(Factor(column=name, at=0.0 if low < 0.0 < high else float(middle)))
-    return found
+        there, scale = Factor(column=name, form=Form.PRESENCE), _scale(values, 0.5)
+        return [there, Factor(column=name, form=Form.PROXIMITY, at=scale)] if scale > 0.0 else [there]
+    if not _varies(values):
+        return []
+    low, middle, high = np.quantile(values[np.isfinite(values)], [0.1, 0.5, 0.9]).tolist()
+    return [Factor(column=name, at=0.0 if low < 0.0 < high else middle)]
 
 
 def _pairs(first: Column, second: Column, factors: Mapping[str, list[Factor]]) -> Iterator[tuple[Factor, Factor]]:
-    for one in factors[first.name]:
-        for other in factors[second.name]:
-            if Values.ANGLE in (first.values, second.values):  # a vector's component: speed counts from its own zero
-                one_, other_ = (Factor(column=f.column) if f.form is Form.VALUE else f for f in (one, other))
-                yield one_, other_
-            else:
-                yield one, other
+    for one, other in product(factors[first.name], factors[second.name]):
+        if Values.ANGLE in (first.values, second.values):  # a vector's component: speed counts from its own zero
+            one, other = (Factor(column=f.column) if f.form is Form.VALUE else f for f in (one, other))
+        yield one, other
 
 
 def _quantiles(seen: FloatArray, shares: Sequence[float]) -> FloatArray:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -19,79 +19,52 @@ from xosc_lateral.identification.core_model import (
     compare_spectrum_shapes,
     test_population,
 )
-from xosc_lateral.identification.cross_validation import held_out_words, hold_out_blocks
+from xosc_lateral.identification.cross_validation import Progress, held_out_words, hold_out_blocks
 from xosc_lateral.identification.held_out import (
-    Estimates,
     HeldOut,
     Scorecard,
     Setting,
-    estimate_all,
     fit_without,
     score_held_out,
     score_runs,
 )
-from xosc_lateral.identification.identify import Identified, Progress, identify, initial_terms
+from xosc_lateral.identification.identify import Identified, identify, initial_terms
 from xosc_lateral.identification.refinement import Alternatives
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
 from xosc_lateral.identification.residual import LackOfFit, lack_of_fit_of, size_of
 from xosc_lateral.identification.selection import Accepted, Gain, Selection
 from xosc_lateral.identification.significance import LoopSeed
-from xosc_lateral.identification.terms.base import Term
+from xosc_lateral.identification.terms.base import Description, Term
 from xosc_lateral.identification.terms.between import between_shift
 from xosc_lateral.identification.timeline import join_drives
 
 
-@dataclass(frozen=True, eq=False)
-class Finding:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Finding(Description):
     """One effect that the base lacked."""
 
-    effect: str  # Short name.
     kind: str  # As in the report's schema.
-    columns: tuple[str, ...]  # That cause it; two when it is a product.
-    alike: Alternatives  # Columns of each other effect that the data can't tell from it.
-    lag_s: float | None
-    response_s: float | None
-    shape: str
-    size_m: float  # Change of the mean between the 5 % and 95 % quantile, or amplitude [m]; factor for scale.
-    size_error: float  # Standard error of it.
     p_value: float  # Family-wise over everything that its component tried.
     error_before: float  # On held-out blocks, by the effect's own quantity. [m]
     error_after: float  # On held-out blocks, by the effect's own quantity. [m]
-    measure: str  # What that error compares.
-    effects: tuple[Effect, ...]  # What the profile got.
-    statistic: str  # Group of summary statistics that shows it best.
+    columns: tuple[str, ...] = ()  # That cause it; two when it is a product.
+    alike: Alternatives = ()  # Columns of each other effect that the data can't tell from it.
+    effects: tuple[Effect, ...] = ()  # What the profile got.
     gain: Gain | None = None  # Held-out gain, nested; None where its path can't be predicted.
 
 
-def describe_finding(one: Accepted, key: str, fitted: Fitted, effects: tuple[Effect, ...], scored: HeldOut) -> Finding:
+def _finding(size: Description, scored: HeldOut, **about: Any) -> Finding:
+    """Put errors on held-out blocks to what was described."""
+    before, after = scored.error_of(size.statistic)
+    described = asdict(size) | {"measure": size.measure or size.statistic}
+    return Finding(error_before=before, error_after=after, **described, **about)
+
+
+def describe_finding(one: Accepted, key: str, effects: tuple[Effect, ...], fitted: Fitted, scored: HeldOut) -> Finding:
     """Put sizes and errors to what was accepted."""
-    size = one.term.describe(fitted, effects, key)
-    return Finding(
-        size.name, one.term.kind, one.term.columns, one.alike, size.lag_s, size.response_s, size.shape, size.size,
-        size.error, one.p_value, *scored.error_of(size.statistic), size.measure, effects, size.statistic, one.gain,
-    )  # fmt: skip
-
-
-def spectrum_finding(spectrum: SpectrumShape, scored: HeldOut) -> Finding:
-    """The core model is replaced: the first-order chain forgets too fast."""
-    worst = int(np.argmax(np.abs(np.log(spectrum.ratio))))
-    statistic, ratio = "movement by band", float(spectrum.ratio[worst])
-    return Finding(
-        "memory beyond one step", "memory", (), (), None, None,
-        f"movement within {spectrum.bands_s[worst]:g} s is {ratio:.2f} times the measured", ratio, 0.0,
-        spectrum.p_value, *scored.error_of(statistic), "size of the movement by frequency band", (), statistic,
-    )  # fmt: skip
-
-
-def population_finding(population: DriverVariance, scored: HeldOut) -> Finding:
-    """The core model is replaced: one pooled driver can't be many."""
-    statistic, scatter = "quantiles of local spread", float(np.exp(population.log_spread))
-    return Finding(
-        "drivers that differ", "population", (), (), None, None,
-        f"{population.drives} drives; their spreads scatter by a factor of {scatter:.2f}", population.shift,
-        population.shift / float(np.sqrt(2.0 * population.drives)), population.p_value, *scored.error_of(statistic),
-        statistic, (), statistic,
-    )  # fmt: skip
+    term = one.term
+    about = {"kind": term.kind, "columns": term.columns, "alike": one.alike, "p_value": one.p_value, "gain": one.gain}
+    return _finding(term.describe(fitted, effects, key), scored, effects=effects, **about)
 
 
 # The held-out error of a profile with more effects may be so many times the base's: 24 runs leave 2 % of noise. [-]
@@ -104,8 +77,8 @@ HARMFUL = "significant, but with it held-out blocks are predicted worse by its o
 class LoopResult:
     """What the loop found, as data; `xosc_lateral.report.loop` turns it into words."""
 
-    base: DriverProfile  # Before and after.
-    refined: DriverProfile  # Before and after.
+    base: DriverProfile
+    refined: DriverProfile
     given: bool  # Whether the base was given; else it was fitted first.
     findings: tuple[Finding, ...]
     coarse: Coarse
@@ -188,33 +161,31 @@ def close_loop(
     root = np.random.SeedSequence(seed)
     progress(0.0, "reading the drives")
     timeline = join_drives(drives)
-    coarse = Coarse.of(timeline)
-    kind = ModelKind.AUTOREGRESSIVE if base is None else _kind_of(base)
-    everything = np.ones(len(timeline), dtype=np.bool_)
+    coarse, everything = Coarse.of(timeline), np.ones(len(timeline), dtype=np.bool_)
     given = base is not None
+    paper = base is not None and base.model.kind == ModelKind.TWO_LEVEL.value
+    kind = ModelKind.TWO_LEVEL if paper else ModelKind.AUTOREGRESSIVE
     if base is None:
         progress(0.02, "fitting the base profile")
-        base = fit_without(fit_model(coarse, ()), {}, everything, kind, f"{name}-base", provenance)
+        base = fit_without(fit_model(coarse, ()), everything, kind, f"{name}-base", provenance)
     # the loop's own base knows what class, lane and speed do as `fit` has it; what acts is found, not begun with
     initial = initial_terms(base, timeline) if given else ()
     found = identify(coarse, root, initial=initial, excluded=excluded, roles=roles, progress=progress)
-    lacks = _lacks_of_the_core(base, found.selection.final, root) if kind is ModelKind.TWO_LEVEL else []
-    refined_kind = ModelKind.AUTOREGRESSIVE if lacks else kind
-    blocks = hold_out_blocks(timeline)
-    setting = Setting(coarse, blocks, base if given else None, kind, refined_kind, root)
+    lacks: list[SpectrumShape | DriverVariance] = []
+    if paper:  # what the two-level model lacks is found once, by replacing it: the autoregressive one has both
+        final = found.selection.final
+        tested = compare_spectrum_shapes(base, timeline, root), test_population(final, between_shift(final))
+        lacks = [lack for lack in tested if lack is not None and lack.found]
+    setting = Setting(coarse, base if given else None, kind, ModelKind.AUTOREGRESSIVE if lacks else kind, root)
     found, scored = _that_helps(setting, found, progress)
     selection = found.selection
     progress(0.95, "refitting on everything")
-    estimates = estimate_all(selection.final)
     refined = base
     if selection.accepted or not given or lacks:
-        refined = fit_without(selection.final, estimates, everything, refined_kind, name, provenance)
-    findings = [
-        describe_finding(one, key, selection.final, effects, scored)
-        for one, key, effects in _accepted(selection, estimates)
-    ]
-    findings += [describe(scored) for describe in lacks]
-    scores = score_runs(timeline, scored.runs_before, scored.runs_after, blocks, setting.rng(LoopSeed.SNIPPETS))
+        refined = fit_without(selection.final, everything, setting.refined_kind, name, provenance)
+    findings = [describe_finding(*one, selection.final, scored) for one in _accepted(selection)]
+    findings += [_finding(lack.described(), scored, kind=lack.KIND, p_value=lack.p_value) for lack in lacks]
+    rng = setting.rng(LoopSeed.SNIPPETS)
     progress(1.0, "done")
     return LoopResult(
         base=base,
@@ -225,19 +196,9 @@ def close_loop(
         identified=found,
         scored=scored,
         lack_of_fit=lack_of_fit_of(scored.real, scored.before, scored.after, scored.halves),
-        scores=scores,
+        scores=score_runs(timeline, scored.runs_before, scored.runs_after, setting.blocks, rng),
         seed=seed,
     )
-
-
-def _lacks_of_the_core(
-    base: DriverProfile, fitted: Fitted, root: np.random.SeedSequence
-) -> list[Callable[[HeldOut], Finding]]:
-    """What the two-level model lacks, found once by replacing it: the autoregressive one has both."""
-    spectrum = compare_spectrum_shapes(base, fitted.coarse.timeline, root)
-    population = test_population(fitted, between_shift(fitted))
-    lacks: list[Callable[[HeldOut], Finding]] = [partial(spectrum_finding, spectrum)] if spectrum.found else []
-    return lacks + ([partial(population_finding, population)] if population is not None and population.found else [])
 
 
 def _that_helps(setting: Setting, found: Identified, progress: Progress) -> tuple[Identified, HeldOut]:
@@ -263,8 +224,8 @@ def _most_harmful(selection: Selection, scored: HeldOut) -> Term | None:
     Of those that are not sure to gain likelihood there, and by more than half samples differ: an error grows by chance
     as well.
     """
-    worst: tuple[float, Term | None] = (0.0, None)
-    for one, key, effects in _accepted(selection, estimate_all(selection.final)):
+    worst: tuple[float, Term | None] = (1.0, None)
+    for one, key, effects in _accepted(selection):
         if one.gain is not None and one.gain.interval[0] > 0.0:
             continue
         own = {f"{what} by effect: {key}" for what in ("mean", "spread")} & set(scored.real)
@@ -272,15 +233,11 @@ def _most_harmful(selection: Selection, scored: HeldOut) -> Term | None:
             before, after = scored.error_of(group)
             chance = np.mean([size_of({"": half[group]}) ** 2 for half in scored.halves])
             loss = (after**2 - before**2) / max(float(chance), 1e-300)
-            worst = max(worst, (loss, one.term), key=lambda pair: pair[0]) if loss > 1.0 else worst
+            worst = max(worst, (loss, one.term), key=lambda pair: pair[0])
     return worst[1]
 
 
-def _accepted(selection: Selection, estimates: Estimates) -> list[tuple[Accepted, str, tuple[Effect, ...]]]:
+def _accepted(selection: Selection) -> list[tuple[Accepted, str, tuple[Effect, ...]]]:
     """What was accepted, with its key and what the profile gets."""
-    keys = {id(term): (key, effects) for key, (term, effects) in estimates.items()}
-    return [(one, *keys[id(one.term)]) for one in selection.accepted]
-
-
-def _kind_of(profile: DriverProfile) -> ModelKind:
-    return ModelKind.TWO_LEVEL if profile.model.kind == ModelKind.TWO_LEVEL.value else ModelKind.AUTOREGRESSIVE
+    estimates = selection.final.estimates.items()
+    return [(one, key, own) for one in selection.accepted for key, (term, own) in estimates if term is one.term]

@@ -2,29 +2,31 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from xosc_lateral.driver.effects import ColumnEffect
+from xosc_lateral.identification.autocorrelation import Problem
 from xosc_lateral.identification.dictionary import (
     CROSS_BASIS,
     NULL_DRAWS,
     Dictionary,
-    Scores,
     build_dictionary,
     orthonormal,
     score_entries,
 )
-from xosc_lateral.identification.refinement import Problem, Refined, Refinement
+from xosc_lateral.identification.refinement import Refined, Refinement
 from xosc_lateral.identification.regression import Fitted, fit_model
-from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.significance import LoopSeed, upper_tail
 from xosc_lateral.identification.terms.base import Outcome
-from xosc_lateral.identification.terms.column import ColumnTerm
 from xosc_lateral.identification.timeline import FloatArray
+
+if TYPE_CHECKING:
+    from xosc_lateral.identification.selection import Search
+    from xosc_lateral.identification.terms.column import SearchedTerm
 
 CONTENDERS = 4  # Sets of columns that are refined, at most.
 WITHIN = 12.0  # Sets of columns that score lower than the best by more than this are not. [squared score]
@@ -38,34 +40,6 @@ CLUSTER_S = 120
 # the right size leaves it the same: a true one is lost in at most 2 % of the tables, however weak it is. [-]
 GROWN = 2.0
 ROUNDS = 2  # Times that the candidates are scored beside what was found before; the first changes most.
-
-
-class SearchedTerm(ColumnTerm):
-    """An effect that the dictionary is searched for, in a regression of its own."""
-
-    @classmethod
-    @abstractmethod
-    def problem(cls, fitted: Fitted) -> Problem:
-        """Regression in which a column of this kind is tested, with the terms fitted already."""
-
-    @classmethod
-    def reweighted(cls, fitted: Fitted, after: Fitted) -> Problem | None:
-        """The same regression beside `fitted`, weighted by the noise that is left in `after`; None: no other."""
-        return None
-
-    @classmethod
-    def barred(cls, fitted: Fitted) -> frozenset[str]:
-        """Columns that this kind may not take up beside the terms fitted."""
-        return frozenset()
-
-    @classmethod
-    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
-        """The best candidate of the whole dictionary against rotations."""
-        return find_column(search, cls, fitted)
-
-    def probability_beside(self, search: Search, fitted: Fitted) -> float:
-        """p-value of its columns in whatever shape suits them beside the terms fitted."""
-        return probability_of(search, type(self), fitted, self.columns)
 
 
 def find_column(search: Search, kind: type[SearchedTerm], fitted: Fitted) -> Outcome | None:
@@ -101,13 +75,11 @@ def probability_of(search: Search, kind: type[SearchedTerm], fitted: Fitted, col
         Without a term of these columns. Where it has a product with one of them, that product is known as it is, not
         with every shape of its factors: nothing would be left to test.
     """
-    problem = kind.problem(fitted)
-    dictionary = build_dictionary(search.quantities, problem.whitener)
-    scored = _score(search, kind, fitted, problem, dictionary, spared=columns)
+    scored = _score(search, kind, fitted, kind.problem(fitted), spared=columns)
     if scored is None:
         return 1.0
     own = [i for i, candidate in enumerate(scored.dictionary.candidates) if candidate.columns == columns]
-    return upper_tail(float(scored.scores.scores[own].max()), scored.scores.maxima) if own else 1.0
+    return upper_tail(float(scored.scores[own].max()), scored.maxima) if own else 1.0
 
 
 def likely_response(search: Search, kind: type[SearchedTerm], fitted: Fitted, level: float) -> tuple[FloatArray, float]:
@@ -119,31 +91,30 @@ def likely_response(search: Search, kind: type[SearchedTerm], fitted: Fitted, le
     return fitted.coarse.response(effect), p_value
 
 
-def _scored(search: Search, kind: type[SearchedTerm], fitted: Fitted) -> _Scored | None:
-    """All candidates beside a fit, scored once."""
-
-    def score() -> _Scored | None:
-        problem = kind.problem(fitted)
-        dictionary = build_dictionary(search.quantities, problem.whitener)
-        return _score(search, kind, fitted, problem, dictionary)
-
-    found: _Scored | None = search.once(kind, fitted, score)
-    return found
-
-
 @dataclass(frozen=True, eq=False)
 class _Scored:
-    """All candidates, scored."""
+    """All candidates, scored beside what is known."""
 
     problem: Problem
     dictionary: Dictionary
-    known: FloatArray
-    scores: Scores
+    known: FloatArray  # shape (seconds, k), orthonormal
+    scores: FloatArray  # shape (entries,): Squared score less cost; -inf: barred.
+    maxima: FloatArray  # shape (draws,): The largest that the null gives.
+
+    @property
+    def best(self) -> int:
+        """Entry with the largest score."""
+        return int(np.argmax(self.scores))
 
     def likeliest(self) -> tuple[ColumnEffect, float]:
         """Best candidate and its p-value."""
-        best = self.scores.best
-        return self.dictionary.timed(best), upper_tail(float(self.scores.scores[best]), self.scores.maxima)
+        return self.dictionary.timed(self.best), upper_tail(float(self.scores[self.best]), self.maxima)
+
+
+def _scored(search: Search, kind: type[SearchedTerm], fitted: Fitted) -> _Scored | None:
+    """All candidates beside a fit, scored once."""
+    found: _Scored | None = search.once(kind, fitted, lambda: _score(search, kind, fitted, kind.problem(fitted)))
+    return found
 
 
 def _score(
@@ -151,23 +122,36 @@ def _score(
     kind: type[SearchedTerm],
     fitted: Fitted,
     problem: Problem,
-    dictionary: Dictionary,
+    dictionary: Dictionary | None = None,
     refused: Collection[tuple[str, ...]] = (),
     *,
     draws: int = NULL_DRAWS,
     spared: tuple[str, ...] = (),
 ) -> _Scored | None:
-    """Score what is neither barred nor refused; None: nothing is left."""
+    """Score what is neither barred nor refused; None: nothing is left.
+
+    Known is what the model has already, and the whole cross-basis of its columns, but for one set that is `spared`:
+    nothing may be blamed on their likes.
+    """
+    if dictionary is None:
+        dictionary = build_dictionary(search.quantities, problem.whitener)
     columns, candidates = kind.barred(fitted), dictionary.candidates
     barred = np.array([not columns.isdisjoint(one.columns) or one.columns in refused for one in candidates])
     if len(dictionary) == 0 or barred.all():
         return None
-    known = _known(problem, dictionary, [term for term in fitted.terms if isinstance(term, kind)], spared)
-    drive = search.coarse.drive[problem.valid]
-    rng = search.rng(LoopSeed.COLUMNS)
+    sizes = np.maximum(np.linalg.norm(problem.known, axis=0), 1e-300)
+    blocks = [orthonormal(problem.known / sizes, 1e-8)]
+    for term in fitted.terms:
+        if isinstance(term, kind):
+            parts = ({(column,) for column in term.columns} | {term.columns}) - {spared}
+            rows = np.array([candidate.columns in parts for candidate in candidates])
+            if rows.any():
+                blocks.append(orthonormal(dictionary.rows[rows].astype(np.float64).T, CROSS_BASIS))
+    known = orthonormal(np.concatenate(blocks, axis=1), 1e-6)
+    drive, rng = search.coarse.drive[problem.whitener.valid], search.rng(LoopSeed.COLUMNS)
     of_mean = kind.component == "mean"
     scores = score_entries(dictionary, problem.observed, known, barred, drive, rng, draws=draws, of_mean=of_mean)
-    return _Scored(problem, dictionary, known, scores)
+    return _Scored(problem, dictionary, known, *scores)
 
 
 def _best(
@@ -179,15 +163,12 @@ def _best(
     chosen once more with the noise that is left beside what was found: a strong slow effect makes the noise look
     slow, and against slow noise a quicker look-alike stands out better than the effect itself.
     """
-    term: SearchedTerm = kind.of(scored.dictionary.timed(scored.scores.best))
+    term: SearchedTerm = kind.of(scored.dictionary.timed(scored.best))
     after = fit_model(fitted.coarse, (*fitted.terms, term))
     best: Refined | None = None
     for _ in range(ROUNDS):
         problem = kind.reweighted(fitted, after)
-        here: _Scored | None = scored
-        if problem is not None:
-            dictionary = build_dictionary(search.quantities, problem.whitener)
-            here = _score(search, kind, fitted, problem, dictionary, refused, draws=0)
+        here = scored if problem is None else _score(search, kind, fitted, problem, refused=refused, draws=0)
         if here is None:
             break
         refined, other = _refined(search, kind, here)
@@ -212,28 +193,11 @@ def _grows(before: Fitted, after: Fitted) -> bool:
     ----------
     .. [1] J. Hausman, "Specification tests in econometrics", Econometrica 46, 1978.
     """
-    coarse = before.coarse
-    rows = np.flatnonzero(coarse.valid)
+    rows = np.flatnonzero(before.coarse.valid)
     saved = np.square(before.movement * before.scale)[rows] - np.square(after.movement * after.scale)[rows]
     cluster = rows // CLUSTER_S
     sums = np.bincount(cluster, saved)[np.unique(cluster)]
     return len(sums) > 1 and float(sums.sum()) < -GROWN * float(np.std(sums, ddof=1)) * np.sqrt(len(sums))
-
-
-def _known(
-    problem: Problem, dictionary: Dictionary, own: Sequence[SearchedTerm], spared: tuple[str, ...]
-) -> FloatArray:
-    """What the model has already, and the whole cross-basis of its columns, but for one set that is `spared`: nothing
-    may be blamed on their likes."""
-    known = problem.known
-    sizes = np.maximum(np.linalg.norm(known, axis=0), 1e-300)
-    blocks = [orthonormal(known / sizes, 1e-8)]
-    for term in own:
-        parts = ({(column,) for column in term.columns} | {term.columns}) - {spared}
-        rows = np.array([candidate.columns in parts for candidate in dictionary.candidates])
-        if rows.any():
-            blocks.append(orthonormal(dictionary.rows[rows].astype(np.float64).T, CROSS_BASIS))
-    return orthonormal(np.concatenate(blocks, axis=1), 1e-6)
 
 
 def _refined(search: Search, kind: type[SearchedTerm], scored: _Scored) -> tuple[Refined, SearchedTerm]:
@@ -245,7 +209,7 @@ def _refined(search: Search, kind: type[SearchedTerm], scored: _Scored) -> tuple
     refinement = Refinement(search.coarse, scored.problem, scored.known, costs)
     outcomes = [
         refinement.refine(scored.dictionary.timed(index), candidates[index].cost, search.columns)
-        for index in _contenders(scored.dictionary, scored.scores)
+        for index in _contenders(scored)
     ]
     outcomes.sort(key=lambda outcome: -outcome.score)
     parts = {(column,) for column in outcomes[0].effect.columns}
@@ -258,19 +222,19 @@ def _refined(search: Search, kind: type[SearchedTerm], scored: _Scored) -> tuple
     return best, kind.of(best.effect, tuple(alike))
 
 
-def _contenders(dictionary: Dictionary, scores: Scores) -> list[int]:
+def _contenders(scored: _Scored) -> list[int]:
     """Best entry of each of the best sets of columns, and of each single column in the best of them.
 
     A product of a column and what is nearly constant wherever it acts is that column: refined, the cheaper one wins.
     """
-    order = np.argsort(-scores.scores, kind="stable")
+    scores, columns = scored.scores, [candidate.columns for candidate in scored.dictionary.candidates]
+    order = np.argsort(-scores, kind="stable")
     best: dict[tuple[str, ...], int] = {}
     for index in order:
-        if scores.scores[index] < scores.scores[scores.best] - WITHIN or len(best) == CONTENDERS:
+        if scores[index] < scores[scored.best] - WITHIN or len(best) == CONTENDERS:
             break
-        best.setdefault(dictionary.candidates[index].columns, int(index))
-    parts = {(column,) for column in dictionary.candidates[scores.best].columns}
-    for index in order[np.isfinite(scores.scores[order])]:
-        if dictionary.candidates[index].columns in parts:
-            best.setdefault(dictionary.candidates[index].columns, int(index))
+        best.setdefault(columns[index], int(index))
+    for index in order[np.isfinite(scores[order])]:
+        if columns[index] in {(column,) for column in columns[scored.best]}:
+            best.setdefault(columns[index], int(index))
     return list(best.values())

@@ -9,14 +9,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.identification.regression import Fitted
 from xosc_lateral.identification.residual import simulated_runs
 from xosc_lateral.identification.significance import LEAST, LoopSeed
+from xosc_lateral.identification.terms.base import Description
 from xosc_lateral.identification.timeline import FloatArray, Timeline, local_mean
 
 TIMES_S = (0.4, 1.0, 2.0, 4.0, 8.0)  # Averaging times between which the bands lie. [s]
@@ -38,6 +39,7 @@ class SpectrumShape:
     `p_value`: that both have the same spectrum shape (Hotelling's test [1]_ over blocks of a minute).
     """
 
+    KIND: ClassVar[str] = "memory"
     bands_s: tuple[float, ...]
     ratio: FloatArray
     p_value: float
@@ -46,6 +48,14 @@ class SpectrumShape:
     def found(self) -> bool:
         """Whether the profile's spectrum has another shape, beyond chance and by enough to matter."""
         return self.p_value < SHAPE_LEVEL and bool(np.max(np.abs(np.log(self.ratio))) > WORTH_ADDING)
+
+    def described(self) -> Description:
+        """The first-order chain forgets too fast."""
+        worst = int(np.argmax(np.abs(np.log(self.ratio))))
+        ratio = float(self.ratio[worst])
+        shape = f"movement within {self.bands_s[worst]:g} s is {ratio:.2f} times the measured"
+        measure = "size of the movement by frequency band"
+        return Description("memory beyond one step", shape, ratio, 0.0, "movement by band", measure)
 
 
 def compare_spectrum_shapes(profile: DriverProfile, timeline: Timeline, seed: np.random.SeedSequence) -> SpectrumShape:
@@ -89,6 +99,7 @@ class DriverVariance:
     `shift` in [m], `log_spread` [-]; `p_value`: that all are of one driver, by the stronger of both.
     """
 
+    KIND: ClassVar[str] = "population"
     drives: int
     shift: float
     log_spread: float
@@ -99,6 +110,12 @@ class DriverVariance:
         """Whether drivers differ beyond chance."""
         return self.p_value < DRIVERS_LEVEL
 
+    def described(self) -> Description:
+        """One pooled driver can't be many."""
+        shape = f"{self.drives} drives; their spreads scatter by a factor of {np.exp(self.log_spread):.2f}"
+        error = self.shift / float(np.sqrt(2.0 * self.drives))
+        return Description("drivers that differ", shape, self.shift, error, "quantiles of local spread")
+
 
 def test_population(fitted: Fitted, known: FloatArray) -> DriverVariance | None:
     """Analysis of variance with every drive's halves as the noise; None with too few drives.
@@ -108,26 +125,16 @@ def test_population(fitted: Fitted, known: FloatArray) -> DriverVariance | None:
     """
     whitener = fitted.whitener
     offset = fitted.movement * whitener.scale + (fitted.levels - known)[whitener.drive]
-    means, spreads = _halves(offset, whitener.valid, whitener.drive, len(fitted.levels))
-    if len(means) < MIN_DRIVES:
-        return None
-    shift, p_shift = _scatter(np.asarray(means))
-    log_spread, p_spread = _scatter(np.asarray(spreads))
-    return DriverVariance(len(means), shift, log_spread, max(min(1.0, 2.0 * min(p_shift, p_spread)), LEAST))
-
-
-def _halves(
-    offset: FloatArray, valid: NDArray[np.bool_], drive: NDArray[np.intp], drives: int
-) -> tuple[list[list[float]], list[list[float]]]:
-    """Means [m] and logarithms of the spread of both halves of every drive that lasts."""
-    means, spreads = [], []
-    for index in range(drives):
-        own = offset[valid & (drive == index)]
+    halves = []
+    for index in range(len(fitted.levels)):
+        own = offset[whitener.valid & (whitener.drive == index)]
         if len(own) >= 2 * MIN_SECONDS:
-            halves = own[: len(own) // 2], own[len(own) // 2 :]
-            means.append([float(half.mean()) for half in halves])
-            spreads.append([float(np.log(max(half.std(), 1e-6))) for half in halves])
-    return means, spreads
+            halves.append((own[: len(own) // 2], own[len(own) // 2 :]))
+    if len(halves) < MIN_DRIVES:
+        return None
+    shift, p_shift = _scatter(np.array([[half.mean() for half in pair] for pair in halves]))
+    log_spread, p_spread = _scatter(np.array([[np.log(max(half.std(), 1e-6)) for half in pair] for pair in halves]))
+    return DriverVariance(len(halves), shift, log_spread, max(min(1.0, 2.0 * min(p_shift, p_spread)), LEAST))
 
 
 def _scatter(halves: FloatArray) -> tuple[float, float]:

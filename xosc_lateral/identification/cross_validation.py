@@ -16,12 +16,12 @@ import numpy as np
 
 from xosc_lateral.identification.autocorrelation import Whitener
 from xosc_lateral.identification.innovations import CLIP, own_levels
-from xosc_lateral.identification.regression import Coarse, Fitted, fit_model, joined, known_scale_of
-from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.selection import Gain, Selection, select
+from xosc_lateral.identification.regression import Coarse, Fitted, design_of, fit_model
+from xosc_lateral.identification.selection import Gain, Search, Selection, select
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.timeline import BoolArray, FloatArray, IntArray, Timeline, coarse_middle
 
+Progress = Callable[[float, str], None]  # Gets the share that is done and what is being done.
 FOLDS = 4  # Every part of the drives is held out once, and predicted from the other three.
 # Length of the blocks of a drive that are held out; drives shorter than three blocks are held out whole. [s]
 BLOCK_S = 150.0
@@ -79,9 +79,8 @@ def held_out_gain(fitted: Fitted, rest: Fitted, coarse: Coarse, held: BoolArray)
 def _log_likelihood(fitted: Fitted, noise: Fitted, coarse: Coarse, held: BoolArray) -> FloatArray:
     """Of every valid row in `held`, shape (n,), with the autoregression of `noise`; 0 elsewhere."""
     rows = coarse.valid & held
-    columns = joined([term.mean_columns(fitted.coarse) for term in fitted.terms], len(coarse))
-    scales = joined([term.scale_columns(fitted.coarse) for term in fitted.terms], len(coarse))
-    scale = np.exp(scales @ fitted.log_sizes + known_scale_of(coarse, fitted.terms))
+    columns, scales, known = design_of(fitted.coarse, fitted.terms)
+    scale = np.exp(scales @ fitted.log_sizes + known)
     whitener = Whitener(noise.whitener.process, rows, coarse.drive, scale)
     squares = np.square(whitener.rows(np.where(rows, coarse.offset - columns @ fitted.sizes, 0.0)))
     typical = max(float(squares[rows].mean()), 1e-300) if rows.any() else 1.0
@@ -97,8 +96,8 @@ class Nested:
     """Selections of all folds, one each, and what they gain."""
 
     selections: tuple[Selection, ...]
-    _by_row: tuple[tuple[BoolArray, Coarse], ...]
-    _blocks: IntArray
+    coarse: Coarse
+    blocks: IntArray  # shape (n,): On the 1 Hz grid.
 
     def only(self, terms: Sequence[Term]) -> Nested:
         """The same without what a fold chose that is none of these terms."""
@@ -110,26 +109,29 @@ class Nested:
 
     def of(self, term: Term) -> Gain:
         """What one accepted term gains: each fold's own version of it, in or out; nothing where it was not chosen."""
-        rows = np.zeros(len(self._blocks))
-        chosen = 0
-        for selection, (held, coarse) in zip(self.selections, self._by_row, strict=True):
-            own = [one for one in selection.final.terms if isinstance(one, Term) and one.matches(term)]
-            if not own:
-                continue
-            chosen += 1
-            rest = fit_model(selection.final.coarse, tuple(one for one in selection.final.terms if one is not own[0]))
-            rows += held_out_gain(selection.final, rest, coarse, held)
-        return _over_blocks(rows, self._blocks, self._by_row, chosen)
+        pairs: list[tuple[Fitted, Fitted] | None] = []
+        for final in (selection.final for selection in self.selections):
+            own = next((one for one in final.terms if one.matches(term)), None)
+            rest = [one for one in final.terms if one is not own]
+            pairs.append(None if own is None else (final, fit_model(final.coarse, rest)))
+        return self._gain(pairs, sum(pair is not None for pair in pairs))
 
     def together(self, terms: Sequence[Term]) -> Gain:
         """What several accepted terms gain over the start: in each fold those of them that were chosen there."""
-        rows = np.zeros(len(self._blocks))
-        for selection, (held, coarse) in zip(self.selections, self._by_row, strict=True):
+        pairs: list[tuple[Fitted, Fitted] | None] = []
+        for selection in self.selections:
+            start = selection.start
             own = [one.term for one in selection.accepted if _any_matches(one.term, terms)]
-            if own:
-                fitted = fit_model(selection.final.coarse, (*selection.start.terms, *own))
-                rows += held_out_gain(fitted, selection.start, coarse, held)
-        return _over_blocks(rows, self._blocks, self._by_row, len(self.selections))
+            pairs.append((fit_model(start.coarse, (*start.terms, *own)), start) if own else None)
+        return self._gain(pairs, len(pairs))
+
+    def _gain(self, pairs: Sequence[tuple[Fitted, Fitted] | None], folds: int) -> Gain:
+        """Over the blocks, of each fold's fits with and without."""
+        rows = np.zeros(len(self.blocks))
+        for fold, pair in enumerate(pairs):
+            if pair is not None:
+                rows += held_out_gain(*pair, self.coarse, self.blocks % len(pairs) == fold)
+        return _over_blocks(rows, self.blocks, self.coarse.valid, folds)
 
 
 def nest(
@@ -168,16 +170,14 @@ def nest(
         for selection in pool.map(selected, range(folds)):
             selections.append(selection)
             progress(len(selections) / folds)
-    return Nested(tuple(selections), tuple((seconds % folds == fold, coarse) for fold in range(folds)), seconds)
+    return Nested(tuple(selections), coarse, seconds)
 
 
 def _any_matches(term: Term, others: Sequence[Term]) -> bool:
     return any(type(term) is type(other) and term.matches(other) for other in others)
 
 
-def _over_blocks(rows: FloatArray, blocks: IntArray, where: Sequence[tuple[BoolArray, Coarse]], folds: int) -> Gain:
-    valid = where[0][1].valid
-    used = np.unique(blocks[valid])
-    sums = np.bincount(blocks, rows, minlength=int(blocks.max()) + 1)[used]
+def _over_blocks(rows: FloatArray, blocks: IntArray, valid: BoolArray, folds: int) -> Gain:
+    sums = np.bincount(blocks, rows)[np.unique(blocks[valid])]
     error = float(np.std(sums, ddof=1) / np.sqrt(len(sums))) if len(sums) > 1 else 0.0
     return Gain(float(sums.mean()), error, folds)

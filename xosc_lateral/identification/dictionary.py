@@ -10,7 +10,8 @@ References
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -76,7 +77,7 @@ class Quantities:
         stacked = np.stack(rows) if rows else np.zeros((0, len(valid)), dtype=np.float32)
         return cls(kept, stacked, coarse_middle(timeline.drive)[: len(valid)])
 
-    def responses(self, members: Sequence[int], response_s: float) -> FloatArray:
+    def responses(self, members: IntArray, response_s: float) -> FloatArray:
         """Some of them through a first-order lag, each drive on its own, shape (n, members)."""
         return respond_by_second(self.values[members].T, response_s, self.drive)
 
@@ -89,11 +90,11 @@ class Dictionary:
     lag: FloatArray  # shape (entries,): [s]
     response: FloatArray  # shape (entries,): [s]
     rows: SingleArray  # shape (entries, seconds): Length one each; valid seconds only.
-    costs: FloatArray = field(init=False)
 
-    def __post_init__(self) -> None:
-        """Costs as an array."""
-        object.__setattr__(self, "costs", np.array([candidate.cost for candidate in self.candidates]))
+    @cached_property
+    def costs(self) -> FloatArray:
+        """Of the entries."""
+        return np.array([candidate.cost for candidate in self.candidates])
 
     def __len__(self) -> int:
         return len(self.candidates)
@@ -106,42 +107,35 @@ class Dictionary:
 
 def _without_gaps(values: FloatArray, valid: BoolArray) -> FloatArray:
     """What is unknown takes the mean of what is known and valid, shape (n,). [own unit]"""
-    missing = np.isnan(values)
-    if not missing.any():
-        return values
-    seen = values[valid]
-    there = seen[np.isfinite(seen)]
-    return np.where(missing, there.mean() if len(there) else 0.0, values)
+    there = values[valid & np.isfinite(values)]
+    return np.where(np.isnan(values), there.mean() if len(there) else 0.0, values)
 
 
 def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:
-    """Pass every candidate through every response and lag, and whiten it."""
+    """Pass every candidate through every response and lag, and whiten it; those left that rest on enough seconds."""
     seconds, compact = np.flatnonzero(whitener.valid), whitener.compact
     entries: list[tuple[Candidate, float, float]] = []
-    blocks: list[SingleArray] = []
-    families = (
-        ([i for i, c in enumerate(quantities.candidates) if len(c.columns) == 1], TIMINGS),
-        ([i for i, c in enumerate(quantities.candidates) if len(c.columns) > 1], PRODUCT_TIMINGS),
-    )
-    for members, timings in families:
+    blocks: list[SingleArray] = [np.zeros((0, len(seconds)), dtype=np.float32)]
+    single = np.array([len(candidate.columns) == 1 for candidate in quantities.candidates], dtype=np.bool_)
+    for members, grid in ((np.flatnonzero(single), TIMINGS), (np.flatnonzero(~single), PRODUCT_TIMINGS)):
         for first in range(0, len(members), CHUNK):
             chunk = members[first : first + CHUNK]
-            for response_s, lags in timings.items():
+            for response_s, lags in grid.items():
                 response = quantities.responses(chunk, response_s)
                 for lag in lags:
                     # drives are padded by more than any lag
                     moved = response[np.clip(seconds - lag, 0, len(response) - 1)]
-                    rows, support, kept = _unit_rows(compact.rows(moved), moved)
-                    kept &= support >= MIN_SUPPORT_S
-                    blocks.append(rows.T[kept].astype(np.float32, copy=False))
-                    entries += [(quantities.candidates[chunk[i]], float(lag), response_s) for i in np.flatnonzero(kept)]
-    stacked = np.concatenate(blocks) if blocks else np.zeros((0, len(seconds)), dtype=np.float32)
-    return Dictionary(
-        [entry[0] for entry in entries],
-        np.array([entry[1] for entry in entries]),
-        np.array([entry[2] for entry in entries]),
-        stacked,
-    )
+                    rows = compact.rows(moved)
+                    squares = np.square(rows)
+                    power = squares.sum(axis=0)
+                    support = power**2 / np.maximum(np.square(squares).sum(axis=0), TINY)
+                    varies = power > 1e-9 * np.maximum(np.square(moved).sum(axis=0), TINY)  # within drives
+                    kept = np.flatnonzero(varies & (support >= MIN_SUPPORT_S))
+                    unit = rows[:, kept] / np.sqrt(np.maximum(power[kept], TINY))
+                    blocks.append(unit.T.astype(np.float32, copy=False))
+                    entries += [(quantities.candidates[chunk[i]], float(lag), response_s) for i in kept]
+    timings = np.array([entry[1:] for entry in entries]).reshape(-1, 2)
+    return Dictionary([entry[0] for entry in entries], timings[:, 0], timings[:, 1], np.concatenate(blocks))
 
 
 def respond_by_second(values: Reals, response_s: float, drive: IntArray) -> FloatArray:
@@ -158,28 +152,6 @@ def respond_by_second(values: Reals, response_s: float, drive: IntArray) -> Floa
     return start_anew(response, values, keep, drive)
 
 
-def _unit_rows(rows: FloatArray, before: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Rows of length one, the seconds that each rests on, and which vary within drives at all; `before` whitening."""
-    squares = np.square(rows)
-    power = squares.sum(axis=0)
-    kept = power > 1e-9 * np.maximum(np.square(before).sum(axis=0), TINY)
-    support = power**2 / np.maximum(np.square(squares).sum(axis=0), TINY)
-    return rows / np.sqrt(np.maximum(power, TINY)), support, kept
-
-
-@dataclass(frozen=True, eq=False)
-class Scores:
-    """Scores of all entries, and the largest ones that the null gives."""
-
-    scores: FloatArray  # shape (entries,): Squared score less cost; -inf: barred.
-    maxima: FloatArray  # shape (NULL_DRAWS,)
-
-    @property
-    def best(self) -> int:
-        """Entry with the largest score."""
-        return int(np.argmax(self.scores))
-
-
 def score_entries(
     dictionary: Dictionary,
     residual: FloatArray,
@@ -190,8 +162,8 @@ def score_entries(
     *,
     draws: int = NULL_DRAWS,
     of_mean: bool = True,
-) -> Scores:
-    """Score every entry, and all of them against the null's residuals.
+) -> tuple[FloatArray, FloatArray]:
+    """Squared score of every entry less its cost, -inf if barred, and the largest of each of the null's residuals.
 
     Parameters
     ----------
@@ -207,12 +179,12 @@ def score_entries(
     of_mean : bool
         Entries shift the mean, so that loudness where they act is no evidence; of a spread it is all there is.
     """
-    left = residual - known @ (known.T @ residual)
+    left = beside(known, residual)
     left = left / max(float(np.sqrt(np.mean(left**2))), 1e-300)
     if len(dictionary) == 0 or barred.all():
-        return Scores(np.full(len(dictionary), -np.inf), np.zeros(0))
+        return np.full(len(dictionary), -np.inf), np.zeros(0)
     rotated = np.concatenate([left[:, None], draw_null(left, drive, rng, draws)], axis=1)
-    rotated = (rotated - known @ (known.T @ rotated)).astype(np.float32)
+    rotated = beside(known, rotated).astype(np.float32)
     basis = known.astype(np.float32)
     squared = np.empty((len(dictionary), rotated.shape[1]), dtype=np.float32)
     rest = np.empty(len(dictionary))
@@ -229,7 +201,7 @@ def score_entries(
     scores = squared[:, 0].astype(np.float64)
     if of_mean:
         scores = _beside_loud_stretches(scores, dictionary, left, basis)
-    return Scores(scores, largest[1:] if np.isfinite(largest).all() else np.zeros(0))
+    return scores, largest[1:] if np.isfinite(largest).all() else np.zeros(0)
 
 
 def _beside_loud_stretches(
@@ -248,7 +220,7 @@ def _beside_loud_stretches(
     for own in set(columns):  # what some response to the same columns explains is not loudness
         alike = [k for k, others in enumerate(columns) if others <= own or own <= others][:RESPONSES]
         span = orthonormal(rows[alike].T)
-        rest[[others == own for others in columns]] = left - span @ (span.T @ left)
+        rest[[others == own for others in columns]] = beside(span, left)
     power = np.maximum(np.square(rows).sum(axis=1), TINY)
     weights = np.square(rows) / power[:, None]
     scatter = (weights * np.square(rest)).sum(axis=1)
@@ -303,3 +275,8 @@ def orthonormal(columns: FloatArray, share: float = 1e-6) -> FloatArray:
     powers, directions = np.linalg.eigh(columns.T @ columns)
     kept = powers > share * max(float(powers[-1]), 1e-300)
     return np.asarray(columns @ (directions[:, kept] / np.sqrt(powers[kept])))
+
+
+def beside(basis: FloatArray, rows: FloatArray) -> FloatArray:
+    """Rows, shape (n,) or (n, k), without what an orthonormal basis, shape (n, rank), explains of them."""
+    return np.asarray(rows - basis @ (basis.T @ rows))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
@@ -13,15 +13,13 @@ from msgspec import structs
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Drift, TimeSmooth, VarianceTrend
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.identification.columns import Assigned, Column, Role, known_columns, roles_of
-from xosc_lateral.identification.cross_validation import Nested, hold_out_blocks, nest
+from xosc_lateral.identification.cross_validation import Nested, Progress, hold_out_blocks, nest
 from xosc_lateral.identification.feedback import Feedback, find_feedback
 from xosc_lateral.identification.regression import Coarse
-from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.selection import ERROR_BUDGET, Gain, Rejected, Selection, select
+from xosc_lateral.identification.selection import ERROR_BUDGET, Gain, Rejected, Search, Selection, select
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.terms.between import BetweenTerm, is_between
-from xosc_lateral.identification.terms.mean import MeanTerm
-from xosc_lateral.identification.terms.spread import SpreadTerm
+from xosc_lateral.identification.terms.column import MeanTerm, SpreadTerm
 from xosc_lateral.identification.terms.time import StepTerm, TimeMeanTerm, TimeSpreadTerm
 from xosc_lateral.identification.timeline import Timeline
 
@@ -29,7 +27,6 @@ from xosc_lateral.identification.timeline import Timeline
 VETOED = "significant, but chosen and estimated on other blocks it predicts the held-out ones worse than nothing"
 # Why a column that goes one way is not tested.
 CLOCK = "a clock: what changes with it changes with time, which is tested as such"
-Progress = Callable[[float, str], None]  # Gets the share that is done and what is being done.
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,16 +97,15 @@ def identify(
             return Identified(usable, selection)
         # what happened once can't be found without the block in which it happened: folds know when, and size it
         once = tuple(one.term for one in selection.accepted if one.term.component == StepTerm.component)
-        there = Counter(getattr(term, "component", "") for term in selection.final.terms)
-        wanted = {one.term.component for one in selection.accepted} - {StepTerm.component}
-        nested = nest(
-            search,
-            hold_out_blocks(coarse.timeline),
-            (*initial, *once),
-            {component: there[component] for component in sorted(wanted)},
-            lambda share: progress(0.3 + 0.3 * share, "selecting without a fold"),
-        )
-        return _worst_first(Identified(usable, selection, nested))
+        found = {one.term.component for one in selection.accepted} - {StepTerm.component}
+        there = Counter(term.component for term in selection.final.terms)
+        wanted = {component: there[component] for component in sorted(found)}
+        folds = hold_out_blocks(coarse.timeline)
+
+        def done(share: float) -> None:
+            progress(0.3 + 0.3 * share, "selecting without a fold")
+
+        return _worst_first(Identified(usable, selection, nest(search, folds, (*initial, *once), wanted, done)))
 
 
 def usable_columns(
@@ -173,21 +169,23 @@ def _same_throughout(effect: ColumnEffect, timeline: Timeline) -> bool:
 def _worst_first(found: Identified) -> Identified:
     """Less what loses on blocks that it was not chosen on, the worst first; or nothing, if all together loses."""
     while found.nested is not None:
+        terms = [one.term for one in found.selection.accepted]
         # each beside those that are kept, and nothing else: a fold's misfit would be blamed on what is right
-        nested = found.nested.only([one.term for one in found.selection.accepted])
+        nested = found.nested.only(terms)
+        gains = [nested.of(term) if term.predictable else None for term in terms]
         found = replace(found, nested=nested)
-        gains = [(one, nested.of(one.term)) for one in found.selection.accepted if one.term.predictable]
-        fallen = [(gain.mean, one.term) for one, gain in gains if not gain.stands]
+        fallen = [(gain.mean, term) for term, gain in zip(terms, gains, strict=True) if gain and not gain.stands]
         if fallen:
             found = found.without([min(fallen, key=lambda pair: pair[0])[1]], VETOED)
             continue
-        known = {id(one): gain for one, gain in gains}
-        accepted = tuple(replace(one, gain=known.get(id(one))) for one in found.selection.accepted)
-        total = nested.together([one.term for one, _ in gains])
-        found = replace(found, selection=replace(found.selection, accepted=accepted), total=total if gains else None)
-        if gains and not total.stands:
-            low, high = total.interval
-            why = f"the effects found gain {total.mean:.2f} nat a held-out block ({low:.2f} to {high:.2f})"
-            found = found.without([one.term for one in accepted], why)
+        accepted = tuple(replace(one, gain=gain) for one, gain in zip(found.selection.accepted, gains, strict=True))
+        found = replace(found, selection=replace(found.selection, accepted=accepted))
+        if any(gains):
+            total = nested.together([term for term, gain in zip(terms, gains, strict=True) if gain])
+            found = replace(found, total=total)
+            if not total.stands:
+                low, high = total.interval
+                why = f"the effects found gain {total.mean:.2f} nat a held-out block ({low:.2f} to {high:.2f})"
+                found = found.without(terms, why)
         break
     return found

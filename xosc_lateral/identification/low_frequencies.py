@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects.hidden import half_cosines
 from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression
-from xosc_lateral.identification.dictionary import orthonormal
+from xosc_lateral.identification.dictionary import beside, orthonormal
 from xosc_lateral.identification.innovations import LONGEST, ORDER
 from xosc_lateral.identification.regression import MIN_DRIFT_S, Coarse, Fitted
 from xosc_lateral.identification.significance import LEAST, upper_tail
@@ -48,7 +48,7 @@ def slow_rows(fitted: Fitted) -> tuple[FloatArray, Whitener]:
     number = int(np.clip(2.0 * coarse.valid.sum() / coarse.drives / UNSEEN_S, 1, max(ORDERS)))
     slow = np.column_stack([np.ones(len(left)), half_cosines_of(coarse, number)]) * coarse.valid[:, None]
     basis = np.linalg.qr(slow)[0]
-    movement = np.where(coarse.valid, (left - basis @ (basis.T @ left)) / fitted.scale, 0.0)
+    movement = np.where(coarse.valid, beside(basis, left) / fitted.scale, 0.0)
     process = fit_autoregression(movement, coarse.valid, ORDER, longest=LONGEST)
     whitener = Whitener(process, coarse.valid, coarse.drive, fitted.scale)
     return whitener.rows(left), whitener
@@ -143,7 +143,6 @@ def without_known(
     known: FloatArray, squares: FloatArray, columns: FloatArray, valid: BoolArray
 ) -> tuple[FloatArray, FloatArray]:
     """Squares, shape (n, 1), and columns, shape (n, k), without what is known to go with the size."""
-    basis = orthonormal(np.column_stack([np.ones(valid.sum()), known[valid]]))
     both = np.column_stack([squares, columns])
-    both[valid] -= basis @ (basis.T @ both[valid])
+    both[valid] = beside(orthonormal(np.column_stack([np.ones(valid.sum()), known[valid]])), both[valid])
     return both[:, :1], both[:, 1:]

@@ -3,59 +3,29 @@
 References
 ----------
 .. [1] G. Schwarz, "Estimating the dimension of a model", Annals of Statistics 6, 1978.
-.. [2] A. C. Aitken, "On least squares and linear combination of observations", Proc. R. Soc. Edinburgh 55, 1936.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from msgspec import structs
 
 from xosc_lateral.driver.effects import ColumnEffect, Product
 from xosc_lateral.driver.effects.product import Form
-from xosc_lateral.identification.autocorrelation import Whitener
+from xosc_lateral.identification.autocorrelation import Problem
 from xosc_lateral.identification.candidates import FINE_SCALES, Family, shapes_of
 from xosc_lateral.identification.columns import Column
-from xosc_lateral.identification.dictionary import orthonormal
+from xosc_lateral.identification.dictionary import beside, orthonormal
 from xosc_lateral.identification.regression import Coarse
-from xosc_lateral.identification.timeline import COARSE, BoolArray, FloatArray, IntArray
+from xosc_lateral.identification.timeline import COARSE, FloatArray, IntArray
 
 Alternatives = tuple[tuple[str, ...], ...]  # Columns of each effect that explains as much.
+Priced = tuple[ColumnEffect, float]  # An effect, and what its family and a finer choice within it take from its score.
 # Standard errors by which the better of two has to be better: 5 %, one-sided; the better is known to be it. [-]
 CLEARLY = 1.645
-
-
-def explains_as_much(chosen: FloatArray, other: FloatArray, observed: FloatArray, cluster: IntArray) -> bool:
-    """Whether squared residuals of two regressions differ by no more than they scatter from cluster to cluster [1]_.
-
-    Neither has to be true, nor one a part of the other.
-
-    Parameters
-    ----------
-    chosen, other : array, shape (n, k) and (n, j)
-        White columns of either.
-    observed : array, shape (n,)
-        White.
-    cluster : int array, shape (n,)
-        Rows of one cluster are not independent.
-    """
-    better = _squares(other, observed) - _squares(chosen, observed)
-    sums = np.bincount(np.unique(cluster, return_inverse=True)[1], better)
-    if len(sums) < 2:
-        return True
-    error = float(np.sqrt(len(sums)) * np.std(sums, ddof=1))
-    return float(sums.sum()) <= CLEARLY * error
-
-
-def _squares(columns: FloatArray, observed: FloatArray) -> FloatArray:
-    sizes = np.linalg.lstsq(columns, observed, rcond=None)[0]
-    return np.asarray(np.square(observed - columns @ sizes))
-
-
 RESPONSES = (0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)  # Time constants that are tried. [s]
 # And in the end, a fifth apart: with a time constant half as long again the size is 15 % off. [s]
 FINE_RESPONSES = tuple(np.round(np.geomspace(0.3, 8.0, 19), 2).tolist())
@@ -65,42 +35,24 @@ LAG_STEPS = (1.0, 0.4, 0.2)  # Lags are searched in steps that get finer. [s]
 LAG_LIMIT = 5.0  # Longest lag either way. [s]
 
 
+def explains_as_much(chosen: FloatArray, other: FloatArray, observed: FloatArray, cluster: IntArray) -> bool:
+    """Whether squared residuals of two regressions differ by no more than they scatter from cluster to cluster.
+
+    Neither has to be true, nor one a part of the other. `chosen` and `other`, shape (n, k) and (n, j): white columns;
+    `observed`, shape (n,): white; `cluster`, shape (n,): rows of one cluster are not independent.
+    """
+    one, two = (np.square(observed - own @ np.linalg.lstsq(own, observed, rcond=None)[0]) for own in (chosen, other))
+    sums = np.bincount(np.unique(cluster, return_inverse=True)[1], two - one)
+    return len(sums) < 2 or float(sums.sum()) <= CLEARLY * float(np.sqrt(len(sums)) * np.std(sums, ddof=1))
+
+
 @dataclass(frozen=True, eq=False)
 class Refined:
-    """One effect, refined."""
+    """One effect, refined, without coefficients."""
 
-    effect: ColumnEffect  # Without coefficients.
-    # Squared score of all its coefficients, less log n for each beyond the first (Schwarz) and less its price.
-    score: float
+    effect: ColumnEffect
+    score: float  # Squared, of all its coefficients, less log n for each beyond the first [1]_ and less its price.
     price: float  # Of its family, and of a finer choice within it than the dictionary has.
-
-
-@dataclass(frozen=True, eq=False)
-class Problem:
-    """One linear regression, whitened: an ordinary one [2]_."""
-
-    whitener: Whitener  # For series and columns.
-    series: FloatArray  # shape (n,): With what the model has of this component still in.
-    columns: FloatArray  # shape (n, k): What the model has already.
-
-    @property
-    def valid(self) -> BoolArray:
-        """Rows that count, shape (n,)."""
-        return self.whitener.valid
-
-    @cached_property
-    def observed(self) -> FloatArray:
-        """White series, levels out, shape (seconds,), valid ones only. [-]"""
-        return self.rows(self.series)
-
-    @cached_property
-    def known(self) -> FloatArray:
-        """White columns, shape (seconds, k). [-]"""
-        return self.rows(self.columns)
-
-    def rows(self, values: FloatArray) -> FloatArray:
-        """White rows [-] of series or columns, shape (n,) or (n, k); valid ones only."""
-        return self.whitener.compact.rows(values[self.valid])
 
 
 class Refinement:
@@ -108,25 +60,16 @@ class Refinement:
 
     Parameters
     ----------
-    coarse : Coarse
-    problem : Problem
     known : array, shape (seconds, k)
         Orthonormal; partialled out.
     costs : mapping of Family to float
         What a member of each family costs.
     """
 
-    def __init__(
-        self,
-        coarse: Coarse,
-        problem: Problem,
-        known: FloatArray,
-        costs: Mapping[Family, float],
-    ) -> None:
+    def __init__(self, coarse: Coarse, problem: Problem, known: FloatArray, costs: Mapping[Family, float]) -> None:
         self._coarse, self._problem, self._costs = coarse, problem, costs
         self._basis = known.astype(np.float32)
-        left = problem.observed
-        left = left - known @ (known.T @ left)
+        left = beside(known, problem.observed)
         self._left = left / max(float(np.sqrt(np.mean(left**2))), 1e-300)
         self._quantities: dict[ColumnEffect, FloatArray] = {}
         self._responses: dict[tuple[ColumnEffect, float], FloatArray] = {}
@@ -144,19 +87,14 @@ class Refinement:
     def scores(self, effects: Sequence[ColumnEffect]) -> list[float]:
         """Squared score of each effect, all its coefficients free, less log n for each beyond the first."""
         responses = [self._response(effect) for effect in effects]
-        widths = [response.shape[1] for response in responses]
-        rows = self._rows(np.concatenate(responses, axis=1))
-        found, at = [], 0
-        for width in widths:
-            own = rows[:, at : at + width].astype(np.float64)
-            at += width
-            found.append(self._score(own))
-        return found
+        ends = np.cumsum([response.shape[1] for response in responses])
+        rows = np.split(self._rows(np.concatenate(responses, axis=1)), ends[:-1], axis=1)
+        return [self._score(own.astype(np.float64)) for own in rows]
 
     def as_good(self, chosen: ColumnEffect, other: ColumnEffect) -> bool:
         """Whether another effect would explain as much, as far as the rows can tell."""
         one, two = (self._rows(self._response(effect)).astype(np.float64) for effect in (chosen, other))
-        return explains_as_much(one, two, self._left, self._coarse.cluster[self._problem.valid])
+        return explains_as_much(one, two, self._left, self._coarse.cluster[self._problem.whitener.valid])
 
     def _rows(self, responses: FloatArray) -> FloatArray:
         """White, beside what is known; in single precision, which tells responses apart as well in half the time."""
@@ -171,27 +109,24 @@ class Refinement:
         unit = rows / sizes
         if unit.shape[1] > 1:
             unit = orthonormal(unit, 1e-6)
-        gain: float = float(np.square(unit.T @ self._left).sum())
-        return gain - float((rows.shape[1] - 1) * np.log(len(self._left)))
+        return float(np.square(unit.T @ self._left).sum() - (rows.shape[1] - 1) * np.log(len(self._left)))
 
     def _response(self, effect: ColumnEffect) -> FloatArray:
         """Response at 1 Hz, standardised, shape (n, k); on the fine grid, as the fit has it, and in whole steps of it.
 
         Responding at 1 Hz is another filter, whose best time constant is too short and whose size is too small.
         """
-        step = self._coarse.timeline.step
-        shape = structs.replace(effect, lag_s=0.0, response_s=0.0)
+        timeline, shape = self._coarse.timeline, structs.replace(effect, lag_s=0.0, response_s=0.0)
         if shape not in self._quantities:
-            values = shape.response(step, self._coarse.context)
-            inside = values[self._coarse.timeline.valid]
+            values = shape.response(timeline.step, self._coarse.context)
+            inside = values[timeline.valid]
             self._quantities[shape] = (values - inside.mean(axis=0)) / np.maximum(inside.std(axis=0), 1e-12)
         key = (shape, effect.response_s)
         if key not in self._responses:
-            responded = self._coarse.timeline.respond(self._quantities[shape], 0.0, effect.response_s)
-            self._responses[key] = np.cumsum(np.pad(responded, ((1, 0), (0, 0))), axis=0)
-        return means_by_second(self._responses[key], round(effect.lag_s / step))
+            self._responses[key] = running_sums(self._coarse, self._quantities[shape], effect.response_s)
+        return means_by_second(self._responses[key], round(effect.lag_s / timeline.step))
 
-    def _best(self, best: Refined, others: Iterable[tuple[ColumnEffect, float]]) -> Refined:
+    def _best(self, best: Refined, others: Iterable[Priced]) -> Refined:
         several = list(others)
         if not several:
             return best
@@ -199,32 +134,43 @@ class Refinement:
         at = int(np.argmax(scores))
         return Refined(several[at][0], float(scores[at]), several[at][1]) if scores[at] > best.score else best
 
-    def _shapes(self, effect: ColumnEffect, columns: Mapping[str, Column]) -> Iterator[tuple[ColumnEffect, float]]:
+    def _shapes(self, effect: ColumnEffect, columns: Mapping[str, Column]) -> Iterator[Priced]:
         """Other shapes of the same column, and other scales and centres of a product's factors, with what each costs.
 
         A finer choice than the dictionary's makes the family as many times as large.
         """
-        timing = {"lag_s": effect.lag_s, "response_s": effect.response_s}
         if isinstance(effect, Product):
             others = [*other_scales(effect, FINE_SCALES), *other_centres(effect, self._coarse)]
             price = self._costs.get(Family.PRODUCT, 0.0) + 2.0 * float(np.log(max(1, len(others))))
-            yield from ((structs.replace(other, **timing), price) for other in others)
+            yield from ((other, price) for other in others)
             return
         column = columns[effect.columns[0]]
         seen = self._coarse.context[column.name][self._coarse.timeline.valid]
-        shapes = shapes_of(column, seen, curves=True)
-        plain = self._costs.get(Family.PLAIN, 0.0)
-        bent = self._costs.get(Family.BENT, plain) + 2.0 * float(np.log(max(1.0, shapes.finer)))
-        yield from ((structs.replace(shape, **timing), plain) for shape in shapes.plain)
-        yield from ((structs.replace(shape, **timing), bent) for shape in shapes.bent)
+        plain, bent, finer = shapes_of(column, seen, curves=True)
+        price = self._costs.get(Family.PLAIN, 0.0)
+        bent_price = self._costs.get(Family.BENT, price) + 2.0 * float(np.log(max(1.0, finer)))
+        for shapes, cost in ((plain, price), (bent, bent_price)):
+            yield from (
+                (structs.replace(shape, lag_s=effect.lag_s, response_s=effect.response_s), cost) for shape in shapes
+            )
+
+
+def lags_about(lag_s: float, reach: float, step: float) -> FloatArray:
+    """Lags within a reach of one, none beyond the longest. [s]"""
+    lags = lag_s + np.arange(-reach, reach + 0.5 * step, step)
+    return np.asarray(lags[np.abs(lags) <= LAG_LIMIT])
 
 
 def _timings(effect: ColumnEffect, step: float, reach: float, responses: Sequence[float]) -> Iterator[ColumnEffect]:
-    lags = effect.lag_s + np.arange(-reach, reach + 0.5 * step, step)
     near = sorted(responses, key=lambda response_s: abs(np.log(response_s / max(effect.response_s, 0.1))))[:5]
-    for lag in lags[np.abs(lags) <= LAG_LIMIT]:
+    for lag in lags_about(effect.lag_s, reach, step):
         for response_s in near:
             yield structs.replace(effect, lag_s=round(float(lag), 1), response_s=response_s)
+
+
+def running_sums(coarse: Coarse, quantity: FloatArray, response_s: float) -> FloatArray:
+    """Of the response to a quantity on the fine grid, shape (fine n, k), from zero on: shape (fine n + 1, k)."""
+    return np.cumsum(np.pad(coarse.timeline.respond(quantity, 0.0, response_s), ((1, 0), (0, 0))), axis=0)
 
 
 def means_by_second(sums: FloatArray, late: int) -> FloatArray:

@@ -14,12 +14,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from msgspec import structs
 
-from xosc_lateral.driver.effects import Acts, ColumnEffect
+from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression, start_factors, unbiased
 from xosc_lateral.identification.innovations import (
     LONGEST,
@@ -41,6 +41,9 @@ from xosc_lateral.identification.timeline import (
     coarse_middle,
     means_by_drive,
 )
+
+if TYPE_CHECKING:
+    from xosc_lateral.identification.terms.base import Term
 
 # White noise that the model of a drive has beside what it shows: no table knows the lane better (in the motorway
 # recording the standard error of a lane's centre is 0.03 m; docs/real_data.md). Providers smooth their tracks,
@@ -131,41 +134,19 @@ class Coarse:
         return means_by_drive(values, self.valid, self.drive)
 
 
-class ModelTerm(Protocol):
-    """What the regression asks of a term: its columns; see `terms.base.Term` for all that a term can do."""
-
-    def mean_columns(self, coarse: Coarse) -> FloatArray:
-        """Columns of the mean, shape (n, k). [any unit]"""
-        ...
-
-    def fine_mean_columns(self, coarse: Coarse) -> FloatArray:
-        """The same on the 0.2 s grid, shape (fine n, k). [any unit]"""
-        ...
-
-    def scale_columns(self, coarse: Coarse) -> FloatArray:
-        """Columns of the log scale, shape (n, j). [any unit]"""
-        ...
-
-    def known_scale(self, coarse: Coarse) -> FloatArray | None:
-        """Log scale that is known as a whole, shape (n,). [-]"""
-        ...
-
-
 @dataclass(frozen=True, eq=False)
 class Fitted:
     """Terms with sizes, and what is left."""
 
     coarse: Coarse
-    terms: tuple[ModelTerm, ...]
+    terms: tuple[Term, ...]
     whitener: Whitener
     columns: FloatArray  # shape (n, k): Of the mean, term by term.
     sizes: FloatArray  # shape (k,): [m] per unit.
     covariance: FloatArray  # shape (k, k): [m] per unit.
     levels: FloatArray  # shape (drives,): Mean offset of every drive where all mean terms are at their mean. [m]
-    scales: FloatArray  # shape (n, j): Columns of the log scale, term by term.
     log_sizes: FloatArray  # shape (j,): Natural logarithm per unit.
     log_covariance: FloatArray  # shape (j, j): Natural logarithm per unit.
-    rows: FloatArray  # shape (n,): Whitened residual, variance 1, 0 where invalid.
     movement: FloatArray  # shape (n,): Offset less level and mean terms, over the scale; 0 where invalid. [m]
     starts: FloatArray  # shape (order + 1,): Factor on the errors of the first rows of runs, for the likelihood.
     log_likelihood: float  # Gaussian, of the valid rows.
@@ -181,7 +162,8 @@ class Fitted:
         coarse = self.coarse
         moved = coarse.offset - self.levels[coarse.drive]
         rows = innovations(moved, self.columns @ self.sizes, coarse.valid, coarse.drive, self.scale)
-        return _standardised(rows, coarse.valid, len(self.sizes))
+        variance = float(rows @ rows) / max(1, int(coarse.valid.sum()) - len(self.sizes))
+        return np.asarray(rows / np.sqrt(max(variance, 1e-300)))
 
     @property
     def explained(self) -> FloatArray:
@@ -190,37 +172,51 @@ class Fitted:
         columns = joined([term.fine_mean_columns(self.coarse) for term in self.terms], len(timeline))
         return columns @ self.sizes + self.levels[timeline.drive]
 
-    def mean_part(self, term: ModelTerm) -> slice:
+    @cached_property
+    def estimates(self) -> Mapping[str, tuple[Term, tuple[Effect, ...]]]:
+        """Every term and what the profile gets for it, by component and number ("mean 0", "step 0")."""
+        found: dict[str, tuple[Term, tuple[Effect, ...]]] = {}
+        for term in self.terms:
+            number = sum(1 for key in found if key.rpartition(" ")[0] == term.kind_key)
+            found[f"{term.kind_key} {number}"] = (term, term.estimate(self))
+        return found
+
+    def mean_part(self, term: Term) -> slice:
         """Where a term's coefficients of the mean are."""
         return self._part(term, [other.mean_columns(self.coarse).shape[1] for other in self.terms])
 
-    def scale_part(self, term: ModelTerm) -> slice:
+    def scale_part(self, term: Term) -> slice:
         """Where a term's coefficients of the log scale are."""
         return self._part(term, [other.scale_columns(self.coarse).shape[1] for other in self.terms])
 
-    def _part(self, term: ModelTerm, widths: Sequence[int]) -> slice:
+    def _part(self, term: Term, widths: Sequence[int]) -> slice:
         index = next(i for i, other in enumerate(self.terms) if other is term)
         first = sum(widths[:index])
         return slice(first, first + widths[index])
 
 
-def fit_model(coarse: Coarse, terms: Sequence[ModelTerm]) -> Fitted:
-    """Fit all terms jointly: generalised least squares and the autoregression by turns."""
+def design_of(coarse: Coarse, terms: Sequence[Term]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Columns of the mean and of the log scale, term by term, shape (n, k) and (n, j), and the log scale that terms
+    know as a whole, shape (n,). [-]"""
     columns = joined([term.mean_columns(coarse) for term in terms], len(coarse))
     scales = joined([term.scale_columns(coarse) for term in terms], len(coarse))
-    known = known_scale_of(coarse, terms)
-    sizes, log_sizes = np.zeros(columns.shape[1]), np.zeros(scales.shape[1])
-    covariance = np.zeros((len(sizes), len(sizes)))
-    levels, spread = coarse.by_drive(coarse.offset), np.ones(coarse.drives)
+    known = [scale for term in terms if (scale := term.known_scale(coarse)) is not None]
+    return columns, scales, np.sum(known, axis=0) if known else np.zeros(len(coarse))
+
+
+def fit_model(coarse: Coarse, terms: Sequence[Term]) -> Fitted:
+    """Fit all terms jointly: generalised least squares and the autoregression by turns."""
+    columns, scales, known = design_of(coarse, terms)
     valid, drive = coarse.valid, coarse.drive
+    sizes, log_sizes = np.zeros(columns.shape[1]), np.zeros(scales.shape[1])
+    levels, spread = coarse.by_drive(coarse.offset), np.ones(coarse.drives)
     for _ in range(ROUNDS):
-        scale = np.exp(scales @ log_sizes + known) * spread[coarse.drive]
-        left = coarse.offset - columns @ sizes - levels[coarse.drive]
-        movement = np.where(coarse.valid, left / scale, 0.0)
-        process = fit_autoregression(movement, coarse.valid, ORDER, longest=LONGEST, floor=FLOOR)
+        scale = np.exp(scales @ log_sizes + known) * spread[drive]
+        movement = np.where(valid, (coarse.offset - columns @ sizes - levels[drive]) / scale, 0.0)
+        process = fit_autoregression(movement, valid, ORDER, longest=LONGEST, floor=FLOOR)
         if not coarse.lasts:
-            process = unbiased(process, coarse.valid, coarse.drive, ORDER, longest=LONGEST)
-        whitener = Whitener(process, coarse.valid, coarse.drive, scale)
+            process = unbiased(process, valid, drive, ORDER, longest=LONGEST)
+        whitener = Whitener(process, valid, drive, scale)
         observed, design = whitener.rows(coarse.offset), whitener.rows(columns)
         sizes, covariance = clustered_least_squares(design, observed, coarse.cluster)
         rows = observed - design @ sizes
@@ -228,20 +224,23 @@ def fit_model(coarse: Coarse, terms: Sequence[ModelTerm]) -> Fitted:
         if scales.shape[1]:
             log_sizes = bounded(log_sizes + scoring_step(scales, rows, valid, drive), scales[valid])
         spread = spread * np.sqrt(own_levels(clipped_squares(rows, valid), valid, drive))
-    left = np.where(coarse.valid, coarse.offset - columns @ sizes - levels[coarse.drive], 0.0)
-    starts = start_factors(rows, coarse.valid, process.order)
+    starts = start_factors(rows, valid, process.order)
+    factor = whitener.by_position(starts)
+    densities = -0.5 * np.square(rows / factor) - np.log(factor * whitener.deviations)
     return Fitted(
-        coarse, tuple(terms), whitener, columns, sizes, covariance, levels, scales, log_sizes,
-        covariance_of_log_sizes(scales, rows, valid, drive), _standardised(rows, valid, len(sizes)),
-        left / scale, starts,
-        _log_likelihood(rows, whitener, starts),
-    )  # fmt: skip
-
-
-def _standardised(rows: FloatArray, valid: BoolArray, sizes: int) -> FloatArray:
-    """Of variance 1, with as many degrees of freedom as the rows less the sizes have."""
-    variance = float(rows @ rows) / max(1, int(valid.sum()) - sizes)
-    return np.asarray(rows / np.sqrt(max(variance, 1e-300)))
+        coarse=coarse,
+        terms=tuple(terms),
+        whitener=whitener,
+        columns=columns,
+        sizes=sizes,
+        covariance=covariance,
+        levels=levels,
+        log_sizes=log_sizes,
+        log_covariance=covariance_of_log_sizes(scales, rows, valid, drive),
+        movement=np.where(valid, coarse.offset - columns @ sizes - levels[drive], 0.0) / scale,
+        starts=starts,
+        log_likelihood=float(np.sum(densities[valid])),
+    )
 
 
 def _within(values: FloatArray, valid: BoolArray) -> FloatArray:
@@ -254,18 +253,6 @@ def joined(blocks: Sequence[FloatArray], n: int) -> FloatArray:
     return np.concatenate(blocks, axis=1) if blocks else np.zeros((n, 0))
 
 
-def known_scale_of(coarse: Coarse, terms: Sequence[ModelTerm]) -> FloatArray:
-    """Log scale that terms know as a whole, shape (n,). [-]"""
-    known = [scale for term in terms if (scale := term.known_scale(coarse)) is not None]
-    return np.sum(known, axis=0) if known else np.zeros(len(coarse))
-
-
-def _log_likelihood(rows: FloatArray, whitener: Whitener, starts: FloatArray) -> float:
-    factor = whitener.by_position(starts)
-    squares = np.square(rows / factor)
-    return float(np.sum((-0.5 * squares - np.log(factor * whitener.deviations))[whitener.valid]))
-
-
 def clustered_least_squares(
     design: FloatArray, observed: FloatArray, cluster: IntArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -273,19 +260,8 @@ def clustered_least_squares(
 
     Loud seconds come together, and a column may come with them; and what whitening leaves of the memory counts too.
 
-    Parameters
-    ----------
-    design : array, shape (n, k)
-        Whitened columns.
-    observed : array, shape (n,)
-        Whitened.
-    cluster : int array, shape (n,)
-        Cluster of each row.
-
-    Returns
-    -------
-    sizes : array, shape (k,)
-    covariance : array, shape (k, k)
+    `design`, shape (n, k), and `observed`, shape (n,): whitened; `cluster`, shape (n,): of each row. Sizes have shape
+    (k,), their covariance (k, k).
 
     References
     ----------

@@ -10,13 +10,15 @@ from msgspec import structs
 from xosc_lateral.driver.effects import ColumnEffect, Linear, Piecewise, Product, Proximity, Saturating, Threshold
 from xosc_lateral.identification.candidates import shapes_of
 from xosc_lateral.identification.columns import Column, read_column
+from xosc_lateral.identification.dictionary import beside
 from xosc_lateral.identification.refinement import (
     FINE_RESPONSES,
-    LAG_LIMIT,
     LAG_STEPS,
+    lags_about,
     means_by_second,
     other_centres,
     other_scales,
+    running_sums,
 )
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.timeline import FloatArray
@@ -96,17 +98,17 @@ def widening(fitted: Fitted, effect: ColumnEffect, part: slice) -> float:
     contrast = high - low
     white = fitted.whitener.rows
     others, _ = np.linalg.qr(white(np.delete(fitted.columns, np.r_[part], axis=1)))
-    left = _beside(others, white(fitted.coarse.offset))
-    own = _beside(others, white(fitted.columns[:, part]))
+    left = beside(others, white(fitted.coarse.offset))
+    own = beside(others, white(fitted.columns[:, part]))
     estimated = _profile(own, left, contrast)
     found = [estimated]
     for response in _timed(fitted, effect):
-        rows = _beside(others, white(response.reshape(len(response), -1)))
+        rows = beside(others, white(response.reshape(len(response), -1)))
         width = len(contrast)
         found += [_profile(rows[:, at : at + width], left, contrast) for at in range(0, rows.shape[1], width)]
     for shape in _shapes(fitted.coarse, effect):
         low, high = driving_range(fitted.coarse, shape)
-        rows = _beside(others, white(fitted.coarse.response(shape)))
+        rows = beside(others, white(fitted.coarse.response(shape)))
         alike = np.sign(float(np.sum(own * rows)))  # nearness falls where distance rises
         found.append(_profile(rows, left, alike * (high - low)))
     gain, size, variance = np.asarray(found).T
@@ -132,34 +134,24 @@ def _shapes(coarse: Coarse, effect: ColumnEffect) -> list[ColumnEffect]:
     column = read_column(name, seen, coarse.timeline.periods.get(name, 0.0))
     if not isinstance(column, Column):
         return []
-    shapes = shapes_of(column, seen, curves=False)
+    plain, bent, _ = shapes_of(column, seen, curves=False)
     near = [
         structs.replace(effect, scale=share * effect.scale) for share in NEAR_SCALES if isinstance(effect, Proximity)
     ]
     return [
         structs.replace(shape, response_range=(), **timing)
-        for shape in (*shapes.plain, *shapes.bent, *near)
+        for shape in (*plain, *bent, *near)
         if shape.seen({name: seen[:1]}).shape[1] == 1
     ]
 
 
 def _timed(fitted: Fitted, effect: ColumnEffect) -> list[FloatArray]:
     """Responses at 1 Hz per time constant, shape (n, lags, k)."""
-    step, finest = fitted.coarse.timeline.step, LAG_STEPS[-1]
-    lags = effect.lag_s + np.arange(-NEAR_S, NEAR_S + 0.5 * finest, finest)
-    late = [round(float(lag) / step) for lag in lags[np.abs(lags) <= LAG_LIMIT]]
-    still = structs.replace(effect, lag_s=0.0, response_s=0.0, response_range=())
-    quantity = fitted.coarse.fine_response(still)
-    responses = []
-    for response_s in FINE_RESPONSES:
-        response = fitted.coarse.timeline.respond(quantity, 0.0, response_s)
-        sums = np.cumsum(np.pad(response, ((1, 0), (0, 0))), axis=0)
-        responses.append(np.stack([means_by_second(sums, one) for one in late], axis=1))
-    return responses
-
-
-def _beside(others: FloatArray, rows: FloatArray) -> FloatArray:
-    return np.asarray(rows - others @ (others.T @ rows))
+    coarse = fitted.coarse
+    late = [round(float(lag) / coarse.timeline.step) for lag in lags_about(effect.lag_s, NEAR_S, LAG_STEPS[-1])]
+    quantity = coarse.fine_response(structs.replace(effect, lag_s=0.0, response_s=0.0, response_range=()))
+    sums = (running_sums(coarse, quantity, response_s) for response_s in FINE_RESPONSES)
+    return [np.stack([means_by_second(one, shift) for shift in late], axis=1) for one in sums]
 
 
 def _profile(rows: FloatArray, left: FloatArray, contrast: FloatArray) -> tuple[float, float, float]:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.identification.close import LoopResult
-from xosc_lateral.identification.terms.cycle import CycleTerm, latent_path
+from xosc_lateral.identification.terms.base import latent_path
+from xosc_lateral.identification.terms.cycle import CycleTerm
 from xosc_lateral.identification.terms.regimes import RegimesTerm
 from xosc_lateral.identification.terms.time import StepTerm, TimeMeanTerm
 from xosc_lateral.identification.timeline import LOCAL_S, coarse_mean, coarse_middle, local_mean

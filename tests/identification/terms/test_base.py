@@ -7,12 +7,10 @@ import pytest
 
 from tests.identification.made_coarse import coarse_of, movement, wander
 from xosc_lateral.driver.effects import Acts, Linear
-from xosc_lateral.identification.held_out import estimate_all, removal_of
+from xosc_lateral.identification.held_out import removal_of
 from xosc_lateral.identification.regression import Coarse, fit_model
-from xosc_lateral.identification.terms.base import Removal, centred
-from xosc_lateral.identification.terms.column import columns_on_size, of_kind, shrunk
-from xosc_lateral.identification.terms.mean import MeanTerm
-from xosc_lateral.identification.terms.spread import SpreadTerm
+from xosc_lateral.identification.terms.base import Removal
+from xosc_lateral.identification.terms.column import MeanTerm, SpreadTerm, columns_on_size, of_kind, shrunk
 from xosc_lateral.identification.terms.time import StepTerm, TimeSpreadTerm
 
 SECONDS = 900.0
@@ -56,13 +54,6 @@ def test_a_term_matches_one_of_its_kind_and_columns(coarse: Coarse) -> None:
     assert not term().matches(term(SpreadTerm))
     assert StepTerm(at=100).matches(StepTerm(at=150))
     assert not StepTerm(at=100).matches(StepTerm(at=400))
-
-
-def test_what_is_centred_has_no_mean_where_it_counts(coarse: Coarse) -> None:
-    values = np.arange(float(len(coarse)))
-    assert centred(values, coarse)[coarse.valid].mean() == pytest.approx(0.0, abs=1e-9)
-    nothing = coarse.only(np.zeros(len(coarse), dtype=bool))
-    np.testing.assert_array_equal(centred(values, nothing), values)
 
 
 def test_nothing_is_removed_before_a_term_says_so() -> None:
@@ -123,9 +114,9 @@ def test_lists_of_terms_by_what_they_act_on(coarse: Coarse) -> None:
 
 def test_terms_of_one_component_are_numbered_and_what_they_did_adds_up(coarse: Coarse) -> None:
     fitted = fit_model(coarse, (term(), term(column="rare"), term(SpreadTerm)))
-    estimates = estimate_all(fitted)
+    estimates = fitted.estimates
     assert list(estimates) == ["mean 0", "mean 1", "spread 0"]
-    removal = removal_of(fitted, estimates)
+    removal = removal_of(fitted)
     parts = [effects[0].strength(0.2, coarse.context) for key, (_, effects) in estimates.items() if "mean" in key]
     np.testing.assert_allclose(removal.location, parts[0] + parts[1], atol=1e-15)  # type: ignore[operator]
     np.testing.assert_array_equal(removal.spread, estimates["spread 0"][1][0].strength(0.2, coarse.context))

@@ -10,10 +10,10 @@ from tests.identification.made_coarse import SPREAD, coarse_of, movement, wander
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Linear
 from xosc_lateral.identification import regression
 from xosc_lateral.identification.regression import Fitted, fit_model
-from xosc_lateral.identification.terms.column import ColumnTerm
-from xosc_lateral.identification.terms.mean import MeanTerm
-from xosc_lateral.identification.terms.spread import (
+from xosc_lateral.identification.terms.column import (
+    ColumnTerm,
     FineNoiseTerm,
+    MeanTerm,
     SlowSpreadTerm,
     SpreadTerm,
     fine_twin,
@@ -125,6 +125,6 @@ def test_a_twin_acts_on_the_fine_noise_by_the_same_quantity(acting: Fitted) -> N
 
 def test_problems_have_a_row_for_each_second_and_finite_numbers(acting: Fitted) -> None:
     problem = SpreadTerm.problem(acting)
-    assert len(problem.observed) == problem.valid.sum() == len(problem.known)
+    assert len(problem.observed) == problem.whitener.valid.sum() == len(problem.known)
     assert np.isfinite(problem.observed).all()
     assert np.isfinite(problem.known).all()

@@ -14,7 +14,7 @@ from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.timeline import FloatArray, on_fine_grid
 
 if TYPE_CHECKING:
-    from xosc_lateral.identification.search import Search
+    from xosc_lateral.identification.selection import Search
 
 
 class Stage(IntEnum):
@@ -33,16 +33,16 @@ class Stage(IntEnum):
     BETWEEN_DRIVES = 7
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Description:
     """A term in numbers that a report can put into words."""
 
-    name: str  # Short name of the effect.
+    effect: str  # Short name.
     shape: str
-    size: float  # [m], or a factor.
-    error: float  # Standard error of the size.
+    size_m: float  # Change of the mean between the 5 % and 95 % quantile, or amplitude [m]; factor for scale.
+    size_error: float  # Standard error of it.
     statistic: str  # Group of summary statistics that shows it best.
-    measure: str  # What the errors before and after compare.
+    measure: str = ""  # What the errors before and after compare; empty: that group.
     lag_s: float | None = None
     response_s: float | None = None
 
@@ -125,9 +125,9 @@ class Term(ABC):
         return bool(later.columns) and not self.columns
 
     @classmethod
-    @abstractmethod
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
         """Test for one more term of this kind beside those fitted; None: there is no candidate."""
+        return None
 
     def probability_beside(self, search: Search, fitted: Fitted) -> float:
         """p-value of this very finding beside the terms fitted, which it is not one of."""
@@ -138,9 +138,10 @@ class Term(ABC):
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """What the profile gets: the effect proper first, then what goes with it."""
 
-    @abstractmethod
     def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
         """Add what the term did to the measured offsets; hidden ones as they most likely were."""
+        coarse, path = fitted.coarse, latent_path(self, fitted)
+        removal.location += on_fine_grid(path - path[coarse.valid].mean(), coarse.timeline)
 
     @abstractmethod
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
@@ -151,6 +152,6 @@ class Term(ABC):
         return type(self) is type(other) and self.columns == other.columns
 
 
-def centred(values: FloatArray, coarse: Coarse) -> FloatArray:
-    """About its mean over valid seconds."""
-    return np.asarray(values - values[coarse.valid].mean()) if coarse.valid.any() else values
+def latent_path(term: Term, fitted: Fitted) -> FloatArray:
+    """A term's part of the mean as fitted, shape (n,). [m]"""
+    return np.asarray(term.mean_columns(fitted.coarse) @ fitted.sizes[fitted.mean_part(term)])

@@ -9,28 +9,23 @@ only: so pairs are tested, too.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 from msgspec import structs
-from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect, Linear
+from xosc_lateral.identification.dictionary import NULL_DRAWS, beside
 from xosc_lateral.identification.regression import Fitted
-from xosc_lateral.identification.significance import MANY_DRIVES, LoopSeed
+from xosc_lateral.identification.significance import MANY_DRIVES, LoopSeed, as_one_degree, upper_tail
 from xosc_lateral.identification.terms.base import Description, Outcome, Stage
 from xosc_lateral.identification.terms.column import ColumnTerm, of_kind
 from xosc_lateral.identification.timeline import BoolArray, FloatArray
 
 if TYPE_CHECKING:
-    from xosc_lateral.identification.search import Search
-
-
-from collections.abc import Sequence
-
-from xosc_lateral.identification.dictionary import NULL_DRAWS
-from xosc_lateral.identification.significance import as_one_degree, upper_tail
+    from xosc_lateral.identification.selection import Search
 
 # Response time of an effect between drives: what a drive usually meets, as far as a run can know it. [s]
 USUAL_S = 60.0
@@ -39,6 +34,8 @@ MIN_SECONDS = 10  # Of road-following in a drive that is counted. [s]
 # squares falls and is convex in the variance, so that rounds from zero approach the root from below.
 ROUNDS, SETTLED = 50, 1e-9
 MIN_SUPPORT = 8.0  # A quantity that rests on fewer drives than this is not tested.
+# Share of either member's variance that the other of a pair must leave: below, the two are one quantity twice. [-]
+LEAST_APART = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +73,7 @@ class BetweenTerm(ColumnTerm):
                 usual.append(mean / np.sqrt(power))
         if not candidates:
             return None
-        best = best_of_drives(
+        members, p_value = best_of_drives(
             places.left(places.place),
             places.weight > 0.0,
             np.stack(usual, axis=1),
@@ -84,11 +81,8 @@ class BetweenTerm(ColumnTerm):
             [candidate.columns[0] for candidate in candidates],
             search.rng(LoopSeed.BETWEEN),
         )
-        terms = [
-            cls.of(structs.replace(candidates[index].effect, lag_s=0.0, response_s=USUAL_S)) for index in best.members
-        ]
-        columns = tuple(term.columns[0] for term in terms)
-        return Outcome(terms[0], columns, best.p_value, together=tuple(terms[1:]))
+        terms = [cls.of(structs.replace(candidates[index].effect, lag_s=0.0, response_s=USUAL_S)) for index in members]
+        return Outcome(terms[0], tuple(term.columns[0] for term in terms), p_value, together=tuple(terms[1:]))
 
     def matches(self, other: Self) -> bool:
         """Any other: columns that go along with each other from drive to drive stand in for one another."""
@@ -96,10 +90,8 @@ class BetweenTerm(ColumnTerm):
 
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """Weighted least squares over drives, all such terms jointly."""
-        terms = of_kind(fitted, BetweenTerm)
         sizes, errors = _Places.of(fitted).sizes()
-        at = next(index for index, term in enumerate(terms) if term is self)
-        own = slice(at, at + 1)
+        own = [term is self for term in of_kind(fitted, BetweenTerm)]
         return (self.sized(fitted.coarse, Acts.LOCATION, sizes[own], errors[own]),)
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
@@ -159,27 +151,13 @@ class _Places:
     def left(self, values: FloatArray) -> FloatArray:
         """Times the weight's root, free of what is known; shape (drives,)."""
         root = np.sqrt(self.weight)
-        basis = np.linalg.qr(self.known * root[:, None])[0]
-        weighed = values * root
-        return np.asarray(weighed - basis @ (basis.T @ weighed))
+        return beside(np.linalg.qr(self.known * root[:, None])[0], values * root)
 
     def sizes(self) -> tuple[FloatArray, FloatArray]:
         """Sizes of the known effects and their standard errors, shape (k,) each. [m] per unit"""
         weighed = self.known * self.weight[:, None]
         inverse = np.linalg.pinv(weighed.T @ self.known)
         return (inverse @ (weighed.T @ self.place))[1:], np.sqrt(np.diag(inverse))[1:]
-
-
-# Share of either member's variance that the other must leave: below, the two are one quantity twice. [-]
-LEAST_APART = 0.1
-
-
-@dataclass(frozen=True, slots=True)
-class Best:
-    """What explains most."""
-
-    members: tuple[int, ...]  # One candidate, or two.
-    p_value: float  # Family-wise over all candidates and pairs.
 
 
 def best_of_drives(
@@ -189,8 +167,10 @@ def best_of_drives(
     costs: FloatArray,
     columns: Sequence[str],
     rng: np.random.Generator,
-) -> Best:
-    """Largest gain in chi-square less what its choice costs, against drives that are dealt anew.
+) -> tuple[tuple[int, ...], float]:
+    """One candidate or two, whichever gain most in chi-square less what their choice costs, and the p-value.
+
+    A pair's gain is the chi-square that is as rare with one degree of freedom. The null: drives dealt anew.
 
     Parameters
     ----------
@@ -204,53 +184,29 @@ def best_of_drives(
         Of choosing each among its family.
     columns : sequence of str
         Each candidate's; the two of a pair are of different columns.
-    rng : Generator
     """
     rows = np.flatnonzero(counted)
     draws = np.zeros((NULL_DRAWS + 1, len(left)))
     draws[0] = left
     for drawn in draws[1:]:
         drawn[rows] = left[rng.permutation(rows)]
+    names, products = np.array(columns), quantities.T @ quantities
+    apart = (names[:, None] != names) & (1.0 - np.square(products) >= LEAST_APART)
+    first, second = np.nonzero(np.triu(apart, 1))
+    product = products[first, second]
+
+    def pairs(z: FloatArray) -> FloatArray:
+        power = np.square(z[first]) + np.square(z[second]) - 2.0 * product * z[first] * z[second]
+        return np.asarray(power / (1.0 - np.square(product)))
+
     z = draws @ quantities
     singles = np.square(z) - costs
-    pairs = _Pairs.of(quantities, columns)
-    scores = np.maximum(singles.max(axis=1), pairs.scores(z))
-    p_value = upper_tail(float(scores[0]), scores[1:])
-    alone = int(np.argmax(singles[0]))
-    return Best((alone,) if singles[0, alone] >= scores[0] else pairs.best(z[0]), p_value)
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class _Pairs:
-    """Pairs of candidates that are two quantities."""
-
-    first: NDArray[np.intp]  # shape (pairs,)
-    second: NDArray[np.intp]  # shape (pairs,)
-    product: FloatArray  # shape (pairs,): Cosine of the angle between the two.
-
-    @classmethod
-    def of(cls, quantities: FloatArray, columns: Sequence[str]) -> _Pairs:
-        names = np.array(columns)
-        products = quantities.T @ quantities
-        apart = (names[:, None] != names) & (1.0 - np.square(products) >= LEAST_APART)
-        first, second = np.nonzero(np.triu(apart, 1))
-        return cls(first, second, products[first, second])
-
-    def best(self, z: FloatArray) -> tuple[int, int]:
-        """The pair that gains most, of the scores of one draw, shape (k,)."""
-        index = int(np.argmax(self._gained(z)))
-        return int(self.first[index]), int(self.second[index])
-
-    def scores(self, z: FloatArray) -> FloatArray:
-        """Largest gain of a pair, as that of one candidate: chi-square that is as rare with one degree of freedom, less
-        the choice among all pairs; shape (draws,) of `z`, shape (draws, k)."""
-        if not len(self.first):
-            return np.full(len(z), -np.inf)
-        gained = np.array([self._gained(drawn).max() for drawn in z])  # one by one: a table of all would fill gigabytes
-        return np.asarray(as_one_degree(gained, 2) - 2.0 * np.log(len(self.first)))
-
-    def _gained(self, z: FloatArray) -> FloatArray:
-        """Chi-square of two degrees, shape (pairs,)."""
-        one, other = z[self.first], z[self.second]
-        power = np.square(one) + np.square(other) - 2.0 * self.product * one * other
-        return np.asarray(power / (1.0 - np.square(self.product)))
+    scores = singles.max(axis=1)
+    if len(first):
+        best = np.array([pairs(drawn).max() for drawn in z])  # one by one: a table of all would fill gigabytes
+        scores = np.maximum(scores, as_one_degree(best, 2) - 2.0 * np.log(len(first)))
+    p_value, alone = upper_tail(float(scores[0]), scores[1:]), int(np.argmax(singles[0]))
+    if singles[0, alone] >= scores[0]:
+        return (alone,), p_value
+    pair = int(np.argmax(pairs(z[0])))
+    return (int(first[pair]), int(second[pair])), p_value

@@ -14,20 +14,18 @@ import numpy as np
 
 from xosc_lateral.driver.effects import Cycle, Effect
 from xosc_lateral.identification.regression import MIN_DRIFT_S, Coarse, Fitted
+from xosc_lateral.identification.residual import OSCILLATION
 from xosc_lateral.identification.significance import LEAST
-from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term, centred
+from xosc_lateral.identification.terms.base import Description, Outcome, Stage, Term
 from xosc_lateral.identification.timeline import FloatArray
 
 if TYPE_CHECKING:
-    from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.timeline import on_fine_grid
+    from xosc_lateral.identification.selection import Search
 
 PERIODS_S = (4.0, 60.0)  # Periods that are tested. [s]
 # Neighbouring frequencies taken together: a cycle keeps its phase for the whole drive, or for a part. [-]
 WIDTHS = (1, 3, 7)
 SURROUNDINGS = 60  # Frequencies to each side that say how high the spectrum is without a cycle. [-]
-
-STATISTIC = "movement at the weave's period"
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,17 +42,13 @@ class CycleTerm(Term):
 
     def mean_columns(self, coarse: Coarse) -> FloatArray:
         """Cosines and sines for each drive, shape (n, 2 * width * drives)."""
-        columns = []
+        columns = np.zeros((len(coarse), coarse.drives, self.width, 2))
         for index in range(coarse.drives):
-            rows = coarse.drive == index
-            n = int(rows.sum())
-            for offset in range(self.width):
-                angle = 2.0 * np.pi * np.arange(n) * (self.frequency + (offset - self.width // 2) / n)
-                for wave in (np.cos(angle), np.sin(angle)):
-                    column = np.zeros(len(coarse))
-                    column[rows] = wave
-                    columns.append(column)
-        return np.stack(columns, axis=1)
+            rows = np.flatnonzero(coarse.drive == index)
+            near = self.frequency + (np.arange(self.width) - self.width // 2) / len(rows)
+            angle = 2.0 * np.pi * np.arange(len(rows))[:, None] * near
+            columns[rows, index] = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        return columns.reshape(len(coarse), -1)
 
     @classmethod
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
@@ -62,11 +56,9 @@ class CycleTerm(Term):
         coarse = fitted.coarse
         if any(isinstance(term, cls) for term in fitted.terms):
             return None
-        outcomes = []
-        for index in range(coarse.drives):
-            rows = coarse.drive == index
-            if coarse.valid[rows].sum() >= MIN_DRIFT_S:
-                outcomes += [_line(fitted.innovations[rows], width) for width in WIDTHS]
+        drives = [coarse.drive == index for index in range(coarse.drives)]
+        lasting = [rows for rows in drives if coarse.valid[rows].sum() >= MIN_DRIFT_S]
+        outcomes = [_line(fitted.innovations[rows], width) for rows in lasting for width in WIDTHS]
         if not outcomes:
             return None
         p_value, frequency, width = min(outcomes)
@@ -87,21 +79,12 @@ class CycleTerm(Term):
         period = 1.0 / self.frequency
         return (Cycle(amplitude=amplitude, amplitude_error=error, period_s=period, coherence_s=float(coherence)),)
 
-    def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
-        """As fitted."""
-        removal.location += on_fine_grid(centred(latent_path(self, fitted), fitted.coarse), fitted.coarse.timeline)
-
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Amplitude and period."""
         effect = effects[0]
         assert isinstance(effect, Cycle)
         shape = f"period {effect.period_s:.1f} s"
-        return Description("weave", shape, effect.amplitude, effect.amplitude_error, STATISTIC, STATISTIC)
-
-
-def latent_path(term: Term, fitted: Fitted) -> FloatArray:
-    """A term's part of the mean as fitted, shape (n,). [m]"""
-    return np.asarray(term.mean_columns(fitted.coarse) @ fitted.sizes[fitted.mean_part(term)])
+        return Description("weave", shape, effect.amplitude, effect.amplitude_error, OSCILLATION)
 
 
 def _line(rows: FloatArray, width: int) -> tuple[float, float, int]:

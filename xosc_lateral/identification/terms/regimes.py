@@ -18,21 +18,19 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect, Regimes
-from xosc_lateral.identification.dictionary import in_another_order
+from xosc_lateral.identification.dictionary import beside, in_another_order
+from xosc_lateral.identification.innovations import SLOW_S, fine_squares, log_sizes, quick_squares, slow_squares
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.significance import HEAVY_TAIL_SHARE, LoopSeed, upper_tail
-from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, quick_squares, slow_squares
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term
-from xosc_lateral.identification.terms.spread import known_log_scale, what_a_column_may_do, what_columns_do
-from xosc_lateral.identification.timeline import BoolArray, FloatArray
+from xosc_lateral.identification.terms.column import known_log_scale, what_a_column_may_do, what_columns_do
+from xosc_lateral.identification.timeline import BoolArray, FloatArray, on_fine_grid
+from xosc_lateral.jit import njit
 
 if TYPE_CHECKING:
-    from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.timeline import on_fine_grid
-from xosc_lateral.jit import njit
+    from xosc_lateral.identification.selection import Search
 
 
 @njit
@@ -86,32 +84,24 @@ class RegimeFit:
     log_likelihood: float
 
 
-def fit_regimes(rows: FloatArray, valid: NDArray[np.bool_]) -> RegimeFit:
+def fit_regimes(rows: FloatArray, valid: BoolArray) -> RegimeFit:
     """Fit to white rows [-], shape (n,), by expectation maximisation; cut-out seconds say nothing about the regime."""
-    fits = []
+    squares, fits = rows**2, []
     for factor, length in STARTS:
-        quiet = float(np.sqrt(np.mean(rows[valid] ** 2) / (0.7 + 0.3 * factor**2)))
-        fits.append(_fit(rows, valid, quiet, quiet * factor, 1.0 / (2.0 * length), 1.0 / length))
-    best = max(fits, key=lambda fit: fit[-1])
-    quiet, loud, go, leave, on, likelihood = best
-    return RegimeFit(loud / quiet, 1.0 / leave, 1.0 / go, on, quiet, likelihood)
-
-
-def _fit(
-    rows: FloatArray, valid: NDArray[np.bool_], quiet: float, loud: float, go: float, leave: float
-) -> tuple[float, float, float, float, FloatArray, float]:
-    squares = rows**2
-    for _ in range(ITERATIONS):
-        on, went, left, likelihood = forward_backward(squares, valid, quiet, loud, go, leave)  # type: ignore[no-untyped-call]  # compiled: numba has no types
-        weight_on, weight_off = on[valid], 1.0 - on[valid]
-        loud = float(np.sqrt((weight_on @ squares[valid]) / max(weight_on.sum(), 1e-9)))
-        quiet = float(np.sqrt((weight_off @ squares[valid]) / max(weight_off.sum(), 1e-9)))
-        go = float(np.clip(went / max(float((1.0 - on).sum()), 1e-9), 1e-4, 0.5))
-        leave = float(np.clip(left / max(float(on.sum()), 1e-9), 1e-4, 0.5))
-        if quiet > loud:
-            quiet, loud, go, leave = loud, quiet, leave, go
-        quiet = max(quiet, 1e-3)
-    return quiet, loud, go, leave, on, likelihood
+        quiet = float(np.sqrt(np.mean(squares[valid]) / (0.7 + 0.3 * factor**2)))
+        loud, go, leave = quiet * factor, 1.0 / (2.0 * length), 1.0 / length
+        for _ in range(ITERATIONS):
+            on, went, left, likelihood = forward_backward(squares, valid, quiet, loud, go, leave)  # type: ignore[no-untyped-call]  # compiled: numba has no types
+            weight_on, weight_off = on[valid], 1.0 - on[valid]
+            loud = float(np.sqrt((weight_on @ squares[valid]) / max(weight_on.sum(), 1e-9)))
+            quiet = float(np.sqrt((weight_off @ squares[valid]) / max(weight_off.sum(), 1e-9)))
+            go = float(np.clip(went / max(float((1.0 - on).sum()), 1e-9), 1e-4, 0.5))
+            leave = float(np.clip(left / max(float(on.sum()), 1e-9), 1e-4, 0.5))
+            if quiet > loud:
+                quiet, loud, go, leave = loud, quiet, leave, go
+            quiet = max(quiet, 1e-3)
+        fits.append(RegimeFit(loud / quiet, 1.0 / leave, 1.0 / go, on, quiet, likelihood))
+    return max(fits, key=lambda fit: fit.log_likelihood)
 
 
 MEMORIES_S = (6.0, 15.0, 40.0)  # Lengths of regimes that are tested. [s]
@@ -145,17 +135,10 @@ class RegimesTerm(Term):
         if not coarse.lasts or any(isinstance(term, cls) for term in fitted.terms):
             return None
         # what a column does to the size in another shape than the one that was found is no regime
-        known = [
-            known_log_scale(fitted),
-            what_columns_do(search, fitted),
-            what_a_column_may_do(search, fitted)[0],
-        ]
-        p_value = probability_of_persistence(
-            quick_squares(fitted).standardised,
-            coarse.valid,
-            np.concatenate(known, axis=1),
-            search.rng(LoopSeed.REGIMES),
-        )
+        columns = what_columns_do(search, fitted), what_a_column_may_do(search, fitted)[0]
+        known = np.concatenate([known_log_scale(fitted), *columns], axis=1)
+        squares, rng = quick_squares(fitted).standardised, search.rng(LoopSeed.REGIMES)
+        p_value = probability_of_persistence(squares, coarse.valid, known, rng)
         return Outcome(cls(fit_regimes(fitted.innovations, coarse.valid)), (), p_value)
 
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
@@ -184,7 +167,7 @@ class RegimesTerm(Term):
         assert isinstance(effect, Regimes)
         shape = f"on for {effect.on_s:.0f} s, off for {effect.off_s:.0f} s on average"
         statistic = "quantiles of local spread"
-        return Description("on/off regimes", shape, effect.factor, effect.factor_error, statistic, statistic)
+        return Description("on/off regimes", shape, effect.factor, effect.factor_error, statistic)
 
 
 def probability_of_persistence(
@@ -196,29 +179,22 @@ def probability_of_persistence(
     ----------
     squares : array, shape (n,)
         Of white rows, one per second, mean 0; 0 where invalid.
-    valid : bool array, shape (n,)
     known : array, shape (n, k)
         What is known to go with the size; taken out of the squares.
-    rng : Generator
     """
     if known.shape[1]:
         basis = np.linalg.qr((known - known[valid].mean(axis=0)) * valid[:, None])[0]
-        squares = squares - basis @ (basis.T @ squares)
+        squares = beside(basis, squares)
+    lags = np.arange(SHORTEST_S, int(3 * max(MEMORIES_S)) + 1)
+    weights = np.exp(-lags / np.asarray(MEMORIES_S)[:, None])
+    scales, size = np.sqrt(valid.sum() * (weights**2).sum(axis=1)), len(squares) + int(lags[-1])
+
+    def score(series: FloatArray) -> float:
+        products = np.fft.irfft(np.abs(np.fft.rfft(series, size)) ** 2, size)[lags]
+        return float((weights @ products / scales).max())
+
     inside, drawn, null = np.flatnonzero(valid), np.zeros(len(squares)), np.zeros(DRAWS)
     for draw in range(DRAWS):
         drawn[inside] = in_another_order(np.roll(squares[inside], rng.integers(CLUSTER_S)), CLUSTER_S, rng)
-        null[draw] = _scores(drawn, valid).max()
-    observed = float(_scores(squares, valid).max())
-    return upper_tail(observed, null, tail_share=HEAVY_TAIL_SHARE, least_excess=0.0)
-
-
-def _products(series: FloatArray, lags: NDArray[np.intp]) -> FloatArray:
-    """Sums of products at lags."""
-    size = len(series) + int(lags[-1])
-    return np.asarray(np.fft.irfft(np.abs(np.fft.rfft(series, size)) ** 2, size)[lags])
-
-
-def _scores(squares: FloatArray, valid: BoolArray) -> FloatArray:
-    lags = np.arange(SHORTEST_S, int(3 * max(MEMORIES_S)) + 1)
-    weights = np.exp(-lags[None, :] / np.asarray(MEMORIES_S)[:, None])
-    return np.asarray(weights @ _products(squares, lags) / np.sqrt(valid.sum() * (weights**2).sum(axis=1)))
+        null[draw] = score(drawn)
+    return upper_tail(score(squares), null, tail_share=HEAVY_TAIL_SHARE, least_excess=0.0)

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 import numpy as np
 
 from xosc_lateral.driver.effects import Effect, Step, TimeSmooth
+from xosc_lateral.identification.innovations import SLOW_S, fine_squares, log_sizes, quick_squares, slow_squares
 from xosc_lateral.identification.low_frequencies import (
     MEAN_SHORTEST_S,
     ORDERS,
@@ -35,28 +36,35 @@ from xosc_lateral.identification.low_frequencies import (
 )
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
 from xosc_lateral.identification.significance import LoopSeed
-from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, quick_squares, slow_squares
-from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term, centred
-from xosc_lateral.identification.terms.cycle import latent_path
-from xosc_lateral.identification.terms.spread import what_a_column_may_do, what_columns_do
+from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term
+from xosc_lateral.identification.terms.column import what_a_column_may_do, what_columns_do
 from xosc_lateral.identification.timeline import FloatArray
 
 if TYPE_CHECKING:
-    from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.timeline import on_fine_grid
+    from xosc_lateral.identification.selection import Search
 
 STEP_PARAMETERS = 2  # Of a step: its height and its moment.
 SURER = 0.01  # Where it is surer than the best column by this factor, what that column may do is left to time. [-]
 
 
-@dataclass(frozen=True, eq=False)
-class StepTerm(Term):
-    """The mean jumps once."""
+class _MeanByTime(Term):
+    """Step or smooth of the mean: they are tested at the same time, and compete."""
 
     component: ClassVar[str] = "time_mean"
+    weight: ClassVar[float] = 3.0
+
+    def probability_beside(self, search: Search, fitted: Fitted) -> float:
+        """p-value of the mean by time, whichever of the two it looks like beside the terms fitted."""
+        test = StepTerm.test(search, fitted)
+        return 1.0 if test is None else test.p_value
+
+
+@dataclass(frozen=True, eq=False)
+class StepTerm(_MeanByTime):
+    """The mean jumps once."""
+
     kind: ClassVar[str] = "step"
     stages: ClassVar[tuple[Stage, ...]] = (Stage.LOW_FREQUENCY,)
-    weight: ClassVar[float] = 3.0
     seen_held_out: ClassVar[bool] = False
     at: int  # Row of the 1 Hz grid.
 
@@ -66,9 +74,14 @@ class StepTerm(Term):
 
     @classmethod
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
-        """Step or smooth, whichever is likelier."""
+        """Step or smooth, whichever is likelier, each parameter at Schwarz's price [1]_.
+
+        References
+        ----------
+        .. [1] G. Schwarz, "Estimating the dimension of a model", Annals of Statistics 6, 1978.
+        """
         coarse = fitted.coarse
-        if not coarse.lasts or any(isinstance(term, StepTerm | TimeMeanTerm) for term in fitted.terms):
+        if not coarse.lasts or any(isinstance(term, _MeanByTime) for term in fitted.terms):
             return None
         rows, whitener = slow_rows(fitted)
         moments = step_moments(coarse)
@@ -84,11 +97,10 @@ class StepTerm(Term):
         step = cls(moment_of(rows, whitener, int(moments[np.argmax(np.abs(unit.T @ slow[:, 0]))])))
         smooth = smooth_probabilities(slow[:, 0], waves, ORDERS)
         order = min(smooth, key=lambda one: smooth[one])
-        return Outcome(step if _is_step(fitted, step, order) else TimeMeanTerm(), (), p_value)
-
-    def probability_beside(self, search: Search, fitted: Fitted) -> float:
-        """p-value of the mean by time, whichever of the two it looks like beside the terms fitted."""
-        return probability_of_mean(search, fitted)
+        likelihoods = [fit_model(coarse, (*fitted.terms, one)).log_likelihood for one in (step, TimeMeanTerm(order))]
+        price = 0.5 * (STEP_PARAMETERS - order) * float(np.log(coarse.valid.sum()))
+        is_step = likelihoods[0] - likelihoods[1] > price
+        return Outcome(step if is_step else TimeMeanTerm(), (), p_value)
 
     def matches(self, other: Self) -> bool:
         """About the same moment."""
@@ -98,54 +110,36 @@ class StepTerm(Term):
         """Height, moment, and the share of the drive before it: the mean stays."""
         coarse, part = fitted.coarse, fitted.mean_part(self)
         before = coarse.valid & (np.arange(len(coarse)) < self.at)
-        return (
-            Step(
-                size=float(fitted.sizes[part][0]),
-                size_error=float(np.sqrt(fitted.covariance[part, part][0, 0])),
-                at_s=float(coarse.time[self.at]),
-                share_before=float(before.sum() / coarse.valid.sum()),
-            ),
+        step = Step(
+            size=float(fitted.sizes[part][0]),
+            size_error=float(np.sqrt(fitted.covariance[part, part][0, 0])),
+            at_s=float(coarse.time[self.at]),
+            share_before=float(before.sum() / coarse.valid.sum()),
         )
-
-    def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
-        """As fitted."""
-        removal.location += on_fine_grid(centred(latent_path(self, fitted), fitted.coarse), fitted.coarse.timeline)
+        return (step,)
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Height and moment."""
         effect = effects[0]
         assert isinstance(effect, Step)
-        statistic = f"mean by effect: {key}"
-        return Description("step", f"at {effect.at_s:.0f} s", effect.size, effect.size_error, statistic, statistic)
+        return Description("step", f"at {effect.at_s:.0f} s", effect.size, effect.size_error, f"mean by effect: {key}")
 
 
 @dataclass(frozen=True, eq=False)
-class TimeMeanTerm(Term):
+class TimeMeanTerm(_MeanByTime):
     """The mean is a smooth function of time; `StepTerm` tests both."""
 
-    component: ClassVar[str] = "time_mean"
     kind: ClassVar[str] = "drift"
-    weight: ClassVar[float] = 3.0
     order: int = max(ORDERS)  # Half cosines that it is made of.
 
     def mean_columns(self, coarse: Coarse) -> FloatArray:
         """Half cosines, within -1..1, shape (n, order). [-]"""
         return half_cosines_of(coarse, self.order)
 
-    @classmethod
-    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
-        """Nothing of its own: a step is tested at the same time."""
-        return None
-
-    def probability_beside(self, search: Search, fitted: Fitted) -> float:
-        """p-value of the mean by time, whichever of the two it looks like beside the terms fitted."""
-        return probability_of_mean(search, fitted)
-
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """Penalised sizes."""
         part = fitted.mean_part(self)
-        sizes, covariance = penalised(fitted.sizes[part], fitted.covariance[part, part])
-        errors = np.sqrt(np.diag(covariance))
+        sizes, errors = penalised(fitted.sizes[part], fitted.covariance[part, part])
         return (_smooth(fitted.coarse, location=tuple(sizes), location_errors=tuple(errors)),)
 
     def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
@@ -160,8 +154,7 @@ class TimeMeanTerm(Term):
         effect = effects[0]
         assert isinstance(effect, TimeSmooth)
         size, error, shape = _swing(fitted.coarse, effect, effect.location, effect.location_errors)
-        statistic = f"mean by effect: {key}"
-        return Description("mean offset by time", shape, size, error, statistic, statistic)
+        return Description("mean offset by time", shape, size, error, f"mean by effect: {key}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,14 +213,15 @@ class TimeSpreadTerm(Term):
         """Penalised sizes; the fine noise goes along as far as it does."""
         coarse = fitted.coarse
         columns = half_cosines_of(coarse, self.order)
-        fine = penalised(*_log_sizes(log_sizes(fine_squares(fitted), columns), 1.0))[0]
         if self.slow:
-            sizes, covariance = penalised(*_log_sizes(log_sizes(slow_squares(fitted), columns), SLOW_S))
-            fine = 0.0 * fine
+            sizes, errors = log_sizes(slow_squares(fitted), columns)
+            sizes, errors = penalised(sizes, np.diag(np.square(errors) * SLOW_S))  # neighbouring sums overlap
+            fine = np.zeros(len(sizes))
         else:
             part = fitted.scale_part(self)
-            sizes, covariance = penalised(fitted.log_sizes[part], fitted.log_covariance[part, part])
-        errors = np.sqrt(np.diag(covariance))
+            sizes, errors = penalised(fitted.log_sizes[part], fitted.log_covariance[part, part])
+            fine, fine_errors = log_sizes(fine_squares(fitted), columns)
+            fine = penalised(fine, np.diag(np.square(fine_errors)))[0]
         return (_smooth(coarse, spread=tuple(sizes), spread_errors=tuple(errors), fine=tuple(fine)),)
 
     def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
@@ -242,32 +236,12 @@ class TimeSpreadTerm(Term):
         effect = effects[0]
         assert isinstance(effect, TimeSmooth)
         size, error, shape = _swing(fitted.coarse, effect, effect.spread, effect.spread_errors)
-        statistic = f"spread by effect: {key}"
         factor = float(np.exp(size))
-        return Description("spread by time", shape, factor, factor * error, statistic, statistic)
-
-
-def _is_step(fitted: Fitted, step: StepTerm, order: int) -> bool:
-    """Whether a step is likelier than a smooth of so many half cosines, each parameter at Schwarz's price [1]_.
-
-    References
-    ----------
-    .. [1] G. Schwarz, "Estimating the dimension of a model", Annals of Statistics 6, 1978.
-    """
-    coarse = fitted.coarse
-    likelihoods = [fit_model(coarse, (*fitted.terms, one)).log_likelihood for one in (step, TimeMeanTerm(order))]
-    price = 0.5 * (STEP_PARAMETERS - order) * float(np.log(coarse.valid.sum()))
-    return likelihoods[0] - likelihoods[1] > price
-
-
-def probability_of_mean(search: Search, fitted: Fitted) -> float:
-    """p-value of a smooth or a step of the mean; 1 where none is tested."""
-    test = StepTerm.test(search, fitted)
-    return 1.0 if test is None else test.p_value
+        return Description("spread by time", shape, factor, factor * error, f"spread by effect: {key}")
 
 
 def penalised(sizes: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Sizes of half cosines, shape (k,), and their covariance, given that rougher ones are smaller beforehand.
+    """Sizes of half cosines and their errors, shape (k,), given that rougher ones are smaller beforehand.
 
     The prior's scale is the one under which the sizes are likeliest (restricted maximum likelihood).
     """
@@ -281,13 +255,7 @@ def penalised(sizes: FloatArray, covariance: FloatArray) -> tuple[FloatArray, Fl
         if likelihood > best:
             best, found = likelihood, scale * shape
     gain = np.linalg.solve(covariance + np.diag(found), np.diag(found)).T
-    return gain @ sizes, np.asarray(gain @ covariance)
-
-
-def _log_sizes(found: tuple[FloatArray, FloatArray], rows_each: float) -> tuple[FloatArray, FloatArray]:
-    """Sizes and covariance, where so many neighbouring rows count as one."""
-    sizes, errors = found
-    return sizes, np.diag(np.square(errors) * rows_each)
+    return gain @ sizes, np.sqrt(np.diag(gain @ covariance))
 
 
 def _smooth(coarse: Coarse, **sizes: tuple[float, ...]) -> TimeSmooth:
@@ -302,8 +270,6 @@ def _swing(
     time = np.unique(coarse.time[coarse.valid])
     path = effect.path(sizes, time)
     first, last = sorted((int(np.argmin(path)), int(np.argmax(path))))
-    contrast = np.diff(
-        np.stack([effect.path(tuple(row), time[[first, last]]) for row in np.eye(len(sizes))], axis=1), axis=0
-    )[0]
-    error = float(np.sqrt(np.sum(np.square(contrast * np.asarray(errors)))))
+    contrast = [np.diff(effect.path(tuple(row), time[[first, last]]))[0] for row in np.eye(len(sizes))]
+    error = float(np.linalg.norm(np.multiply(contrast, errors)))
     return float(path[last] - path[first]), error, f"smooth, from {time[first]:.0f} s to {time[last]:.0f} s"
