@@ -10,7 +10,7 @@ import typer
 
 from xosc_lateral.cli.words import Allow, Force, Parameters, Quiet, TimeLimit, examples, pairs, warn
 
-EXAMPLES = examples("view cut-in.xosc", "view cut-in_lifelike.xosc -o pages/", "view cut-in.xosc -o cut-in.mcap")
+EXAMPLES = examples("view cut-in.xosc", "view cut-in_lifelike.xosc -o pages/")
 
 
 def register(app: typer.Typer) -> None:
@@ -22,7 +22,7 @@ def view(
     scenario: Annotated[Path, typer.Argument(help="Any scenario (.xosc), converted or not.", show_default=False)],
     output: Annotated[
         str | None,
-        typer.Option("--output", "-o", help="Page (.html) or recording (.mcap); default: NAME_view.html beside it."),
+        typer.Option("--output", "-o", help="Page to write; default: NAME_view.html beside it."),
     ] = None,
     parameter: Parameters = None,
     allow: Allow = None,
@@ -41,7 +41,5 @@ def view(
     warn(played.warnings)
     if not quiet:
         typer.echo(str(page))
-    if page.suffix == ".mcap":
-        return
     if open_page or (open_page is None and sys.stdout.isatty()):
         typer.launch(page.absolute().as_uri())
