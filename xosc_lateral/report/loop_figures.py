@@ -12,7 +12,6 @@ from xosc_lateral.driver.effects import Acts, ColumnEffect, Cycle, Product, Regi
 from xosc_lateral.evaluation.spectra import gapped_spectrum
 from xosc_lateral.identification.close import Finding, LoopResult
 from xosc_lateral.identification.cross_validation import hold_out_blocks
-from xosc_lateral.mask import true_slices
 from xosc_lateral.report.chart import BLUE, DASHED, MUTED, ORANGE, VERMILLION, Panel
 from xosc_lateral.report.figure import Figure
 from xosc_lateral.report.loop_curves import (
@@ -25,6 +24,7 @@ from xosc_lateral.report.loop_curves import (
     regime_probability,
 )
 from xosc_lateral.report.loop_words import SPREAD, column_label, product_label
+from xosc_lateral.rows import true_slices
 
 FloatArray = NDArray[np.float64]
 

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from xosc_lateral.enrich.result import EntityResult
-from xosc_lateral.mask import true_slices
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.report.path_dynamics import lateral_dynamics
@@ -20,6 +19,7 @@ from xosc_lateral.road import RoadNetwork
 from xosc_lateral.road.geometry import simplify
 from xosc_lateral.road.network import DRIVING
 from xosc_lateral.road.positions import RoadMark
+from xosc_lateral.rows import true_slices
 
 FloatArray = NDArray[np.float64]
 RowArray = NDArray[np.int64]
