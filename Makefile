@@ -13,7 +13,7 @@ QUICK := --disable-pip-version-check --progress-bar on --no-compile
 
 # What running needs, and no more.
 $(STAMP): pyproject.toml
-	@echo "Setting up $(VENV): numpy, scipy, pandas, pyarrow, numba, matplotlib ... (a minute or two, 0.8 GB)"
+	@echo "Setting up $(VENV): numpy, scipy, pandas, pyarrow, numba ... (a minute or two, 0.8 GB)"
 	@$(PYTHON) -m venv $(VENV)
 	@$(BIN)/python -m pip install --disable-pip-version-check --progress-bar on --upgrade pip | grep -v '^Requirement' || true
 	@$(BIN)/python -m pip install $(QUICK) -e .
@@ -107,7 +107,7 @@ $(WHEEL): | $(STAMP)
 # Every package that development and CI install, with hashes; see SECURITY.md. All extras but `commonroad`, whose protobuf
 # is not the one of `osi`.
 LOCK := requirements/lock.txt
-EXTRAS := mdf osi cluster classifier board sumo fmu mcap docs dev
+EXTRAS := mdf osi cluster classifier board sumo fmu docs dev
 UV ?= $(BIN)/uv
 MATRIX ?= 3.11 3.12 3.13
 

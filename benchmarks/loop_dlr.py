@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from benchmarks.library import SEED
 from benchmarks.markers import show
@@ -21,16 +20,8 @@ from benchmarks.refined import refine_population
 from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.residual import LackOfFit
-from xosc_lateral.report.figures import PAPER
 from xosc_lateral.report.loop import loop_text
-from xosc_lateral.report.loop_figures import effect_figure, residual_figure, spectrum_figure
-from xosc_lateral.report.loop_hidden_figures import DRAWINGS
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-DPI = 110
-"""Of figures in documents. [1/inch]"""
+from xosc_lateral.report.loop_figures import DRAWINGS, effect_figure, residual_figure, spectrum_figure
 
 
 def main() -> None:
@@ -68,16 +59,12 @@ def draw(result: LoopResult, folder: Path) -> None:
     for number, finding in enumerate(result.findings, 1):
         if finding.columns:
             name = "_".join([str(number), *finding.columns])  # one column may act in several ways
-            _save(effect_figure(result, finding), folder / f"loop_dlr_{name}.png")
+            effect_figure(result, finding).save(folder / f"loop_dlr_{name}.svg")
         else:
             figure, _ = DRAWINGS[finding.kind]
-            _save(figure(result, finding), folder / f"loop_dlr_{finding.kind}.png")
-    _save(spectrum_figure(result), folder / "loop_dlr_spectrum.png")
-    _save(residual_figure(result, "mean"), folder / "loop_dlr_residual.png")
-
-
-def _save(figure: Figure, path: Path) -> None:
-    figure.savefig(path, dpi=DPI, facecolor=PAPER, metadata={"Software": None})
+            figure(result, finding).save(folder / f"loop_dlr_{finding.kind}.svg")
+    spectrum_figure(result).save(folder / "loop_dlr_spectrum.svg")
+    residual_figure(result, "mean").save(folder / "loop_dlr_residual.svg")
 
 
 if __name__ == "__main__":

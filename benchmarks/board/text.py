@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xosc_lateral.report.render import environment
-
 if TYPE_CHECKING:
     from benchmarks.board.result import Board, ModelScore, Row
 
@@ -61,8 +59,11 @@ def method_text(board: Board) -> str:
 
 
 def _rendered(template: str, **values: Any) -> str:
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     text = (Path(__file__).parent / "pages" / template).read_text(encoding="utf-8")
-    return f"{environment().overlay(autoescape=False).from_string(text).render(**values).rstrip()}\n"
+    return f"{environment.from_string(text).render(**values).rstrip()}\n"
 
 
 def shown_columns(board: Board) -> dict[str, str]:

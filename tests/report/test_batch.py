@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from xml.etree import ElementTree
 
 import pytest
 
-from tests.report.made_enriched import made_enriched
-from xosc_lateral.report.batch import BatchEntry, batch_page, thumbnail
+from xosc_lateral.report.batch import BatchEntry, batch_page
 
 CALM = BatchEntry("calm.xosc", "calm.xosc", "calm.html", "calm.svg", 2, 3, 40.0, 0.2, 2.0, 1.9, (), "")
 
@@ -43,18 +41,3 @@ def test_a_failed_output_has_its_reason_and_no_link_or_picture(page):
 
 def test_warnings_are_escaped(page):
     assert "two &lt;b&gt;" in page
-
-
-def test_a_thumbnail_is_a_picture_of_every_path(tmp_path):
-    enriched = made_enriched(tmp_path)
-    drawn = ElementTree.fromstring(thumbnail(enriched))
-    lines = [each for each in drawn if each.tag.endswith("polyline")]
-    assert len(lines) == 3
-    points = [tuple(map(float, point.split(","))) for line in lines for point in line.get("points").split()]
-    assert all(0 <= x <= 200 and 0 <= y <= 64 for x, y in points)
-    assert thumbnail(enriched) == thumbnail(enriched)
-
-
-def test_a_thumbnail_of_nothing_is_empty(tmp_path):
-    enriched = made_enriched(tmp_path)
-    assert len(ElementTree.fromstring(thumbnail(replace(enriched, entities=())))) == 0

@@ -1,8 +1,7 @@
-"""Pictures against the plane: where a page's script looks for a value is where the drawing has it."""
+"""Figures against what was to be drawn: every mark in its place, where the page's script looks for it too."""
 
 from __future__ import annotations
 
-import io
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -16,12 +15,11 @@ from tests.road.places import hand_written
 from xosc_lateral.enrich.result import ConversionProvenance, ConvertedScenario
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.pipeline.settings import ConvertSettings
-from xosc_lateral.report.batch import BORDER, HEIGHT, WIDTH, thumbnail
-from xosc_lateral.report.figures import figure_style, new_figure
+from xosc_lateral.report.chart import BLUE
+from xosc_lateral.report.figure import Figure
 from xosc_lateral.report.frames import conversion_frame
-from xosc_lateral.report.interactive import describe_axes, name_parts
-from xosc_lateral.report.road_drawing import edge_lines, view_along
 from xosc_lateral.report.scenario import as_text, facts
+from xosc_lateral.report.scenario_figures import edge_lines, thumbnail, view_along
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -31,50 +29,119 @@ def enriched(tmp_path_factory):
     return made_enriched(tmp_path_factory.mktemp("road"))
 
 
-# ---- values read off a figure ----------------------------------------------------------------------------------------
-@figure_style()
-def _figure(kind: str):
-    figure, axes = new_figure(1, 2, height=2.5)
-    for axis in axes[0]:
-        axis.plot([1.0, 10.0, 100.0], [0.5, 2.0, -1.0], label="shown")
-        axis.text(10.0, 2.0, "top")
-        axis.set(xscale=kind, xlim=(0.5, 200.0), ylim=(3.0, -2.0), xlabel="x", ylabel="y")
-    return figure
+# ---- marks in their place --------------------------------------------------------------------------------------------
+def _places(panel: etree._Element, x: list[float], y: list[float]) -> np.ndarray:
+    """Where values lie in a panel by what it says of itself, which is all that the page's script knows."""
+    found = []
+    for name, values in (("x", x), ("y", y)):
+        low, high, *log = panel.get(f"data-{name}").split()
+        place = np.log if log else np.asarray
+        ends = place(np.array([float(low), float(high)]))
+        share = (place(np.array(values)) - ends[0]) / (ends[1] - ends[0])
+        found.append(share * float(panel.get("width")) if name == "x" else (1.0 - share) * float(panel.get("height")))
+    return np.column_stack(found)
 
 
-@pytest.mark.parametrize("kind", ["linear", "log"])
-def test_the_script_finds_every_point_where_the_svg_has_it(kind):
-    """Box and limits are all that the script knows; the path in the SVG is where the point was drawn."""
-    figure = _figure(kind)
-    name_parts(figure)
-    file = io.BytesIO()
-    figure.savefig(file, format="svg")
-    described = describe_axes(figure, "f", lambda color: color)["axes"]
-    root = etree.fromstring(file.getvalue())
-    assert [one["id"] for one in described] == ["f-a0", "f-a1"]
-    for number, axes in enumerate(described):
-        (group,) = root.iterfind(f".//{SVG}g[@id='a{number}l0']")
-        drawn = group.find(f"{SVG}path").get("d").replace("M", " ").replace("L", " ").split()
-        points = np.array(drawn, dtype=float).reshape(-1, 2)
-        left, top, right, bottom = axes["box"]
-        place = np.log if axes["xlog"] else np.asarray
-        low, high = place(np.array(axes["x"]))
-        x = left + (place(np.array([1.0, 10.0, 100.0])) - low) / (high - low) * (right - left)
-        y = bottom + (np.array([0.5, 2.0, -1.0]) - axes["y"][0]) / (axes["y"][1] - axes["y"][0]) * (top - bottom)
-        np.testing.assert_allclose(points, np.column_stack([x, y]), atol=0.05)
-        assert axes["texts"][0]["at"] == pytest.approx(points[1], abs=0.05)
-        assert axes["lines"][0]["label"] == "shown" and axes["xlog"] is (kind == "log")
+def _points(path: str) -> np.ndarray:
+    return np.array(path.replace("M", " ").replace("L", " ").replace("Z", " ").split(), dtype=float).reshape(-1, 2)
+
+
+@pytest.mark.parametrize("log", [False, True])
+@pytest.mark.parametrize("limits", [None, (3.0, -2.0)])
+def test_the_script_finds_every_point_where_the_svg_has_it(log, limits):
+    figure = Figure(1, 2)
+    x, y = [1.0, 10.0, 100.0], [0.5, 2.0, -1.0]
+    for panel in figure.panels:
+        panel.line(x, y, BLUE, label="shown")
+        panel.dots(x, y, BLUE)
+        panel.x.log, panel.y.limits = log, limits
+    root = etree.fromstring(figure.svg().encode())
+    panels = root.findall(f"{SVG}svg")
+    assert len(panels) == 2
+    for panel in panels:
+        (line,) = panel.findall(f"{SVG}path")
+        assert line.get("data-label") == "shown" and (" log" in panel.get("data-x")) is log
+        expected = _places(panel, x, y)
+        np.testing.assert_allclose(_points(line.get("d")), expected, atol=0.06)
+        dots = [(float(one.get("cx")), float(one.get("cy"))) for one in panel.iter(f"{SVG}circle")]
+        np.testing.assert_allclose(dots, expected, atol=0.06)
+
+
+def test_numbers_stand_at_their_ticks():
+    figure = Figure()
+    (panel,) = figure.panels
+    panel.line([0.0, 47.0], [0.0, 1.0], BLUE)
+    root = etree.fromstring(figure.svg().encode())
+    (inner,) = root.findall(f"{SVG}svg")
+    below = float(inner.get("y")) + float(inner.get("height")) + 11.0
+    numbers = [one for one in root.findall(f"{SVG}text") if abs(float(one.get("y")) - below) < 0.2]
+    assert [one.text for one in numbers] == ["0", "10", "20", "30", "40"]
+    at = _places(inner, [float(one.text) for one in numbers], [0.0] * 5)[:, 0] + float(inner.get("x"))
+    np.testing.assert_allclose([float(one.get("x")) for one in numbers], at, atol=0.06)
+
+
+@pytest.mark.parametrize(
+    ("log", "limits", "expected"),
+    [
+        (False, (-0.6, 0.6), ["−0.5", "0.0", "0.5"]),
+        (False, (0.0, 3e-6), ["0", "1e-06", "2e-06", "3e-06"]),
+        (False, (5.0, 5.0 + 1e-9), None),
+        (True, (1e-6, 1.0), ["10⁻⁶", "10⁻⁵", "10⁻⁴", "0.001", "0.01", "0.1", "1"]),
+        (True, (0.9, 12.0), ["1", "2", "5", "10"]),
+    ],
+)
+def test_ticks_are_round_and_read_as_what_they_are(log, limits, expected):
+    figure = Figure(height=100.0)
+    (panel,) = figure.panels
+    panel.line([0.0, 1.0], limits, BLUE)
+    panel.x.ticks, panel.y.log, panel.y.limits = [], log, limits
+    texts = [one.text for one in etree.fromstring(figure.svg().encode()).findall(f"{SVG}text")]
+    assert expected is None or texts == expected
+
+
+def test_a_line_breaks_at_nan_and_thousands_of_points_keep_their_extremes():
+    figure = Figure()
+    (panel,) = figure.panels
+    x = np.linspace(0.0, 1.0, 20_000)
+    y = np.random.default_rng(0).normal(size=len(x))
+    y[12_345], y[777:800] = 9.0, np.nan
+    panel.line(x, y, BLUE)
+    panel.y.limits = (-10.0, 10.0)
+    text = figure.svg()
+    (drawn,) = etree.fromstring(text.encode()).iterfind(f".//{SVG}svg/{SVG}path")
+    assert drawn.get("d").count("M") == 2 and len(text) < 100_000
+    assert _points(drawn.get("d"))[:, 1].min() == pytest.approx(150.0 * (1.0 - 19.0 / 20.0), abs=0.06)
+
+
+def test_true_to_scale_means_as_long_along_y_as_along_x():
+    figure = Figure(equal=True, height=80.0)
+    (panel,) = figure.panels
+    panel.line([0.0, 300.0], [0.0, 1.0], BLUE)
+    root = etree.fromstring(figure.svg().encode())
+    (inner,) = root.findall(f"{SVG}svg")
+    origin, along, across = _places(inner, [0.0, 10.0, 0.0], [0.0, 0.0, 10.0])
+    assert along[0] - origin[0] == pytest.approx(origin[1] - across[1], rel=1e-3)
+
+
+def test_nothing_and_a_single_value_can_be_drawn():
+    figure = Figure(2, 1, legend=True)
+    figure.panels[0].line([], [], BLUE)
+    figure.panels[1].dots(3.0, 0.0, BLUE)
+    etree.fromstring(figure.svg().encode())
 
 
 # ---- the thumbnail ---------------------------------------------------------------------------------------------------
 def test_a_thumbnail_holds_every_path_inside_its_border_from_left_to_right(enriched):
     root = etree.fromstring(thumbnail(enriched).encode())
-    lines = root.findall(f"{SVG}polyline")
+    (panel,) = root.findall(f"{SVG}svg")
+    lines = panel.findall(f"{SVG}path")
     assert len(lines) == 3
-    for line, start in zip(lines, root.findall(f"{SVG}circle"), strict=True):
-        points = np.array([pair.split(",") for pair in line.get("points").split()], dtype=float)
-        assert points.min() >= BORDER and (points.max(axis=0) <= [WIDTH - BORDER, HEIGHT - BORDER]).all()
+    for line, start in zip(lines, panel.iter(f"{SVG}circle"), strict=True):
+        points = _points(line.get("d"))
+        assert points.min() >= 0.0
+        assert (points.max(axis=0) <= [float(panel.get("width")), float(panel.get("height"))]).all()
         assert points[0, 0] == float(start.get("cx")) < points[-1, 0]
+    assert thumbnail(enriched) == thumbnail(enriched)
 
 
 def test_who_never_appears_is_not_drawn_and_a_scenario_of_nobody_is_empty(enriched):
@@ -83,8 +150,9 @@ def test_who_never_appears_is_not_drawn_and_a_scenario_of_nobody_is_empty(enrich
         for one in enriched.entities
     ]
     some = replace(enriched, entities=(enriched.entities[0], *absent[1:]))
-    assert thumbnail(some).count("<polyline") == 1
-    assert etree.fromstring(thumbnail(replace(enriched, entities=tuple(absent))).encode()).findall("*") == []
+    assert thumbnail(some).count("<circle") == 1
+    for nobody in (tuple(absent), ()):
+        assert "<circle" not in thumbnail(replace(enriched, entities=nobody))
 
 
 @pytest.mark.parametrize("angle", np.linspace(-3.0, 3.0, 7))
@@ -108,7 +176,7 @@ def test_edges_of_a_straight_road_are_drawn_where_its_lanes_end():
     assert levels == [-6.75, -3.5, 0.0, 3.5]
     for line in lines:
         assert line.s[0] == 100.0 and line.s[-1] == pytest.approx(300.0, abs=1e-5)
-    dashed = [line for line in lines if "dashes" in line.style]
+    dashed = [line for line in lines if line.dashes]
     assert len(dashed) == 1 and not np.any(dashed[0].t)  # the broken line in the middle of the road
 
 

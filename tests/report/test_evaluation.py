@@ -80,7 +80,7 @@ def test_a_profiles_card_is_a_page(tmp_path):
     page = tmp_path / "card.html"
     assert main(["profiles", "show", "motorway", "--report", str(page), "--quiet"]) == 0
     html = page.read_text(encoding="utf-8")
-    assert "Driver profile motorway" in html and html.count("<svg") == 2
+    assert "Driver profile motorway" in html and html.count("<figure") == 2
 
 
 def test_evaluate_tells_a_person_the_same(table, profile, capsys):
@@ -96,7 +96,7 @@ def test_report_is_one_page_with_violins_and_the_same_bytes_each_time(table, pro
         assert main(words) == 0
         pages.append((tmp_path / name).read_text(encoding="utf-8"))
     assert pages[0] == pages[1]
-    assert pages[0].count("<svg") == 7, "traces, four evaluations, spectrum, autocorrelation"
+    assert pages[0].count("<figure") == 6, "traces, four evaluations, spectrum and autocorrelation"
     assert "measured" in pages[0] and "sampled" in pages[0] and "drives.parquet" in pages[0]
     assert not re.search(r"\bsrc=|@import", pages[0].split("<script>")[0]) and 'href="http' not in pages[0], (
         "opens offline"

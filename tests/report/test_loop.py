@@ -35,11 +35,10 @@ from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.identification.close import Finding, LoopResult, close_loop
 from xosc_lateral.identification.residual import lack_of_fit_of
 from xosc_lateral.identification.selection import Rejected
+from xosc_lateral.report.chart import Panel
 from xosc_lateral.report.loop import finding_sentence, loop_page, loop_text
-from xosc_lateral.report.loop_courses import moving_spread
-from xosc_lateral.report.loop_curves import curve_of
-from xosc_lateral.report.loop_figures import DRIVES, draw_spectra, effect_figure, residual_figure
-from xosc_lateral.report.loop_hidden_figures import DRAWINGS
+from xosc_lateral.report.loop_curves import curve_of, moving_spread
+from xosc_lateral.report.loop_figures import DRAWINGS, DRIVES, draw_spectra, effect_figure, residual_figure
 from xosc_lateral.report.loop_json import column_record, finding_record, finite, loop_record
 from xosc_lateral.report.loop_words import lack_of_fit_words, meaning, others_words, outcome, p_value_words, size_words
 
@@ -151,7 +150,7 @@ def test_the_residual_stands_out_of_the_band_before_and_not_after(result: LoopRe
     assert group.before > 1.5 * group.floor
     assert group.after < 0.6 * group.before
     figure = residual_figure(result, "mean")
-    assert figure.axes[0].get_title(loc="left") == "grade [%]"  # columns of the effects come first
+    assert figure.panels[0].title == "grade [%]"  # columns of the effects come first
 
 
 def test_an_error_clearly_above_the_floor_is_called_unexplained(result: LoopResult, table: Path) -> None:
@@ -196,15 +195,15 @@ def test_the_json_keeps_to_the_schema_and_adds_the_meaning(result: LoopResult, t
 def test_every_hidden_effect_has_a_picture_with_the_measured_drive_in_it(result: LoopResult, effect: Effect) -> None:
     draw, caption = DRAWINGS[effect.kind]
     figure = draw(result, hidden(result, effect, "periodic"))
-    lines = [line for axis in figure.axes for line in axis.get_lines()]
+    lines = [mark for panel in figure.panels for mark in panel.curves()]
     assert caption.endswith(".")
-    assert any(line.get_color() == DRIVES and len(np.asarray(line.get_xdata())) > 50 for line in lines)
+    assert any(line.color == DRIVES and len(line.x) > 50 for line in lines)
 
 
 @pytest.mark.parametrize("kind", ["memory", "population"])
 def test_what_a_core_model_lacks_has_a_picture(result: LoopResult, kind: str) -> None:
     draw, _ = DRAWINGS[kind]
-    assert draw(result, hidden(result, None, kind)).axes
+    assert len(draw(result, hidden(result, None, kind)).panels[0].curves()) >= 3
 
 
 @pytest.mark.parametrize("kind", ["periodic", "drift", "step", "scale", "regime", "memory", "population"])
@@ -222,7 +221,7 @@ def test_every_shape_is_told_and_drawn(result: LoopResult, effect: ColumnEffect)
     curve = curve_of(result, effect)
     assert np.isfinite(curve.strength).all() and np.isfinite(curve.error).all()
     assert np.isfinite(curve.measured).all() and (len(curve.seen) > 0) == (effect.acts is not Acts.RATE)
-    assert len(effect_figure(result, finding).axes) == 2
+    assert all(panel.curves() for panel in effect_figure(result, finding).panels)
 
 
 def test_a_p_value_is_told_as_one_in_so_many_tables() -> None:
@@ -237,12 +236,10 @@ def test_courses_leave_out_what_is_cut(result: LoopResult) -> None:
 
 
 def test_a_table_whose_runs_are_all_shorter_than_a_spectrum_s_segment_has_a_spectrum_still(result: LoopResult) -> None:
-    from matplotlib.figure import Figure
-
-    axis = Figure().add_subplot()
-    draw_spectra(axis, result, 10**6)
-    for line in axis.lines:
-        assert len(line.get_ydata()) and np.all(np.asarray(line.get_ydata())[1:] > 0.0)
+    panel = Panel()
+    draw_spectra(panel, result, 10**6)
+    for line in panel.curves():
+        assert len(line.y) and np.all(line.y > 0.0)
 
 
 def test_what_became_of_everything_is_said_whatever_it_was(result: LoopResult) -> None:

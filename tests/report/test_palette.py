@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from xosc_lateral.report.figures import PALETTE
+from xosc_lateral.report.chart import PALETTE
 
 # Machado, Oliveira, Fernandes, IEEE TVCG 15(6), 2009, table for severity 1.0 (linear RGB).
 VISION = {

@@ -16,8 +16,8 @@ from xosc_lateral.motion.nominal import Activity, Note
 from xosc_lateral.pipeline.settings import ConvertSettings
 from xosc_lateral.report import scenario_figures as figures
 from xosc_lateral.report.path_dynamics import lateral_dynamics
-from xosc_lateral.report.road_drawing import view_along
 from xosc_lateral.report.scenario import conversion_page, scenario_page
+from xosc_lateral.report.scenario_figures import view_along
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def test_the_page_holds_every_section_and_the_same_bytes_each_time(enriched, pla
     headings = re.findall(r"<h2[^>]*>([^<]+)", plain)
     expected = ["Player", "Paths", "Offsets", "Speed and lateral dynamics", "Gaps", "Segments", "Not played as written"]
     assert headings == expected
-    assert plain.count("<svg") == 7
+    assert plain.count("<figure") == 7
 
 
 def test_numbers_on_the_page_are_those_of_the_result(enriched, plain):

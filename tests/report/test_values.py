@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from xosc_lateral.report.render import NOTHING, format_number, format_value, is_number
+from xosc_lateral.report.page import NOTHING, format_number, format_value
 
 
 @given(st.floats(-1e12, 1e12).filter(lambda value: abs(value) > 1e-12))
@@ -47,8 +47,3 @@ def test_whatever_a_result_holds_is_written_out(value, shown):
 def test_a_format_of_the_callers_own_is_kept_but_for_what_is_not_there():
     assert format_value(0.5, ".1%") == "50.0%"
     assert format_value(math.nan, ".1%") == NOTHING
-
-
-def test_cells_are_set_like_numbers_when_they_are_or_when_they_are_missing():
-    assert [is_number(value) for value in (1, 2.5, np.float64(3.0), None, True, "4", [5])] == [
-        True, True, True, True, False, False, False]  # fmt: skip

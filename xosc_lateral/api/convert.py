@@ -13,9 +13,9 @@ from xosc_lateral.pipeline.settings import ConvertOptions, ConvertSettings, spel
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
     from xosc_lateral.enrich.result import ConvertedScenario
+    from xosc_lateral.report.figure import Figure
 
 SCENARIO_SUFFIXES = (".xosc",)
 REPORT_SUFFIXES = (".html", ".htm")

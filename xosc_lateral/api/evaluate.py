@@ -22,11 +22,11 @@ from xosc_lateral.formats.output_paths import claim, output_file
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
     from xosc_lateral.driver.profile import DriverProfile
     from xosc_lateral.evaluation.realism import Realism
     from xosc_lateral.evaluation.scores import ProfileScores
+    from xosc_lateral.report.figure import Figure
 
 
 def evaluate(
@@ -127,7 +127,8 @@ class Evaluation(Result):
         """Violins of the ten metrics, measured beside sampled."""
         from xosc_lateral.report.violins import violin_figure
 
-        return violin_figure(self._scores.evaluations[3])
+        shown = self._scores.evaluations[3]
+        return violin_figure(shown.real, shown.artificial)
 
     def write_report(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the HTML page."""

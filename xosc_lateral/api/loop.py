@@ -22,10 +22,10 @@ from xosc_lateral.formats.output_paths import claim, output_folder
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
     from xosc_lateral.driver.profile import DriverProfile
     from xosc_lateral.identification.close import LoopResult
+    from xosc_lateral.report.figure import Figure
 
 
 def close_loop(

@@ -17,12 +17,11 @@ from xosc_lateral.pipeline.settings import STEP
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
+
+    from xosc_lateral.report.figure import Figure
 
 
 PAGE_SUFFIXES = (".html", ".htm")
-
-RECORDING_SUFFIX = ".mcap"
 
 
 def play(
@@ -185,29 +184,25 @@ class Playback(Result):
 
     def page(self) -> str:
         """A self-contained HTML page that plays the scenario."""
-        from xosc_lateral.report.recording import view_page
+        from xosc_lateral.report.played import view_page
 
         motion, network = self._played.motion, self._played.network
         return view_page(motion, network, source=self.scenario.name, provenance=self._provenance())
 
     def write_page(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write the page that plays the scenario, or a recording of it for Foxglove and others.
+        """Write the page that plays the scenario.
 
         Parameters
         ----------
         path : str or Path
-            ``.html``: the page; ``.mcap``: the recording (extra `mcap`). Into a folder as ``NAME_view.html``.
+            ``.html``; into a folder as ``NAME_view.html``.
         force : bool
             Replace a file that this package did not write.
         """
         from xosc_lateral.formats.atomic import write_atomically
 
-        output = output_file(path, f"{self.scenario.stem}_view.html", (*PAGE_SUFFIXES, RECORDING_SUFFIX))
+        output = output_file(path, f"{self.scenario.stem}_view.html", PAGE_SUFFIXES)
         claim([output], self._inputs(), force=force)
-        if output.name.lower().endswith(RECORDING_SUFFIX):
-            from xosc_lateral.report.recording import scene_recording
-
-            return write_atomically(output, scene_recording(self._played.motion, self._played.network))
         return write_atomically(output, self.page())
 
     def write_osi(self, path: PathLike, *, force: bool = False) -> Path:
@@ -249,7 +244,7 @@ class Segments(Result):
         return f"{len(following)} road-following segments of {entities} entities, {seconds:.1f} s"
 
     def __str__(self) -> str:
-        from xosc_lateral.report.recording import as_text
+        from xosc_lateral.report.played import as_text
 
         return as_text(self._rows)
 

@@ -12,12 +12,12 @@ from xosc_lateral.formats.output_paths import claim, output_file, output_folder
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
     from xosc_lateral.driver.profile import DriverProfile
     from xosc_lateral.formats.profiles import Entry
     from xosc_lateral.pipeline.derive import Derived
     from xosc_lateral.report.comparison import Compared
+    from xosc_lateral.report.figure import Figure
 
 PROFILE_SUFFIXES = (".json",)
 

@@ -22,11 +22,11 @@ from xosc_lateral.formats.output_paths import claim, output_file
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
     from xosc_lateral.driver.profile import DriverProfile
     from xosc_lateral.driver.sampled_offsets import SampledOffsets
     from xosc_lateral.drives.drive import Drive
+    from xosc_lateral.report.figure import Figure
 
 
 def sample(

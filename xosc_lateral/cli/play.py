@@ -117,13 +117,13 @@ def segments(
 
 @command(
     app, "view", VERBS["view"],
-    "view cut-in.xosc", "view cut-in_lifelike.xosc -o pages/", "view cut-in.xosc -o cut-in.mcap",
+    "view cut-in.xosc", "view cut-in_lifelike.xosc -o pages/",
 )  # fmt: skip
 def view(
     scenario: Annotated[Path, typer.Argument(help="Any scenario (.xosc), converted or not.", show_default=False)],
     output: Annotated[
         str | None,
-        typer.Option("--output", "-o", help="Page (.html) or recording (.mcap); default: NAME_view.html beside it."),
+        typer.Option("--output", "-o", help="Page to write; default: NAME_view.html beside it."),
     ] = None,
     parameter: Parameters = None,
     allow: Allow = None,
@@ -142,7 +142,5 @@ def view(
     warn(played.warnings)
     if not quiet:
         typer.echo(str(page))
-    if page.suffix == ".mcap":
-        return
     if open_page or (open_page is None and sys.stdout.isatty()):
         typer.launch(page.absolute().as_uri())

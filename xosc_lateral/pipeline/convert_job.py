@@ -30,8 +30,8 @@ INDEX = "index.html"
 
 def write_page_and_thumbnail(conversion: ConvertedScenario, page: Path) -> None:
     """Write the page of one conversion of a batch, and the small picture that stands for it in the index."""
-    from xosc_lateral.report.batch import thumbnail
     from xosc_lateral.report.scenario import conversion_page
+    from xosc_lateral.report.scenario_figures import thumbnail
 
     page.parent.mkdir(parents=True, exist_ok=True)
     write_atomically(page.with_suffix(".svg"), thumbnail(conversion.enriched))

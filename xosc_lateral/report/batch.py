@@ -4,60 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from html import escape
 
-import numpy as np
-from numpy.typing import NDArray
+from xosc_lateral.report.page import Html, KeyFigure, Page, Tone
 
-from xosc_lateral.enrich.result import Enriched
-from xosc_lateral.motion.nominal import Activity
-from xosc_lateral.report.figures import MUTED, PALETTE
-from xosc_lateral.report.render import KeyFigure, render_page
-from xosc_lateral.report.road_drawing import view_along
-
-FloatArray = NDArray[np.float64]
-
-WIDTH, HEIGHT, BORDER = 200, 64, 5
-"""[pixel]"""
-
-POINTS = 60
-"""Per path."""
-
-
-def thumbnail(enriched: Enriched) -> str:
-    """SVG document."""
-    paths = [(number, path) for number, path in enumerate(_paths(enriched)) if len(path)]
-    lines = []
-    if paths:
-        longest = max((path for _, path in paths), key=lambda path: float(np.ptp(path, axis=0).sum()))
-        view = view_along(longest[:, 0], longest[:, 1])
-        turned = [(number, np.column_stack(view.turn(*path.T))) for number, path in paths]
-        points = np.concatenate([path for _, path in turned])
-        low, spread = points.min(axis=0), np.maximum(np.ptp(points, axis=0), 1.0)
-        for number, path in turned:
-            color = PALETTE[number % len(PALETTE)] if enriched.entities[number].is_enriched else MUTED
-            lines += _track((path - low) / spread, color)
-    head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}">'
-    return "\n".join([head, *lines, "</svg>\n"])
-
-
-def _track(share: FloatArray, color: str) -> list[str]:
-    """A path, shape (n, 2), in shares of the picture from its lower left corner, and a dot where it starts. [-]"""
-    x = BORDER + share[:, 0] * (WIDTH - 2 * BORDER)
-    y = HEIGHT - BORDER - share[:, 1] * (HEIGHT - 2 * BORDER)
-    track = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
-    return [
-        f'<circle cx="{x[0]:.1f}" cy="{y[0]:.1f}" r="2.5" fill="{color}"/>',
-        f'<polyline points="{track}" fill="none" stroke="{color}" stroke-width="1.5"/>',
-    ]
-
-
-def _paths(enriched: Enriched) -> list[FloatArray]:
-    paths = []
-    for entity in enriched.entities:
-        rows = np.flatnonzero((entity.motion.activity & Activity.ACTIVE) != 0)
-        rows = rows[np.linspace(0, len(rows) - 1, min(POINTS, len(rows))).astype(int)] if len(rows) else rows
-        paths.append(np.column_stack([entity.trajectory.x[rows], entity.trajectory.y[rows]]))
-    return paths
+GAPS = ("smallest gap, nominal [m]", "smallest gap, enriched [m]")
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,16 +72,37 @@ def batch_page(entries: Iterable[BatchEntry], name: str) -> str:
     ranked = sorted(entries, key=lambda entry: entry.urgency)
     failed = sum(bool(entry.error) for entry in ranked)
     contacts = sum(entry.has_new_contact for entry in ranked)
-    warned = sum(bool(entry.warnings) for entry in ranked)
-    return render_page(
-        "batch.html",
-        title=f"Batch {name}",
-        provenance={},
-        entries=ranked,
-        numbers=[
+    page = Page(f"Batch {name}")
+    page.lead(
+        "All outputs of the batch: failures first, then scenarios in which vehicles collide that did not before, then "
+        "the others by number of warnings. The pictures show the paths from above, with the scale across the road "
+        "exaggerated."
+    )
+    page.key_figures(
+        [
             KeyFigure(len(ranked) - failed, "outputs"),
             KeyFigure(failed, "failed", tone="bad" if failed else ""),
             KeyFigure(contacts, "with collisions", "that the nominal motion does not have", "bad" if contacts else ""),
-            KeyFigure(warned, "with warnings"),
-        ],
+            KeyFigure(sum(bool(entry.warnings) for entry in ranked), "with warnings"),
+        ]
     )
+    tones: dict[int, Tone] = {k: "bad" for k, one in enumerate(ranked) if one.error or one.has_new_contact}
+    formats = dict.fromkeys(("std. deviation of offsets [m]", *GAPS), ".2f")
+    page.table([_row(entry) for entry in ranked], "Outputs", formats=formats, tones=tones)
+    return page.html({})
+
+
+def _row(entry: BatchEntry) -> dict[str, object]:
+    link, picture = escape(entry.page), escape(entry.thumbnail)
+    image = f'<img loading="lazy" width="200" height="64" src="{picture}" alt="Paths in {escape(entry.output)}">'
+    name = escape(entry.output)
+    done = not entry.error
+    return {
+        "paths": Html(f'<a href="{link}">{image}</a>' if picture else ""),
+        "output": Html(f'<a href="{link}">{name}</a>' if link else name),
+        "enriched": f"{entry.enriched} of {entry.entities}" if done else None,
+        "std. deviation of offsets [m]": entry.offset_spread if done else None,
+        GAPS[0]: entry.gap_before if done else None,
+        GAPS[1]: entry.gap_after if done else None,
+        "warnings": "; ".join(entry.warnings) or "none" if done else f"failed: {entry.error}",
+    }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +16,11 @@ from xosc_lateral.evaluation.lane_keeping import LaneKeeping, keeping_of
 from xosc_lateral.evaluation.metrics import DURATION, MovementSummary, free_runs, summarise, summary_of
 from xosc_lateral.evaluation.spectra import Spectrum, spectrum
 from xosc_lateral.formats.profiles import FIELDS, Entry, facts_of, profile_hash
-from xosc_lateral.report.figures import GRID, SAMPLED, figure_style, new_figure, new_panels
-from xosc_lateral.report.render import KeyFigure, format_value, render_page
+from xosc_lateral.report.chart import SAMPLED
+from xosc_lateral.report.figure import Figure
+from xosc_lateral.report.page import KeyFigure, Page, format_value
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
+FloatArray = NDArray[np.float64]
 
 CHANGED: Mapping[Acts, str] = {
     Acts.LOCATION: "mean offset",
@@ -240,13 +239,8 @@ def _indented(label: str, text: str) -> list[str]:
     return [f"  {label if k == 0 else '':10s} {line}" for k, line in enumerate(wrapped)]
 
 
-FloatArray = NDArray[np.float64]
-
-SHOWN_DRIVERS, SHOWN_S = 6, 120.0
+SHOWN_DRIVERS, SHOWN_S = 4, 120.0
 """Sample paths that are drawn, and their length. [s]"""
-
-TICK_M = 0.5
-"""Between the ticks of offsets. [m]"""
 
 
 def card_page(profile: DriverProfile, seed: int = 0) -> str:
@@ -259,21 +253,13 @@ def card_page(profile: DriverProfile, seed: int = 0) -> str:
         Of the free runs that are drawn and summed up.
     """
     runs, step = free_runs(profile, seed), profile.model.step
-    summary = summarise(runs, step)
-    known = profile.provenance
+    summary, known = summarise(runs, step), profile.provenance
     side = "left" if summary.mean_offset > 0 else "right"
     within = "" if known.drives == 1 else f"one driver over {DURATION / 60:g} min: {summary.spread_within:.2f} m"
-    return render_page(
-        "card.html",
-        title=f"Driver profile {profile.name}",
-        provenance={
-            "profile sha256": profile_hash(profile),
-            "inputs": {name: digest[:12] for name, digest in known.inputs.items()},
-            "seed of the free runs": seed,
-        },
-        profile=profile,
-        known=known,
-        numbers=[
+    page = Page(f"Driver profile {profile.name}")
+    page.lead(known.notes)
+    page.key_figures(
+        [
             KeyFigure(f"{abs(summary.mean_offset):.2f} m", f"mean offset, to the {side}"),
             KeyFigure(f"{summary.spread:.2f} m", "standard deviation over all drivers", within),
             KeyFigure(
@@ -282,40 +268,58 @@ def card_page(profile: DriverProfile, seed: int = 0) -> str:
                 "positive: left of the lane centre",
             ),
             KeyFigure(f"{summary.lateral_speed:.3f} m/s", "lateral speed", "root mean square"),
-        ],
-        paths=_paths(runs, step),
-        places=_places(runs, spectrum(list(runs), step)),
-        effects=[effect_line(effect) for effect in profile.effects],
-        facts=[
-            {"fact": name, "value": value} for name, value in (("fitted on", amount(profile)), *provenance_items(known))
-        ],
+        ]
+    )
+    page.section("Sample paths")
+    page.figure(
+        _paths(runs, step),
+        "Offsets of drivers drawn from the profile, in steady traffic on a straight road.",
+        "Offsets over time of several sampled drivers",
+    )
+    page.section("Distribution and spectrum")
+    page.figure(
+        _places(runs, spectrum(list(runs), step)),
+        "Left: distribution of the offset. Right: its power spectral density.",
+        "Density of the offset, and its spectrum",
+    )
+    page.section(
+        "Model and effects",
+        f"Model `{profile.model.kind}`, time step {profile.model.step} s, lane width {profile.lane_width:.2f} m.",
+    )
+    page.items(effect_line(effect) for effect in profile.effects)
+    page.text("" if profile.effects else "The profile has no effects: it does not depend on context.")
+    page.section("Where it comes from")
+    facts = [("fitted on", amount(profile)), *provenance_items(known)]
+    page.table([{"fact": name, "value": value} for name, value in facts])
+    page.text(f"Source: {known.source}" if known.source else "")
+    page.text(f"Licence of the data: {known.licence}" if known.licence else "")
+    return page.html(
+        {
+            "profile sha256": profile_hash(profile),
+            "inputs": {name: digest[:12] for name, digest in known.inputs.items()},
+            "seed of the free runs": seed,
+        }
     )
 
 
-@figure_style()
 def _paths(runs: FloatArray, step: float) -> Figure:
-    from matplotlib.ticker import MultipleLocator
-
-    figure, axes = new_panels(min(SHOWN_DRIVERS, len(runs)), sharex=True, sharey=True, panel_height=0.6)
-    for number, (axis, run) in enumerate(zip(axes[:, 0], runs, strict=False), start=1):
-        shown = run[: round(SHOWN_S / step) + 1]
-        axis.plot(step * np.arange(len(shown)), shown, color=SAMPLED, label=f"driver {number}")
-        axis.axhline(0.0, color=GRID, linewidth=0.8)
-        axis.set_title(f"Driver {number}")
-    axes[0, 0].yaxis.set_major_locator(MultipleLocator(TICK_M))
-    axes[len(axes) // 2, 0].set_ylabel("offset [m]")
-    axes[-1, 0].set_xlabel("time [s]")
+    shown = runs[:SHOWN_DRIVERS, : round(SHOWN_S / step) + 1]
+    figure = Figure(len(shown), height=48.0, share_x="all", share_y="all")
+    for number, (panel, run) in enumerate(zip(figure.panels, shown, strict=True), start=1):
+        panel.level()
+        panel.line(step * np.arange(len(run)), run, SAMPLED, label=f"driver {number}")
+        panel.title, panel.x.label = f"Driver {number}", "time [s]"
+    figure.panels[len(shown) // 2].y.label = "offset [m]"
     return figure
 
 
-@figure_style()
 def _places(runs: FloatArray, power: Spectrum) -> Figure:
-    figure, axes = new_figure(1, 2, height=3.0)
-    place, spectral = axes[0]
-    edges = np.linspace(-1.2, 1.2, 97)
-    density, _ = np.histogram(runs, edges, density=True)
-    place.plot(0.5 * (edges[1:] + edges[:-1]), density, color=SAMPLED, label="density")
-    place.set(xlabel="offset [m], positive to the left", ylabel="density [1/m]", title="Distribution")
-    spectral.loglog(power.frequency, power.density, color=SAMPLED, label="power density")
-    spectral.set(xlabel="frequency [Hz]", ylabel="power density [m²/Hz]", title="Spectrum")
+    figure = Figure(1, 2)
+    place, spectral = figure.panels
+    density, edges = np.histogram(runs, np.linspace(-1.2, 1.2, 97), density=True)
+    place.steps(edges, density, SAMPLED, label="density")
+    spectral.line(power.frequency, power.density, SAMPLED, label="power density")
+    spectral.x.log = spectral.y.log = True
+    place.title, place.x.label, place.y.label = "Distribution", "offset [m], positive to the left", "density [1/m]"
+    spectral.title, spectral.x.label, spectral.y.label = "Spectrum", "frequency [Hz]", "power density [m²/Hz]"
     return figure

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,12 +25,9 @@ from xosc_lateral.evaluation.metrics import (
 from xosc_lateral.evaluation.spectra import Spectrum, spectrum
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.report.cards import keeping_record
-from xosc_lateral.report.figures import PALETTE, figure_style, new_figure
-from xosc_lateral.report.render import render_page
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from xosc_lateral.report.chart import color_of
+from xosc_lateral.report.figure import Figure
+from xosc_lateral.report.page import Page
 
 FloatArray = NDArray[np.float64]
 
@@ -236,63 +233,55 @@ def _profile_record(profile: DriverProfile, summary: MovementSummary, keeping: L
     }
 
 
-@figure_style()
 def comparison_figure(compared: Compared) -> Figure:
     """Where in the lane, how fast (spectrum), and sample paths, a colour per profile."""
-    figure, axes = new_figure(1, 3, height=3.4)
-    place, power, paths = axes[0]
-    edges = np.linspace(-1.0, 1.0, 81)
+    figure = Figure(1, 3, height=180.0, legend=True)
+    place, power, paths = figure.panels
     shown = list(zip(compared.profiles, compared.runs, compared.spectra, strict=True))[:SHOWN]
     for number, (profile, runs, density) in enumerate(shown):
-        color, dashes = PALETTE[number % len(PALETTE)], "-" if number < len(PALETTE) else "--"
-        counts, _ = np.histogram(runs, edges, density=True)
-        place.plot(0.5 * (edges[1:] + edges[:-1]), counts, dashes, color=color, label=profile.name)
-        power.loglog(density.frequency, density.density, dashes, color=color)
-        step = profile.model.step
-        rows = slice(0, round(SHOWN_S / step))
-        paths.plot(
-            step * np.arange(len(runs[0][rows])), runs[0][rows] + SPACING * (len(shown) - number), dashes, color=color
-        )
-    _label(figure, place, power, paths)
-    return figure
-
-
-def _label(figure: Figure, place: Axes, power: Axes, paths: Axes) -> None:
-    place.set(xlabel="offset [m], positive to the left", ylabel="density [1/m]", title="Distribution")
-    power.set(xlabel="frequency [Hz]", ylabel="power density [m²/Hz]", title="Spectrum")
-    paths.set(xlabel="time [s]", title=f"Sample paths, {SPACING:g} m apart", yticks=[])
-    figure.legend(*place.get_legend_handles_labels(), loc="outside lower center", ncols=4)
-
-
-@figure_style()
-def distance_figure(compared: Compared) -> Figure:
-    """The matrix of distances."""
-    names = [profile.name for profile in compared.profiles]
-    figure, axes = new_figure(1, 1, height=1.6 + 0.28 * len(names))
-    axis, distance = axes[0, 0], compared.distance
-    axis.grid(visible=False)
-    axis.imshow(distance, cmap="Blues", vmin=0.0, aspect="auto")
-    axis.set_xticks(range(len(names)), names, rotation=60, ha="right")
-    axis.set_yticks(range(len(names)), names)
-    if len(names) <= SHOWN:
-        dark = 0.6 * distance.max()
-        for row, column in np.ndindex(*distance.shape):
-            color = "#fefefe" if distance[row, column] > dark else "#101010"  # the map is the same in both themes
-            axis.text(column, row, f"{distance[row, column]:.2f}", ha="center", va="center", color=color, fontsize=8)
+        color, name = color_of(number), profile.name
+        heights, edges = np.histogram(runs, np.linspace(-1.0, 1.0, 81), density=True)
+        place.line(0.5 * (edges[1:] + edges[:-1]), heights, color, label=name)
+        power.line(density.frequency, density.density, color, label=name)
+        run = runs[0][: round(SHOWN_S / profile.model.step)] + SPACING * (len(shown) - number)
+        paths.line(profile.model.step * np.arange(len(run)), run, color, label=name)
+    power.x.log = power.y.log = True
+    place.title, place.x.label, place.y.label = "Distribution", "offset [m], positive to the left", "density [1/m]"
+    power.title, power.x.label, power.y.label = "Spectrum", "frequency [Hz]", "power density [m²/Hz]"
+    paths.title, paths.x.label, paths.y.ticks = f"Sample paths, {SPACING:g} m apart", "time [s]", []
     return figure
 
 
 def comparison_page(compared: Compared) -> str:
-    """HTML page."""
-    facts = {profile.name: profile_hash(profile)[:12] for profile in compared.profiles}
-    return render_page(
-        "comparison.html",
-        title=f"{len(compared.profiles)} driver profiles compared",
-        provenance={"seed": compared.seed, **facts},
-        alike=[", ".join(group) for group in compared.groups if len(group) > 1],
-        rows=_rows(compared),
-        overview=comparison_figure(compared),
-        left_out=max(0, len(compared.profiles) - SHOWN),
-        distances=distance_figure(compared),
-        snippet_s=SNIPPET,
+    """HTML page: a figure and two tables; same values, same bytes."""
+    names = [profile.name for profile in compared.profiles]
+    page = Page(f"{len(names)} driver profiles compared")
+    alike = "; ".join(", ".join(group) for group in compared.groups if len(group) > 1)
+    page.lead(
+        "Every profile is sampled in steady traffic on a straight road, at its own lane width. "
+        + (f"These profiles are not distinguishable: {alike}." if alike else "All of them differ from each other.")
     )
+    page.section("Summary")
+    page.table(
+        [row | {"effects": len(one.effects)} for row, one in zip(_rows(compared), compared.profiles, strict=True)]
+    )
+    more = f"; {len(names) - SHOWN} more are left out of the figure" if len(names) > SHOWN else ""
+    page.figure(
+        comparison_figure(compared),
+        f"Distribution of the offset, power spectral density and a sample path of each profile{more}.",
+        "Densities, spectra and sample paths of the profiles",
+    )
+    page.section("Distances")
+    rows = [
+        {"profile": name, **dict(zip(names, row, strict=True))}
+        for name, row in zip(names, compared.distance.tolist(), strict=True)
+    ]
+    page.table(
+        rows,
+        f"Mean Wasserstein distance of the ten metrics of snippets of {SNIPPET:g} s, in standard deviations over the "
+        "snippets of all profiles. The diagonal shows how far random halves of a profile's own drivers are apart at "
+        "most (95 % of them), which is sampling error alone.",
+        formats=dict.fromkeys(names, ".2f"),
+    )
+    hashes = {profile.name: profile_hash(profile)[:12] for profile in compared.profiles}
+    return page.html({"seed": compared.seed, **hashes})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,9 @@ from xosc_lateral.evaluation.realism import Realism
 from xosc_lateral.evaluation.record import scores_to_dict
 from xosc_lateral.evaluation.scores import SNIPPET, ProfileScores, SnippetScores
 from xosc_lateral.formats.profiles import profile_hash
-from xosc_lateral.report.figures import GRID, INK, MEASURED, SAMPLED, figure_style, new_figure, new_panels
+from xosc_lateral.report.chart import MEASURED, SAMPLED
+from xosc_lateral.report.figure import Figure
+from xosc_lateral.report.page import KeyFigure, Page, Tone
 from xosc_lateral.report.realism import (
     FAMILIES,
     condition_groups,
@@ -26,62 +28,39 @@ from xosc_lateral.report.realism import (
     realism_lines,
     start_fade_note,
 )
-from xosc_lateral.report.render import KeyFigure, Tone, render_page
 from xosc_lateral.report.violins import LABELS, violin_figure
 from xosc_lateral.version import __version__
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 FloatArray = NDArray[np.float64]
 
 
-@figure_style()
 def trace_figure(scores: ProfileScores) -> Figure:
     """Measured offsets on the left, sampled ones of the same drives on the right, on one scale."""
-    figure, axes = new_panels(len(scores.traces), 2, panel_height=0.7, sharex=True, sharey=True)
-    for row, trace in zip(axes, scores.traces, strict=True):
-        for axis, values, color, label in (
-            (row[0], trace.real, MEASURED, "measured"),
-            (row[1], trace.sampled, SAMPLED, "sampled"),
-        ):
-            axis.plot(trace.step * np.arange(len(values)), values, color=color, label=f"{trace.drive}, {label}")
-            axis.axhline(0.0, color=GRID, linewidth=0.8)
-            axis.set_title(f"{trace.drive}, {label}")
-    axes[len(scores.traces) // 2, 0].set_ylabel("offset [m]")
-    for axis in axes[-1]:
-        axis.set_xlabel("time [s]")
+    figure = Figure(len(scores.traces), 2, height=50.0, share_x="all", share_y="all")
+    for number, trace in enumerate(scores.traces):
+        sides = ((trace.real, MEASURED, "measured"), (trace.sampled, SAMPLED, "sampled"))
+        for panel, (values, color, label) in zip(figure.row(number), sides, strict=True):
+            panel.level()
+            panel.line(trace.step * np.arange(len(values)), values, color, label=label)
+            panel.title, panel.x.label = f"{trace.drive}, {label}", "time [s]"
+    figure.row(len(scores.traces) // 2)[0].y.label = "offset [m]"
     return figure
 
 
-@figure_style()
 def spectrum_figure(scores: ProfileScores) -> Figure:
-    """Power density, measured and sampled."""
-    figure, axes = new_figure(height=3.4)
-    axis = axes[0, 0]
-    for one, label, color in (
-        (scores.spectrum_real, "measured", MEASURED),
-        (scores.spectrum_sampled, "sampled", SAMPLED),
+    """Power density and autocorrelation, measured and sampled."""
+    figure = Figure(1, 2, height=180.0, legend=True)
+    power, memory = figure.panels
+    memory.level()
+    for one, correlation, color, label in (
+        (scores.spectrum_real, scores.autocorrelation_real, MEASURED, "measured"),
+        (scores.spectrum_sampled, scores.autocorrelation_sampled, SAMPLED, "sampled"),
     ):
-        axis.loglog(one.frequency, one.density, color=color, marker="o", markersize=3, label=label)
-    axis.set_xlabel("frequency [Hz]")
-    axis.set_ylabel("power density [m²/Hz]")
-    axis.legend()
-    return figure
-
-
-@figure_style()
-def memory_figure(scores: ProfileScores) -> Figure:
-    """Autocorrelation, measured and sampled."""
-    figure, axes = new_figure(height=3.0)
-    axis = axes[0, 0]
-    axis.semilogx(scores.lags, scores.autocorrelation_real, color=MEASURED, marker="o", markersize=3, label="measured")
-    axis.semilogx(scores.lags, scores.autocorrelation_sampled, color=SAMPLED, marker="o", markersize=3, label="sampled")
-    axis.axhline(0.0, color=INK, linewidth=0.8)
-    axis.set_xlabel("lag [s]")
-    axis.set_ylabel("correlation [-]")
-    axis.legend()
+        power.line(one.frequency, one.density, color, label=label)
+        memory.line(scores.lags, correlation, color, label=label)
+    power.x.log = power.y.log = memory.x.log = True
+    power.title, power.x.label, power.y.label = "Spectrum", "frequency [Hz]", "power density [m²/Hz]"
+    memory.title, memory.x.label, memory.y.label = "Autocorrelation", "lag [s]", "correlation [-]"
     return figure
 
 
@@ -130,31 +109,98 @@ def evaluation_record(scores: ProfileScores, profile: DriverProfile, inputs: Map
 
 def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mapping[str, str]) -> str:
     """HTML page: scores beside those of real drivers, violins, spectra, and traces; same scores, same bytes."""
+    page = Page(f"Evaluation of {scores.profile}")
+    page.lead(
+        f"{scores.hours:.1f} h of measured driving ({scores.drives} drives), compared with offsets sampled from the "
+        f"profile `{scores.profile}` under the same context. Distances are Wasserstein distances in units of the "
+        "measured metric's standard deviation. Beside each stands the distance between real drivers: of measured data "
+        "from other measured data."
+    )
     worst, ratio = worst_block(scores)
-    return render_page(
-        "evaluation.html",
-        title=f"Evaluation of {scores.profile}",
-        provenance=_provenance(scores, profile, inputs),
-        scores=scores,
-        fitted=FITTED if _fitted_on(profile, inputs) else "",
-        numbers=[
-            KeyFigure(f"{ratio:.2f}", f"worst comparison: {worst}", "1: as close as other real drivers", _tone(ratio)),
-            *_key_figures(scores.realism),
-        ],
-        groups=[(heading, ratio_rows(group)) for heading, group in condition_groups(scores.realism).items()],
-        indicators=[
-            (one.condition.name, indicator_rows(one))
-            for one in scores.realism.conditions
-            if not one.condition.same_start
-        ],
-        start_fade=start_fade_note(profile),
-        metric_table=_metric_table,
-        near_marking=f"{NEAR_MARKING:g}",
-        snippet=f"{SNIPPET:g}",
-        part_rows=[_part_row(one) for one in scores.evaluations],
-        margin_rows=[_margin_row("measured", scores.margins_real), _margin_row("sampled", scores.margins_sampled)],
-        figures={"trace": trace_figure(scores), "spectrum": spectrum_figure(scores), "memory": memory_figure(scores)},
-        violin_figure=violin_figure,
+    worst_figure = KeyFigure(
+        f"{ratio:.2f}", f"worst comparison: {worst}", "1: as close as other real drivers", _tone(ratio)
+    )
+    page.key_figures([worst_figure, *_key_figures(scores.realism)])
+    if _fitted_on(profile, inputs):
+        page.warning(FITTED)
+    _add_realism(page, scores.realism)
+    page.section("Traces")
+    page.figure(
+        trace_figure(scores),
+        "Left: offsets as measured. Right: sampled, from the same start and under the same context. The curves are not "
+        "meant to coincide: two drives of the same driver do not either. What should agree is how they move.",
+        "Measured and sampled offsets over time, drive by drive",
+    )
+    page.section(
+        f"Ten metrics of {scores.snippets.seconds:g} s snippets",
+        "As in the paper: sampled from the same start, without the sensor; real drivers are compared without a common "
+        f"start. {start_fade_note(profile)}",
+    )
+    _add_metrics(page, scores.snippets)
+    _add_violins(page, scores.evaluations[3], "Measured (left, blue) beside sampled (right) snippets.")
+    if scores.long_snippets is not None:
+        page.section(
+            f"Snippets of {scores.long_snippets.seconds:g} s",
+            "The same metrics of longer snippets, which show slow movement.",
+        )
+        _add_metrics(page, scores.long_snippets)
+    page.section(
+        "The four evaluations",
+        "Which part of the model falls short? The coarse and fine parts of measured snippets (split as in Neis and "
+        "Beyerer, 2024) and those of the profile are combined. Evaluation (1) combines the measured coarse part with "
+        "the measured fine part, shifted in time: the best that the split allows.",
+    )
+    page.table([_part_row(one) for one in scores.evaluations])
+    for one in scores.evaluations[:3]:
+        _add_violins(page, one, f"({one.number}) Coarse part {one.coarse}, fine part {one.fine}.")
+    page.section("Spectrum and autocorrelation")
+    page.figure(
+        spectrum_figure(scores),
+        "Left: power spectral density of the offset. Right: autocorrelation about the mean over all drivers.",
+        "Measured and sampled spectrum and autocorrelation",
+    )
+    page.section(
+        "Near the markings",
+        f"How often the reference point comes within {NEAR_MARKING:g} m of a marking (half the width of a car, and a "
+        "margin).",
+    )
+    page.table([_margin_row("measured", scores.margins_real), _margin_row("sampled", scores.margins_sampled)])
+    return page.html(_provenance(scores, profile, inputs))
+
+
+def _add_realism(page: Page, realism: Realism) -> None:
+    """The fair measure, and lane keeping."""
+    page.section(
+        "Compared with other real drivers",
+        "Differences between sampled and measured driving, divided by the differences between measured drivers: a "
+        "ratio of 1 is as close as other real drivers are. Where sampled snippets start at the measured offset, so do "
+        "the other drivers' snippets; free runs have no given start. Recordings contain the driver and the sensor. A "
+        "classifier that does not separate sampled from measured snippets has an AUC of 0.5; in brackets, the 95 % "
+        "interval over resampled drives. With context, the classifier also sees what was around the vehicle. A context "
+        "column that follows from the vehicle's own movement, such as its steering angle, gives sampled movement away.",
+    )
+    for heading, group in condition_groups(realism).items():
+        page.table(ratio_rows(group), heading)
+    page.section("Lane keeping")
+    formats = {"measured": ".4g", "sampled": ".4g", "distance [sd]": ".3f", "real drivers [sd]": ".3f"}
+    for one in realism.conditions:
+        if not one.condition.same_start:
+            page.table(indicator_rows(one), one.condition.name, formats=formats)
+    real, sampled = (
+        f"{each.between:.4f}, {each.within:.4f} and {each.inside:.4f} m²"
+        for each in (realism.variance_real, realism.variance_sampled)
+    )
+    page.text(
+        f"Variance between drivers, within drivers and inside snippets of {SNIPPET:g} s: {real} measured, "
+        f"{sampled} sampled."
+    )
+
+
+def _add_violins(page: Page, one: PartEvaluation, caption: str) -> None:
+    page.figure(
+        violin_figure(one.real, one.artificial),
+        f"{caption} Bars: minimum, mean, maximum.",
+        f"Ten pairs of violins; mean distance {one.distances.mean:.3f}.",
     )
 
 
@@ -169,18 +215,15 @@ def _part_row(one: PartEvaluation) -> dict[str, object]:
     }
 
 
-def _metric_table(scores: SnippetScores) -> dict[str, Any]:
-    """Arguments of `render.table`."""
-    rows: list[dict[str, object]] = []
-    tones: dict[int, Tone] = {}
-    for number, name in enumerate(METRICS):
-        distance, floor = scores.distances.by_metric[name], scores.floor.by_metric[name]
-        rows.append({"metric": LABELS[name], "distance": distance, "real drivers": floor, "ratio": distance / floor})
-        tones[number] = _tone(distance / floor)
-    rows.append(
-        {"metric": "mean", "distance": scores.distances.mean, "real drivers": scores.floor.mean, "ratio": scores.ratio}
+def _add_metrics(page: Page, scores: SnippetScores) -> None:
+    pairs = [(LABELS[name], scores.distances.by_metric[name], scores.floor.by_metric[name]) for name in METRICS]
+    pairs.append(("mean", scores.distances.mean, scores.floor.mean))
+    page.table(
+        [{"metric": name, "distance": one, "real drivers": real, "ratio": one / real} for name, one, real in pairs],
+        f"{scores.count} snippets of {scores.seconds:g} s; distances in standard deviations of the measured metric",
+        formats={"distance": ".3f", "real drivers": ".3f", "ratio": ".2f"},
+        tones={number: _tone(one / real) for number, (_, one, real) in enumerate(pairs[:-1])},
     )
-    return {"rows": rows, "tones": tones, "formats": {"distance": ".3f", "real drivers": ".3f", "ratio": ".2f"}}
 
 
 def _margin_row(name: str, one: Margins) -> dict[str, object]:

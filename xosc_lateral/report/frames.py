@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from xosc_lateral.motion.nominal import Activity
-from xosc_lateral.report.figures import MEASURED, SAMPLED, figure_style, new_figure
+from xosc_lateral.report.chart import MEASURED, SAMPLED
+from xosc_lateral.report.figure import Figure
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
     from xosc_lateral.driver.sampled_offsets import SampledOffsets
     from xosc_lateral.enrich.result import Enriched
@@ -49,16 +49,12 @@ def conversion_frame(enriched: Enriched) -> pd.DataFrame:
     return rows.sort_values(["time", "entity"], kind="stable", ignore_index=True).drop(columns="entity")
 
 
-@figure_style()
 def offsets_figure(sampled: Sequence[SampledOffsets]) -> Figure:
     """Offset over time, a panel per run; what was measured beside it where it is known."""
-    figure, axes = new_figure(max(1, len(sampled)), 1, height=0.6 + 1.3 * max(1, len(sampled)))
-    for axis, one in zip(axes[:, 0], sampled, strict=False):
+    figure = Figure(max(1, len(sampled)), height=75.0, legend=True)
+    for panel, one in zip(figure.panels, sampled, strict=False):
         if one.offset_real is not None:
-            axis.plot(one.time, one.offset_real, color=MEASURED, label="measured")
-        axis.plot(one.time, one.offset, color=SAMPLED, label="sampled")
-        axis.set_title(one.drive)
-        axis.set_ylabel("offset [m]")
-        axis.legend(loc="upper right")
-    axes[-1, 0].set_xlabel("time [s]")
+            panel.line(one.time, one.offset_real, MEASURED, label="measured")
+        panel.line(one.time, one.offset, SAMPLED, label="sampled")
+        panel.title, panel.x.label, panel.y.label = one.drive, "time [s]", "offset [m]"
     return figure

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
 
 from xosc_lateral.driver.effects import ColumnEffect
 from xosc_lateral.formats.hashes import parsed_hashes
@@ -13,6 +13,8 @@ from xosc_lateral.identification.close import Finding, LoopResult
 from xosc_lateral.identification.held_out import SNIPPET_ROWS
 from xosc_lateral.identification.residual import GroupError
 from xosc_lateral.identification.selection import Rejected
+from xosc_lateral.report.loop_figures import DRAWINGS, effect_figure, residual_figure, spectrum_figure, traces_figure
+from xosc_lateral.report.loop_json import column_record
 from xosc_lateral.report.loop_words import (
     CERTAIN,
     COMPONENT_WORDS,
@@ -26,11 +28,8 @@ from xosc_lateral.report.loop_words import (
     size_words,
     taken_back_words,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from xosc_lateral.report.render import KeyFigure, Tone
+from xosc_lateral.report.page import KeyFigure, Page, Tone
+from xosc_lateral.report.violins import LABELS, violin_figure
 
 NAMED_DRIVES = 3
 """So many drives are named in the title; more are counted."""
@@ -69,50 +68,171 @@ def finding_sentence(finding: Finding) -> str:
 
 def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] = ()) -> str:
     """HTML page; same result, same bytes. `proofs`: what findings do in a scenario, in words."""
-    from xosc_lateral.report.loop_json import column_record
-    from xosc_lateral.report.loop_traces import traces_figure
-    from xosc_lateral.report.render import render_page
-
-    groups = sorted(result.lack_of_fit.groups, key=lambda group: -group.unexplained)[:LEFT_ROWS]
-    timed = any(finding.lag_s is not None for finding in result.findings)
-    return render_page(
-        "loop.html",
-        title=f"Closed loop: {_title(result.names)}",
-        provenance=_provenance(result, tables),
-        result=result,
-        outcome=outcome(result),
-        certain=CERTAIN,
-        trace=traces_figure(result),
-        snippet_s=(SNIPPET_ROWS - 1) * result.coarse.timeline.step,
-        unexplained=lack_of_fit_words(result),
-        numbers=_numbers(result),
-        capital=_capital,
-        finding_rows=[_finding_row(finding, timed) for finding in result.findings],
-        proof_rows=[{"in a scenario": one} for one in proofs],
-        findings=[(finding, meaning(finding, result), _pictures(result, finding)) for finding in result.findings],
-        only_hidden=not any(finding.columns for finding in result.findings),
-        residuals=_residuals(result),
-        group_rows=[_group_row(group, result) for group in groups],
-        group_tones={k: "bad" for k, group in enumerate(groups) if group.after > FAR * group.floor},
-        n_groups=len(result.lack_of_fit.groups),
-        n_runs=len(result.scored.runs_after),
-        role_rows=[column_record(column, result) for column in sorted(result.identified.usable.roles)],
-        feedback_rows=[
-            {"column": item.column, "reason": feedback_words(item)} for item in result.identified.usable.feedback
-        ],
-        rejected_rows=[_rejected_row(item) for item in result.identified.selection.rejected],
-        **_movement(result),
+    names = ", ".join(result.names) if len(result.names) <= NAMED_DRIVES else f"{len(result.names)} drives"
+    page = Page(f"Closed loop: {names}")
+    page.lead(outcome(result))
+    page.key_figures(_numbers(result))
+    page.lead(lack_of_fit_words(result))
+    page.section("Columns, and what they are taken for")
+    page.table(
+        [column_record(column, result) for column in sorted(result.identified.usable.roles)],
+        "Role of every column, by whom it was given, and its use. Road, weather and traffic that are declared are "
+        "never dismissed as consequences; own movement and time are never causes; all others are tested. Declare with "
+        "`--role COLUMN=ROLE`.",
+    )
+    _add_findings(page, result, proofs)
+    _add_residuals(page, result)
+    _add_movement(page, result)
+    page.section("Consequences of the car's own movement")
+    feedback = result.identified.usable.feedback
+    page.text(
+        "These columns are, or may be, brought about by the car's own movement, as the angle of a steering wheel is. "
+        "They are not used as causes."
+        if feedback
+        else "None."
+    )
+    if feedback:
+        page.table([{"column": item.column, "reason": feedback_words(item)} for item in feedback])
+    page.section(
+        "Tested and rejected",
+        "The strongest candidate of each component that was not significant, and what was found and taken back.",
+    )
+    rejected = result.identified.selection.rejected
+    page.table([_rejected_row(item) for item in rejected], formats={"p-value": ".2g"})
+    page.items(f"`{column}` was not tested: {why}." for column, why in result.identified.usable.unused.items())
+    page.section("How to read this page")
+    page.items(line.format(n_runs=len(result.scored.runs_after), certain=f"{CERTAIN:g}") for line in HOW_TO_READ)
+    return page.html(
+        {
+            "base profile": f"{result.base.name} {profile_hash(result.base)[:12]}",
+            "refined profile": f"{result.refined.name} {profile_hash(result.refined)[:12]}",
+            "held out": result.held_out,
+            "seed": result.seed,
+            **{name: value[:16] for name, value in parsed_hashes(tables).items()},
+        }
     )
 
 
-def _provenance(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
-    return {
-        "base profile": f"{result.base.name} {profile_hash(result.base)[:12]}",
-        "refined profile": f"{result.refined.name} {profile_hash(result.refined)[:12]}",
-        "held out": result.held_out,
-        "seed": result.seed,
-        **{name: value[:16] for name, value in parsed_hashes(tables).items()},
-    }
+HOW_TO_READ = (
+    "Offset: distance of the rear axle from the lane centre, positive to the left of travel.",
+    "Error: the root mean square of measured minus expected over all groups of statistics, on blocks that were used "
+    "neither to choose nor to fit the base, the effects or their sizes. The expectation is the mean of {n_runs} "
+    "simulated runs of the profile under the same context.",
+    "Floor: the same difference between random halves of the measured blocks and all of them. At the floor, no mean, "
+    "spread or frequency band tells the profile from the driver.",
+    "p-value: how often a table without this effect would show one as strong. It is family-wise: all columns, lags "
+    "and shapes that were tested count. Below {certain} it is extrapolated; read it as certain.",
+    "Lag: negative if the driver looks ahead. Response: time constant of a first-order lag, after which about two "
+    "thirds of the response have happened.",
+)
+
+
+def _add_findings(page: Page, result: LoopResult, proofs: Sequence[str]) -> None:
+    page.section("What the profile lacked")
+    if not result.findings:
+        stays = "stays as it was given" if result.given else "is the base that was fitted to these drives"
+        page.text(f"Nothing was added: the profile {stays}.")
+        return
+    timed = any(finding.lag_s is not None for finding in result.findings)
+    page.table(
+        [_finding_row(finding, timed) for finding in result.findings],
+        "Size ± two standard errors: the change from the 5 % to the 95 % quantile of the driving quantity, or an "
+        "amplitude. Errors are held-out errors of the statistic that shows the effect best.",
+        formats={
+            **{"lag [s]": "+.1f", "response [s]": ".1f", "p-value": ".1e"},
+            **{"error before [mm]": ".1f", "error after [mm]": ".1f"},
+        },
+    )
+    for finding in result.findings:
+        page.heading(_capital(finding.effect))
+        page.text(meaning(finding, result))
+        _add_picture(page, result, finding)
+    if proofs:
+        said = "The same stretch converted with an effect and without it, four seeds; the shift is measured there."
+        page.table([{"in a scenario": one} for one in proofs], said)
+    applied = (
+        "`sample --context` and `convert` apply it where the context has the columns, and name the columns that are "
+        "missing."
+        if any(finding.columns for finding in result.findings)
+        else "Effects without a column are drawn anew for every simulated vehicle."
+    )
+    page.text(f"The refined profile `{result.refined.name}` contains what was found. {applied}")
+
+
+def _add_picture(page: Page, result: LoopResult, finding: Finding) -> None:
+    effect = finding.effects[0] if finding.effects else None
+    if not isinstance(effect, ColumnEffect):
+        draw, caption = DRAWINGS[effect.kind if effect is not None else finding.kind]
+        page.figure(draw(result, finding), caption, f"{_capital(finding.effect)}: {caption}")
+    elif finding.statistic in result.scored.real:
+        page.figure(
+            effect_figure(result, finding),
+            "Left: the fitted effect and the measured offsets, less the drives' own means and all other effects (bars "
+            "and band: two standard errors). Right: means of held-out blocks, by fifths of the effect.",
+            f"Curve of {finding.effect} over measured points, and measured against expected before and after.",
+        )
+
+
+def _add_residuals(page: Page, result: LoopResult) -> None:
+    page.section(
+        "Residual by context",
+        "Measured minus expected offset on held-out blocks, by quantile groups of every column and by time; the values "
+        "of the column stand below each panel. The band is the sampling error (95 %): residuals within it are no sign "
+        "of a lack of fit.",
+    )
+    page.text("" if result.identified.usable.columns else "The table has no column that varies.")
+    for what, words in (("mean", "mean offset"), ("spread", SPREAD)):
+        if any(name.startswith(f"{what} by ") and " by effect: " not in name for name in result.scored.real):
+            page.figure(
+                residual_figure(result, what),
+                f"Residual of the {words}, before (grey) and after (orange). Columns of the effects come first.",
+                f"Residual of the {words} by every context column.",
+            )
+    groups = sorted(result.lack_of_fit.groups, key=lambda group: -group.unexplained)[:LEFT_ROWS]
+    page.table(
+        [_group_row(group, result) for group in groups],
+        f"The {len(groups)} of {len(result.lack_of_fit.groups)} groups of statistics with the largest residual above "
+        "the floor: root mean square of measured minus expected [mm]. All groups are in report.json.",
+        formats={"before": ".1f", "after": ".1f", "floor": ".1f", "after / floor": ".2f"},
+        tones={k: "bad" for k, group in enumerate(groups) if group.after > FAR * group.floor},
+    )
+
+
+def _add_movement(page: Page, result: LoopResult) -> None:
+    page.section("Movement")
+    page.figure(
+        traces_figure(result),
+        "Offsets as measured, and one simulated run of the profile before and of the profile after under the same "
+        "context, on blocks that neither was fitted to. The curves are not meant to coincide: two drives of the same "
+        "driver do not either. What should agree is how they move.",
+        "Measured and simulated offsets over time, drive by drive",
+    )
+    page.figure(
+        spectrum_figure(result),
+        "Power spectral density within held-out blocks. Where a profile's curve lies in the band, its movement cannot "
+        "be told from the measured one at that frequency.",
+        "Spectra, measured, before and after.",
+    )
+    scores, seconds = result.scores, (SNIPPET_ROWS - 1) * result.coarse.timeline.step
+    if scores.before is None or scores.after is None or scores.floor is None:
+        page.text(f"There are too few snippets of {seconds:g} s to compare metrics.")
+        return
+    before, after, floor = scores.before.by_metric, scores.after.by_metric, scores.floor.by_metric
+    page.table(
+        [
+            {"metric": LABELS[name], "before": before[name], "after": after[name], "floor": floor[name]}
+            for name in before
+        ],
+        f"Ten metrics of snippets of {seconds:g} s: distance from the measured ones, in standard deviations of these",
+        formats={"before": ".3f", "after": ".3f", "floor": ".3f"},
+        tones={k: _tone(after[name], floor[name]) for k, name in enumerate(before)},
+    )
+    page.figure(
+        violin_figure(scores.real, scores.sampled_after, scores.sampled_before, ("measured", "profile")),
+        f"Ten metrics of snippets of {seconds:g} s: measured (left, blue), profile after (right, orange), profile "
+        "before (dashed). Bars: minimum, mean, maximum.",
+        "Ten violins, measured beside the profile after and before.",
+    )
 
 
 def _rejected_row(item: Rejected) -> dict[str, Any]:
@@ -124,13 +244,7 @@ def _rejected_row(item: Rejected) -> dict[str, Any]:
     }
 
 
-def _title(names: Sequence[str]) -> str:
-    return ", ".join(names) if len(names) <= NAMED_DRIVES else f"{len(names)} drives"
-
-
 def _numbers(result: LoopResult) -> list[KeyFigure]:
-    from xosc_lateral.report.render import KeyFigure
-
     tone: Tone = "bad" if result.lack_of_fit.clear else "good" if result.findings else ""
     errors = (result.error_before, result.error_after, result.floor)
     before, after, floor = (f"{1000 * value:.1f} mm" for value in errors)
@@ -155,45 +269,6 @@ def _finding_row(finding: Finding, timed: bool) -> dict[str, object]:
     }
 
 
-class _Picture(NamedTuple):
-    figure: Figure
-    caption: str
-    alt: str
-
-
-def _pictures(result: LoopResult, finding: Finding) -> list[_Picture]:
-    from xosc_lateral.report.loop_figures import effect_figure
-    from xosc_lateral.report.loop_hidden_figures import DRAWINGS, QUANTILES_CAPTION, quantiles_figure
-
-    effect = finding.effects[0] if finding.effects else None
-    if isinstance(effect, ColumnEffect):
-        caption = (
-            "Left: the fitted effect and the measured offsets, less the drives' own means and all other effects (bars "
-            "and band: two standard errors). Right: means of held-out blocks, by fifths of the effect."
-        )
-        alt = f"Curve of {finding.effect} over measured points, and measured against expected before and after."
-        return (
-            [_Picture(effect_figure(result, finding), caption, alt)] if finding.statistic in result.scored.real else []
-        )
-    draw, caption = DRAWINGS[effect.kind if effect is not None else finding.kind]
-    pictures = [_Picture(draw(result, finding), caption, f"{_capital(finding.effect)}: {caption}")]
-    if finding.kind == "regime":
-        alt = "Quantiles of the local spread, measured, before and after."
-        pictures.append(_Picture(quantiles_figure(result), QUANTILES_CAPTION, alt))
-    return pictures
-
-
-def _residuals(result: LoopResult) -> list[tuple[str, Figure]]:
-    """What is drawn, in words, and its figure."""
-    from xosc_lateral.report.loop_figures import residual_figure
-
-    return [
-        (words, residual_figure(result, what))
-        for what, words in (("mean", "mean offset"), ("spread", SPREAD))
-        if any(name.startswith(f"{what} by ") and " by effect: " not in name for name in result.scored.real)
-    ]
-
-
 def _group_row(group: GroupError, result: LoopResult) -> dict[str, object]:
     return {
         "group": group_words(group.name, result),
@@ -202,21 +277,6 @@ def _group_row(group: GroupError, result: LoopResult) -> dict[str, object]:
         "floor": 1000.0 * group.floor,
         "after / floor": group.after / group.floor if group.floor > 0 else None,
     }
-
-
-def _movement(result: LoopResult) -> dict[str, Any]:
-    from xosc_lateral.report.loop_figures import spectrum_figure, violins_figure
-    from xosc_lateral.report.violins import LABELS
-
-    scores, values = result.scores, {"spectrum": spectrum_figure(result), "metric_rows": []}
-    if scores.before is None or scores.after is None or scores.floor is None:
-        return values
-    before, after, floor = scores.before.by_metric, scores.after.by_metric, scores.floor.by_metric
-    rows = [
-        {"metric": LABELS[name], "before": before[name], "after": after[name], "floor": floor[name]} for name in before
-    ]
-    tones = {k: _tone(after[name], floor[name]) for k, name in enumerate(before)}
-    return values | {"metric_rows": rows, "metric_tones": tones, "violins": violins_figure(result)}
 
 
 def _tone(value: float, floor: float) -> Tone:

@@ -1,36 +1,41 @@
-"""Figures of a closed loop: residual by context, effect curves, spectra, violins."""
+"""Figures of a closed loop: residual by context, effect curves, hidden effects over time, traces, spectra, violins."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects import Acts, ColumnEffect, Product
-from xosc_lateral.evaluation.metrics import METRICS
+from xosc_lateral.driver.effects import Acts, ColumnEffect, Cycle, Product, Regimes, Step, TimeSmooth
 from xosc_lateral.evaluation.spectra import gapped_spectrum
 from xosc_lateral.identification.close import Finding, LoopResult
 from xosc_lateral.identification.cross_validation import hold_out_blocks
-from xosc_lateral.identification.held_out import Scorecard
-from xosc_lateral.report.figures import BLUE, GRID, MUTED, VERMILLION, figure_style, new_figure, new_panels
-from xosc_lateral.report.loop_curves import Curve, curve_of
+from xosc_lateral.report.chart import BLUE, DASHED, MUTED, ORANGE, VERMILLION, Panel
+from xosc_lateral.report.figure import Figure
+from xosc_lateral.report.loop_curves import (
+    MovingStatistic,
+    curve_of,
+    hidden_mean,
+    longest_parts,
+    moving_mean,
+    moving_spread,
+    regime_probability,
+)
 from xosc_lateral.report.loop_words import SPREAD, column_label, product_label
-from xosc_lateral.report.violins import LABELS, density_over
 from xosc_lateral.rows import true_slices
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 FloatArray = NDArray[np.float64]
 
 DRIVES, BEFORE, AFTER = BLUE, MUTED, VERMILLION
 """Measured drives, the profile before and the profile after, in every figure of the loop."""
 
-SPECTRUM_ROWS = 512
-"""Samples per segment of a spectrum: 102 s."""
+SPECTRUM_ROWS, CYCLE_ROWS = 512, 4096
+"""Samples per segment of a spectrum: 102 s; of that about a cycle, at most: 14 min, or a line would be smeared."""
+
+SURROUNDINGS_HZ = 0.07
+"""To either side of a cycle's line. [Hz]"""
 
 TWO_ERRORS = 2.0
 """Half width of bands, in standard errors: chance leaves them 1 time in 20. [-]"""
@@ -44,173 +49,35 @@ NEGLIGIBLE = 1e-2
 PANELS = 4
 """Residual panels side by side."""
 
+MEAN_S, SPREAD_S, REGIME_S = 120.0, 240.0, 20.0
+"""Averaging times of the paths of the mean, of the spread, and of the spread with regimes. [s]"""
 
-@figure_style()
+GAP_S = 5.0
+"""Longer gaps in a drive interrupt a line. [s]"""
+
+QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
+"""As `identification.residual.LOCAL_QUANTILES`."""
+
+
+def _three(result: LoopResult) -> tuple[tuple[Mapping[str, FloatArray], str, str], ...]:
+    """Statistics by group of cells, colour and name: measured, and of both profiles."""
+    scored = result.scored
+    return (
+        (scored.real, DRIVES, "measured"),
+        (scored.before, BEFORE, "profile before"),
+        (scored.after, AFTER, "profile after"),
+    )
+
+
+# ---- columns ----
 def residual_figure(result: LoopResult, what: str) -> Figure:
     """Measured minus expected by every column's fifths, before and after; `what` is "mean" or "spread"."""
     names = _shown(result, what)
-    rows = -(-len(names) // PANELS)
-    figure, axes = new_panels(rows, PANELS, panel_height=0.95, between=0.55, sharey=True)
-    for axis, name in zip(axes.ravel(), names, strict=False):
-        _draw_residual(axis, result, what, name)
-    for axis in axes.ravel()[len(names) :]:
-        axis.set_visible(False)
-    low, high = axes[0, 0].get_ylim()
-    axes[0, 0].set_ylim(min(low, -FLAT_AXIS_CM), max(high, FLAT_AXIS_CM))
-    for axis in axes[:, 0]:
-        axis.set_ylabel("residual [cm]")
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="lower right", ncols=3, borderaxespad=0.1)
+    figure = Figure(-(-len(names) // PANELS), PANELS, height=66.0, share_y="all", legend=True)
+    for number, (panel, name) in enumerate(zip(figure.panels, names, strict=False)):
+        _draw_residual(panel, result, f"{what} by {name}", name)
+        panel.y.label = "residual [cm]" if number % PANELS == 0 else ""
     return figure
-
-
-def _draw_residual(axis: Axes, result: LoopResult, what: str, name: str) -> None:
-    """One column's fifths, over what chance gives."""
-    group = f"{what} by {name}"
-    place = np.arange(len(result.scored.real[group]))
-    floor = 100.0 * TWO_ERRORS * result.lack_of_fit.floors[group]
-    axis.fill_between(place, -floor, floor, color=MUTED, alpha=0.2, linewidth=0, label="sampling error")
-    axis.axhline(0.0, color=MUTED, linewidth=0.6)
-    for values, color, label in ((result.scored.before, BEFORE, "before"), (result.scored.after, AFTER, "after")):
-        axis.plot(
-            place, 100.0 * (result.scored.real[group] - values[group]), "o-", color=color, markersize=3, label=label
-        )
-    _name_bins(axis, result.scored.statistics.middles[name], name)
-    axis.set_title(column_label(name, hint=False))
-
-
-@figure_style()
-def effect_figure(result: LoopResult, finding: Finding) -> Figure:
-    """An effect's curve with its uncertainty over measured points, beside what held-out blocks show."""
-    effect = finding.effects[0]
-    assert isinstance(effect, ColumnEffect)
-    figure, axes = new_figure(1, 2, height=3.3)
-    _draw_curve(axes[0, 0], result, effect)
-    _draw_held_out(axes[0, 1], result, finding, effect)
-    return figure
-
-
-def _draw_held_out(axis: Axes, result: LoopResult, finding: Finding, effect: ColumnEffect) -> None:
-    """The statistics that show an effect best, on blocks that it was not fitted on."""
-    name = finding.statistic.split(" by ", 1)[1]
-    bins = _in_unit(effect, result.scored.statistics.middles[name])
-    for values, color, label in (
-        (result.scored.real, DRIVES, "measured"),
-        (result.scored.before, BEFORE, "profile before"),
-        (result.scored.after, AFTER, "profile after"),
-    ):
-        axis.plot(bins, values[finding.statistic], "o-", color=color, markersize=3.5, label=label)
-    on_mean = effect.acts is Acts.LOCATION
-    axis.set_title("Held-out blocks")
-    axis.set_xlabel("shift by the effect [m]" if on_mean else "factor by the effect [-]")
-    axis.set_ylabel("mean offset [m]" if on_mean else f"{SPREAD} [m]")
-    axis.legend()
-
-
-@figure_style()
-def spectrum_figure(result: LoopResult, finding: Finding | None = None) -> Figure:
-    """Power density of measured offsets and of both profiles' held-out runs."""
-    figure, axes = new_figure(height=3.4)
-    axis = axes[0, 0]
-    draw_spectra(axis, result, SPECTRUM_ROWS)
-    axis.set_xscale("log")
-    axis.set_yscale("log")
-    axis.legend()
-    return figure
-
-
-def draw_spectra(axis: Axes, result: LoopResult, segment: int, *, within_blocks: bool = True) -> None:
-    """Measured spectrum with its uncertainty, and the mean of either profile's runs; `segment` in samples."""
-    timeline = result.coarse.timeline
-    seams = hold_out_blocks(timeline) if within_blocks else timeline.drive
-    together = timeline.valid & np.r_[True, seams[1:] == seams[:-1]]
-    segment = min(segment, max(part.stop - part.start for part in true_slices(together)))  # runs may all be shorter
-    frequency, density, number = gapped_spectrum(timeline.offset[None], timeline.valid, seams, timeline.step, segment)
-    _draw_measured(axis, frequency, density, number)
-    for runs, color, label, style in (
-        (result.scored.runs_before, BEFORE, "profile before", "-"),
-        (result.scored.runs_after, AFTER, "profile after", "--"),
-    ):
-        frequency, density, _ = gapped_spectrum(runs, timeline.valid, seams, timeline.step, segment)
-        axis.plot(frequency, density, color=color, label=label, linestyle=style)
-    axis.set_xlabel("frequency [Hz]")
-    axis.set_ylabel("power density [m²/Hz]")
-
-
-def _draw_measured(axis: Axes, frequency: FloatArray, density: FloatArray, number: float) -> None:
-    """With what so many periodograms leave open."""
-    # the mean of so many independent periodograms, which overlap by half
-    about = TWO_ERRORS / np.sqrt(max(0.75 * number, 1.0))
-    low, high = density * np.exp(-about), density * np.exp(about)
-    axis.fill_between(frequency, low, high, color=DRIVES, alpha=0.2, linewidth=0)
-    axis.plot(frequency, density, color=DRIVES, label="measured (band: two standard errors)")
-
-
-@figure_style()
-def violins_figure(result: LoopResult) -> Figure:
-    """The ten metrics: measured to the left, the profile after to the right, the profile before as an outline."""
-    scores = result.scores
-    figure, axes = new_figure(2, 5, height=5.2)
-    for k, (axis, name) in enumerate(zip(axes.ravel(), METRICS, strict=True)):
-        _draw_violins(axis, scores, k)
-        axis.set_title(LABELS[name])
-        axis.grid(False, axis="x")
-    for axis in axes[:, 0]:
-        axis.set_ylabel("[m]")
-    return figure
-
-
-def _draw_violins(axis: Axes, scores: Scorecard, k: int) -> None:
-    """One metric: measured, after and before."""
-    for values, side, color, filled in (
-        (scores.real[:, k], -1.0, DRIVES, True),
-        (scores.sampled_after[:, k], 1.0, AFTER, True),
-        (scores.sampled_before[:, k], 1.0, BEFORE, False),
-    ):
-        grid, density = density_over(values)
-        width = side * 0.95 * density / density.max()
-        if filled:
-            axis.fill_betweenx(grid, 0.0, width, color=color, alpha=0.35, linewidth=0)
-        axis.plot(width, grid, color=color, linewidth=0.9, linestyle="-" if filled else "--")
-        axis.plot([0.0, 0.8 * side], [values.mean()] * 2, color=color, linewidth=1.6 if filled else 1.0)
-    axis.axvline(0.0, color=GRID, linewidth=0.8)
-    axis.set_xticks([-0.5, 0.5], ["measured", "profile"], fontsize=8.0)
-    axis.set_xlim(-1.15, 1.15)
-
-
-def _draw_curve(axis: Axes, result: LoopResult, effect: ColumnEffect) -> None:
-    curve = curve_of(result, effect)
-    middle, low, high = (
-        _in_unit(effect, curve.strength + share * curve.error) for share in (0.0, -TWO_ERRORS, TWO_ERRORS)
-    )
-    axis.fill_between(curve.over, low, high, color=AFTER, alpha=0.2, linewidth=0, label="two standard errors")
-    axis.plot(curve.over, middle, color=AFTER, label="fitted effect")
-    if len(curve.seen):
-        _draw_points(axis, curve, effect)
-    axis.set_title("The effect")
-    axis.set_xlabel(_quantity_label(effect))
-    axis.set_ylabel("shift of the mean [m], positive to the left" if effect.acts is Acts.LOCATION else "factor [-]")
-    axis.locator_params(axis="x", nbins=6)
-    axis.legend()
-
-
-def _draw_points(axis: Axes, curve: Curve, effect: ColumnEffect) -> None:
-    points, bottom, top = (
-        _in_unit(effect, curve.measured + share * curve.measured_error) for share in (0.0, -TWO_ERRORS, TWO_ERRORS)
-    )
-    axis.errorbar(
-        curve.seen, points, np.stack([points - bottom, top - points]),
-        color=DRIVES, fmt="o", markersize=3.5, elinewidth=1.0, label="measured",
-    )  # fmt: skip
-
-
-def _in_unit(effect: ColumnEffect, strength: FloatArray) -> FloatArray:
-    return strength if effect.acts is Acts.LOCATION else np.exp(strength)
-
-
-def _quantity_label(effect: ColumnEffect) -> str:
-    if isinstance(effect, Product):
-        return product_label(effect)
-    return column_label(effect.columns[0])
 
 
 def _shown(result: LoopResult, what: str) -> list[str]:
@@ -224,15 +91,25 @@ def _shown(result: LoopResult, what: str) -> list[str]:
     return sorted(names, key=lambda name: not any(column == name or f"({column})" in name for column in acting))
 
 
-def _name_bins(axis: Axes, middles: FloatArray, name: str) -> None:
-    """Bins stand side by side; the outer ones and the middle one say what the column is there."""
-    last = len(middles) - 1
-    marked: Sequence[int] = sorted({0, last // 2, last})
+def _draw_residual(panel: Panel, result: LoopResult, group: str, name: str) -> None:
+    """One column's fifths side by side, over what chance gives; the outer ones and the middle one say their value."""
+    scored, middles = result.scored, result.scored.statistics.middles[name]
+    place = np.arange(len(scored.real[group]))
+    floor = 100.0 * TWO_ERRORS * result.lack_of_fit.floors[group]
+    panel.band(place, -floor, floor, MUTED, opacity=0.2, label="sampling error")
+    panel.level(color=MUTED)
+    for values, color, label in ((scored.before, BEFORE, "before"), (scored.after, AFTER, "after")):
+        residual = 100.0 * (scored.real[group] - values[group])
+        panel.line(place, residual, color, label=label)
+        panel.dots(place, residual, color)
     # what a smoothed switch decays to is as good as 0
     shown = np.where(np.abs(middles) < NEGLIGIBLE * np.nanmax(np.abs(middles)), 0.0, middles)
-    labels = [f"{100 * shown[k]:.0f} %" if name == "time" else _short(shown[k]) for k in marked]
-    axis.set_xticks(list(marked), labels, fontsize=8.0)
-    axis.set_xlim(-0.3, last + 0.3)
+    last = len(middles) - 1
+    panel.x.ticks = [
+        (k, f"{100 * shown[k]:.0f} %" if name == "time" else _short(shown[k])) for k in sorted({0, last // 2, last})
+    ]
+    panel.x.limits, panel.y.holds = (-0.3, last + 0.3), (-FLAT_AXIS_CM, FLAT_AXIS_CM)
+    panel.title = column_label(name, hint=False)
 
 
 def _short(value: float) -> str:
@@ -240,3 +117,205 @@ def _short(value: float) -> str:
     if np.isnan(value):
         return "none"
     return f"{value:.0f}" if 10.0 <= abs(value) < 1e4 else f"{value:.2g}"
+
+
+def effect_figure(result: LoopResult, finding: Finding) -> Figure:
+    """An effect's curve with its uncertainty over measured points, beside what held-out blocks show."""
+    effect = finding.effects[0]
+    assert isinstance(effect, ColumnEffect)
+    on_mean = effect.acts is Acts.LOCATION
+    figure = Figure(1, 2, height=180.0, legend=True)
+    panel, held_out = figure.panels
+    curve = curve_of(result, effect)
+
+    def shown(strength: FloatArray) -> FloatArray:
+        return strength if on_mean else np.exp(strength)
+
+    about, errors = TWO_ERRORS * curve.error, TWO_ERRORS * curve.measured_error
+    low, high = shown(curve.strength - about), shown(curve.strength + about)
+    panel.band(curve.over, low, high, AFTER, opacity=0.2, label="two standard errors")
+    panel.line(curve.over, shown(curve.strength), AFTER, label="fitted effect")
+    for place, value, error in zip(curve.seen, curve.measured, errors, strict=True):
+        panel.line((place, place), shown(np.array([value - error, value + error])), DRIVES, width=1.0)
+    if len(curve.seen):
+        panel.dots(curve.seen, shown(curve.measured), DRIVES, label="measured")
+    panel.title = "The effect"
+    panel.x.label = product_label(effect) if isinstance(effect, Product) else column_label(effect.columns[0])
+    panel.y.label = "shift, positive to the left [m]" if on_mean else "factor [-]"
+    bins = shown(result.scored.statistics.middles[finding.statistic.split(" by ", 1)[1]])
+    for values, color, label in _three(result):
+        held_out.line(bins, values[finding.statistic], color, label=label)
+        held_out.dots(bins, values[finding.statistic], color)
+    held_out.title = "Held-out blocks"
+    held_out.x.label = "shift by the effect [m]" if on_mean else "factor by the effect [-]"
+    held_out.y.label = "mean offset [m]" if on_mean else f"{SPREAD} [m]"
+    return figure
+
+
+# ---- movement ----
+def traces_figure(result: LoopResult) -> Figure:
+    """The longest uninterrupted stretches of a few drives: measured, profile before, profile after, on one scale."""
+    timeline, scored = result.coarse.timeline, result.scored
+    parts = longest_parts(result)
+    figure = Figure(len(parts), 3, height=54.0, share_x="all", share_y="all")
+    offsets = (timeline.offset, scored.runs_before[0], scored.runs_after[0])
+    for number, rows in enumerate(parts):
+        name = timeline.names[timeline.drive[rows.start]]
+        for panel, offset, (_, color, label) in zip(figure.row(number), offsets, _three(result), strict=True):
+            panel.level()
+            panel.line(timeline.time[rows] - timeline.time[rows.start], offset[rows], color, label=label)
+            panel.title, panel.x.label = f"{name}, {label}", "time [s]"
+    figure.row(len(parts) // 2)[0].y.label = "offset [m]"
+    return figure
+
+
+def spectrum_figure(result: LoopResult, finding: Finding | None = None) -> Figure:
+    """Power density of measured offsets and of both profiles' held-out runs."""
+    figure = Figure(height=170.0, legend=True)
+    (panel,) = figure.panels
+    draw_spectra(panel, result, SPECTRUM_ROWS)
+    panel.x.log = True
+    return figure
+
+
+def draw_spectra(panel: Panel, result: LoopResult, segment: int, *, within_blocks: bool = True) -> None:
+    """Measured spectrum with its uncertainty, and the mean of either profile's runs; `segment` in samples."""
+    timeline = result.coarse.timeline
+    seams = hold_out_blocks(timeline) if within_blocks else timeline.drive
+    together = timeline.valid & np.r_[True, seams[1:] == seams[:-1]]
+    segment = min(segment, max(part.stop - part.start for part in true_slices(together)))  # runs may all be shorter
+    for runs, color, label, dashes in (
+        (timeline.offset[None], DRIVES, "measured (band: two standard errors)", ""),
+        (result.scored.runs_before, BEFORE, "profile before", ""),
+        (result.scored.runs_after, AFTER, "profile after", DASHED),
+    ):
+        frequency, density, number = gapped_spectrum(runs, timeline.valid, seams, timeline.step, segment)
+        if color == DRIVES:
+            # the mean of so many independent periodograms, which overlap by half
+            about = TWO_ERRORS / np.sqrt(max(0.75 * number, 1.0))
+            inner = slice(1, None)  # frequency 0 has no place on a logarithmic axis
+            low, high = density[inner] * np.exp(-about), density[inner] * np.exp(about)
+            panel.band(frequency[inner], low, high, DRIVES, opacity=0.2)
+        panel.line(frequency[1:], density[1:], color, dashes=dashes, label=label)
+    panel.y.log = True
+    panel.x.label, panel.y.label = "frequency [Hz]", "power density [m²/Hz]"
+
+
+# ---- hidden effects ----
+def _cycle(result: LoopResult, finding: Finding) -> Figure:
+    """Spectrum about the cycle's frequency, the line marked."""
+    effect = finding.effects[0]
+    assert isinstance(effect, Cycle)
+    figure = Figure(height=165.0, legend=True)
+    (panel,) = figure.panels
+    line = 1.0 / effect.period_s
+    low, high = max(0.0, line - SURROUNDINGS_HZ), line + SURROUNDINGS_HZ
+    panel.across(
+        line - 0.002, line + 0.002, ORANGE, opacity=0.4, label=f"fitted: {line:.3f} Hz, once in {effect.period_s:.1f} s"
+    )
+    longest = int(np.bincount(result.scored.statistics.timeline.drive).max())
+    draw_spectra(panel, result, min(CYCLE_ROWS, 2 ** int(np.log2(longest))), within_blocks=False)
+    curves = [curve.y[(curve.x > low) & (curve.x < high)] for curve in panel.curves()]
+    seen = np.concatenate([each[np.isfinite(each) & (each > 0.0)] for each in curves])
+    panel.x.limits = low, high
+    panel.y.limits = (float(seen.min()) / 1.5, float(seen.max()) * 2.0) if len(seen) else None
+    return figure
+
+
+def _time(result: LoopResult, finding: Finding) -> Figure:
+    """Mean or spread over time, with the fitted step or curve."""
+    effect = finding.effects[0]
+    figure = Figure(height=165.0, legend=True)
+    (panel,) = figure.panels
+    if isinstance(effect, TimeSmooth) and not effect.location:
+        _draw_spread(panel, result, effect, finding.size_m)
+        return figure
+    moving = moving_mean(result, MEAN_S)
+    _draw_statistic(panel, moving)
+    word = "step" if isinstance(effect, Step) else "smooth change"
+    fitted = hidden_mean(result) + moving.measured.mean()
+    panel.line(moving.time, fitted, ORANGE, width=2.0, label=f"fitted {word}")
+    panel.y.label = f"mean over {MEAN_S / 60:.0f} min, positive to the left [m]"
+    return figure
+
+
+def _draw_spread(panel: Panel, result: LoopResult, effect: TimeSmooth, factor: float) -> None:
+    moving = moving_spread(result, SPREAD_S)
+    curve = effect.path(effect.spread, moving.time)
+    waves = [effect.path(tuple(row), moving.time) for row in np.eye(len(effect.spread))]
+    error = np.sqrt(sum(np.square(wave * own) for wave, own in zip(waves, effect.spread_errors, strict=True)))
+    middle = float(np.mean(np.log(moving.measured) - curve)) + curve
+    low, high = (np.exp(middle + sign * TWO_ERRORS * error) for sign in (-1.0, 1.0))
+    panel.band(moving.time, low, high, ORANGE, opacity=0.25)
+    _draw_statistic(panel, moving)
+    panel.line(moving.time, np.exp(middle), ORANGE, label=f"fitted: factor {factor:.2f}")
+    panel.y.holds, panel.y.label = (0.0,), f"spread over {SPREAD_S / 60:.0f} min [m]"
+
+
+def _draw_statistic(panel: Panel, moving: MovingStatistic) -> None:
+    for values, color, dashes, label in (
+        (moving.measured, DRIVES, "", "measured"),
+        (moving.before, BEFORE, "", "profile before, all runs"),
+        (moving.after, AFTER, DASHED, "profile after, all runs"),
+    ):
+        panel.line(moving.time, _gapped(moving, values), color, width=1.2, dashes=dashes, label=label)
+    panel.x.label = "time [s]"
+
+
+def _regimes(result: LoopResult, finding: Finding) -> Figure:
+    """Local spread over time where the regime of large spread is likely, and how often which spread occurs."""
+    figure = Figure(1, 2, height=165.0, legend=True)
+    over_time, quantiles = figure.panels
+    moving = moving_spread(result, REGIME_S)
+    top = 1.05 * float(moving.measured.max())
+    loud = np.where(regime_probability(result) > 0.5, top, np.nan)
+    over_time.band(moving.time, 0.0, loud, ORANGE, opacity=0.3, label="large spread more likely than not")
+    over_time.line(moving.time, _gapped(moving, moving.measured), DRIVES, width=0.8, label="measured")
+    over_time.y.limits, over_time.y.label, over_time.x.label = (
+        (0.0, top),
+        f"spread within {REGIME_S:.0f} s [m]",
+        "time [s]",
+    )
+    _draw_quantiles(quantiles, result)
+    return figure
+
+
+def _population(result: LoopResult, finding: Finding) -> Figure:
+    """Quantiles of the local spread, measured and of both profiles."""
+    figure = Figure(height=150.0, legend=True)
+    _draw_quantiles(figure.panels[0], result)
+    return figure
+
+
+def _draw_quantiles(panel: Panel, result: LoopResult) -> None:
+    for values, color, label in _three(result):
+        place, spread = 100.0 * np.asarray(QUANTILES), values["quantiles of local spread"]
+        panel.line(place, spread, color, label=label)
+        panel.dots(place, spread, color)
+    panel.y.holds, panel.y.label = (0.0,), f"{SPREAD} [m]"
+    panel.x.label = "share of the time with less spread [%]"
+
+
+def _gapped(moving: MovingStatistic, values: FloatArray) -> FloatArray:
+    """NaN at the first second after a gap, so that no line is drawn across it."""
+    return np.where(np.diff(moving.time, prepend=moving.time[:1]) > GAP_S, np.nan, values)
+
+
+DRAWINGS: Mapping[str, tuple[Callable[[LoopResult, Finding], Figure], str]] = MappingProxyType(
+    {
+        Cycle.kind: (
+            _cycle,
+            "Power spectral density about the fitted oscillation, a peak that the profile before does not have.",
+        ),
+        TimeSmooth.kind: (_time, "What changes with time, over the drive; orange: the fitted curve."),
+        Regimes.kind: (
+            _regimes,
+            "Left: local spread over the drive; shaded: the regime of large spread is more likely than not. Right: its "
+            "distribution on held-out blocks.",
+        ),
+        Step.kind: (_time, "Mean position over the drive; orange: the fitted step."),
+        "memory": (spectrum_figure, "Power spectral density of the movement, measured and of both profiles."),
+        "population": (_population, "Distribution of the local spread of the movement on held-out blocks."),
+    }
+)
+"""By kind of effect, or of finding: what draws it, and the caption."""

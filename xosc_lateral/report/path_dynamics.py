@@ -27,7 +27,7 @@ class LateralDynamics(NamedTuple):
     jerk: FloatArray
 
 
-def lateral_dynamics(motion: EntityMotion, path: WorldTrajectory) -> LateralDynamics:
+def lateral_dynamics(motion: EntityMotion, path: WorldTrajectory | EntityMotion) -> LateralDynamics:
     """Acceleration across the direction of travel, and its derivative.
 
     Parameters

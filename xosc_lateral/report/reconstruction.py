@@ -16,14 +16,13 @@ from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.reconstruction.drivers import ChosenDriver
 from xosc_lateral.reconstruction.encounters import Beside, Encounter
 from xosc_lateral.reconstruction.plan import Residuals, VehiclePlan, planned_motion
-from xosc_lateral.report.figures import MEASURED, SAMPLED, figure_style, new_figure
-from xosc_lateral.report.player.scene import paths_scene
-from xosc_lateral.report.render import KeyFigure, render_page
+from xosc_lateral.report.chart import MEASURED, SAMPLED
+from xosc_lateral.report.figure import Figure
+from xosc_lateral.report.page import KeyFigure, Page
+from xosc_lateral.report.scene import scene_of
 from xosc_lateral.version import __version__
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from xosc_lateral.pipeline.reconstruct import Reconstructed
 
 FloatArray = NDArray[np.float64]
@@ -183,39 +182,75 @@ def page_of(made: Reconstructed, facts: dict[str, Any]) -> str:
     motions = NominalMotion(
         FRAME, tuple(motion for motion, _ in pairs), (), float(time[-1]), "end of the recording", ()
     )
-    return render_page(
-        "reconstruction.html",
-        title=f"{facts['name']}: from the recording to maneuvers",
-        provenance=facts["provenance"],
-        facts=facts,
-        figures=[
+    page = Page(f"{facts['name']}: from the recording to maneuvers")
+    page.lead(
+        f"{numbers['vehicles']} vehicles of `{facts['recording']}`, {facts['window'][0]:.1f} to "
+        f"{facts['window'][1]:.1f} s, as a maneuver-based scenario: lane changes, a speed of straight pieces for each, "
+        "appearing and leaving. What maneuvers do not say, how somebody moves in the lane, is left to the driver "
+        "profiles in `drivers.csv`."
+    )
+    in_lane = f"in lane {numbers['across_in_lane_rms']:.2f} m"
+    page.key_figures(
+        [
             KeyFigure(f"{numbers['vehicles']}", "vehicles", f"{numbers['duration']:g} s"),
             KeyFigure(f"{numbers['lane_changes']}", "lane changes"),
             KeyFigure(f"{numbers['along_p95']:.2f} m", "along the road, 95 % within", "recorded less maneuvers"),
-            KeyFigure(
-                f"{numbers['across_rms']:.2f} m", "across, rms", f"in lane {numbers['across_in_lane_rms']:.2f} m"
-            ),
-        ],
-        scene=paths_scene(motions, network, [result for _, result in pairs]),
-        spread=_spread(residuals),
+            KeyFigure(f"{numbers['across_rms']:.2f} m", "across, rms", in_lane),
+        ]
     )
+    page.section(
+        "Player",
+        "From above. Filled boxes are the recorded vehicles, dashed outlines (nominal) the places that the maneuvers "
+        "give them. Click a vehicle to follow it, point at it for its values, drag to look elsewhere.",
+    )
+    scene = scene_of(motions, network, [result for _, result in pairs])
+    page.player(scene, "Recorded and reconstructed traffic from above")
+    page.section(
+        "Residuals",
+        "Recorded less planned. Along the road, the speed profile is at fault: "
+        f"{numbers['corners_per_minute']} changes of acceleration a minute leave 95 % within {numbers['along_p95']} m. "
+        f"Across, it is mostly the driver: {numbers['across_in_lane_rms']} m rms outside of maneuvers, "
+        f"{numbers['across_in_maneuvers_rms']} m in them.",
+    )
+    page.figure(
+        _spread(residuals),
+        "Distribution of the residuals of all vehicles.",
+        "Histograms of recorded less planned position, along and across the road",
+    )
+    page.section("Vehicles")
+    page.table(facts["vehicles"], "Times in s, lengths in m. Profile: who drives it in a twin.")
+    page.section("Lateral maneuvers")
+    page.table(
+        facts["maneuvers"],
+        "Start and duration in s, residual of the fitted shape in m (rms). Cut off: the recording begins or ends "
+        "within it.",
+    )
+    page.section("Encounters")
+    page.table(
+        facts["encounters"],
+        "Every lane change, half way, and every braking at its begin: who is ahead and behind in the lane it leads to, "
+        "free space between the bumpers in m, and time in s until that is used up.",
+    )
+    page.section("Not expressed")
+    page.items(facts["not_expressed"])
+    page.text("" if facts["not_expressed"] else "Nothing was left out.")
+    return page.html(facts["provenance"])
 
 
-@figure_style()
 def _spread(residuals: Sequence[Residuals]) -> Figure:
-    figure, axes = new_figure(1, 2, height=2.8)
-    along = np.concatenate([one.along for one in residuals])
-    across = np.concatenate([one.across for one in residuals])
-    in_lane = np.concatenate([one.in_lane for one in residuals])
-    left, right = axes[0]
-    left.hist(np.clip(along, -1.0, 1.0), 80, density=True, color=SAMPLED, label="along")
-    left.set(xlabel="recorded ahead of the maneuvers [m]", ylabel="density [1/m]", title="Along the road")
-    bins = np.linspace(-1.5, 1.5, 91).tolist()
-    right.hist(across[in_lane], bins, density=True, color=MEASURED, alpha=0.6, label="road-following")
-    if (~in_lane).any():
-        right.hist(across[~in_lane], bins, density=True, histtype="step", color=SAMPLED, label="in maneuvers")
-    right.set(xlabel="recorded to the left of the maneuvers [m]", title="Across")
-    right.legend(loc="upper right")
+    figure = Figure(1, 2, height=130.0, legend=True)
+    left, right = figure.panels
+    along, across, in_lane = (
+        np.concatenate([getattr(one, name) for one in residuals]) for name in ("along", "across", "in_lane")
+    )
+    density, edges = np.histogram(np.clip(along, -1.0, 1.0), np.linspace(-1.0, 1.0, 81), density=True)
+    left.steps(edges, density, SAMPLED)
+    for part, color, label in ((in_lane, MEASURED, "road-following"), (~in_lane, SAMPLED, "in maneuvers")):
+        if part.any():
+            density, edges = np.histogram(across[part], np.linspace(-1.5, 1.5, 91), density=True)
+            right.steps(edges, density, color, label=label)
+    left.title, left.x.label, left.y.label = "Along the road", "recorded ahead of the maneuvers [m]", "density [1/m]"
+    right.title, right.x.label = "Across", "recorded to the left of the maneuvers [m]"
     return figure
 
 

@@ -15,10 +15,9 @@ from xosc_lateral.enrich.result import ConversionProvenance, ConvertedScenario, 
 from xosc_lateral.motion.gaps import REACH, Gap
 from xosc_lateral.motion.nominal import Note
 from xosc_lateral.report import scenario_figures as figures
-from xosc_lateral.report import scenario_time_figures as over_time
+from xosc_lateral.report.page import KeyFigure, Page, Tone
 from xosc_lateral.report.path_dynamics import COMFORTABLE
-from xosc_lateral.report.player.scene import enriched_scene
-from xosc_lateral.report.render import KeyFigure, Tone, render_page
+from xosc_lateral.report.scene import scene_of
 
 WRITTEN_AS = {"trajectory": "a trajectory", "lane-offset": "lane offsets"}
 
@@ -179,63 +178,145 @@ def scenario_page(
         Who is, in a line.
     """
     done = [entity for entity in enriched.entities if entity.is_enriched]
-    others = [entity for entity in enriched.entities if not entity.is_enriched]
-    return render_page(
-        "conversion.html",
-        title=f"{Path(source).name}: lateral movement added",
-        provenance={"scenario": source, "output": output, **provenance},
-        enriched=enriched,
-        output=output,
-        warnings=warnings,
-        under_test=under_test,
-        done=done,
-        numbers=_key_figures(enriched),
-        scene=enriched_scene(enriched),
-        stretched=figures.paths_stretched(enriched),
-        above=figures.paths_from_above(enriched),
-        others=[{"entity": entity.name, "reason": entity.why} for entity in others],
-        speeds=over_time.speeds_over_time(enriched),
-        timeline=over_time.timeline(enriched),
-        segment_rows=_segment_rows(enriched),
-        notes=_note_rows(enriched.motion.notes),
-        comfortable=COMFORTABLE,
-        reach=f"{REACH:g}",
-        left_out=lambda most: _left_out(done, most),
-        **_enriched_entities(enriched, done),
-        **_gaps(enriched),
+    page = Page(f"{Path(source).name}: lateral movement added")
+    page.lead(
+        (
+            f"{len(done)} of {len(enriched.entities)} entities now move inside their lanes as the chosen drivers do; "
+            "their maneuvers are unchanged."
+            if done
+            else "No entity was enriched; the reasons are listed below."
+        )
+        + f" The scenario runs for {enriched.motion.end_time:.1f} s (ended by the {enriched.motion.ended_by}). "
+        f"The result is in `{output}`."
     )
+    page.key_figures(_key_figures(enriched, done))
+    page.lead(under_test)
+    for warning in warnings:
+        page.warning(warning)
+    page.section(
+        "Player",
+        "The scenario from above. Filled boxes are the enriched vehicles, dashed outlines their nominal places. A "
+        "lateral stretch above 1 widens the road, so that decimetres become visible. Click a vehicle to follow it, "
+        "point at it for its values, drag to look elsewhere.",
+    )
+    page.player(
+        scene_of(enriched.motion, enriched.network, enriched.entities), "Scenario from above, nominal and enriched"
+    )
+    _add_paths(page, enriched)
+    _add_offsets(page, enriched, done)
+    _add_dynamics(page, enriched, done)
+    _add_gaps(page, enriched)
+    page.section(
+        "Segments",
+        "Offsets are sampled where a vehicle simply follows its road. Everywhere else the table gives the reason why "
+        "not.",
+    )
+    page.figure(figures.timeline(enriched), "Coloured: road-following, by entity over time. Grey: not.", over_time=True)
+    rows = [
+        {"entity": entity.name, "from [s]": span.start, "to [s]": span.end, "what": span.kind.value}
+        for entity in enriched.entities
+        for span in entity.spans
+    ]
+    page.table(rows, "Segments of every entity", formats={"from [s]": ".2f", "to [s]": ".2f"})
+    add_notes(page, enriched.motion.notes)
+    return page.html({"scenario": source, "output": output, **provenance})
 
 
-def _enriched_entities(enriched: Enriched, done: Sequence[EntityResult]) -> dict[str, Any]:
-    if not done:
-        return {}
-    return {
-        "offsets": over_time.offsets_over_time(enriched, _largest(done, MOST_PANELS)),
-        "dynamics": over_time.dynamics_over_time(_largest(done, MOST_DYNAMICS)),
-        "entity_rows": [_entity_row(entity) for entity in done],
-        "entity_formats": {"time [s]": ".1f", f"> {COMFORTABLE} m/s² [%]": ".1f"},
-        "most_panels": MOST_PANELS,
-        "most_dynamics": MOST_DYNAMICS,
-    }
+def add_notes(page: Page, notes: Sequence[Note]) -> None:
+    """The section on what was not played as the scenario states it."""
+    page.section("Not played as written")
+    if not notes:
+        page.text("Nothing: every action and condition was played as the scenario states it.")
+        return
+    rows = [
+        {"what": note.what, "element": note.element, "file": Path(note.path).name, "line": str(note.line or "")}
+        for note in notes
+    ]
+    page.table(rows, "What was left out or played differently")
 
 
-def _gaps(enriched: Enriched) -> dict[str, Any]:
+def _add_paths(page: Page, enriched: Enriched) -> None:
+    stretched, above = figures.paths_stretched(enriched), figures.paths_from_above(enriched)
+    page.section("Paths")
+    if stretched is None or above is None:
+        page.text("No entity is on a road.")
+        return
+    page.figure(
+        stretched,
+        "Position across the road (t) over position along it (s), with the scale across the road exaggerated. "
+        "Coloured: enriched. Dashed: nominal. Dots: where each entity starts. Bends of the road are drawn straight.",
+        "Lateral position of every vehicle along the road, nominal and enriched, with lane markings",
+    )
+    page.figure(above, "The same, true to scale.", "Plan view of the road with nominal and enriched paths")
+
+
+def _add_offsets(page: Page, enriched: Enriched, done: Sequence[EntityResult]) -> None:
+    page.section("Offsets", "The distance between the enriched and the nominal path, positive to the left of travel.")
+    if done:
+        page.figure(
+            figures.offsets_over_time(enriched, _largest(done, MOST_PANELS)),
+            "Shaded: road-following segments, where offsets are sampled. Between two segments, the offset leads "
+            f"smoothly from one to the other.{_left_out(done, MOST_PANELS)}",
+            "Offset over time of each enriched entity",
+            over_time=True,
+        )
+        page.table(
+            [_entity_row(entity) for entity in done],
+            "Enriched entities. Acceleration and jerk are lateral, and what enriching adds to the nominal path.",
+            formats={"time [s]": ".1f", f"> {COMFORTABLE} m/s² [%]": ".1f"},
+        )
+    others = [{"entity": one.name, "reason": one.why} for one in enriched.entities if not one.is_enriched]
+    if others:
+        page.table(others, "Entities that keep their nominal motion")
+
+
+def _add_dynamics(page: Page, enriched: Enriched, done: Sequence[EntityResult]) -> None:
+    page.section("Speed and lateral dynamics")
+    page.figure(
+        figures.speeds_over_time(enriched.motion, enriched.entities),
+        "Coloured: enriched. Dashed: nominal. Lateral movement hardly changes the distance driven, and therefore "
+        "hardly changes the speed.",
+        "Speed over time of every entity",
+        over_time=True,
+    )
+    if done:
+        page.figure(
+            figures.dynamics_over_time(_largest(done, MOST_DYNAMICS)),
+            "Blue: enriched. Dashed: nominal, that is, what curves and lane changes require. The band reaches "
+            f"{COMFORTABLE} m/s² to either side of nominal; real drivers rarely leave it while they keep their lane."
+            f"{_left_out(done, MOST_DYNAMICS)}",
+            "Lateral acceleration and jerk over time, nominal and enriched",
+            over_time=True,
+        )
+
+
+def _add_gaps(page: Page, enriched: Enriched) -> None:
+    page.section(
+        "Gaps",
+        "The smallest free space between the bounding boxes of two vehicles that come within "
+        f"{REACH:g} m of each other.",
+    )
     before = {gap.names: gap for gap in enriched.gaps_before}
     after = {gap.names: gap for gap in enriched.gaps_after}
     pairs = [(before.get(names), after.get(names)) for names in sorted(before | after)]
     pairs.sort(key=lambda pair: min(gap.distance for gap in pair if gap is not None))
     if not pairs:
-        return {"pairs": pairs}
-    tones = _tones(enriched, pairs)
-    return {
-        "pairs": pairs,
-        "shown_pairs": MOST_PAIRS,
-        "gaps": over_time.gaps_before_and_after(pairs[:MOST_PAIRS]),
-        "gap_rows": [_gap_row(*pair) for pair in pairs],
-        "gap_formats": dict.fromkeys(("nominal [m]", "enriched [m]", "change [m]"), ".2f")
-        | dict.fromkeys(GAP_TIMES, ".1f"),
-        "gap_tones": tones,
-    }
+        page.text("No two vehicles come that close to each other.")
+        return
+    closest = (
+        f"the {MOST_PAIRS} closest of {len(pairs)} pairs" if len(pairs) > MOST_PAIRS else "the closest pairs first"
+    )
+    page.figure(
+        figures.gaps_before_and_after(pairs[:MOST_PAIRS]),
+        f"Nominal and enriched, {closest}.",
+        "Smallest gap of each pair of vehicles, nominal and enriched",
+    )
+    page.table(
+        [_gap_row(*pair) for pair in pairs],
+        "Pairs of vehicles. Marked: pairs that touch in the enriched scenario only.",
+        formats=dict.fromkeys(("nominal [m]", "enriched [m]", "change [m]"), ".2f") | dict.fromkeys(GAP_TIMES, ".1f"),
+        tones=_tones(enriched, pairs),
+    )
 
 
 def _tones(enriched: Enriched, pairs: Sequence[tuple[Gap | None, Gap | None]]) -> dict[int, Tone]:
@@ -244,8 +325,7 @@ def _tones(enriched: Enriched, pairs: Sequence[tuple[Gap | None, Gap | None]]) -
     return {number: "bad" for number, pair in enumerate(pairs) if any(gap and gap.names in touching for gap in pair)}
 
 
-def _key_figures(enriched: Enriched) -> list[KeyFigure]:
-    done = [entity for entity in enriched.entities if entity.is_enriched]
+def _key_figures(enriched: Enriched, done: Sequence[EntityResult]) -> list[KeyFigure]:
     if not done:
         return []
     offsets = np.concatenate([segment.offset for entity in done for segment in entity.segments])
@@ -300,21 +380,6 @@ def _gap_row(before: Gap | None, after: Gap | None) -> dict[str, object]:
         GAP_TIMES[1]: None if after is None else after.time,
         "change [m]": None if before is None or after is None else after.distance - before.distance,
     }
-
-
-def _segment_rows(enriched: Enriched) -> list[dict[str, object]]:
-    return [
-        {"entity": entity.name, "from [s]": span.start, "to [s]": span.end, "what": span.kind.value}
-        for entity in enriched.entities
-        for span in entity.spans
-    ]
-
-
-def _note_rows(notes: Sequence[Note]) -> list[dict[str, object]]:
-    return [
-        {"what": note.what, "element": note.element, "file": Path(note.path).name, "line": str(note.line or "")}
-        for note in notes
-    ]
 
 
 def _largest(entities: Sequence[EntityResult], most: int) -> list[EntityResult]:

@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.evaluation.metrics import METRICS
-from xosc_lateral.evaluation.parts import PartEvaluation
-from xosc_lateral.report.figures import GRID, MEASURED, SAMPLED, figure_style, new_figure
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from xosc_lateral.report.chart import DASHED, MEASURED, MUTED, SAMPLED
+from xosc_lateral.report.figure import Figure
 
 FloatArray = NDArray[np.float64]
 
@@ -35,35 +29,43 @@ SHOWN_QUANTILES = (0.001, 0.999)
 """Violins are drawn within these; minimum and maximum are bars of their own."""
 
 
-@figure_style()
-def violin_figure(evaluation: PartEvaluation) -> Figure:
-    """Ten pairs of half violins, measured beside sampled, with bars at minimum, mean and maximum."""
-    figure, axes = new_figure(2, 5, height=5.0)
-    for k, name in enumerate(METRICS):
-        axis = axes[k // 5, k % 5]
-        for values, side, color, name_ in (
-            (evaluation.real[:, k], -1.0, MEASURED, "measured"),
-            (evaluation.artificial[:, k], 1.0, SAMPLED, "sampled"),
-        ):
-            _half_violin(axis, values, side, color, name_)
-        axis.set_title(LABELS[name])
-        axis.set_xticks([-0.5, 0.5], ["measured", "sampled"], fontsize=8.0)
-        axis.set_xlim(-1.15, 1.15)
-        axis.grid(False, axis="x")
-        if k % 5 == 0:
-            axis.set_ylabel("[m]")
+def violin_figure(
+    left: FloatArray,
+    right: FloatArray,
+    before: FloatArray | None = None,
+    names: tuple[str, str] = ("measured", "sampled"),
+) -> Figure:
+    """Ten pairs of half violins with bars at minimum, mean and maximum.
+
+    Parameters
+    ----------
+    left, right : array, shape (n, 10)
+        Metrics of snippets, of which the halves are drawn. [m]
+    before : array, shape (n, 10), optional
+        Drawn on the right as an outline.
+    names : tuple of str
+        Of both sides.
+    """
+    figure = Figure(2, 5, height=150.0, legend=True)
+    for k, (panel, name) in enumerate(zip(figure.panels, METRICS, strict=True)):
+        for values, side, color, label in ((left, -1.0, MEASURED, names[0]), (right, 1.0, SAMPLED, names[1])):
+            x, y = _half(values[:, k], side)
+            panel.area(x, y, color, opacity=0.35, label=label)
+            panel.line(x, y, color, width=0.8)
+            low, mean, high = (f(values[:, k]) for f in (np.min, np.mean, np.max))
+            for bar, reach in ((low, 0.35), (mean, 0.8), (high, 0.35)):
+                panel.line((0.0, side * reach), (bar, bar), color, width=1.6)
+        if before is not None:
+            panel.line(*_half(before[:, k], 1.0), MUTED, width=1.0, dashes=DASHED, label=f"{names[1]} before")
+        panel.title, panel.x.limits, panel.x.ticks = LABELS[name], (-1.15, 1.15), []
+        panel.y.label = "[m]" if k % 5 == 0 else ""
     return figure
 
 
-def _half_violin(axis: Axes, values: FloatArray, side: float, color: str, name: str) -> None:
+def _half(values: FloatArray, side: float) -> tuple[FloatArray, FloatArray]:
+    """Outline of one half, from the bottom to the top, closed along the middle."""
     grid, density = density_over(values)
-    width = 0.95 * density / density.max()
-    axis.fill_betweenx(grid, 0.0, side * width, color=color, alpha=0.35, linewidth=0)
-    axis.plot(side * width, grid, color=color, linewidth=0.8, label=name)
-    bars = (("minimum", values.min(), 0.35), ("mean", values.mean(), 0.8), ("maximum", values.max(), 0.35))
-    for bar, value, reach in bars:
-        axis.plot([0.0, side * reach], [value, value], color=color, linewidth=1.6, label=f"{name}, {bar}")
-    axis.axvline(0.0, color=GRID, linewidth=0.8)
+    return np.r_[0.0, side * 0.95 * density / density.max(), 0.0], np.r_[grid[0], grid, grid[-1]]
 
 
 def density_over(values: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -80,10 +82,5 @@ def _density(values: FloatArray, grid: FloatArray) -> FloatArray:
     spread = min(values.std(), (np.quantile(values, 0.75) - np.quantile(values, 0.25)) / 1.349) or values.std()
     width = max(0.9 * spread * len(values) ** -0.2, step)
     kernel = np.exp(-0.5 * (np.arange(-len(grid) + 1, len(grid)) * step / width) ** 2)
-    return np.asarray(np.convolve(counts, kernel, mode="valid") if len(grid) == 1 else _same(counts, kernel)) + 1e-12
-
-
-def _same(counts: NDArray[np.int64], kernel: FloatArray) -> FloatArray:
-    full = np.convolve(counts, kernel)
-    start = (len(kernel) - 1) // 2
-    return np.asarray(full[start : start + len(counts)], dtype=np.float64)
+    start = len(grid) - 1
+    return np.convolve(counts, kernel)[start : start + len(grid)] + 1e-12

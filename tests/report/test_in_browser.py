@@ -12,7 +12,7 @@ import pytest
 
 from tests.report.browser import open_browser
 from tests.report.made_enriched import made_enriched
-from xosc_lateral.report.figures import BLUE, GREEN, VERMILLION
+from xosc_lateral.report.chart import BLUE, GREEN, VERMILLION
 from xosc_lateral.report.scenario import scenario_page
 
 AHEAD, LANE_WIDTH = 1.4, 3.5  # of the made vehicles and road [m]
@@ -103,16 +103,18 @@ def test_a_stretch_widens_across_alone(player, enriched):
     assert along == pytest.approx(0.0, abs=0.3)
 
 
-def test_on_the_arc_the_stretched_road_is_straight(player, enriched):
-    """At 20 s both are on the arc, and the van has moved into the ego's lane: ahead of it, and not beside."""
+def test_on_the_arc_a_stretch_is_across_the_lane_that_is_followed(player, enriched):
+    """At 20 s both are on the arc; the view looks along the lane where the ego vehicle is."""
     run(player, "p.scale = 4; p.setStretch(4); c.set(20)")
-    ego, van = enriched.entity("Ego"), enriched.entity("Van")
     row = round(20.0 / 0.02)
-    assert ego.motion.road[row] == van.motion.road[row] == 1
+    ego, van = enriched.entity("Ego").motion, enriched.entity("Van").trajectory
+
+    def middle(path) -> complex:
+        return path.x[row] + 1j * path.y[row] + AHEAD * np.exp(1j * path.heading[row])
+
+    seen = (middle(van) - middle(ego)) * np.exp(-1j * ego.heading[row])
     along, left = metres(player, VERMILLION)
-    outside = (400.0 + 1.5 * LANE_WIDTH) / 400.0  # the arc of the lane over that of the reference line
-    assert along == pytest.approx((van.motion.s[row] - ego.motion.s[row]) * outside, abs=1.0)
-    assert left == pytest.approx(van.deviation[row], abs=0.15)
+    assert (along, left) == pytest.approx((seen.real, seen.imag), abs=0.6)
 
 
 def test_play_moves_time_and_pause_stops_it(player):
@@ -135,10 +137,8 @@ def test_the_scrub_bar_sets_the_time_and_the_cursors_of_the_plots(player):
     assert player.execute_script("return xoscLateral.clock.time") == pytest.approx(15.0)
     assert player.find_element("css selector", ".player .time").text.startswith("15.0") or run(player, "") is None
     places = player.execute_script(
-        """
-        return xoscLateral.plots.filter((plot) => plot.overTime).flatMap((plot) => plot.axes.map((axes, k) =>
-          axes.x.value(Number(plot.cursor.children[k].getAttribute("x1")))));
-        """
+        "return xoscLateral.panels.filter((one) => one.overTime)"
+        ".map((one) => one.x.value(one.cursor.getAttribute('x1')))"
     )
     assert len(places) >= 4
     assert places == pytest.approx([15.0] * len(places), abs=0.05)
@@ -176,58 +176,27 @@ def test_pointing_at_a_vehicle_shows_its_values(player, enriched):
     assert "-2 of road a" in tip
 
 
-def test_a_figure_zooms_and_tells_its_values(player, enriched):
+def test_a_figure_tells_its_values_and_a_click_takes_the_player_there(player, enriched):
     from selenium.webdriver.common.action_chains import ActionChains
 
     figure = player.find_element("xpath", "//figure[.//*[contains(., 'offset [m]')]][.//*[contains(., 'Van')]]")
     player.execute_script("arguments[0].scrollIntoView({block: 'center'})", figure)
-    number = player.execute_script("return xoscLateral.plots.findIndex((plot) => plot.figure === arguments[0])", figure)
-
-    def screen(value: float) -> list[float]:
-        return player.execute_script(
-            """
-            const plot = xoscLateral.plots[arguments[0]], axes = plot.axes[0], [, top, , bottom] = axes.data.box;
-            const point = new DOMPoint(axes.x.out(axes.x.place(arguments[1])), (top + bottom) / 2);
-            const seen = point.matrixTransform(plot.svg.getScreenCTM());
-            return [Math.round(seen.x), Math.round(seen.y)];
-            """,
-            number,
-            value,
-        )
-
-    def shown() -> list[float]:
-        return player.execute_script(
-            "const {x} = xoscLateral.plots[arguments[0]].axes[0]; return [x.value(x.from), x.value(x.to)];", number
-        )
-
+    x, y = player.execute_script(
+        """
+        const panel = xoscLateral.panels.find((one) => arguments[0].contains(one.svg));
+        const point = new DOMPoint(panel.x.place(12.5), panel.height / 2).matrixTransform(panel.svg.getScreenCTM());
+        return [Math.round(point.x), Math.round(point.y)];
+        """,
+        figure,
+    )
     body = ActionChains(player)
-    (x, y), (to, _) = screen(10.0), screen(20.0)
-    body.w3c_actions.pointer_action.move_to_location(x, y).pointer_down().move_to_location(to, y).pointer_up()
-    body.perform()
-    assert shown() == pytest.approx([10.0, 20.0], abs=0.1)
-    assert (
-        len(
-            {
-                tuple(each)
-                for each in player.execute_script(
-                    "return xoscLateral.plots.filter((p) => p.overTime).flatMap((p) => p.axes.map("
-                    "({x}) => [x.value(x.from).toFixed(1), x.value(x.to).toFixed(1)]))"
-                )
-            }
-        )
-        == 1
-    )  # all figures over time show the same
-
-    body = ActionChains(player)
-    x, y = screen(12.5)
     body.w3c_actions.pointer_action.move_to_location(x, y)
     body.perform()
     tip = figure.find_element("css selector", ".tip").text
-    said = float(tip.split()[-1])
-    assert said == pytest.approx(enriched.entity("Ego").deviation[625], abs=0.02)
-
-    player.execute_script("arguments[0].querySelector('.plot-buttons button:last-child').click()", figure)
-    assert shown()[0] < 0.5 and shown()[1] > 29.5
+    assert float(tip.split()[-1]) == pytest.approx(enriched.entity("Ego").deviation[625], abs=0.02)
+    body.w3c_actions.pointer_action.click()
+    body.perform()
+    assert player.execute_script("return xoscLateral.clock.time") == pytest.approx(12.5, abs=0.1)
 
 
 def test_on_a_phone_nothing_is_cut_and_figures_scroll(player, enriched):

@@ -12,7 +12,7 @@ from tests.identification.made_coarse import coarse_of, movement
 from xosc_lateral.identification.regression import fit_model
 from xosc_lateral.identification.terms.regimes import RegimeFit, RegimesTerm
 from xosc_lateral.identification.terms.time import StepTerm
-from xosc_lateral.report.loop_courses import (
+from xosc_lateral.report.loop_curves import (
     hidden_mean,
     moving_mean,
     moving_spread,

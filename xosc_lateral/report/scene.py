@@ -1,19 +1,145 @@
-"""Lanes and markings around the vehicles, as polygons and lines in the world."""
+"""A played scenario as plain values for the player of a page: vehicles over time, roads around them, packed small."""
 
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterator
+import json
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from xosc_lateral.enrich.result import EntityResult
+from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
+from xosc_lateral.motion.trajectory import WorldTrajectory
+from xosc_lateral.report.path_dynamics import lateral_dynamics
 from xosc_lateral.road import RoadNetwork
 from xosc_lateral.road.geometry import simplify
 from xosc_lateral.road.network import DRIVING
 from xosc_lateral.road.positions import RoadMark
+from xosc_lateral.rows import true_slices
 
+FloatArray = NDArray[np.float64]
+RowArray = NDArray[np.int64]
+
+FRAME = 0.1
+"""Between two frames; the player interpolates, which is off by 6 mm at 5 m/s2. [s]"""
+
+MOST_FRAMES = 60_000
+"""Frames of all entities together beyond which they are spaced farther apart: what a browser takes at once."""
+
+
+def scene_of(motion: NominalMotion, network: RoadNetwork, results: Sequence[EntityResult] = ()) -> str:
+    """JSON for the player: results with the nominal motion as ghosts, or the nominal motion alone."""
+    given: list[tuple[EntityMotion, EntityResult | None]] = [(one.motion, one) for one in results]
+    given = given or [(one, None) for one in motion.entities]
+    shown = [(number, entity, result) for number, (entity, result) in enumerate(given) if _present(entity).any()]
+    rows = _rows(motion, len(shown))
+    origin = _origin([entity for _, entity, _ in shown])
+    places = [np.column_stack([e.x[_present(e)], e.y[_present(e)]]) for _, e, _ in shown]
+    step = (rows[1] - rows[0]) * motion.step if len(rows) > 1 else FRAME
+    scene = {
+        "step": round(float(step), 9),
+        "frames": len(rows),
+        "end": motion.end_time,
+        "entities": [_entity(network, number, each, result, rows, origin) for number, each, result in shown],
+        **road_shapes(network, np.concatenate(places) if places else np.empty((0, 2)), origin),
+    }
+    # "<" would end the script element that holds this
+    return json.dumps(scene, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c")
+
+
+def _rows(motion: NominalMotion, entities: int) -> RowArray:
+    count = len(motion.entities[0].time) if motion.entities else 0
+    frames = max(1, count * motion.step / FRAME * entities)
+    every = max(1, round(FRAME / motion.step)) * int(np.ceil(frames / MOST_FRAMES))
+    return np.arange(0, count, every)
+
+
+def _present(motion: EntityMotion) -> NDArray[np.bool_]:
+    return np.asarray((motion.activity & Activity.ACTIVE) != 0)
+
+
+def _origin(entities: Sequence[EntityMotion]) -> FloatArray:
+    """Whole metres near the first place: coordinates stay small on roads with geographic ones."""
+    if not entities:
+        return np.zeros(2)
+    first = entities[0]
+    row = int(np.argmax(_present(first)))
+    return np.round(np.array([first.x[row], first.y[row]]))
+
+
+def _entity(
+    network: RoadNetwork,
+    number: int,
+    motion: EntityMotion,
+    result: EntityResult | None,
+    rows: RowArray,
+    origin: FloatArray,
+) -> dict[str, Any]:
+    box = motion.entity.bounding_box
+    values: dict[str, Any] = {
+        "name": motion.name,
+        "number": number,
+        "length": box.length,
+        "width": box.width,
+        "ahead": box.center_x,
+        "left": box.center_y,
+        "vehicle": motion.entity.is_vehicle,
+        "present": [[part.start, part.stop - 1] for part in true_slices(_present(motion)[rows])],
+        "jumps": _jumps(motion, rows),
+        "lanes": _lane_changes(network, motion, rows),
+        "course": pack(np.unwrap(_filled(_course(motion)[rows])), MILLIRADIAN_TENTH),
+        "nominal": _path(motion, rows, origin, motion),
+        "offset": pack(_filled(motion.offset[rows]), MILLIMETRE),
+    }
+    if result is not None and result.is_enriched:
+        values["enriched"] = _path(result.trajectory, rows, origin, motion)
+        values["added"] = pack(_filled(result.deviation[rows]), MILLIMETRE)
+    return values
+
+
+def _course(motion: EntityMotion) -> FloatArray:
+    """Direction of the lane where the entity is, the way that it drives; its own heading off the roads. [rad]"""
+    turned = np.arctan(np.tan(motion.heading_relative))  # against s, half a turn is no deviation
+    return np.asarray(motion.heading - np.where(motion.road >= 0, turned, 0.0))
+
+
+def _path(
+    path: EntityMotion | WorldTrajectory, rows: RowArray, origin: FloatArray, motion: EntityMotion
+) -> dict[str, Any]:
+    dynamics = lateral_dynamics(motion, path)
+    across = np.interp(path.time[rows], dynamics.time, np.nan_to_num(dynamics.acceleration))
+    return {
+        "x": pack(_filled(path.x[rows] - origin[0]), MILLIMETRE),
+        "y": pack(_filled(path.y[rows] - origin[1]), MILLIMETRE),
+        "h": pack(np.unwrap(_filled(path.heading[rows])), MILLIRADIAN_TENTH),
+        "v": pack(_filled(path.speed[rows]), CENTIMETRE_PER_SECOND),
+        "a": pack(across, MILLIMETRE),
+    }
+
+
+def _filled(values: FloatArray) -> FloatArray:
+    """Numbers instead of NaN, where an entity is absent: nobody sees them there."""
+    return np.nan_to_num(np.asarray(values, dtype=np.float64))
+
+
+def _jumps(motion: EntityMotion, rows: RowArray) -> list[int]:
+    """Frames that are not reached by moving from the one before."""
+    placed = np.cumsum((motion.activity & Activity.TELEPORTED) != 0)[rows]
+    return [k + 1 for k, (one, other) in enumerate(pairwise(placed.tolist())) if other > one]
+
+
+def _lane_changes(network: RoadNetwork, motion: EntityMotion, rows: RowArray) -> list[tuple[int, str, int]]:
+    """Frame, road id and lane id wherever one of them is new; no road: off the road."""
+    road, lane = motion.road[rows], motion.lane[rows]
+    is_new = np.append(True, (np.diff(road) != 0) | (np.diff(lane) != 0))[: len(rows)]
+    return [(int(k), network.road_ids[road[k]] if road[k] >= 0 else "", int(lane[k])) for k in np.flatnonzero(is_new)]
+
+
+# ---- roads ----
 MILLIMETRE = CENTIMETRE_PER_SECOND = 1e-3
 """Resolution of positions [m]; of speeds a hundred times finer than anybody reads them. [m/s]"""
 
@@ -54,15 +180,13 @@ def unpack(column: dict[str, Any]) -> NDArray[np.float64]:
     return np.asarray(np.concatenate(([0], np.cumsum(steps))) + column["b"]) * float(column["r"])
 
 
-FloatArray = NDArray[np.float64]
-
 REACH = 250.0
 """Roads are shown as far as this around every place where a vehicle was. [m]"""
 
 PIECE = 200.0
 """Length of one piece of a lane or marking: pieces out of sight are not drawn. [m]"""
 
-STEP = 2.0
+LINE_STEP = 2.0
 """Between two points of a line before it is simplified. [m]"""
 
 TOLERANCE = 0.01
@@ -132,7 +256,7 @@ def _sections(network: RoadNetwork, road: int, first: float, last: float) -> Ite
 
 def _grid(start: float, stop: float) -> FloatArray:
     """From start to just before stop, where the next section begins."""
-    return np.linspace(start, max(start, stop - 1e-6), max(2, int(np.ceil((stop - start) / STEP)) + 1))
+    return np.linspace(start, max(start, stop - 1e-6), max(2, int(np.ceil((stop - start) / LINE_STEP)) + 1))
 
 
 def _lanes(
@@ -177,17 +301,6 @@ def _mark_lines(
         s = _grid(start, stop)
         outer = 0.5 * np.sign(mark.lane) * network.lane_width(road, mark.lane, s) if mark.lane else 0.0
         yield mark, start, s, network.lane_centre_t(road, mark.lane, s) + outer
-
-
-def mark_points(network: RoadNetwork, places: FloatArray) -> Iterator[FloatArray]:
-    """Lines of paint near the given places, shape (n, 2), as points in the world, shape (m, 3) each. [m]"""
-    near = _cells(places, reach=REACH)
-    for road in range(len(network.roads)):
-        for first, last in _ranges_near(network, road, near):
-            for _, _, s, t in _mark_lines(network, road, first, last):
-                poses = network.road_to_world(road, s, t)
-                kept = simplify(np.asarray(poses.x), np.asarray(poses.y), TOLERANCE)
-                yield np.column_stack([poses.x, poses.y, poses.z])[kept]
 
 
 def _line(

@@ -11,17 +11,21 @@ import pytest
 
 from tests.motion.made_motion import drive, entity, together, two_roads
 from tests.report.made_enriched import made_enriched
+from xosc_lateral.enrich.result import Enriched
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.motion.trajectory import WorldTrajectory
-from xosc_lateral.report.player.roads import pack, unpack
-from xosc_lateral.report.player.scene import enriched_scene, nominal_scene, track_of
 from xosc_lateral.report.scenario import scenario_page
+from xosc_lateral.report.scene import pack, scene_of, unpack
 from xosc_lateral.road.geometry import simplify
 
 
 @pytest.fixture(scope="module")
 def enriched(tmp_path_factory):
     return made_enriched(tmp_path_factory.mktemp("road"))
+
+
+def enriched_scene(made: Enriched) -> str:
+    return scene_of(made.motion, made.network, made.entities)
 
 
 @pytest.fixture(scope="module")
@@ -73,25 +77,27 @@ def test_absence_and_being_placed_anew_are_told(tmp_path):
     activity[:100] = 0
     activity[300] |= int(Activity.TELEPORTED)
     motion = together(drive(network, entity("Late"), lane=-2, activity=activity))
-    (late,) = json.loads(nominal_scene(motion, network))["entities"]
+    (late,) = json.loads(scene_of(motion, network))["entities"]
     assert late["present"] == [[20, 100]]
     assert late["jumps"] == [60]
 
 
-def test_the_track_runs_beside_the_reference_line_through_a_lane_change_and_over_the_link(enriched):
-    """The van starts in lane -3, 2.5 lanes from the reference line, and ends in lane -2 on the arc."""
-    track = track_of(enriched.network, enriched.entity("Van").motion)
-    on_straight, on_arc = track[track[:, 0] < 480.0], track[track[:, 0] > 520.0]
-    np.testing.assert_allclose(on_straight[:, 1], -2.5 * 3.5, atol=0.02)
-    np.testing.assert_allclose(np.hypot(on_arc[:, 0] - 500.0, on_arc[:, 1] - 400.0), 400.0 + 2.5 * 3.5, atol=0.02)
-    assert track[0, 0] < enriched.entity("Van").motion.x[0] - 100.0  # goes on behind the start
+def test_the_course_is_the_lane_s_and_not_the_car_s(enriched, scene):
+    """The van changes lanes on the straight; at the end it drives 18 s on, along the arc of 400 m."""
+    van, motion = scene["entities"][1], enriched.entity("Van").motion
+    course = unpack(van["course"])
+    here = motion.x[::5] < 499.0
+    np.testing.assert_allclose(course[here], 0.0, atol=1e-4)
+    on_arc = motion.x[::5] > 501.0
+    tangent = np.arctan2(motion.x[::5] - 500.0, 400.0 - motion.y[::5])
+    np.testing.assert_allclose(course[on_arc], tangent[on_arc], atol=1e-3)
 
 
-def test_standing_and_leaving_the_road_give_a_track_all_the_same(enriched):
-    motion = enriched.entity("Slow").motion
-    nowhere = np.full_like(motion.road, -1)
-    still = replace(motion, x=np.full_like(motion.x, 5.0), y=np.zeros_like(motion.y), road=nowhere)
-    assert len(track_of(enriched.network, still)) == 2
+def test_against_the_reference_line_the_course_is_the_way_that_is_driven(tmp_path):
+    network = two_roads(tmp_path)
+    motion = drive(network, entity("Back"), lane=1, start=50.0)
+    (one,) = json.loads(scene_of(together(motion), network))["entities"]
+    np.testing.assert_allclose(np.cos(unpack(one["course"]) - motion.heading[::5]), 1.0, atol=1e-6)
 
 
 def test_ten_cars_for_a_minute_stay_under_a_megabyte(tmp_path):
@@ -127,7 +133,7 @@ def test_the_scripts_are_small_and_load_nothing():
 
 def test_a_name_cannot_end_the_script_that_holds_it(tmp_path):
     network = two_roads(tmp_path)
-    scene = nominal_scene(together(drive(network, entity("</script><img src=x>"))), network)
+    scene = scene_of(together(drive(network, entity("</script><img src=x>"))), network)
     assert "</script" not in scene
     assert json.loads(scene)["entities"][0]["name"] == "</script><img src=x>"
 

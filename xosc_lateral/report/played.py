@@ -1,0 +1,61 @@
+"""A played scenario, before anything is converted: a page with the player, and its segments as text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from xosc_lateral.motion.nominal import NominalMotion
+from xosc_lateral.motion.segments import SegmentRow
+from xosc_lateral.report.page import Page
+from xosc_lateral.report.scenario import add_notes
+from xosc_lateral.report.scenario_figures import speeds_over_time
+from xosc_lateral.report.scene import scene_of
+from xosc_lateral.road import RoadNetwork
+
+
+def view_page(motion: NominalMotion, network: RoadNetwork, *, source: str, provenance: Mapping[str, object]) -> str:
+    """HTML page with the player, self-contained; same input, same bytes.
+
+    Parameters
+    ----------
+    motion : NominalMotion
+        As played.
+    network : RoadNetwork
+        That it was played on.
+    source : str
+        File name, for the reader.
+    provenance : mapping
+        Shown in the footer.
+    """
+    page = Page(Path(source).name)
+    count = len(motion.entities)
+    page.lead(
+        f"{count} {'entity' if count == 1 else 'entities'}, {motion.end_time:.1f} s (ended by the {motion.ended_by}). "
+        "The maneuvers are played as the scenario states them, without added lateral movement."
+    )
+    page.section(
+        "Player",
+        "The scenario from above. A lateral stretch above 1 widens the road. Click a vehicle to follow it, point at it "
+        "for its values, drag to look elsewhere.",
+    )
+    page.player(scene_of(motion, network), "Scenario from above")
+    page.section("Speed")
+    page.figure(
+        speeds_over_time(motion),
+        "Speed over time. Click to take the player to that time.",
+        "Speed over time of every entity",
+        over_time=True,
+    )
+    add_notes(page, motion.notes)
+    return page.html(provenance)
+
+
+def as_text(rows: Sequence[SegmentRow]) -> str:
+    """One line per segment."""
+    width = max((len(row.entity) for row in rows), default=0)
+    return "\n".join(
+        f"{row.entity:<{width}}  {row.start:8.2f} - {row.end:8.2f} s  "
+        + (f"road {row.road} lane {row.lane}: road-following" if row.road_following else f"no: {row.why}")
+        for row in rows
+    )
