@@ -10,8 +10,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
-from contextlib import AbstractContextManager
-from typing import Protocol, TypeVar
+from types import TracebackType
+from typing import Self, TypeVar
 
 from xosc_lateral.errors import XoscLateralError
 
@@ -43,8 +43,8 @@ class WorkerDiedError(XoscLateralError):
     """A task took down its worker, time and again."""
 
 
-class Pool(AbstractContextManager["Pool"], Protocol):
-    """Workers; use as a context.
+class Pool:
+    """Workers, used as a context: here none, a task runs in this process when it is handed out.
 
     Attributes
     ----------
@@ -52,27 +52,33 @@ class Pool(AbstractContextManager["Pool"], Protocol):
         How often a task that may have killed its worker is tried by itself.
     """
 
-    tries_alone: int
+    tries_alone = TRIES_ALONE
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
+        """End the workers: at once after an error."""
 
     def capacity(self) -> int:
         """How many tasks may be handed out at once."""
-        ...
+        return 1
 
     def submit(self, work: Callable[[Task], Result], task: Task) -> Future[Result]:
         """Hand out a task."""
-        ...
+        future: Future[Result] = Future()
+        future.set_result(work(task))
+        return future
 
     def recover(self) -> None:
         """Get fit again after a worker died; raises `ClusterError` if that can't be."""
-        ...
 
     def lost(self, error: BaseException) -> bool:
         """Whether a future's error means that its worker died, rather than that the task raised it."""
-        ...
+        return False
 
     def check(self) -> None:
         """Raise `ClusterError` when no result can come any more; called every few seconds without one."""
-        ...
 
 
 def run_tasks(

@@ -11,10 +11,10 @@ import time
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from xosc_lateral.pipeline.guard import let_worker_die
-from xosc_lateral.pipeline.tasks import AHEAD, TRIES_ALONE, ClusterError, Pool, Result, Task
+from xosc_lateral.pipeline.tasks import AHEAD, ClusterError, Pool, Result, Task
 from xosc_lateral.version import __version__
 
 PARENT_CHECK = 0.5
@@ -24,49 +24,29 @@ PR_SET_PDEATHSIG = 1
 """Of Linux's prctl(2), from <linux/prctl.h>: the signal that this process gets when its parent ends."""
 
 
-class LocalProcesses:
-    """Worker processes of joblib's executor (loky).
-
-    Parameters
-    ----------
-    count : int
-        How many.
-    """
-
-    tries_alone = TRIES_ALONE
+class _LocalProcesses(Pool):
+    """So many worker processes of joblib's executor (loky), which sees by itself when one is gone."""
 
     def __init__(self, count: int) -> None:
         self._count = count
         self._executor = self._start()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
         self._executor.shutdown(wait=True, kill_workers=error is not None)
 
     def capacity(self) -> int:
-        """A few per worker."""
         return AHEAD * self._count
 
     def submit(self, work: Callable[[Task], Result], task: Task) -> Future[Result]:
-        """Hand out a task."""
         future: Future[Result] = self._executor.submit(work, task)
         return future
 
     def recover(self) -> None:
-        """Start anew."""
         self._executor.shutdown(wait=True, kill_workers=True)
         self._executor = self._start()
 
     def lost(self, error: BaseException) -> bool:
-        """Whether the pool broke."""
         return isinstance(error, BrokenExecutor)
-
-    def check(self) -> None:
-        """The executor sees by itself when a process is gone."""
 
     def _start(self) -> Any:
         from joblib.externals.loky import ProcessPoolExecutor
@@ -105,7 +85,7 @@ WORKERLESS = 120.0
 """A cluster without workers for so long is given up; restarting one takes seconds. [s]"""
 
 
-class Cluster:
+class _Cluster(Pool):
     """Workers of a running dask.distributed cluster.
 
     They have to see the same files under the same paths, and have the same version of this package. The scheduler
@@ -140,37 +120,28 @@ class Cluster:
         # pure=False: the key of a task must not come from its arguments, a repeated task has to run again
         self._executor: Executor = self._client.get_executor(pure=False)
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
         self._executor.shutdown(wait=error is None)
         self._client.close()
 
     def capacity(self) -> int:
-        """A few per thread of the workers that there are now; workers may come and go."""
+        # of the workers that there are now; they may come and go
         return AHEAD * max(1, sum(map(int, self._client.nthreads().values())))
 
     def submit(self, work: Callable[[Task], Result], task: Task) -> Future[Result]:
-        """Hand out a task."""
         self._check()
         return self._executor.submit(work, task)
 
     def recover(self) -> None:
-        """The scheduler sees to it, if it is still there."""
-        self._check()
+        self._check()  # the scheduler sees to it
 
     def lost(self, error: BaseException) -> bool:
-        """Whether the scheduler has given the task up, rather than that it is gone."""
         from distributed import KilledWorker
 
         self._check()
         return isinstance(error, KilledWorker | CancelledError)
 
     def check(self) -> None:
-        """Whether scheduler and workers are there; a worker that is being restarted has its time."""
         self._check()
         if self._client.nthreads():
             self._had_workers = time.monotonic()
@@ -203,40 +174,6 @@ def installed_version() -> str:
     return __version__
 
 
-class ThisProcess:
-    """No workers: a task runs when it is handed out."""
-
-    tries_alone = TRIES_ALONE
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        return None
-
-    def capacity(self) -> int:
-        """One."""
-        return 1
-
-    def submit(self, work: Callable[[Task], Result], task: Task) -> Future[Result]:
-        """Run it."""
-        future: Future[Result] = Future()
-        future.set_result(work(task))
-        return future
-
-    def recover(self) -> None:
-        """Nothing to do: if a task takes this process down, that was it."""
-
-    def lost(self, error: BaseException) -> bool:
-        """Never."""
-        return False
-
-    def check(self) -> None:
-        """It answers at once."""
-
-
 def open_pool(workers: int, cluster: str | None) -> Pool:
     """Pool for so many processes on this machine (-1: one per core; 0: this process), or for a cluster.
 
@@ -248,13 +185,11 @@ def open_pool(workers: int, cluster: str | None) -> Pool:
         Fewer than none.
     """
     if cluster is not None:
-        from xosc_lateral.pipeline.workers import Cluster
-
-        return Cluster(cluster)
+        return _Cluster(cluster)
     if workers == -1:
         import joblib
 
         workers = joblib.cpu_count()
     if workers < 0:
         raise ValueError(f"{workers} workers; at least 0 (this process), or -1 for one per core")
-    return ThisProcess() if workers == 0 else LocalProcesses(workers)
+    return Pool() if workers == 0 else _LocalProcesses(workers)
