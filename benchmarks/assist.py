@@ -16,7 +16,7 @@ import pandas as pd
 
 from benchmarks.markers import write_between_markers
 from benchmarks.simulated.assist import FLAG, OPENLKA_MAP, LaneKeepingAssist, openlka_layout
-from xosc_lateral.datasets.driver_simulator import simulate_drive
+from examples.driver_simulator.simulator import simulate_drive
 from xosc_lateral.driver.fitting import fit_profile
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.evaluation.snippets import sample_runs

@@ -26,9 +26,9 @@ import xosc_lateral as xl
 from benchmarks.clearance import BANDS, FAR, Clearance, band_name, resampled, within_vehicles
 from benchmarks.markers import write_between_markers
 from benchmarks.pair_scenarios import FAST, ROADS, SLOW, Driven, Road, write_scenario
+from benchmarks.storyboard import Vehicle
 from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.identification.timeline import join_drives
-from xosc_lateral.templates.storyboard import Vehicle
 
 FloatArray = NDArray[np.float64]
 

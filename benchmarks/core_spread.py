@@ -19,8 +19,8 @@ from unittest.mock import patch
 import numpy as np
 from numpy.typing import NDArray
 
+from examples.driver_simulator import simulate_drive
 from tests.profiles import as_drive
-from xosc_lateral.datasets import simulate_drive
 from xosc_lateral.driver.models.autoregressive import fit as fitting
 from xosc_lateral.driver.models.autoregressive import fit_coarse
 from xosc_lateral.driver.models.autoregressive.coarse import Autoregression, stabilise

@@ -25,7 +25,7 @@ from xosc_lateral.driver.models.autoregressive.coarse import COARSE_EVERY, split
 from xosc_lateral.driver.models.autoregressive.fit import fit_autoregressive
 from xosc_lateral.driver.models.autoregressive.fit_coarse import fit_autoregression
 from xosc_lateral.driver.models.autoregressive.fit_matching import simulate
-from xosc_lateral.driver.models.autoregressive.parameters import DEFAULT_SETTINGS
+from xosc_lateral.driver.models.autoregressive.settings import DEFAULT_SETTINGS
 from xosc_lateral.driver.sensor.runs import driver_runs
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.drives.drive import Run

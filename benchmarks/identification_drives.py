@@ -30,7 +30,7 @@ from benchmarks.simulated.movements import (
     sawtooth,
     zigzag,
 )
-from xosc_lateral.datasets import simulate_drive
+from examples.driver_simulator import simulate_drive
 
 Values = np.ndarray
 MOVEMENTS = {

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.models.autoregressive.fit import fit_autoregressive
 from xosc_lateral.driver.models.autoregressive.fit_matching import matched, simulate
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
-from xosc_lateral.driver.models.autoregressive.parameters import DEFAULT_SETTINGS
+from xosc_lateral.driver.models.autoregressive.settings import DEFAULT_SETTINGS
 from xosc_lateral.driver.models.autoregressive.volatility import Volatility
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.models.two_level.fit import fit_two_level

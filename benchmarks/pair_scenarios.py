@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 
-from xosc_lateral.templates.storyboard import Vehicle
+from benchmarks.storyboard import Vehicle
 
 LANE_WIDTH = 3.86
 """Median of the recording that the shipped profiles are fitted on. [m]"""

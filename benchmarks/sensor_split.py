@@ -22,7 +22,7 @@ import numpy as np
 from scipy.signal import butter, lfilter, sosfilt, sosfiltfilt
 
 from benchmarks.markers import show
-from xosc_lateral.datasets.driver_simulator import simulate_drive
+from examples.driver_simulator.simulator import simulate_drive
 from xosc_lateral.driver.fitting import fit_runs
 from xosc_lateral.driver.sensor.separation import separate
 from xosc_lateral.drives.cuts import cut_runs

@@ -8,8 +8,9 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from driver_simulator import curve_cutting, simulate_drive
+
 import xosc_lateral as xl
-from xosc_lateral.datasets import curve_cutting, simulate_drive
 
 
 def main(out: Path) -> None:

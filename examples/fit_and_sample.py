@@ -11,9 +11,9 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from driver_simulator import simulate_population
 
 import xosc_lateral as xl
-from xosc_lateral.datasets import simulate_population
 
 
 def main(out: Path, table: Path | None = None) -> None:

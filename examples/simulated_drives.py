@@ -9,8 +9,7 @@ import sys
 from pathlib import Path
 
 import pandas as pd
-
-from xosc_lateral.datasets import curve_cutting, simulate_drive
+from driver_simulator import curve_cutting, simulate_drive
 
 
 def main(out: Path) -> None:

@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from xosc_lateral.datasets.driver_simulator import simulate_drive
+from examples.driver_simulator.simulator import simulate_drive
 from xosc_lateral.driver.fitting import fit_profile
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.drive import Drive

@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 
 import xosc_lateral as xl
-from xosc_lateral.datasets import simulate_drive
+from examples.driver_simulator import simulate_drive
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from xosc_lateral.datasets import simulate_drive
+from examples.driver_simulator import simulate_drive
 
 PLUGIN = Path(__file__).resolve().parents[1] / "examples" / "plugin"
 

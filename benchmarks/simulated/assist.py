@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from xosc_lateral.datasets.motorway import STEP
-from xosc_lateral.datasets.plants import Context, Intent
+from examples.driver_simulator.motorway import STEP
+from examples.driver_simulator.plants import Context, Intent
 
 FLAG = "op_lat_enable"
 """Column that says who steers, as OpenLKA calls it."""

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from xosc_lateral.datasets.motorway import STEP
-from xosc_lateral.datasets.plants import Context, Intent, SimulatedResponse
-from xosc_lateral.drives.filters import first_order
+from examples.driver_simulator.motorway import STEP, first_order
+from examples.driver_simulator.plants import Context, Intent, SimulatedResponse
 
 
 @dataclass(frozen=True)

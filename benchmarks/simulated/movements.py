@@ -18,9 +18,8 @@ import numpy as np
 import pandas as pd
 from scipy.signal import lfilter
 
-from xosc_lateral.datasets.driver_simulator import measure, sample_times
-from xosc_lateral.datasets.motorway import N_LANES, STEP, draw_motorway, least_jerk
-from xosc_lateral.drives.filters import first_order
+from examples.driver_simulator.motorway import N_LANES, STEP, draw_motorway, first_order, least_jerk
+from examples.driver_simulator.simulator import measure, sample_times
 
 MOVEMENT_STEP = 0.1
 """Step of the movements [s]; the table interpolates between."""

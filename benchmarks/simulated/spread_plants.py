@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from xosc_lateral.datasets.plants import Context, Intent, SimulatedResponse
+from examples.driver_simulator.plants import Context, Intent, SimulatedResponse
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,6 @@ TEXT = {
     "pipeline": "from files to files, batches",
     "api": "a verb per file",
     "cli": "argument names",
-    "datasets": "simulated drives",
 }
 WIDTH, HEIGHT, GAP_X, GAP_Y, MARGIN = 190, 44, 24, 40, 16  # [px]
 FONT = "font-family='sans-serif'"

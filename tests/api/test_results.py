@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 
 import xosc_lateral as xl
+from examples.driver_simulator import simulate_drive
 from xosc_lateral.api.profiles import add_profile, tag_profile
-from xosc_lateral.datasets import simulate_drive
 from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.hashes import file_hash, parsed_hashes
 

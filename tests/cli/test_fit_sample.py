@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from examples.driver_simulator import simulate_drive
 from xosc_lateral.cli import main
-from xosc_lateral.datasets import simulate_drive
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 
+from examples.driver_simulator import simulate_drive, simulate_population
 from xosc_lateral.cli import main
-from xosc_lateral.datasets import simulate_drive, simulate_population
 
 SCHEMAS = Path(__file__).resolve().parents[2] / "docs" / "schemas"
 LISTED = (SCHEMAS.parent / "json.md").read_text(encoding="utf-8")

@@ -69,6 +69,8 @@ def test_the_table_of_verbs_says_what_they_say_themselves(name: str) -> None:
 
 def test_every_module_of_the_command_line_is_a_verb_or_shared() -> None:
     folder = Path(xl.__file__).parent / "cli"
-    with_verb = {path.stem for path in folder.glob("*.py") if "def register(" in path.read_text(encoding="utf-8")}
+    with_verb = {
+        path.stem for path in folder.glob("*.py") if "app = group_of_verbs()" in path.read_text(encoding="utf-8")
+    }
     verbs = {verb: MODULES.get(verb, verb.replace("-", "_")) for verb in VERBS}
     assert with_verb == set(verbs.values())

@@ -61,6 +61,7 @@ def test_page_runs_and_prints_as_shown(page, tmp_path, monkeypatch, capsys):
     if page == "how_to/osi.md":
         pytest.importorskip("osi_utilities", reason="extra `osi` is not installed")
     monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(ROOT / "examples"))  # its driver simulator
     names: dict[str, object] = {"__name__": page}
     shown = [(kind, text) for kind, text in blocks(f"docs/{page}") if kind in ("sh", "python", "output")]
     assert shown

@@ -11,7 +11,7 @@ import pytest
 
 FIT = """
 import sys
-from xosc_lateral.datasets.driver_simulator import simulate_drive
+from examples.driver_simulator.simulator import simulate_drive
 from xosc_lateral.driver.fitting import fit_profile
 from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.formats.profiles import write_profile

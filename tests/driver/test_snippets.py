@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from examples.driver_simulator import simulate_drive
 from tests.profiles import as_drive, simulated_profile
-from xosc_lateral.datasets import simulate_drive
 from xosc_lateral.driver.sampled_offsets import cut_snippets, sample_context, sample_free, sample_like
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.drives.drive import Drive

@@ -93,8 +93,8 @@ def test_side_wind_of_the_scenarios_weather_pushes_to_its_own_side(tmp_path: Pat
         factors=(Factor(column="wind_speed"), Factor(column="wind_direction", form=Form.SINE, at=360.0)),
     )
     place = Place("made", 1, "Environment")
-    blows_along_y = Environment("wind", place, weather=Weather(wind_speed=speed, wind_direction=np.pi / 2))
-    content = Action("weather", EnvironmentAction(blows_along_y, place), place, is_private=False)
+    blows_along_y = Environment("wind", place=place, weather=Weather(wind_speed=speed, wind_direction=np.pi / 2))
+    content = Action("weather", EnvironmentAction(blows_along_y, place=place), place, is_private=False)
     weather = PlayedAction(content, None, ("Init",), 0.0, 0.0)
     for lane, start, side in ((-2, 50.0, 1.0), (2, 650.0, -1.0)):
         motion = together(drive(network, entity(), lane=lane, start=start), actions=(weather,))

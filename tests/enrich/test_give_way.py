@@ -19,10 +19,10 @@ def moved(network, *vehicles):
     """What `give_way` moves vehicles of (motion, deviation) by in the middle of the drive."""
     motion = together(*(motion for motion, _ in vehicles))
     sampled = [
-        SampledVehicle(one, np.full(len(one.time), deviation), np.ones(len(one.time), dtype=bool))
+        SampledVehicle(one, np.full(len(ROWS), deviation), np.ones(len(ROWS), dtype=bool))
         for one, deviation in vehicles
     ]
-    return [0.0 if move is None else float(move[250]) for move in give_way(motion, network, sampled, ROWS)]
+    return [0.0 if move is None else float(move[25]) for move in give_way(motion, network, sampled, ROWS)]
 
 
 @pytest.mark.parametrize("rule", ["RHT", "LHT"])
@@ -52,7 +52,7 @@ def test_who_is_far_away_or_comes_the_other_way_changes_nobody(tmp_path: Path) -
 def test_whoever_can_not_move_leaves_it_to_the_other(tmp_path: Path) -> None:
     network = two_roads(tmp_path)
     right, left = (drive(network, entity(str(k)), lane=k, start=100.0) for k in (-2, -1))
-    rows = len(right.time)
+    rows = len(ROWS)
     sampled = [
         SampledVehicle(right, np.full(rows, 0.5), np.zeros(rows, dtype=bool)),
         SampledVehicle(left, np.full(rows, -0.5), np.ones(rows, dtype=bool)),
@@ -60,7 +60,7 @@ def test_whoever_can_not_move_leaves_it_to_the_other(tmp_path: Path) -> None:
     stays, moves = give_way(together(right, left), network, sampled, ROWS)
     assert stays is None and moves is not None
     undisturbed = LANE_WIDTH - 1.0 - 2.0
-    assert moves[250] == pytest.approx(float(np.interp(undisturbed, *GAPS)) - undisturbed, rel=0.02)
+    assert moves[25] == pytest.approx(float(np.interp(undisturbed, *GAPS)) - undisturbed, rel=0.02)
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
@@ -71,7 +71,7 @@ def test_where_a_profile_responds_to_somebody_by_itself_the_law_adds_what_that_l
     network = two_roads(tmp_path)
     apart = 0.5 * (gap - (LANE_WIDTH - 2.0))
     sampled = [
-        SampledVehicle(one, np.full(len(one.time), deviation), np.ones(len(one.time), dtype=bool), frozenset({side}))
+        SampledVehicle(one, np.full(len(ROWS), deviation), np.ones(len(ROWS), dtype=bool), frozenset({side}))
         for one, deviation in (
             (drive(network, entity("right"), lane=-2, start=100.0), -apart),
             (drive(network, entity("left"), lane=-1, start=100.0), apart),
@@ -83,11 +83,11 @@ def test_where_a_profile_responds_to_somebody_by_itself_the_law_adds_what_that_l
     assert left is not None
     if side == "left":  # who is overtaken has done its part
         assert right is None
-        assert left[250] == pytest.approx(OVERTAKING_SHARE * by_law, rel=0.02)
+        assert left[25] == pytest.approx(OVERTAKING_SHARE * by_law, rel=0.02)
     else:
         assert right is not None
-        assert right[250] == pytest.approx(-(1 - OVERTAKING_SHARE) * by_law, rel=0.02)
-        assert left[250] == pytest.approx(after, rel=0.02)
+        assert right[25] == pytest.approx(-(1 - OVERTAKING_SHARE) * by_law, rel=0.02)
+        assert left[25] == pytest.approx(after, rel=0.02)
 
 
 def test_a_scenario_s_neighbours_keep_apart_whatever_their_order(tmp_path: Path) -> None:

@@ -15,12 +15,12 @@ from unittest import mock
 import numpy as np
 import pandas as pd
 
+from examples.driver_simulator import simulate_drive
 from tests.faults.reader import NonsenseError, Reader, sane
 from tests.faults.recordings import RECORDINGS
 from tests.formats.made_scenario import ROAD, declarations, entity, parameter, scenario_text, vehicle
 from tests.profiles import simulated_profile
 from xosc_lateral.api.result import given_drives, given_profile, naming
-from xosc_lateral.datasets import simulate_drive
 from xosc_lateral.driver.sampled_offsets import sample_free
 from xosc_lateral.driver.stream import OffsetStream
 from xosc_lateral.drives.cuts import all_runs

@@ -11,12 +11,12 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from examples.driver_simulator import simulate_drive
 from tests.faults.readers import manifest_row
 from tests.formats.made_scenario import scenario_text, write_scenario
 from tests.profiles import simulated_profile
 from xosc_lateral import write_template
 from xosc_lateral.cli import main
-from xosc_lateral.datasets import simulate_drive
 from xosc_lateral.driver.stream import OffsetStream
 from xosc_lateral.formats.profiles import profile_bytes
 from xosc_lateral.pipeline.batch import STATE

@@ -34,18 +34,24 @@ TURNED = Orientation(h=-0.3, p=-0.1, r=0.05)
 
 POSITIONS: list[tuple[Position, Position]] = [
     (
-        WorldPosition(1.0, 2.0, HERE, z=3.0, h=0.3, p=0.1, r=0.05),
-        WorldPosition(1.0, -2.0, HERE, z=3.0, h=-0.3, p=-0.1, r=0.05),
+        WorldPosition(1.0, 2.0, z=3.0, h=0.3, p=0.1, r=0.05, place=HERE),
+        WorldPosition(1.0, -2.0, z=3.0, h=-0.3, p=-0.1, r=0.05, place=HERE),
     ),
-    (RelativeWorldPosition("A", 1.0, 2.0, HERE, 3.0, TURN), RelativeWorldPosition("A", 1.0, -2.0, HERE, 3.0, TURNED)),
-    (RoadPosition("r", 5.0, 2.0, HERE, TURN), RoadPosition("r", 5.0, -2.0, HERE, TURNED)),
-    (RelativeRoadPosition("A", 5.0, 2.0, HERE, TURN), RelativeRoadPosition("A", 5.0, -2.0, HERE, TURNED)),
-    (RelativeLanePosition("A", 1, HERE, ds=5.0, offset=0.4), RelativeLanePosition("A", 1, HERE, ds=5.0, offset=-0.4)),
-    (GeoPosition(48.0, 9.0, HERE, orientation=TURN), GeoPosition(48.0, 9.0, HERE, orientation=TURNED)),
-    (RoutePosition(None, None, HERE, TURN), RoutePosition(None, None, HERE, TURNED)),
     (
-        TrajectoryPosition(Trajectory("t", Polyline(()), False, HERE), 5.0, HERE, 2.0, TURN),
-        TrajectoryPosition(Trajectory("t", Polyline(()), False, HERE), 5.0, HERE, -2.0, TURNED),
+        RelativeWorldPosition("A", 1.0, 2.0, 3.0, TURN, place=HERE),
+        RelativeWorldPosition("A", 1.0, -2.0, 3.0, TURNED, place=HERE),
+    ),
+    (RoadPosition("r", 5.0, 2.0, TURN, place=HERE), RoadPosition("r", 5.0, -2.0, TURNED, place=HERE)),
+    (RelativeRoadPosition("A", 5.0, 2.0, TURN, place=HERE), RelativeRoadPosition("A", 5.0, -2.0, TURNED, place=HERE)),
+    (
+        RelativeLanePosition("A", 1, ds=5.0, offset=0.4, place=HERE),
+        RelativeLanePosition("A", 1, ds=5.0, offset=-0.4, place=HERE),
+    ),
+    (GeoPosition(48.0, 9.0, orientation=TURN, place=HERE), GeoPosition(48.0, 9.0, orientation=TURNED, place=HERE)),
+    (RoutePosition(None, None, TURN, place=HERE), RoutePosition(None, None, TURNED, place=HERE)),
+    (
+        TrajectoryPosition(Trajectory("t", Polyline(()), False, place=HERE), 5.0, 2.0, TURN, place=HERE),
+        TrajectoryPosition(Trajectory("t", Polyline(()), False, place=HERE), 5.0, -2.0, TURNED, place=HERE),
     ),
 ]
 
@@ -63,19 +69,19 @@ def test_a_lane_offset_counts_to_the_right_of_the_lane_s_own_direction(
     lane: int, offset: float, expected: float
 ) -> None:
     """A lane of positive id goes against s: to the right of its direction is the road's +t already."""
-    position = LanePosition("r", lane, 5.0, HERE, offset)
-    assert mirrored(position) == LanePosition("r", lane, 5.0, HERE, expected)
+    position = LanePosition("r", lane, 5.0, offset, place=HERE)
+    assert mirrored(position) == LanePosition("r", lane, 5.0, expected, place=HERE)
 
 
 def test_relative_to_an_object_is_along_the_world_s_axes_there() -> None:
-    assert mirrored(RelativeObjectPosition("A", 1.0, 2.0, HERE, 3.0, TURN)) == RelativeWorldPosition(
-        "A", 1.0, -2.0, HERE, 3.0, TURNED
+    assert mirrored(RelativeObjectPosition("A", 1.0, 2.0, 3.0, TURN, place=HERE)) == RelativeWorldPosition(
+        "A", 1.0, -2.0, 3.0, TURNED, place=HERE
     )
 
 
 def test_angles_that_are_not_given_stay_so() -> None:
-    assert mirrored(WorldPosition(0.0, 0.0, HERE)) == WorldPosition(0.0, 0.0, HERE)
-    assert mirrored(RoadPosition("r", 0.0, 0.0, HERE)) == RoadPosition("r", 0.0, 0.0, HERE)
+    assert mirrored(WorldPosition(0.0, 0.0, place=HERE)) == WorldPosition(0.0, 0.0, place=HERE)
+    assert mirrored(RoadPosition("r", 0.0, 0.0, place=HERE)) == RoadPosition("r", 0.0, 0.0, place=HERE)
 
 
 def test_what_is_not_known_is_left_alone() -> None:
@@ -84,7 +90,7 @@ def test_what_is_not_known_is_left_alone() -> None:
 
 
 def test_curves_bend_to_the_other_side() -> None:
-    there = WorldPosition(0.0, 0.0, HERE)
+    there = WorldPosition(0.0, 0.0, place=HERE)
     clothoid = Clothoid(there, 0.01, 0.002, 50.0)
     assert mirrored_shape(clothoid) == Clothoid(there, -0.01, -0.002, 50.0)
     spline = ClothoidSpline((ClothoidSplineSegment(0.01, -0.02, 30.0, 0.1), ClothoidSplineSegment(0.0, 0.03, 20.0)))

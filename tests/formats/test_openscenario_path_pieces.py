@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from xosc_lateral.formats.openscenario.write.path_pieces import PathPiece, cut_path, vertex_times
+from xosc_lateral.motion.nominal import Activity
 
 STEP = 0.02
 FloatArray = NDArray[np.float64]
@@ -19,7 +20,8 @@ def pieces(x: FloatArray, *, active: FloatArray | None = None, teleported: Float
     time = STEP * np.arange(len(x))
     there = np.ones(len(x), bool) if active is None else active.astype(bool)
     placed = np.zeros(len(x), bool) if teleported is None else teleported.astype(bool)
-    return cut_path(time, x, np.zeros_like(x), there, placed)
+    activity = Activity.ACTIVE * there + Activity.TELEPORTED * placed
+    return cut_path(time, x, np.zeros_like(x), activity.astype(np.uint8))
 
 
 def driven(speed: FloatArray) -> FloatArray:

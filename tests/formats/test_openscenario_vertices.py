@@ -19,12 +19,11 @@ def test_the_text_is_what_elements_would_be(motion: bool) -> None:
     columns = [rng.normal(size=n) for _ in range(9)]
     root, vertices = etree.fromstring(SOURCE), Vertices(SOURCE)
     holder = etree.Element("Holder")
-    vertices.add(
-        build.sub(holder, "Polyline"), TimedVertices(columns[0], columns[1:7], columns[7:] if motion else None)
-    )
-    vertices.add(
-        build.sub(holder, "Polyline"), TimedVertices(columns[0][:2], [values[:2] for values in columns[1:7]], None)
-    )
+    for count, number in ((n, 9 if motion else 7), (2, 7)):
+        polyline = TimedVertices(
+            count, lambda part, k=number, end=count: [values[:end][part] for values in columns[:k]]
+        )
+        vertices.add(build.sub(holder, "Polyline"), polyline)
     build.insert_indented(root, 1, holder)
     pieces = list(vertices.document(root))
     assert max(map(len, pieces)) < 600 * BLOCK  # no piece holds more than a block

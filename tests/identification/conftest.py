@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from xosc_lateral.datasets.driver_simulator import Driver, simulate_drive
-from xosc_lateral.datasets.plants import Plant
+from examples.driver_simulator.plants import Plant
+from examples.driver_simulator.simulator import Driver, simulate_drive
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.formats.drives import read_drives
 

@@ -7,7 +7,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from benchmarks.simulated.movements import ornstein_uhlenbeck, record_movement
-from xosc_lateral.drives.filters import first_order
+from examples.driver_simulator.motorway import first_order
 from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.identification.regression import Coarse
 from xosc_lateral.identification.timeline import join_drives

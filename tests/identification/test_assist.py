@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 
 from benchmarks.simulated.assist import FLAG, OPENLKA_MAP, LaneKeepingAssist, openlka_layout
+from examples.driver_simulator.simulator import simulate_drive
 from xosc_lateral.cli import main
-from xosc_lateral.datasets.driver_simulator import simulate_drive
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.evaluation.snippets import sample_runs
 from xosc_lateral.formats.drives import read_drives

@@ -12,10 +12,10 @@ import pytest
 
 from benchmarks import simulated as plants
 from benchmarks.simulated.movements import ornstein_uhlenbeck, record_movement
+from examples.driver_simulator.simulator import Driver, simulate_drive
 from tests.identification import truth
 from tests.identification.conftest import driver_in
 from xosc_lateral.cli import main
-from xosc_lateral.datasets.driver_simulator import Driver, simulate_drive
 from xosc_lateral.driver.effects import Linear, Product
 from xosc_lateral.driver.fitting import fit_profile
 from xosc_lateral.drives.drive import Drive

@@ -13,8 +13,8 @@ import pytest
 
 from benchmarks import simulated as plants
 from benchmarks.simulated.movements import held, in_regimes, record_movement
+from examples.driver_simulator.simulator import Driver, simulate_drive
 from tests.identification.selected import named, selected
-from xosc_lateral.datasets.driver_simulator import Driver, simulate_drive
 from xosc_lateral.driver.effects import ColumnEffect, Levels, Product, Saturating, Threshold
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.formats.drives import read_drives

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from xosc_lateral.datasets.driver_simulator import Driver, simulate_drive
-from xosc_lateral.datasets.plants import Plant
+from examples.driver_simulator.plants import Plant
+from examples.driver_simulator.simulator import Driver, simulate_drive
 
 BAND_S = (8.0, 80.0)
 """A driver who lets more pass moves more within such times; what shakes the car within a second stays. [s]"""

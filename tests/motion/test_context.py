@@ -148,8 +148,8 @@ def test_weather_holds_from_the_time_of_its_action_and_wind_is_relative_to_trave
         illuminance=900.0,
     )
     clock = TimeOfDay(datetime(2026, 1, 1, 6, 30), animation=True)
-    environment = Environment("storm", place, time_of_day=clock, weather=weather, friction_scale_factor=0.7)
-    content = Action("weather", EnvironmentAction(environment, place), place, is_private=False)
+    environment = Environment("storm", place=place, time_of_day=clock, weather=weather, friction_scale_factor=0.7)
+    content = Action("weather", EnvironmentAction(environment, place=place), place, is_private=False)
     action = PlayedAction(content, None, ("Init",), 4.0, 4.0)
     motion = together(drive(network, entity(), lane=-2, start=0.0), actions=(action,))
     context = entity_context(motion, network, 0, GRID)

@@ -46,7 +46,9 @@ def test_gaps_are_those_of_all_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
     boxes = [BoxPath(f"v{k}", x[k], y[k], np.full(300, 0.3), 4.0 + k % 9, 2.0, 1.0) for k in range(len(x))]
     time = np.arange(300) / 50
     indexed = smallest_gaps(time, boxes)
-    monkeypatch.setattr(gaps, "pairs_within", lambda x, y, reach: list(combinations(range(len(x)), 2)))
+    monkeypatch.setattr(
+        gaps, "stretches_within", lambda x, y, reach: [(slice(0, len(x[0])), list(combinations(range(len(x)), 2)))]
+    )
     assert indexed == smallest_gaps(time, boxes)
     assert len(indexed) > 5
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 import xosc_lateral as xl
-from xosc_lateral.cli.convert import convert as verb
+from xosc_lateral.cli import verb
 from xosc_lateral.cli.words import SHARED
 from xosc_lateral.enrich.result import Neighbours
 from xosc_lateral.errors import FormatError
@@ -20,8 +20,9 @@ from xosc_lateral.pipeline.settings import OPTIONS, ConvertOptions, ConvertSetti
 
 def test_python_the_command_line_and_the_configuration_have_the_same_options() -> None:
     assert ConvertOptions.__annotations__.keys() == OPTIONS.keys()
-    for call in (xl.convert, xl.convert_many, verb):
+    for call in (xl.convert, xl.convert_many):
         assert OPTIONS.keys() <= inspect.signature(call).parameters.keys()
+    assert OPTIONS.keys() <= {option.name for option in verb("convert").params}
     assert {name for name, option in OPTIONS.items() if option.kind is None} == SHARED.keys()
     assert OPTIONS.keys() >= SETTINGS
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from xosc_lateral.datasets.driver_simulator import simulate_drive
-from xosc_lateral.datasets.plants import ShiftBy, SimulatedResponse
+from examples.driver_simulator.plants import ShiftBy, SimulatedResponse
+from examples.driver_simulator.simulator import simulate_drive
 from xosc_lateral.driver.effects import (
     Acts,
     Angular,

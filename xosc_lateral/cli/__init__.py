@@ -1,4 +1,4 @@
-"""The command line: one verb per file; this module only names them and turns errors into exit codes."""
+"""The command line: this module only names its verbs, and turns errors into exit codes."""
 
 from __future__ import annotations
 
@@ -35,10 +35,12 @@ VERBS = {
     "live": "Drivers in a simulation that runs.",
     "export": "Drivers as parts for other tools.",
 }
-"""Name -> what it does. Each has a module with `register(app)`, which is loaded when the verb is used."""
+"""Name -> what it does."""
 
-MODULES = {"import": "import_", "export": "live"}
-"""Verbs whose module is not called like them."""
+MODULES = {
+    "import": "import_", "export": "live", "reproduce": "verify", "view": "play", "segments": "play",
+}  # fmt: skip
+"""Verbs whose module, which is loaded when they are used, is not called like them."""
 
 LOOKS: dict[str, Any] = {
     "no_args_is_help": True,
@@ -48,14 +50,32 @@ LOOKS: dict[str, Any] = {
 }
 
 
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"xosc-lateral {__version__}")
+        raise typer.Exit
+
+
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Lifelike lateral movement for OpenSCENARIO traffic."""
+
+
+def group_of_verbs() -> typer.Typer:
+    """What a module adds its verbs to: a group, though of one."""
+    found = typer.Typer(**LOOKS)
+    found.callback()(_root)
+    return found
+
+
 @cache
 def verb(name: str) -> Any:
     """The command of a verb, its module loaded."""
-    module = MODULES.get(name, name.replace("-", "_"))
-    alone = typer.Typer(**LOOKS)
-    alone.callback()(_root)  # a group, though of one verb
-    import_module(f"xosc_lateral.cli.{module}").register(alone)
-    return cast(TyperGroup, typer.main.get_command(alone)).commands[name]
+    module = import_module(f"xosc_lateral.cli.{MODULES.get(name, name.replace('-', '_'))}")
+    return cast(TyperGroup, typer.main.get_command(module.app)).commands[name]
 
 
 class _Verbs(TyperGroup):
@@ -71,21 +91,7 @@ class _Verbs(TyperGroup):
 
 
 app = typer.Typer(cls=_Verbs, name="xosc-lateral", help="Lifelike lateral movement for OpenSCENARIO traffic.", **LOOKS)
-
-
-def _version(wanted: bool) -> None:
-    if wanted:
-        typer.echo(f"xosc-lateral {__version__}")
-        raise typer.Exit
-
-
-@app.callback()
-def _root(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
-    ] = False,
-) -> None:
-    """Lifelike lateral movement for OpenSCENARIO traffic."""
+app.callback()(_root)
 
 
 def _in_words(error: XoscLateralError | OSError) -> str:

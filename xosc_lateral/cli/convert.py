@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
-from inspect import Parameter, Signature, signature
+from inspect import Parameter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 from typer.core import TyperCommand
 
-from xosc_lateral.cli.words import SHARED, AsJson, Force, Osi, Quiet, examples, say, warn, write_stdout
+from xosc_lateral.cli import VERBS, group_of_verbs
+from xosc_lateral.cli.words import SHARED, Osi, Written, command, say_json, warn, write_stdout
 from xosc_lateral.formats.openscenario.write.target import Player
 from xosc_lateral.limits import JOB_MEMORY, JOB_TIMEOUT
 from xosc_lateral.pipeline.settings import OPTIONS, ConvertSettings, OutputMode
@@ -19,20 +20,9 @@ from xosc_lateral.pipeline.settings import OPTIONS, ConvertSettings, OutputMode
 if TYPE_CHECKING:
     from xosc_lateral.api.convert import Conversion
 
+app = group_of_verbs()
+
 BATCH = "Batches"
-
-EXAMPLES = examples(
-    "convert cut-in.xosc -o lifelike.xosc --seed 1 --report report.html",
-    "convert scenarios/ -o enriched/ --variants 3 --jobs 2",
-    "convert cut-in.xosc -o - --entity Truck=motorway-vehicle-3 | grep Vertex",
-)
-
-
-def register(app: typer.Typer) -> None:
-    """Add the verb to the command line."""
-    convert.__signature__ = _spelled_out()  # type: ignore[attr-defined]
-    short = "Make scenarios lifelike: one, several, a folder."
-    app.command("convert", cls=_WithPanels, short_help=short, epilog=EXAMPLES)(convert)
 
 
 class _WithPanels(TyperCommand):
@@ -50,6 +40,29 @@ class _WithPanels(TyperCommand):
                 formatter.write_dl(records)
 
 
+def _settings() -> list[Parameter]:
+    """An option for each setting."""
+    found = []
+    for item in fields(ConvertSettings):
+        if item.name in OPTIONS:
+            option = OPTIONS[item.name]
+            kind = SHARED.get(item.name) or Annotated[option.kind, typer.Option(*_flags(item.name), **option.words)]
+            default = None if type(None) in get_args(get_args(kind)[0]) else item.default
+            found.append(Parameter(item.name, Parameter.KEYWORD_ONLY, default=default, annotation=kind))
+    return found
+
+
+def _flags(name: str) -> tuple[str, ...]:
+    return OPTIONS[name].flags or (f"--{name.replace('_', '-')}",)
+
+
+@command(
+    app, "convert", VERBS["convert"],
+    "convert cut-in.xosc -o lifelike.xosc --seed 1 --report report.html",
+    "convert scenarios/ -o enriched/ --variants 3 --jobs 2",
+    "convert cut-in.xosc -o - --entity Truck=motorway-vehicle-3 | grep Vertex",
+    cls=_WithPanels, more=_settings(), after=2,
+)  # fmt: skip
 def convert(
     scenario: Annotated[
         list[str],
@@ -58,6 +71,7 @@ def convert(
             show_default=False,
         ),
     ],
+    *,
     output: Annotated[
         str | None,
         typer.Option(
@@ -86,44 +100,27 @@ def convert(
     log_json: Annotated[
         bool, typer.Option("--log-json", help="Progress as JSON lines on stderr.", rich_help_panel=BATCH)
     ] = False,
-    force: Force = False,
-    quiet: Quiet = False,
-    as_json: AsJson = False,
-    **said: Any,
+    said: Written,
+    **settings: Any,
 ) -> None:
     """Give every car in a scenario the lateral movement of a real driver."""
-    from xosc_lateral.cli.batches import convert_batch, is_batch
+    from xosc_lateral.pipeline.request import is_single
 
-    options = {**_options(said), "force": force}
-    strict = said["strict"]
-    if is_batch(scenario):
-        if osi is not None:
-            raise typer.BadParameter("traces are written for a single scenario", param_hint="--osi")
-        if jobs == 0 or jobs < -1:
-            raise typer.BadParameter("at least 1, or -1 for one per core", param_hint="--jobs")
-        if report is not None and Path(report).is_file():
-            raise typer.BadParameter("of a batch: a folder, not a file", param_hint="--report")
-        show = "json" if log_json else "quiet" if quiet else "auto"
-        convert_batch(
-            scenario,
-            output,
-            {
-                **options,
-                "variants": variants,
-                "report": report,
-                "workers": jobs,
-                "cluster": cluster,
-                "keep_old": keep_old,
-                "show": show,
-                "job_timeout": job_timeout,
-                "job_memory": job_memory,
-            },
-            strict=strict,
-            quiet=quiet,
-            as_json=as_json,
-        )
-    else:
-        _convert_one(Path(scenario[0]), output, options, variants, report, osi, strict, quiet, as_json)
+    options = {**_options(settings), "force": said.force}
+    strict = settings["strict"]
+    if len(scenario) == 1 and is_single(scenario[0]):
+        _convert_one(Path(scenario[0]), output, options, variants, report, osi, strict, said)
+        return
+    if osi is not None:
+        raise typer.BadParameter("traces are written for a single scenario", param_hint="--osi")
+    if jobs == 0 or jobs < -1:
+        raise typer.BadParameter("at least 1, or -1 for one per core", param_hint="--jobs")
+    if report is not None and Path(report).is_file():
+        raise typer.BadParameter("of a batch: a folder, not a file", param_hint="--report")
+    options |= {"variants": variants, "report": report, "workers": jobs, "cluster": cluster, "keep_old": keep_old}
+    options |= {"job_timeout": job_timeout, "job_memory": job_memory}
+    options["show"] = "json" if log_json else "quiet" if said.quiet else "auto"
+    _convert_batch(scenario, output, options, strict, said)
 
 
 def _warn_if_cut_off(result: Conversion, unsaid: bool) -> None:
@@ -149,23 +146,6 @@ def _options(said: Mapping[str, Any]) -> dict[str, Any]:
     return given
 
 
-def _flags(name: str) -> tuple[str, ...]:
-    return OPTIONS[name].flags or (f"--{name.replace('_', '-')}",)
-
-
-def _spelled_out() -> Signature:
-    """The verb's signature, with an option for each setting in place of `**said`."""
-    own = [one.replace(kind=one.KEYWORD_ONLY) for one in signature(convert, eval_str=True).parameters.values()]
-    settings = []
-    for item in fields(ConvertSettings):
-        if item.name in OPTIONS:
-            option = OPTIONS[item.name]
-            kind = SHARED.get(item.name) or Annotated[option.kind, typer.Option(*_flags(item.name), **option.words)]
-            default = None if type(None) in get_args(get_args(kind)[0]) else item.default
-            settings.append(Parameter(item.name, Parameter.KEYWORD_ONLY, default=default, annotation=kind))
-    return Signature([*own[:2], *settings, *own[2:-1]])
-
-
 def _convert_one(
     source: Path,
     output: str | None,
@@ -174,8 +154,7 @@ def _convert_one(
     report: str | None,
     osi: str | None,
     strict: bool,
-    quiet: bool,
-    as_json: bool,
+    said: Written,
 ) -> None:
     from xosc_lateral.api.convert import REPORT_SUFFIXES, convert, lifelike, osi_files, output_scenario
     from xosc_lateral.formats.osi.extra import osi_wanted
@@ -183,12 +162,12 @@ def _convert_one(
     from xosc_lateral.pipeline.convert import numbered
 
     if output == STDOUT:
-        if variants > 1 or as_json or osi is not None:
+        if variants > 1 or said.as_json or osi is not None:
             raise typer.BadParameter("standard output takes a single scenario and no other output", param_hint="-o -")
         result = convert(source, None, report=report, **options)
         write_stdout(result.data)
-        say(result, as_json=False, quiet=quiet, aside=True)
-        _warn_if_cut_off(result, quiet)
+        said.say(result, err=True)
+        _warn_if_cut_off(result, said.quiet)
         unclean = bool(result.warnings) or not result.enriched
     else:
         written = lifelike(source) if output is None else output_scenario(output, source)
@@ -205,8 +184,39 @@ def _convert_one(
             result = convert(source, path, variant=variant + 1, report=its_page, **options)
             if trace is not None:
                 result.write_osi(trace, force=True)
-            say(result, as_json=as_json, quiet=quiet)
-            _warn_if_cut_off(result, quiet or as_json)
+            said.say(result)
+            _warn_if_cut_off(result, said.quiet or said.as_json)
             unclean |= bool(result.warnings) or not result.enriched
     if strict and unclean:
+        raise typer.Exit(1)
+
+
+def _convert_batch(
+    inputs: Sequence[str], output: str | None, options: Mapping[str, Any], strict: bool, said: Written
+) -> None:
+    """Convert all of them; exit code 1 if any failed, or with `strict` if anything is to be said of any."""
+    from xosc_lateral.api.batch import convert_many
+
+    if output is None or output == "-":
+        raise typer.BadParameter("several scenarios need a folder for their outputs: -o FOLDER", param_hint="-o")
+    finished = 0
+
+    def show(row: Mapping[str, Any]) -> None:
+        nonlocal finished
+        finished += row["state"] != "failed"
+        if said.as_json:
+            say_json({"kind": "output", **row})
+
+    try:
+        result = convert_many(list(inputs), output, on_outcome=show, **options)
+    except KeyboardInterrupt:
+        typer.echo(
+            f"\nxosc-lateral: interrupted; {finished} outputs in {output} are finished, and the same command continues",
+            err=True,
+        )
+        raise typer.Exit(130) from None
+    said.say_words(str(result), {"kind": "summary", **result.totals()}, err=False)
+    if result.cut_off and (said.quiet or said.as_json):
+        warn([f"{len(result.cut_off)} runs end at the time limit, not by themselves: {result.cut_off[0]} is one"])
+    if result.failed or (strict and (result.with_warnings or result.nobody_enriched)):
         raise typer.Exit(1)

@@ -6,27 +6,10 @@ from typing import Annotated
 
 import typer
 
-from xosc_lateral.cli.words import (
-    AsJson,
-    Columns,
-    Force,
-    MappingFile,
-    Quiet,
-    Tables,
-    examples,
-    mapped,
-    say_json,
-    write_stdout,
-)
+from xosc_lateral.cli import VERBS, group_of_verbs
+from xosc_lateral.cli.words import Mapped, Tables, Written, command, warn, write_stdout
 
-
-def register(app: typer.Typer) -> None:
-    """Add the verb to the command line."""
-    epilog = examples(
-        "fit drives.csv.gz -o mine.json",
-        "fit monday.csv tuesday.csv -o profiles/ --name anna --map speed=v_kmh:km/h",
-    )
-    app.command("fit", short_help="Fit a profile to measured drives.", epilog=epilog)(fit)
+app = group_of_verbs()
 
 
 def _known_model(text: str) -> str:
@@ -39,8 +22,13 @@ def _known_model(text: str) -> str:
         raise typer.BadParameter(str(error)) from error
 
 
+@command(
+    app, "fit", VERBS["fit"],
+    "fit drives.csv.gz -o mine.json", "fit monday.csv tuesday.csv -o profiles/ --name anna --map speed=v_kmh:km/h",
+)  # fmt: skip
 def fit(
     tables: Tables,
+    *,
     output: Annotated[
         str, typer.Option("--output", "-o", metavar="PROFILE.json", help="Profile to write: file, folder/, or -.")
     ],
@@ -52,8 +40,7 @@ def fit(
             help="two-level: Neis and Beyerer; autoregressive: the default (formerly best).",
         ),
     ] = "autoregressive",
-    columns: Columns = None,
-    mapping_file: MappingFile = None,
+    mapped: Mapped,
     name: Annotated[str, typer.Option(help="Name of the profile; default: the file's name.")] = "",
     source: Annotated[str, typer.Option(help="Description of the drives, for the provenance.")] = "",
     licence: Annotated[str, typer.Option(help="Licence of the drives, for the provenance.")] = "",
@@ -71,9 +58,7 @@ def fit(
             help="Whether to fit how drivers keep away from vehicles beside them; default: where they are known.",
         ),
     ] = None,
-    force: Force = False,
-    quiet: Quiet = False,
-    as_json: AsJson = False,
+    said: Written,
 ) -> None:
     """Fit a driver profile to measured drives."""
     from xosc_lateral import fit, write_profile
@@ -84,14 +69,12 @@ def fit(
 
     usual = name or tables[0].name.split(".")[0]
     written = None if output == STDOUT else output_file(output, f"{usual}.json", PROFILE_SUFFIXES)
-    claim([written], tables, force=force)
-    called = name or (usual if written is None else written.stem)
-    mapping = mapped(columns, mapping_file)
+    claim([written], tables, force=said.force)
     profile = fit(
         tables,
-        name=called,
+        name=name or (usual if written is None else written.stem),
         model=model,
-        columns=mapping,
+        columns=mapped.mapping(),
         source=source,
         licence=licence,
         sensor_noise=sensor_noise,
@@ -101,10 +84,7 @@ def fit(
     if written is None:
         write_stdout(profile_bytes(profile))
     else:
-        write_profile(profile, written, force=force)
-    if as_json and written is not None:
-        say_json({"output": str(written), **profile_record(profile)})
-    elif not quiet:
-        typer.echo(describe_profile(profile), err=True)
-    for warning in fit_warnings(profile, sensor_noise):
-        typer.echo(f"xosc-lateral: warning: {warning}", err=True)
+        write_profile(profile, written, force=said.force)
+    facts = None if written is None else {"output": str(written), **profile_record(profile)}
+    said.say_words(describe_profile(profile), facts)
+    warn(fit_warnings(profile, sensor_noise))

@@ -3,46 +3,72 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from inspect import Parameter, Signature, signature
+from inspect import Parameter, signature
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from xosc_lateral.cli.words import AsJson, Force, Library, Osi, Profile, Quiet, Seed, examples, pairs, say, warn
+from xosc_lateral.cli import VERBS, group_of_verbs
+from xosc_lateral.cli.words import Force, Library, Osi, Profile, Quiet, Seed, Written, command, pairs, spelled_out, warn
+
+app = group_of_verbs()
+group = typer.Typer(help="Drivers in a simulation that runs.", no_args_is_help=True)
+app.add_typer(group, name="live", short_help=VERBS["live"])
+export = typer.Typer(help="Drivers as parts for other tools.", no_args_is_help=True)
+app.add_typer(export, name="export", short_help=VERBS["export"])
 
 FCD = "x,y,angle,type,speed,pos,posLat,lane"
 """What `import fcd` reads; SUMO leaves `posLat` out unless told."""
 
-HELP = {
-    "esmini": (
-        "Play a scenario in esmini, through your library of it.",
-        examples("live esmini cut-in.xosc --player-library libesminiLib.so --ego Ego --states states.csv"),
-    ),
-    "sumo": (
-        "Run a SUMO simulation (extra sumo).",
-        examples("live sumo run.sumocfg -p motorway --seed 1 --lateral-resolution 4 --states states.parquet"),
-    ),
-    "stdio": (
-        "Answer over a pipe: one line of JSON in, one out.",
-        examples("live stdio -p motorway --seed 1 --road motorway.xodr"),
-    ),
-}
+
+def _run(
+    live: Any,
+    source: Path,
+    *,
+    profile: Profile = "motorway",
+    vehicle: Annotated[
+        list[str] | None,
+        typer.Option("--vehicle", metavar="NAME=PROFILE", help="Another profile for one vehicle; may be repeated."),
+    ] = None,
+    ego: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="Vehicle under test: not driven; may be repeated.")
+    ] = None,
+    seed: Seed = 0,
+    states: Annotated[
+        str | None,
+        typer.Option("--states", metavar="OUT", help="Table of where everybody was: .csv, .csv.gz, .parquet."),
+    ] = None,
+    osi: Osi = None,
+    library: Library = None,
+    said: Written,
+) -> None:
+    """Options of both simulators, and what is done with what `live` gives."""
+    from xosc_lateral.formats.osi.extra import SUFFIXES, osi_wanted
+    from xosc_lateral.formats.output_paths import claim, output_file
+    from xosc_lateral.formats.tables import TABLE_SUFFIXES
+
+    table = None if states is None else output_file(states, "states.csv", TABLE_SUFFIXES)
+    trace = None if osi is None else output_file(osi, f"{source.stem}_gt.mcap", SUFFIXES)
+    claim([table, trace], [source], force=said.force)
+    osi_wanted(trace)
+    run = live(profile=profile, profiles=pairs(vehicle, "--vehicle"), ego=ego or (), seed=seed, folders=library or ())
+    if table is not None:
+        run.write(table, force=said.force)
+    if trace is not None:
+        run.write_osi(trace, force=said.force)
+    warn(run.warnings)
+    said.say(run)
 
 
-def register(app: typer.Typer) -> None:
-    """Add the verb to the command line."""
-    live = typer.Typer(help="Drivers in a simulation that runs.", no_args_is_help=True)
-    for verb in (esmini, sumo, stdio):
-        short, epilog = HELP[verb.__name__]
-        live.command(verb.__name__, short_help=short, epilog=epilog)(verb)
-    app.add_typer(live, name="live", short_help="Drivers in a simulation that runs.")
-    export = typer.Typer(help="Drivers as parts for other tools.", no_args_is_help=True)
-    lines = examples("export fmu -p motorway -o driver.fmu", "export fmu -p motorway --fmi 3.0 -o driver.fmu")
-    export.command("fmu", short_help="A functional mock-up unit (extra fmu).", epilog=lines)(fmu)
-    app.add_typer(export, name="export", short_help="Drivers as parts for other tools.")
+_with_driver = spelled_out(_run)
+_SHARED: list[Parameter] = list(signature(_with_driver).parameters.values())[2:]
 
 
+@command(
+    group, "esmini", "Play a scenario in esmini, through your library of it.",
+    "live esmini cut-in.xosc --player-library libesminiLib.so --ego Ego --states states.csv", more=_SHARED,
+)  # fmt: skip
 def esmini(
     scenario: Annotated[Path, typer.Argument(help="Scenario (.xosc).", show_default=False)],
     player_library: Annotated[
@@ -56,12 +82,16 @@ def esmini(
     """Play a scenario in esmini with drivers in its vehicles; its triggers and maneuvers stay as written."""
     from xosc_lateral.api.live import live_esmini
 
-    _run(
-        lambda **who: live_esmini(scenario, player_library, duration=duration, step=step, window=window, **who),
-        scenario, **shared,
+    _with_driver(
+        live=lambda **who: live_esmini(scenario, player_library, duration=duration, step=step, window=window, **who),
+        source=scenario, **shared,
     )  # fmt: skip
 
 
+@command(
+    group, "sumo", "Run a SUMO simulation (extra sumo).",
+    "live sumo run.sumocfg -p motorway --seed 1 --lateral-resolution 4 --states states.parquet", more=_SHARED,
+)  # fmt: skip
 def sumo(
     config: Annotated[Path, typer.Argument(help="Configuration (.sumocfg).", show_default=False)],
     duration: Annotated[
@@ -80,54 +110,18 @@ def sumo(
     from xosc_lateral.api.live import live_sumo
 
     options = () if fcd_output is None else ("--fcd-output", str(fcd_output), "--fcd-output.attributes", FCD)
-    _run(
-        lambda **who: live_sumo(
+    _with_driver(
+        live=lambda **who: live_sumo(
             config, duration=duration, lateral_resolution=lateral_resolution, options=options, **who
         ),
-        config, **shared,
+        source=config, **shared,
     )  # fmt: skip
 
 
-def _run(
-    live: Any,
-    source: Path,
-    profile: Profile = "motorway",
-    vehicle: Annotated[
-        list[str] | None,
-        typer.Option("--vehicle", metavar="NAME=PROFILE", help="Another profile for one vehicle; may be repeated."),
-    ] = None,
-    ego: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="Vehicle under test: not driven; may be repeated.")
-    ] = None,
-    seed: Seed = 0,
-    states: Annotated[
-        str | None,
-        typer.Option("--states", metavar="OUT", help="Table of where everybody was: .csv, .csv.gz, .parquet."),
-    ] = None,
-    osi: Osi = None,
-    library: Library = None,
-    force: Force = False,
-    quiet: Quiet = False,
-    as_json: AsJson = False,
-) -> None:
-    """Options of both simulators, and what is done with what `live` gives."""
-    from xosc_lateral.formats.osi.extra import SUFFIXES, osi_wanted
-    from xosc_lateral.formats.output_paths import claim, output_file
-    from xosc_lateral.formats.tables import TABLE_SUFFIXES
-
-    table = None if states is None else output_file(states, "states.csv", TABLE_SUFFIXES)
-    trace = None if osi is None else output_file(osi, f"{source.stem}_gt.mcap", SUFFIXES)
-    claim([table, trace], [source], force=force)
-    osi_wanted(trace)
-    run = live(profile=profile, profiles=pairs(vehicle, "--vehicle"), ego=ego or (), seed=seed, folders=library or ())
-    if table is not None:
-        run.write(table, force=force)
-    if trace is not None:
-        run.write_osi(trace, force=force)
-    warn(run.warnings)
-    say(run, as_json=as_json, quiet=quiet)
-
-
+@command(
+    group, "stdio", "Answer over a pipe: one line of JSON in, one out.",
+    "live stdio -p motorway --seed 1 --road motorway.xodr",
+)  # fmt: skip
 def stdio(
     profile: Profile = "motorway",
     seed: Seed = 0,
@@ -156,6 +150,10 @@ class Fmi(StrEnum):
     THREE = "3.0"
 
 
+@command(
+    export, "fmu", "A functional mock-up unit (extra fmu).",
+    "export fmu -p motorway -o driver.fmu", "export fmu -p motorway --fmi 3.0 -o driver.fmu",
+)  # fmt: skip
 def fmu(
     output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.fmu", help="The unit.")],
     profile: Profile = "motorway",
@@ -174,14 +172,3 @@ def fmu(
     export_fmu(chosen, output, fmi=fmi)
     if not quiet:
         typer.echo(f"{chosen.name} as FMI {fmi} in {output}", err=True)
-
-
-def _spelled_out(verb: Any) -> Signature:
-    """A verb's signature, with the options of both simulators in place of `**shared`."""
-    own, both = (list(signature(one, eval_str=True).parameters.values()) for one in (verb, _run))
-    return Signature([*own[:-1], *(one.replace(kind=Parameter.KEYWORD_ONLY) for one in both[2:])])
-
-
-_BOTH: tuple[Any, ...] = (esmini, sumo)
-for _verb in _BOTH:
-    _verb.__signature__ = _spelled_out(_verb)

@@ -1,44 +1,45 @@
-"""`xosc-lateral play`: the nominal motion of a scenario as a table."""
+"""`xosc-lateral play`: the nominal motion of a scenario as a table; `segments` of it; `view`: as a page that plays."""
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from xosc_lateral.cli import VERBS, group_of_verbs
 from xosc_lateral.cli.words import (
     Allow,
-    AsJson,
     Force,
     Osi,
     Parameters,
     Quiet,
     Road,
     RoadPath,
+    Said,
     TimeLimit,
-    examples,
+    Written,
+    command,
     pairs,
     say_json,
     warn,
     write_stdout,
 )
 
-EXAMPLES = examples(
-    "play cut-in.xosc -o states.csv",
-    "play cut-in.xosc --osi cut-in_gt.mcap",
-    "play cut-in.xosc -o states.parquet",
+app = group_of_verbs()
+
+Scenario = Annotated[Path, typer.Argument(help="Maneuver-based scenario (.xosc).", show_default=False)]
+
+
+@command(
+    app, "play", VERBS["play"],
+    "play cut-in.xosc -o states.csv", "play cut-in.xosc --osi cut-in_gt.mcap", "play cut-in.xosc -o states.parquet",
     "play cut-in.xosc -o - | head",
-)
-
-
-def register(app: typer.Typer) -> None:
-    """Add the verb to the command line."""
-    app.command("play", short_help="Write the nominal motion as a table.", epilog=EXAMPLES)(play)
-
-
+)  # fmt: skip
 def play(
-    scenario: Annotated[Path, typer.Argument(help="Maneuver-based scenario (.xosc).", show_default=False)],
+    scenario: Scenario,
+    *,
     output: Annotated[
         str | None,
         typer.Option("--output", "-o", help="Table: .csv, .csv.gz, .parquet, folder/, - .", show_default=False),
@@ -53,9 +54,7 @@ def play(
     strict: Annotated[
         bool, typer.Option("--strict", help="A missing vehicle catalog, or a run cut off, is an error.")
     ] = False,
-    force: Force = False,
-    quiet: Quiet = False,
-    as_json: AsJson = False,
+    said: Written,
 ) -> None:
     """Play a scenario without offsets and write every entity's position at every step."""
     from xosc_lateral import play
@@ -68,7 +67,7 @@ def play(
     is_file = output is not None and output != STDOUT
     table = output_file(output, f"{scenario.stem}.csv", output_suffixes()) if output is not None and is_file else None
     trace = None if osi is None else output_file(osi, f"{scenario.stem}_gt.mcap", SUFFIXES)
-    claim([table, trace], [scenario], force=force)
+    claim([table, trace], [scenario], force=said.force)
     osi_wanted(trace)
     played = play(
         scenario,
@@ -84,15 +83,66 @@ def play(
     if output == STDOUT:
         write_stdout(played.csv())
     elif output is not None:
-        written = played.write(output, force=force)
+        written = played.write(output, force=said.force)
     if trace is not None:
-        played.write_osi(trace, force=force)
-    if as_json:
+        played.write_osi(trace, force=said.force)
+    if said.as_json:
         traces = {} if trace is None else {"osi": str(trace)}
         say_json({"output": None if written is None else str(written), **traces, **played.to_dict()})
-    elif not quiet:
+    elif not said.quiet:
         for note in played.notes:
             typer.echo(note, err=True)
     warn(played.warnings)
     if strict and played.warnings:
         raise typer.Exit(1)
+
+
+@command(app, "segments", VERBS["segments"], "segments cut-in.xosc", "segments cut-in.xosc --json")
+def segments(
+    scenario: Scenario,
+    *,
+    time_limit: TimeLimit = None,
+    parameter: Parameters = None,
+    allow: Allow = None,
+    said: Said,
+) -> None:
+    """List each entity's road-following segments, and the reason for everything else."""
+    from xosc_lateral import play, segments
+
+    played = play(scenario, time_limit=time_limit, parameters=pairs(parameter, "--set"), allow=allow or ())
+    found = segments(played)
+    warn(played.warnings)
+    said.say(found)
+
+
+@command(
+    app, "view", VERBS["view"],
+    "view cut-in.xosc", "view cut-in_lifelike.xosc -o pages/", "view cut-in.xosc -o cut-in.mcap",
+)  # fmt: skip
+def view(
+    scenario: Annotated[Path, typer.Argument(help="Any scenario (.xosc), converted or not.", show_default=False)],
+    output: Annotated[
+        str | None,
+        typer.Option("--output", "-o", help="Page (.html) or recording (.mcap); default: NAME_view.html beside it."),
+    ] = None,
+    parameter: Parameters = None,
+    allow: Allow = None,
+    time_limit: TimeLimit = None,
+    open_page: Annotated[
+        bool | None, typer.Option("--open/--no-open", help="Open the page in the browser. Default: from a terminal.")
+    ] = None,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Play any scenario in the browser, on one self-contained page; adds no lateral movement."""
+    from xosc_lateral import play
+
+    played = play(scenario, time_limit=time_limit, parameters=pairs(parameter, "--set"), allow=allow or ())
+    page = played.write_page(output or scenario.with_name(f"{scenario.stem}_view.html"), force=force)
+    warn(played.warnings)
+    if not quiet:
+        typer.echo(str(page))
+    if page.suffix == ".mcap":
+        return
+    if open_page or (open_page is None and sys.stdout.isatty()):
+        typer.launch(page.absolute().as_uri())

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from xosc_lateral.cli.words import AsJson, Force, Library, Quiet, Seed, examples, pairs, say, say_json, write_stdout
+from xosc_lateral.cli import VERBS, group_of_verbs
+from xosc_lateral.cli.words import Library, Said, Seed, Written, command, pairs, say_json, write_stdout
 
 Name = Annotated[str, typer.Argument(metavar="NAME|PATH", help="Driver profile.", show_default=False)]
 Names = Annotated[list[str], typer.Argument(metavar="NAME|PATH...", help="Driver profiles.", show_default=False)]
@@ -20,44 +21,14 @@ Fields = Annotated[
     ),
 ]
 
-HELP = {
-    "list": ("List profiles.", examples("profiles list --tag truck --where country=DE")),
-    "show": ("Show one profile's card.", examples("profiles show motorway --report card.html")),
-    "compare": (
-        "Compare several profiles.",
-        examples("profiles compare motorway motorway-vehicle-1 --report compared.html"),
-    ),
-    "derive": (
-        "Make a driver from stated figures.",
-        examples(
-            "profiles derive --preset drowsy -o drowsy.json",
-            "profiles derive motorway --sdlp 0.25 --mean 0.1 -o calm.json",
-        ),
-    ),
-    "add": (
-        "Add a profile to a library.",
-        examples("profiles add mine.json --library team/ --tag truck --set country=DE"),
-    ),
-    "tag": ("Change tags and metadata.", examples("profiles tag mine --library team/ --tag night --remove day")),
-    "export": (
-        "Copy profiles, to pass them on.",
-        examples("profiles export motorway motorway-vehicle-1 -o for-a-friend/"),
-    ),
-    "check": ("Check a library for broken files.", examples("profiles check --library team/")),
-}
+app = group_of_verbs()
+group = typer.Typer(help="Driver profiles: those shipped, and your own.", no_args_is_help=True)
+app.add_typer(group, name="profiles", short_help=VERBS["profiles"])
 
 
-def register(app: typer.Typer) -> None:
-    """Add the verb to the command line."""
-    profiles = typer.Typer(help="Driver profiles: those shipped, and your own.", no_args_is_help=True)
-    for verb in (list_, show, compare, derive, add, tag, export, check):
-        name = verb.__name__.rstrip("_")
-        short, epilog = HELP[name]
-        profiles.command(name, short_help=short, epilog=epilog)(verb)
-    app.add_typer(profiles, name="profiles", short_help="The library of driver profiles.")
-
-
+@command(group, "list", "List profiles.", "profiles list --tag truck --where country=DE")
 def list_(
+    *,
     library: Library = None,
     tags: Annotated[
         list[str] | None, typer.Option("--tag", metavar="TAG", help="Only profiles with this tag; may be repeated.")
@@ -66,23 +37,22 @@ def list_(
         list[str] | None,
         typer.Option(metavar="FIELD=VALUE", help="Only profiles with this value, e.g. country=DE; may be repeated."),
     ] = None,
-    quiet: Quiet = False,
-    as_json: AsJson = False,
+    said: Said,
 ) -> None:
     """List all profiles with model and source, and name files that cannot be read."""
     from xosc_lateral import list_profiles
 
     found = list_profiles(library or (), tags=tags or (), where=pairs(where, "--where"))
-    say(found, as_json=as_json, quiet=quiet)
+    said.say(found)
 
 
+@command(group, "show", "Show one profile's card.", "profiles show motorway --report card.html")
 def show(
     name: Name,
+    *,
     library: Library = None,
     report: Page = None,
-    force: Force = False,
-    quiet: Quiet = False,
-    as_json: AsJson = False,
+    said: Written,
 ) -> None:
     """A profile's card: what it does, where it comes from, how realistic it is."""
     from xosc_lateral import read_profile
@@ -93,22 +63,24 @@ def show(
 
     profile = read_profile(name, library or ())
     if report is not None:
-        write_card(profile, report, force=force)
-    if as_json:
+        write_card(profile, report, force=said.force)
+    if said.as_json:
         say_json(card(profile))
-    elif not quiet:
+    elif not said.quiet:
         beside = [effect for effect in profile.effects if NEIGHBOURS.intersection(effect.columns)]
         typer.echo("\n".join([card_text(profile), *(f"  converted  {one}" for one in proofs_of(profile, beside))]))
 
 
+@command(
+    group, "compare", "Compare several profiles.", "profiles compare motorway motorway-vehicle-1 --report compared.html"
+)
 def compare(
     names: Names,
+    *,
     library: Library = None,
     seed: Seed = 0,
     report: Page = None,
-    force: Force = False,
-    quiet: Quiet = False,
-    as_json: AsJson = False,
+    said: Written,
 ) -> None:
     """Compare profiles, and show which are not distinguishable."""
     from xosc_lateral import compare_profiles
@@ -117,11 +89,19 @@ def compare(
         raise typer.BadParameter("at least two profiles are needed", param_hint="NAME|PATH...")
     compared = compare_profiles(*names, seed=seed, library=library or ())
     if report is not None:
-        compared.write_report(report, force=force)
-    say(compared, as_json=as_json, quiet=quiet)
+        compared.write_report(report, force=said.force)
+    said.say(compared)
 
 
+@command(
+    group,
+    "derive",
+    "Make a driver from stated figures.",
+    "profiles derive --preset drowsy -o drowsy.json",
+    "profiles derive motorway --sdlp 0.25 --mean 0.1 -o calm.json",
+)
 def derive(
+    *,
     base: Annotated[str, typer.Argument(metavar="[BASE]", help="Profile that gives what is not stated.")] = "motorway",
     output: Annotated[str, typer.Option("--output", "-o", help="File, folder/ or -.")] = "-",
     preset: Annotated[
@@ -140,9 +120,7 @@ def derive(
     ] = None,
     called: Annotated[str, typer.Option("--name", help="Id of the new profile.")] = "",
     library: Library = None,
-    force: Force = False,
-    quiet: Quiet = False,
-    as_json: AsJson = False,
+    said: Written,
 ) -> None:
     """A driver from stated figures, sampled until he has them within 2 %; what can't be had together is refused.
 
@@ -160,41 +138,38 @@ def derive(
     if output == STDOUT:
         write_stdout(profile_bytes(made.profile))
         return
-    path = write_profile(made.profile, output, force=force)
-    if as_json:
-        say_json({"output": str(path), **made.profile.provenance.fit})
-    elif not quiet:
-        typer.echo(str(made))
+    path = write_profile(made.profile, output, force=said.force)
+    said.say_words(str(made), {"output": str(path), **made.profile.provenance.fit}, err=False)
 
 
+@command(
+    group, "add", "Add a profile to a library.", "profiles add mine.json --library team/ --tag truck --set country=DE"
+)
 def add(
     name: Name,
+    *,
     library: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder of the library; created if missing.")],
     called: Annotated[str | None, typer.Option("--name", help="Id in the library; default: its own.")] = None,
     tags: Tags = None,
     fields: Fields = None,
-    force: Force = False,
-    quiet: Quiet = False,
-    as_json: AsJson = False,
+    said: Written,
 ) -> None:
     """Put a profile into a library's folder, with tags and metadata."""
     from xosc_lateral.api.profiles import add_profile
 
-    path = add_profile(name, library, name=called, tags=tags or (), metadata=pairs(fields, "--set"), force=force)
-    if as_json:
-        say_json({"id": path.stem, "output": str(path)})
-    elif not quiet:
-        typer.echo(path)
+    path = add_profile(name, library, name=called, tags=tags or (), metadata=pairs(fields, "--set"), force=said.force)
+    said.say_written(path, id=path.stem)
 
 
+@command(group, "tag", "Change tags and metadata.", "profiles tag mine --library team/ --tag night --remove day")
 def tag(
     name: Name,
+    *,
     library: Library = None,
     tags: Tags = None,
     remove: Annotated[list[str] | None, typer.Option(metavar="TAG", help="Tag to remove; may be repeated.")] = None,
     fields: Fields = None,
-    quiet: Quiet = False,
-    as_json: AsJson = False,
+    said: Said,
 ) -> None:
     """Change tags and metadata of a profile of your own, in its file."""
     from xosc_lateral.api.profiles import tag_profile
@@ -203,21 +178,20 @@ def tag(
     metadata = pairs(fields, "--set")
     changed = tag_profile(name, library or (), add=tags or (), remove=remove or (), metadata=metadata)
     facts = {**facts_of(changed), "tags": list(changed.metadata.tags)}
-    if as_json:
-        say_json(facts)
-    elif not quiet:
-        typer.echo(", ".join(f"{key} {value}" for key, value in facts.items() if value))
+    said.say_words(", ".join(f"{key} {value}" for key, value in facts.items() if value), facts, err=False)
 
 
+@command(
+    group, "export", "Copy profiles, to pass them on.", "profiles export motorway motorway-vehicle-1 -o for-a-friend/"
+)
 def export(
     names: Names,
+    *,
     output: Annotated[
         str, typer.Option("--output", "-o", help="One profile: file or -; several: folder/.", show_default=False)
     ],
     library: Library = None,
-    force: Force = False,
-    quiet: Quiet = False,
-    as_json: AsJson = False,
+    said: Written,
 ) -> None:
     """Write profiles to a file or a folder, to pass them on."""
     from xosc_lateral import read_profile, write_profile
@@ -230,27 +204,24 @@ def export(
     if output == STDOUT:
         write_stdout(profile_bytes(chosen[0]))
         return
-    written = [write_profile(profile, output, force=force) for profile in chosen]
-    if as_json:
-        say_json({"outputs": [str(path) for path in written]})
-    elif not quiet:
-        for path in written:
-            typer.echo(path)
+    written = [write_profile(profile, output, force=said.force) for profile in chosen]
+    said.say_written(written)
 
 
-def check(library: Library = None, quiet: Quiet = False, as_json: AsJson = False) -> None:
+@command(group, "check", "Check a library for broken files.", "profiles check --library team/")
+def check(*, library: Library = None, said: Said) -> None:
     """Read every profile of the library; exit with 1 if one cannot be read or its id is not its file's name."""
     from xosc_lateral import list_profiles
 
     found = list_profiles(library or ())
     wrong = [entry.problem for entry in found if entry.problem]
-    if as_json:
+    if said.as_json:
         problems = [{"path": str(entry.path), "problem": entry.problem} for entry in found if entry.problem]
         say_json({"checked": len(found), "problems": problems})
     else:
         for problem in wrong:
             typer.echo(problem)
-        if not quiet:
+        if not said.quiet:
             typer.echo(f"{len(found)} files, {len(wrong)} with problems")
     if wrong:
         raise typer.Exit(1)

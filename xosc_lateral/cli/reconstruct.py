@@ -7,24 +7,21 @@ from typing import Annotated
 
 import typer
 
-from xosc_lateral.cli.words import AsJson, Columns, Force, Library, MappingFile, Quiet, examples, mapped, say
+from xosc_lateral.cli import VERBS, group_of_verbs
+from xosc_lateral.cli.words import Library, Mapped, Written, command
 
-EXAMPLES = examples(
+app = group_of_verbs()
+
+
+@command(
+    app, "reconstruct", VERBS["reconstruct"],
     "reconstruct tasi-0.15.4-py3-none-any.whl -o a39/ --from 60 --to 120",
     "reconstruct tracks.csv --road road.xodr -o out/ --around 17 --host 17 --relative",
     "convert out/drivers.csv -o twins/ --variants 20",
-)
-
-
-def register(app: typer.Typer) -> None:
-    """Add the verb to the command line."""
-    app.command("reconstruct", short_help="Turn a recording into a maneuver-based scenario.", epilog=EXAMPLES)(
-        reconstruct
-    )
-
-
+)  # fmt: skip
 def reconstruct(
     recording: Annotated[Path, typer.Argument(help="Tracks of several vehicles.", show_default=False)],
+    *,
     output: Annotated[str, typer.Option("--output", "-o", help="Folder to write to.", show_default=False)],
     format_: Annotated[
         str | None,
@@ -35,8 +32,7 @@ def reconstruct(
     road: Annotated[
         Path | None, typer.Option("--road", help="OpenDRIVE file that it was recorded on.", show_default=False)
     ] = None,
-    columns: Columns = None,
-    mapping_file: MappingFile = None,
+    mapped: Mapped,
     begin: Annotated[float | None, typer.Option("--from", help="Begin there [s].", show_default=False)] = None,
     end: Annotated[float | None, typer.Option("--to", help="End there [s].", show_default=False)] = None,
     vehicles: Annotated[
@@ -58,9 +54,7 @@ def reconstruct(
     exact: Annotated[bool, typer.Option("--exact", help="Recorded paths as trajectories, no maneuvers.")] = False,
     fit: Annotated[bool, typer.Option("--fit", help="Fit a profile to everybody who drove long enough.")] = False,
     library: Library = None,
-    force: Force = False,
-    quiet: Quiet = False,
-    as_json: AsJson = False,
+    said: Written,
 ) -> None:
     """Turn a recording into maneuvers, its road, and the drivers who drove."""
     from xosc_lateral.api.reconstruct import reconstruct as make
@@ -71,7 +65,7 @@ def reconstruct(
             output,
             format=format_,
             road=road,
-            columns=mapped(columns, mapping_file),
+            columns=mapped.mapping(),
             begin=begin,
             end=end,
             vehicles=vehicles or None,
@@ -84,7 +78,7 @@ def reconstruct(
             exact=exact,
             fit=fit,
             library=library or (),
-            force=force,
+            force=said.force,
         )
     except ValueError as wrong:
         from xosc_lateral.errors import XoscLateralError
@@ -92,4 +86,4 @@ def reconstruct(
         if isinstance(wrong, XoscLateralError):
             raise
         raise typer.BadParameter(str(wrong), param_hint="--version") from wrong
-    say(made, as_json=as_json, quiet=quiet)
+    said.say(made)

@@ -7,35 +7,21 @@ from typing import Annotated, Any
 
 import typer
 
-from xosc_lateral.cli.words import (
-    AsJson,
-    Columns,
-    Force,
-    Library,
-    MappingFile,
-    Profile,
-    Quiet,
-    Seed,
-    With,
-    examples,
-    mapped,
-    say_json,
-    write_stdout,
-)
+from xosc_lateral.cli import VERBS, group_of_verbs
+from xosc_lateral.cli.words import Library, Mapped, Profile, Seed, With, Written, command, warn, write_stdout
+
+app = group_of_verbs()
 
 Table = list[Path] | None
 
 
-def register(app: typer.Typer) -> None:
-    """Add the verb to the command line."""
-    epilog = examples(
-        "sample -p motorway --duration 600 --speed 33 --seed 1 -o offsets.csv",
-        "sample -p mine.json --like drives.parquet --snippet 10 -o snippets.parquet",
-    )
-    app.command("sample", short_help="Sample offsets alone, as a table.", epilog=epilog)(sample)
-
-
+@command(
+    app, "sample", VERBS["sample"],
+    "sample -p motorway --duration 600 --speed 33 --seed 1 -o offsets.csv",
+    "sample -p mine.json --like drives.parquet --snippet 10 -o snippets.parquet",
+)  # fmt: skip
 def sample(
+    *,
     profile: Profile,
     output: Annotated[
         str, typer.Option("--output", "-o", metavar="OUT", help="Table: .csv, .csv.gz, .parquet, folder/, - .")
@@ -54,12 +40,9 @@ def sample(
         float | None, typer.Option(help="Lane width of the free run [m]; default: the profile's.", min=1, max=10)
     ] = None,
     with_: With = None,
-    columns: Columns = None,
-    mapping_file: MappingFile = None,
+    mapped: Mapped,
     library: Library = None,
-    force: Force = False,
-    quiet: Quiet = False,
-    as_json: AsJson = False,
+    said: Written,
 ) -> None:
     """Sample offsets from a profile (one of --like, --context, --duration)."""
     from xosc_lateral import sample
@@ -69,20 +52,15 @@ def sample(
     if sum(choice is not None for choice in (like, context, duration)) != 1:
         raise typer.BadParameter("give one of --like, --context, --duration")
     if output != STDOUT:
-        claim([output_file(output, "offsets.csv", output_suffixes())], [*(like or []), *(context or [])], force=force)
+        inputs = [*(like or []), *(context or [])]
+        claim([output_file(output, "offsets.csv", output_suffixes())], inputs, force=said.force)
     how: dict[str, Any] = {"snippet": snippet, "speed": speed, "lane_width": lane_width, "with_sensor": bool(with_)}
-    mapping = mapped(columns, mapping_file)
-    made = sample(
-        profile, like=like, context=context, duration=duration, seed=seed, columns=mapping, library=library or (), **how
-    )
-    written = None
+    how |= {"columns": mapped.mapping(), "library": library or ()}
+    made = sample(profile, like=like, context=context, duration=duration, seed=seed, **how)
     if output == STDOUT:
         write_stdout(made.csv())
+        said.say_words(made.headline(), None)
     else:
-        written = made.write(output, force=force)
-    if as_json and written is not None:
-        say_json({"output": str(written), **made.to_dict()})
-    elif not quiet:
-        typer.echo(f"{made.headline()}{'' if written is None else f' in {written}'}", err=True)
-    for warning in made.warnings:
-        typer.echo(f"xosc-lateral: warning: {warning}", err=True)
+        written = made.write(output, force=said.force)
+        said.say_words(f"{made.headline()} in {written}", {"output": str(written), **made.to_dict()})
+    warn(made.warnings)

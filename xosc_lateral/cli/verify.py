@@ -1,4 +1,4 @@
-"""`xosc-lateral verify`: whether outputs are what would be made today."""
+"""`xosc-lateral verify`: whether outputs are what would be made today; `reproduce`: make one again."""
 
 from __future__ import annotations
 
@@ -7,16 +7,13 @@ from typing import Annotated
 
 import typer
 
-from xosc_lateral.cli.words import AsJson, Library, Quiet, examples, say
+from xosc_lateral.cli import VERBS, group_of_verbs
+from xosc_lateral.cli.words import Allow, Library, RoadPath, Said, Written, command
 
-EXAMPLES = examples("verify enriched/", "verify lifelike.xosc --json")
-
-
-def register(app: typer.Typer) -> None:
-    """Add the verb to the command line."""
-    app.command("verify", short_help="Whether outputs are what would be made today.", epilog=EXAMPLES)(verify)
+app = group_of_verbs()
 
 
+@command(app, "verify", VERBS["verify"], "verify enriched/", "verify lifelike.xosc --json")
 def verify(
     outputs: Annotated[
         list[Path],
@@ -24,14 +21,43 @@ def verify(
             metavar="OUTPUT...", help="Converted scenarios, or folders with a manifest.", show_default=False
         ),
     ],
+    *,
     library: Library = None,
-    quiet: Quiet = False,
-    as_json: AsJson = False,
+    said: Said,
 ) -> None:
     """Name outputs that were edited, whose inputs have changed, or that another version made; exit code 1 then."""
     from xosc_lateral import verify as check
 
     result = check(outputs, library=library or ())
-    say(result, as_json=as_json, quiet=quiet and not result.failing)
+    said.say(result, even=bool(result.failing))
+    if result.failing:
+        raise typer.Exit(1)
+
+
+@command(
+    app, "reproduce", VERBS["reproduce"],
+    "reproduce lifelike.xosc -o again.xosc", "reproduce enriched/ -o again/ --jobs 2",
+)  # fmt: skip
+def reproduce(
+    output: Annotated[
+        Path,
+        typer.Argument(metavar="OUTPUT", help="Converted scenario, or a folder with a manifest.", show_default=False),
+    ],
+    new: Annotated[str, typer.Option("--output", "-o", help="File or folder to write to.", show_default=False)],
+    *,
+    library: Library = None,
+    allow: Allow = None,
+    road_path: RoadPath = None,
+    jobs: Annotated[int, typer.Option(help="Of a folder: number of processes; -1: one per core.")] = 1,
+    said: Written,
+) -> None:
+    """Make an output, or a folder of them, again and compare the content; exit code 1 if it differs."""
+    from xosc_lateral import reproduce as again
+
+    if jobs == 0 or jobs < -1:
+        raise typer.BadParameter("at least 1, or -1 for one per core", param_hint="--jobs")
+    found = {"library": library or (), "allow": allow or (), "road_path": road_path or ()}
+    result = again(output, new, **found, workers=jobs, force=said.force)
+    said.say(result, even=bool(result.failing))
     if result.failing:
         raise typer.Exit(1)

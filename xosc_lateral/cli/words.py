@@ -5,16 +5,21 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from enum import StrEnum
+from functools import wraps
+from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
 if TYPE_CHECKING:
     from xosc_lateral.api.result import Result
     from xosc_lateral.formats.mapping import TableMapping
+
+Verb = TypeVar("Verb", bound=Callable[..., Any])
 
 AsJson = Annotated[bool, typer.Option("--json", help="Machine-readable: JSON on standard output, errors included.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
@@ -86,11 +91,6 @@ With = Annotated[
 ]
 
 
-def examples(*lines: str) -> str:
-    """End of a verb's help."""
-    return "\b\nExamples:\n" + "\n".join(f"  xosc-lateral {line}" for line in lines)
-
-
 SHARED = {
     "seed": Seed,
     "parameters": Parameters,
@@ -117,25 +117,10 @@ def pairs(words: Iterable[str] | None, option: str) -> dict[str, str]:
     return found
 
 
-def mapped(columns: Iterable[str] | None, file: Path | None) -> TableMapping:
-    """What `--mapping` and `--map` say of tables; a column of the latter stands in for one of the former."""
-    from xosc_lateral.formats.mapping import as_mapping
-
-    return as_mapping(file).with_words(pairs(columns, "--map"))
-
-
 def warn(lines: Iterable[str]) -> None:
     """Say on standard error what has to be known whatever was asked to be kept quiet."""
     for line in lines:
         typer.echo(f"xosc-lateral: warning: {line}", err=True)
-
-
-def say(result: Result, *, as_json: bool, quiet: bool, aside: bool = False) -> None:
-    """Say what came out: JSON on standard output, else text there, or on standard error if that is only `aside`."""
-    if as_json:
-        say_json(result.to_dict())
-    elif not quiet:
-        typer.echo(str(result), err=aside)
 
 
 def say_json(values: Any) -> None:
@@ -148,3 +133,109 @@ def write_stdout(data: str | bytes) -> None:
     sys.stdout.flush()
     sys.stdout.buffer.write(data.encode() if isinstance(data, str) else data)
     sys.stdout.buffer.flush()
+
+
+@dataclass(frozen=True, slots=True)
+class Mapped:
+    """Options of verbs that read tables: what columns are called."""
+
+    columns: Columns = None
+    mapping_file: MappingFile = None
+
+    def mapping(self) -> TableMapping:
+        """What `--mapping` and `--map` say; a column of the latter stands in for one of the former."""
+        from xosc_lateral.formats.mapping import as_mapping
+
+        return as_mapping(self.mapping_file).with_words(pairs(self.columns, "--map"))
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """Options of verbs that say what came out, and how it is said."""
+
+    quiet: Quiet = False
+    as_json: AsJson = False
+
+    def say(self, result: Result, *, even: bool = False, err: bool = False) -> None:
+        """JSON on standard output, else text there, or on standard error; `even`: whatever was to be kept quiet."""
+        if self.as_json:
+            say_json(result.to_dict())
+        elif even or not self.quiet:
+            typer.echo(str(result), err=err)
+
+    def say_words(self, words: str, values: Any, *, err: bool = True) -> None:
+        """Words, on standard error for what is no output; or, where there are any, values as JSON."""
+        if self.as_json and values is not None:
+            say_json(values)
+        elif not self.quiet:
+            typer.echo(words, err=err)
+
+    def say_written(self, paths: Path | Sequence[Path], **values: Any) -> None:
+        """Paths of files, a line each."""
+        if self.as_json:
+            written = {"output": str(paths)} if isinstance(paths, Path) else {"outputs": [str(path) for path in paths]}
+            say_json({**values, **written})
+        elif not self.quiet:
+            for path in [paths] if isinstance(paths, Path) else paths:
+                typer.echo(path)
+
+
+@dataclass(frozen=True, slots=True)
+class Written(Said):
+    """The same of verbs that write files."""
+
+    force: Force = False
+
+
+TOGETHER = (Mapped, Said, Written)
+"""Options that go together; a verb has them as one parameter."""
+
+
+def spelled_out(
+    verb: Callable[..., Any], more: Sequence[Parameter] = (), after: int | None = None
+) -> Callable[..., None]:
+    """The verb with each option that it has in a parameter of `TOGETHER`.
+
+    Parameters
+    ----------
+    more : sequence of Parameter
+        What the verb takes as ``**others``, and behind how many of its own they stand (all of them).
+    """
+    kinds, own = dict[str, Any](), list[Parameter]()
+    for one in signature(verb, eval_str=True).parameters.values():
+        if one.annotation in TOGETHER:
+            kinds[one.name] = one.annotation
+            options = signature(one.annotation, eval_str=True).parameters.values()
+            own += sorted(options, key=lambda option: option.name != "force")
+        elif one.kind is not one.VAR_KEYWORD:
+            own.append(one)
+    own[len(own) if after is None else after : after] = more
+
+    @wraps(verb)
+    def run(**given: Any) -> None:
+        for name, kind in kinds.items():
+            given[name] = kind(**{option: given.pop(option) for option in signature(kind).parameters})
+        verb(**given)
+
+    parameters = [one.replace(kind=one.KEYWORD_ONLY) for one in own]
+    run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+    return run
+
+
+def command(
+    group: typer.Typer,
+    name: str,
+    short: str,
+    *examples: str,
+    cls: Any = None,
+    more: Sequence[Parameter] = (),
+    after: int | None = None,
+) -> Callable[[Verb], Verb]:
+    """Add a verb to a group, with examples at the end of its help; `more` and `after`: see `spelled_out`."""
+    epilog = "\b\nExamples:\n" + "\n".join(f"  xosc-lateral {line}" for line in examples)
+
+    def add(verb: Verb) -> Verb:
+        group.command(name, cls=cls, short_help=short, epilog=epilog)(spelled_out(verb, more, after))
+        return verb
+
+    return add

@@ -118,32 +118,6 @@ def mirrored(values: FloatArray, rows: int) -> FloatArray:
     return np.pad(extended, rows - near, mode="edge") if near < rows else extended
 
 
-def first_order(
-    values: FloatArray, keep: float, *, gain: float = 1.0, before: float | None = None, axis: int = -1
-) -> FloatArray:
-    """``y[k] = keep * y[k - 1] + gain * values[k]``: a first-order lag, or the noise of an autoregression.
-
-    Parameters
-    ----------
-    values : array
-        Even in time along `axis`. [any unit]
-    keep, gain : float
-        exp(-step / time constant), 0 to 1; the gain is ``1 - keep`` for a lag that comes to rest at its input. [-]
-    before : float, optional
-        y before the first row, of a single series; 0 unless given. [unit of the values]
-
-    Returns
-    -------
-    array, shape of `values`
-        In the same unit.
-    """
-    from scipy.signal import lfilter
-
-    if before is None:
-        return np.asarray(lfilter([gain], [1.0, -keep], values, axis=axis), dtype=np.float64)
-    return np.asarray(lfilter([gain], [1.0, -keep], values, axis=axis, zi=[keep * before])[0], dtype=np.float64)
-
-
 def scale_frequencies(values: FloatArray, gain: FloatArray) -> FloatArray:
     """A series with every frequency scaled; it goes round: its end runs into its beginning.
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from xosc_lateral.enrich.result import EntityResult, LaneDeparture
-from xosc_lateral.mask import true_slices
 from xosc_lateral.motion.gaps import BoxPath, Gap, smallest_gaps
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.road.network import RoadNetwork
+from xosc_lateral.rows import blocks, give_back, kept, slices_where
 
 GAP_STEP = 0.1
 """Rows that gaps are looked for on. [s]"""
@@ -23,14 +24,16 @@ def lane_departures(entity: EntityResult, network: RoadNetwork) -> list[LaneDepa
     motion = entity.motion
     spans = [(segment.span.first, segment.span.last) for segment in entity.segments]
     for first, last in spans + _lateral_within_a_lane(motion):
-        rows = slice(first, last + 1)
-        half = 0.5 * network.lane_width(motion.road[rows], motion.lane[rows], motion.s[rows])
-        along_lane = np.where(np.cos(motion.heading_relative[rows]) >= 0.0, 1.0, -1.0)
-        beyond = np.abs(motion.offset[rows] + along_lane * entity.deviation[rows]) - half
-        left = (beyond > 0.0) & (np.abs(motion.offset[rows]) <= half)
-        if left.any():
-            worst = int(np.argmax(np.where(left, beyond, -np.inf)))
-            found.append(LaneDeparture(entity.name, float(motion.time[rows][worst]), float(beyond[worst])))
+        worst: LaneDeparture | None = None
+        for rows in blocks(last + 1, first):
+            half = 0.5 * network.lane_width(motion.road[rows], motion.lane[rows], motion.s[rows])
+            along_lane = np.where(np.cos(motion.heading_relative[rows]) >= 0.0, 1.0, -1.0)
+            beyond = np.abs(motion.offset[rows] + along_lane * entity.deviation[rows]) - half
+            left = (beyond > 0.0) & (np.abs(motion.offset[rows]) <= half)
+            k = int(np.argmax(np.where(left, beyond, -np.inf)))
+            if left[k] and (worst is None or beyond[k] > worst.beyond):
+                worst = LaneDeparture(entity.name, float(motion.time[rows][k]), float(beyond[k]))
+        found += [] if worst is None else [worst]
     return found
 
 
@@ -39,10 +42,17 @@ def _lateral_within_a_lane(motion: EntityMotion) -> list[tuple[int, int]]:
 
     Lane changes cross markings anyway.
     """
-    lateral = (
-        ((motion.activity & Activity.LATERAL) != 0) & ((motion.activity & Activity.ACTIVE) != 0) & (motion.road >= 0)
-    )
-    return [(part.start, part.stop - 1) for part in true_slices(lateral) if len(set(motion.lane[part].tolist())) == 1]
+
+    def lateral(rows: slice) -> NDArray[np.bool_]:
+        activity = motion.activity[rows]
+        at_work = ((activity & Activity.LATERAL) != 0) & ((activity & Activity.ACTIVE) != 0)
+        return np.asarray(at_work & (motion.road[rows] >= 0))
+
+    def in_one_lane(part: slice) -> bool:
+        return all((motion.lane[rows] == motion.lane[part.start]).all() for rows in blocks(part.stop, part.start))
+
+    parts = slices_where(len(motion.time), lateral)
+    return [(part.start, part.stop - 1) for part in parts if in_one_lane(part)]
 
 
 def gaps_of(motion: NominalMotion, trajectories: Sequence[WorldTrajectory]) -> tuple[Gap, ...]:
@@ -53,11 +63,11 @@ def gaps_of(motion: NominalMotion, trajectories: Sequence[WorldTrajectory]) -> t
         if not entity.entity.is_vehicle:
             continue
         box = entity.entity.bounding_box
-        absent = ((entity.activity & Activity.ACTIVE) == 0)[::every]
+        absent = (entity.activity[::every] & Activity.ACTIVE) == 0
         x = np.where(absent, np.nan, path.x[::every])
-        paths.append(
-            BoxPath(entity.name, x, path.y[::every], path.heading[::every], box.length, box.width, box.center_x)
-        )
+        x, y, heading = (kept(values) for values in (x, path.y[::every], path.heading[::every]))
+        paths.append(BoxPath(entity.name, x, y, heading, box.length, box.width, box.center_x))
+        give_back()
     if not paths:
         return ()
     return smallest_gaps(motion.entities[0].time[::every], paths)

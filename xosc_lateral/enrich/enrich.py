@@ -24,6 +24,7 @@ from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.motion.segments import SegmentSpan, cut_segments
 from xosc_lateral.motion.trajectory import WorldTrajectory, displace, distance_driven
 from xosc_lateral.road.network import RoadNetwork
+from xosc_lateral.rows import blocks, columns, give_back, kept
 from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]
@@ -153,7 +154,8 @@ def _scaled(entity: EntityResult, network: RoadNetwork, factor: float, why: str)
     segments = tuple(
         replace(segment, offset=factor * segment.offset, beyond=factor * segment.beyond) for segment in entity.segments
     )
-    deviation = factor * entity.deviation
+    n = len(entity.deviation)
+    deviation = columns(n, ([factor * entity.deviation[rows]] for rows in blocks(n)))[0]
     trajectory = displace(entity.motion, network, deviation)
     return replace(entity, segments=segments, deviation=deviation, trajectory=trajectory)
 
@@ -193,14 +195,20 @@ class _Drawn:
     alone: frozenset[str] = frozenset()
     beyond: tuple[FloatArray, ...] = ()
 
-    def deviation(self, distance: FloatArray) -> FloatArray:
-        """On every row, positive left. [m]"""
-        settling = SETTLING_TIME * self.motion.speed
-        parts = [
-            SampledDeviation(distance[knots], offset, (settling[knots[0]], settling[knots[-1]]))
-            for _, knots, offset in self.segments
-        ]
-        return deviation_through(parts)(distance)
+    def deviation(self, rows: IntArray | None = None) -> FloatArray:
+        """On some rows or all, positive left. [m]"""
+        distance, speed = distance_driven(self.motion), self.motion.speed
+        through = deviation_through(
+            [
+                SampledDeviation(
+                    distance[knots], offset, (SETTLING_TIME * speed[knots[0]], SETTLING_TIME * speed[knots[-1]])
+                )
+                for _, knots, offset in self.segments
+            ]
+        )
+        if rows is not None:
+            return through(distance[rows])
+        return columns(len(distance), ([through(distance[part])] for part in blocks(len(distance))))[0]
 
 
 def _draw(
@@ -226,7 +234,7 @@ def _draw(
     beyond: list[FloatArray] = []
     neutral, responds, alone = set[str](), set[str](), set[str]()
     for span in spans:
-        knots = np.arange(span.first, span.last + 1, every)
+        knots = kept(np.arange(span.first, span.last + 1, every))
         if not span.is_road_following or len(knots) < 2:
             continue
         segment = _segment(motion, network, index, knots, every, foreign_context)
@@ -239,12 +247,13 @@ def _draw(
         seen, side = (mirrored(segment), -1.0) if other_hand else (segment, 1.0)
         wanted = side * sampler.sample(seen)
         later = _going_on(seen, max(least - len(knots), 0))
+        give_back()
         beyond.append(side * sampler.copy().sample(later) if later.time.size > later.before else np.empty(0))
         inside = segment.inside
         who = f"profile {driver.name} for {entity.name!r}"
         check_offsets(wanted, segment.lane_width[inside], who, segment.time[inside])
-        errors.append(sensor_error(sensor, wanted, SAMPLE_STEP, seed, part=len(segments)))
-        segments.append((span, knots, wanted))
+        errors.append(kept(sensor_error(sensor, wanted, SAMPLE_STEP, seed, part=len(segments))))
+        segments.append((span, knots, kept(wanted)))
     if not segments:
         return _Drawn(entity, spans, None, "no road-following segment")
     unknown = tuple(sorted(neutral))
@@ -278,26 +287,31 @@ def _apart(
         return [moved.get(one.motion.name, one) for one in drawn]
     if sum(bool(one.segments) for one in drawn) == 0 or len(drawn) < 2:
         return list(drawn)
-    sampled = [_sampled(one) for one in drawn]
     every = max(1, round(SAMPLE_STEP / motion.step))
-    moves = give_way(motion, network, sampled, np.arange(0, len(motion.entities[0].time), every))
+    rows = np.arange(0, len(motion.entities[0].time), every)
+    moves = give_way(motion, network, [_sampled(one, rows) for one in drawn], rows)
     return [
         one
         if move is None
-        else replace(one, segments=tuple((span, knots, offset + move[knots]) for span, knots, offset in one.segments))
+        else replace(
+            one,
+            segments=tuple(
+                (span, knots, kept(offset + np.interp(knots, rows, move))) for span, knots, offset in one.segments
+            ),
+        )
         for one, move in zip(drawn, moves, strict=True)
     ]
 
 
-def _sampled(one: _Drawn) -> SampledVehicle:
-    """What its neighbours see of a vehicle: how it deviates, and where it could do so more."""
-    rows = len(one.motion.time)
-    deviation, can_move = np.zeros(rows), np.zeros(rows, dtype=np.bool_)
+def _sampled(one: _Drawn, rows: IntArray) -> SampledVehicle:
+    """What its neighbours see of a vehicle on some rows: how it deviates, and where it could do so more."""
+    deviation, can_move = np.zeros(len(rows)), np.zeros(len(rows), dtype=np.bool_)
     if one.segments:
-        deviation = one.deviation(distance_driven(one.motion))
+        deviation = one.deviation(rows)
         for span, _, _ in one.segments:
-            can_move[span.first : span.last + 1] = True
-    return SampledVehicle(one.motion, deviation, can_move, one.responds, one.alone)
+            can_move[(rows >= span.first) & (rows <= span.last)] = True
+    give_back()
+    return SampledVehicle(one.motion, kept(deviation), kept(can_move), one.responds, one.alone)
 
 
 def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:
@@ -308,17 +322,17 @@ def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:
     bounded = [drivable(offset, SAMPLE_STEP, entity.speed[knots]) for _, knots, offset in drawn.segments]
     worst = max((bound for _, bound in bounded if bound), key=lambda bound: bound.before.excess, default=None)
     segments = tuple(
-        (span, knots, offset + error)
+        (span, knots, kept(offset + error))
         for (span, knots, _), (offset, _), error in zip(drawn.segments, bounded, drawn.errors, strict=True)
     )
-    deviation = replace(drawn, segments=segments).deviation(distance_driven(entity))
+    deviation = replace(drawn, segments=segments).deviation()
     return EntityResult(
         entity,
         drawn.spans,
         drawn.profile,
         "",
         tuple(
-            SampledSegment(span, entity.time[knots], offset, later)
+            SampledSegment(span, entity.time[knots[0] : knots[-1] + 1 : knots[1] - knots[0]], offset, later)
             for (span, knots, offset), later in zip(segments, drawn.beyond, strict=True)
         ),
         deviation,
@@ -340,14 +354,17 @@ def _with_trailers(
         trailer = results[name]
         behind = float(np.hypot(trailer.motion.x[0] - tractor.motion.x[0], trailer.motion.y[0] - tractor.motion.y[0]))
         distance = distance_driven(tractor.motion)
-        deviation = np.interp(distance - behind, distance, tractor.deviation)
+        n = len(distance)
+        along = ([np.interp(distance[rows] - behind, distance, tractor.deviation)] for rows in blocks(n))
+        deviation = columns(n, along)[0]
         trajectory = displace(trailer.motion, network, deviation)
         results[name] = replace(trailer, deviation=deviation, trajectory=trajectory, why="follows its tractor")
     return tuple(results.values())
 
 
 def _untouched(entity: EntityMotion, spans: tuple[SegmentSpan, ...], why: str) -> EntityResult:
-    return EntityResult(entity, spans, None, why, (), np.zeros(len(entity.time)), _nominal(entity))
+    no_deviation = np.broadcast_to(0.0, len(entity.time))
+    return EntityResult(entity, spans, None, why, (), no_deviation, _nominal(entity))
 
 
 def _nominal(entity: EntityMotion) -> WorldTrajectory:
@@ -366,12 +383,15 @@ def _segment(
 ) -> Segment:
     """The segment on its knots, with context before and after as far as the entity's motion is one piece."""
     entity = motion.entities[index]
-    broken = ((entity.activity & Activity.TELEPORTED) != 0) | ((entity.activity & Activity.ACTIVE) == 0)
-    breaks = np.flatnonzero(broken)
-    first = int(breaks[breaks <= knots[0]].max(initial=0))
-    last = int(breaks[breaks > knots[-1]].min(initial=len(entity.time))) - 1
-    before = min((knots[0] - first) // every, round(PAST / SAMPLE_STEP))
-    after = min((last - knots[-1]) // every, round(FUTURE / SAMPLE_STEP))
+
+    start = max(0, knots[0] - every * round(PAST / SAMPLE_STEP))
+    stop = min(len(entity.time), knots[-1] + every * round(FUTURE / SAMPLE_STEP) + 1)
+    earlier, later = (
+        np.flatnonzero(((activity & Activity.TELEPORTED) != 0) | ((activity & Activity.ACTIVE) == 0))
+        for activity in (entity.activity[start : knots[0] + 1], entity.activity[knots[-1] + 1 : stop])
+    )
+    before = (knots[0] - start - int(earlier.max(initial=0))) // every
+    after = int(later.min(initial=stop - knots[-1] - 1)) // every
     grid = np.arange(knots[0] - before * every, knots[-1] + after * every + 1, every)
     context = entity_context(motion, network, index, grid)
     for name, (time, values) in foreign_context.items():

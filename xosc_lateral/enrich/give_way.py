@@ -20,15 +20,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.motion.context import CELLS, STEERING, smooth_step
-from xosc_lateral.motion.nearby import pairs_within
+from xosc_lateral.motion.nearby import stretches_within
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.road.network import RoadNetwork
+from xosc_lateral.rows import empty, give_back, kept
 from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]
@@ -103,10 +104,10 @@ class SampledVehicle:
     ----------
     motion : EntityMotion
         Nominal.
-    deviation : array, shape (rows,)
-        From it, positive left. [m]
-    can_move : array of bool, shape (rows,)
-        Where its path is sampled and may be moved.
+    deviation : array, shape (n,)
+        From it on the rows that are looked at, positive left. [m]
+    can_move : array of bool, shape (n,)
+        On which of them its path is sampled and may be moved.
     responds : frozenset of str
         Sides, "left" and "right", on which its profile responds to neighbours by itself: there, gaps are widened by
         what that leaves to be widened.
@@ -124,7 +125,7 @@ class SampledVehicle:
 def give_way(
     motion: NominalMotion, network: RoadNetwork, sampled: Sequence[SampledVehicle], rows: IntArray
 ) -> list[FloatArray | None]:
-    """By how much each vehicle moves aside, on every row of the motion, positive left; None: not at all. [m]
+    """By how much each vehicle moves aside on the rows, positive left, shape (n,); None: not at all. [m]
 
     Parameters
     ----------
@@ -136,43 +137,51 @@ def give_way(
         Rows that are looked at, evenly spaced.
     """
     count, n = len(sampled), len(rows)
-    left, right = np.zeros((count, n)), np.zeros((count, n))
-    frames = [Frame.of(one, rows) for one in sampled]
-    left_hand = np.array(_left_hand(network, sampled, rows), dtype=bool)
-    x, y = ([np.where(frame.present, getattr(frame, name), np.nan) for frame in frames] for name in ("x", "y"))
-    longest = max((one.motion.entity.bounding_box.length for one in sampled), default=0.0)
-    can_move = [one.can_move.any() for one in sampled]
-    meeting = [pair for pair in pairs_within(x, y, FADES + longest + MARGIN) if can_move[pair[0]] or can_move[pair[1]]]
+    left, right = empty((2, count, n))
     names = ("x", "y", "heading", "deviation", "can_move", "present")
-    tables = [np.stack([getattr(frame, name) for frame in frames]) for name in names] if meeting else []
-    sizes = [np.array([getattr(frame, name) for frame in frames]) for name in ("length", "width")]
+    tables = [empty((count, n), bool if name in names[4:] else np.float64) for name in names]
+    for k, one in enumerate(sampled):
+        left[k] = right[k] = 0.0
+        for table, values in zip(tables, Frame.of(one, rows)[: len(names)], strict=True):
+            table[k] = values
+        give_back()
+    left_hand = np.array(_left_hand(network, sampled, rows), dtype=bool)
+    x, y = (
+        (np.where(there, row, np.nan) for row, there in zip(table, tables[-1], strict=True)) for table in tables[:2]
+    )
+    boxes = [one.motion.entity.bounding_box for one in sampled]
+    length, width = (np.array([getattr(box, name) for box in boxes]) for name in ("length", "width"))
+    can_move = [one.can_move.any() for one in sampled]
     responds, alone = (
         [np.array([side in getattr(one, name) for one in sampled], dtype=bool) for side in ("left", "right")]
         for name in ("responds", "alone")
     )
-    for pairs in _together(meeting, n):
-        near = np.flatnonzero(_near(tables, sizes[0], *pairs))
-        own, other = (who[near // n] for who in pairs)
-        at = near % n
-        first, second = (
-            Frame(*(table[who, at] for table in tables), *(size[who] for size in sizes)) for who in (own, other)
-        )
-        widening = widened(first, second, responds[0][own], responds[1][own])
-        if widening is None:
-            continue
-        aside, is_left, responding = widening  # of `own`, by where `other` is
-        share = part_of(is_left == left_hand[own], responding)
-        share = np.where(second.can_move, share, 1.0) * first.can_move
-        share *= ~np.where(is_left, alone[0][own], alone[1][own])
-        np.maximum.at(right, (own, at), np.where(is_left, share * aside, 0.0))
-        np.maximum.at(left, (own, at), np.where(is_left, 0.0, share * aside))
+    for stretch, near_pairs in stretches_within(x, y, FADES + length.max(initial=0.0) + MARGIN):
+        meeting = [pair for pair in near_pairs if can_move[pair[0]] or can_move[pair[1]]]
+        part = [table[:, stretch] for table in tables]
+        for own, other in _together(meeting, part[0].shape[1]):
+            near = np.flatnonzero(_near(part, length, own, other))
+            who, at = np.divmod(near, part[0].shape[1])
+            own, other = own[who], other[who]
+            first, second = (
+                Frame._make([*(table[who, at] for table in part), length[who], width[who]]) for who in (own, other)
+            )
+            widening = widened(first, second, responds[0][own], responds[1][own])
+            if widening is None:
+                continue
+            aside, is_left, responding = widening  # of `own`, by where `other` is
+            share = part_of(is_left == left_hand[own], responding)
+            share = np.where(second.can_move, share, 1.0) * first.can_move
+            share *= ~np.where(is_left, alone[0][own], alone[1][own])
+            np.maximum.at(right[:, stretch], (own, at), np.where(is_left, share * aside, 0.0))
+            np.maximum.at(left[:, stretch], (own, at), np.where(is_left, 0.0, share * aside))
+        give_back()
     every = max(1, int(rows[1] - rows[0])) if n > 1 else 1
-    width = STEERING / (motion.step * every)
-    all_rows = np.arange(len(motion.entities[0].time)) if count else np.empty(0)
+    smoothed = STEERING / (motion.step * every)
     result: list[FloatArray | None] = []
     for k in range(count):
         aside = left[k] - right[k]
-        result.append(np.interp(all_rows, rows, _smoothed(aside, width)) if aside.any() else None)
+        result.append(kept(_smoothed(aside, smoothed)) if aside.any() else None)
     return result
 
 
@@ -196,8 +205,7 @@ MARGIN = 10.0
 """Added to the reach for what lies aside: more than two widths and deviations. [m]"""
 
 
-@dataclass(frozen=True, eq=False)
-class Frame:
+class Frame(NamedTuple):
     """A vehicle on the rows that are looked at: middle, heading, size, and where it is present and may move.
 
     Or one of two vehicles each row, of a moment: size is then an array, too. Shape (n,).
@@ -223,8 +231,8 @@ class Frame:
             motion.x[rows] + box.center_x * np.cos(heading),
             motion.y[rows] + box.center_x * np.sin(heading),
             heading,
-            sampled.deviation[rows],
-            sampled.can_move[rows],
+            sampled.deviation,
+            sampled.can_move,
             present,
             box.length,
             box.width,

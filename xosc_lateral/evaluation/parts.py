@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.models.two_level.fit import split_levels
-from xosc_lateral.driver.models.two_level.settings import PAPER_SETTINGS
+from xosc_lateral.driver.models.two_level.model import PAPER_SETTINGS
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.evaluation.distances import Distances, metric_distances
 from xosc_lateral.evaluation.metrics import snippet_metrics

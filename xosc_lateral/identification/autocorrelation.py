@@ -17,48 +17,26 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from xosc_lateral.mask import true_slices
+from xosc_lateral.identification.timeline import BoolArray, FloatArray, IntArray
+from xosc_lateral.rows import true_slices
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
-
-MAX_REFLECTION = 0.999
-"""Reflection coefficients are kept inside the unit circle: the process is stationary. [-]"""
-
-ENOUGH_ROWS = 0.5
-"""The memory is the longest for which this share of the rows has so much past in its own run. [-]"""
-
-ROWS_PER_COEFFICIENT = 20
-"""Fewer rows than this per coefficient shorten the memory. [-]"""
-
-
-START_ROWS = 10.0
-"""First rows of runs have errors of their own as far as there are more of them than this."""
-
+MAX_REFLECTION = 0.999  # Reflection coefficients are kept inside the unit circle: the process is stationary. [-]
+ENOUGH_ROWS = 0.5  # The memory is the longest for which this share of the rows has so much past in its own run. [-]
+ROWS_PER_COEFFICIENT = 20  # Fewer rows than this per coefficient shorten the memory. [-]
+START_ROWS = 10.0  # First rows of runs have errors of their own as far as there are more of them than this.
+# Simulated tables that tell the bias of short drives: their scatter adds an eighth to the fit's own variance.
 BIAS_DRAWS = 4
-"""Simulated tables that tell the bias of short drives: their scatter adds an eighth to the fit's own variance."""
-
-BIAS_SEED = 0
-"""The same numbers each time: fits with and without a term differ by the term alone."""
+BIAS_SEED = 0  # The same numbers each time: fits with and without a term differ by the term alone.
 
 
 @dataclass(frozen=True, eq=False)
 class MovementProcess:
-    """x_t = sum_k a_k x_{t-k} + sd * white.
+    """x_t = sum_k a_k x_{t-k} + sd * white."""
 
-    Parameters
-    ----------
-    lags : tuple of array
-        Coefficients of the best predictors from 0, 1, ... p past values; the last one is the process itself.
-    deviations : array, shape (p + 1,)
-        Standard deviation of each predictor's error.
-    """
-
+    # Coefficients of the best predictors from 0, 1, ... p past values; the last one is the process itself.
     lags: tuple[FloatArray, ...]
-    deviations: FloatArray
+    deviations: FloatArray  # shape (p + 1,): Standard deviation of each predictor's error.
 
     @property
     def order(self) -> int:
@@ -247,26 +225,13 @@ def unbiased(
 
 @dataclass(frozen=True, eq=False)
 class Whitener:
-    """Turns series on the grid into independent rows of variance 1, the drives' own levels taken out.
+    """Turns series on the grid into independent rows of variance 1, the drives' own levels taken out."""
 
-    Parameters
-    ----------
-    process : MovementProcess
-        Of the movement divided by `scale`.
-    valid : bool array, shape (n,)
-    drive : int array, shape (n,)
-        Which level a row has; increasing.
-    scale : array, shape (n,)
-        Factor on the movement at each row.
-    runs : tuple of slice, optional
-        Rows of each run, where they stand side by side without anything invalid in between.
-    """
-
-    process: MovementProcess
-    valid: BoolArray
-    drive: IntArray
-    scale: FloatArray
-    runs: tuple[slice, ...] = ()
+    process: MovementProcess  # Of the movement divided by `scale`.
+    valid: BoolArray  # shape (n,)
+    drive: IntArray  # shape (n,): Which level a row has; increasing.
+    scale: FloatArray  # shape (n,): Factor on the movement at each row.
+    runs: tuple[slice, ...] = ()  # Rows of each run, where they stand side by side without anything invalid in between.
 
     @cached_property
     def compact(self) -> Whitener:

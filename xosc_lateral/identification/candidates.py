@@ -38,29 +38,17 @@ from xosc_lateral.driver.effects import (
     known_effects,
 )
 from xosc_lateral.identification.columns import Column, Role, Values
+from xosc_lateral.identification.timeline import FloatArray
 
-FloatArray = NDArray[np.float64]
-
-LIMITS = (0.1, 0.25, 0.5, 0.75, 0.9)
-"""Quantiles at which limits are tried first; refined later. [-]"""
-
-FINE_LIMITS = tuple(np.linspace(0.05, 0.95, 37).tolist())
-"""The quantiles at which they are refined. [-]"""
-
-KNOTS = (0.1, 0.3, 0.5, 0.7, 0.9)
-"""Quantiles at which a curve may bend. [-]"""
-
-SCALES = (0.25, 0.5, 0.75)
-"""Quantiles of a distance that are tried as scale of its influence. [-]"""
-
+LIMITS = (0.1, 0.25, 0.5, 0.75, 0.9)  # Quantiles at which limits are tried first; refined later. [-]
+FINE_LIMITS = tuple(np.linspace(0.05, 0.95, 37).tolist())  # The quantiles at which they are refined. [-]
+KNOTS = (0.1, 0.3, 0.5, 0.7, 0.9)  # Quantiles at which a curve may bend. [-]
+SCALES = (0.25, 0.5, 0.75)  # Quantiles of a distance that are tried as scale of its influence. [-]
+# Scales that refinement tries, alone and in products, as shares of the median distance. [-]
 FINE_SCALES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0)
-"""Scales that refinement tries, alone and in products, as shares of the median distance. [-]"""
-
-NEAR = 2.0 / 3.0
-"""A distance comes near: its 5 % quantile is below this share of its median. [-]"""
-
+NEAR = 2.0 / 3.0  # A distance comes near: its 5 % quantile is below this share of its median. [-]
+# Directions that an angle is projected on: at most 8 % of a score is lost between two of them. [rad]
 PHASES = np.pi * np.arange(4) / 4.0
-"""Directions that an angle is projected on: at most 8 % of a score is lost between two of them. [rad]"""
 
 
 class Family(StrEnum):
@@ -73,23 +61,12 @@ class Family(StrEnum):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Candidate:
-    """A quantity with one degree of freedom, not yet sized.
+    """A quantity with one degree of freedom, not yet sized."""
 
-    Parameters
-    ----------
-    effect : ColumnEffect
-        Without coefficients.
-    family : Family
-    cost : float
-        What its family's size takes from its score. [squared score]
-    contrast : tuple of float
-        Weights of the effect's components, where it has several.
-    """
-
-    effect: ColumnEffect
+    effect: ColumnEffect  # Without coefficients.
     family: Family
-    cost: float
-    contrast: tuple[float, ...] = (1.0,)
+    cost: float  # What its family's size takes from its score. [squared score]
+    contrast: tuple[float, ...] = (1.0,)  # Weights of the effect's components, where it has several.
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -126,19 +103,11 @@ def candidates_of(columns: Sequence[Column], context: Mapping[str, FloatArray], 
 
 @dataclass(frozen=True, slots=True)
 class Shapes:
-    """Shapes of one column for refinement.
+    """Shapes of one column for refinement."""
 
-    Parameters
-    ----------
-    plain, bent : list of ColumnEffect
-        Bent ones with a fine choice of limits and scales.
-    finer : float
-        How many times as many bent ones as the dictionary has. [-]
-    """
-
-    plain: list[ColumnEffect]
-    bent: list[ColumnEffect]
-    finer: float
+    plain: list[ColumnEffect]  # Bent ones with a fine choice of limits and scales.
+    bent: list[ColumnEffect]  # Bent ones with a fine choice of limits and scales.
+    finer: float  # How many times as many bent ones as the dictionary has. [-]
 
 
 def shapes_of(column: Column, values: FloatArray, *, curves: bool) -> Shapes:

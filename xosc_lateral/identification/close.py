@@ -8,7 +8,6 @@ from functools import partial
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect
 from xosc_lateral.driver.models.base import ModelKind
@@ -41,59 +40,27 @@ from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.terms.between import between_shift
 from xosc_lateral.identification.timeline import join_drives
 
-FloatArray = NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """One effect that the base lacked.
+    """One effect that the base lacked."""
 
-    Parameters
-    ----------
-    effect : str
-        Short name.
-    kind : str
-        As in the report's schema.
-    columns : tuple of str
-        That cause it; two when it is a product.
-    alike : tuple of tuple of str
-        Columns of each other effect that the data can't tell from it.
-    lag_s, response_s : float or None
-    shape : str
-    size_m : float
-        Change of the mean between the 5 % and 95 % quantile, or amplitude [m]; factor for scale.
-    size_error : float
-        Standard error of it.
-    p_value : float
-        Family-wise over everything that its component tried.
-    error_before, error_after : float
-        On held-out blocks, by the effect's own quantity. [m]
-    measure : str
-        What that error compares.
-    effects : tuple of Effect
-        What the profile got.
-    statistic : str
-        Group of summary statistics that shows it best.
-    gain : Gain or None
-        Held-out gain, nested; None where its path can't be predicted.
-    """
-
-    effect: str
-    kind: str
-    columns: tuple[str, ...]
-    alike: Alternatives
+    effect: str  # Short name.
+    kind: str  # As in the report's schema.
+    columns: tuple[str, ...]  # That cause it; two when it is a product.
+    alike: Alternatives  # Columns of each other effect that the data can't tell from it.
     lag_s: float | None
     response_s: float | None
     shape: str
-    size_m: float
-    size_error: float
-    p_value: float
-    error_before: float
-    error_after: float
-    measure: str
-    effects: tuple[Effect, ...]
-    statistic: str
-    gain: Gain | None = None
+    size_m: float  # Change of the mean between the 5 % and 95 % quantile, or amplitude [m]; factor for scale.
+    size_error: float  # Standard error of it.
+    p_value: float  # Family-wise over everything that its component tried.
+    error_before: float  # On held-out blocks, by the effect's own quantity. [m]
+    error_after: float  # On held-out blocks, by the effect's own quantity. [m]
+    measure: str  # What that error compares.
+    effects: tuple[Effect, ...]  # What the profile got.
+    statistic: str  # Group of summary statistics that shows it best.
+    gain: Gain | None = None  # Held-out gain, nested; None where its path can't be predicted.
 
 
 def describe_finding(one: Accepted, key: str, fitted: Fitted, effects: tuple[Effect, ...], scored: HeldOut) -> Finding:
@@ -127,45 +94,25 @@ def population_finding(population: DriverVariance, scored: HeldOut) -> Finding:
     )  # fmt: skip
 
 
+# The held-out error of a profile with more effects may be so many times the base's: 24 runs leave 2 % of noise. [-]
 NO_WORSE = 1.05
-"""The held-out error of a profile with more effects may be so many times the base's: 24 runs leave 2 % of noise. [-]"""
-
+# Why an effect that does not help is taken back.
 HARMFUL = "significant, but with it held-out blocks are predicted worse by its own quantity, beyond what chance does"
-"""Why an effect that does not help is taken back."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LoopResult:
-    """What the loop found, as data; `xosc_lateral.report.loop` turns it into words.
+    """What the loop found, as data; `xosc_lateral.report.loop` turns it into words."""
 
-    Parameters
-    ----------
-    base, refined : DriverProfile
-        Before and after.
-    given : bool
-        Whether the base was given; else it was fitted first.
-    findings : tuple of Finding
-    coarse : Coarse
-    identified : Identified
-        Terms that are kept and those that are not, and the columns.
-    scored : HeldOut
-        Both profiles on held-out blocks.
-    lack_of_fit : LackOfFit
-        What is left.
-    scores : Scorecard
-        The ten metrics.
-    seed : int
-    """
-
-    base: DriverProfile
-    refined: DriverProfile
-    given: bool
+    base: DriverProfile  # Before and after.
+    refined: DriverProfile  # Before and after.
+    given: bool  # Whether the base was given; else it was fitted first.
     findings: tuple[Finding, ...]
     coarse: Coarse
-    identified: Identified
-    scored: HeldOut
-    lack_of_fit: LackOfFit
-    scores: Scorecard
+    identified: Identified  # Terms that are kept and those that are not, and the columns.
+    scored: HeldOut  # Both profiles on held-out blocks.
+    lack_of_fit: LackOfFit  # What is left.
+    scores: Scorecard  # The ten metrics.
     seed: int
 
     @property

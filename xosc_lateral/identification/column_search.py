@@ -7,7 +7,6 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import ColumnEffect
 from xosc_lateral.identification.dictionary import (
@@ -25,30 +24,20 @@ from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.significance import LoopSeed, upper_tail
 from xosc_lateral.identification.terms.base import Outcome
 from xosc_lateral.identification.terms.column import ColumnTerm
+from xosc_lateral.identification.timeline import FloatArray
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-
-CONTENDERS = 4
-"""Sets of columns that are refined, at most."""
-
-WITHIN = 12.0
-"""Sets of columns that score lower than the best by more than this are not. [squared score]"""
-
+CONTENDERS = 4  # Sets of columns that are refined, at most.
+WITHIN = 12.0  # Sets of columns that score lower than the best by more than this are not. [squared score]
+# A term may lower the likelihood of the rows that it is fitted to by so much. More, and the model contradicts it: a
+# factor on the movement that changes faster than the movement does, say, which its innovations alone allow. [nat]
 ROUNDING = 1e-6
-"""A term may lower the likelihood of the rows that it is fitted to by so much. More, and the model contradicts it: a
-factor on the movement that changes faster than the movement does, say, which its innovations alone allow. [nat]"""
-
+# Windows that count as independent where movement with and without a term is compared: longer than the memory of a
+# minute and a half. [s]
 CLUSTER_S = 120
-"""Windows that count as independent where movement with and without a term is compared: longer than the memory of a
-minute and a half. [s]"""
-
+# Standard errors by which the movement must have grown. A term of the right size lowers it by as much as one of twice
+# the right size leaves it the same: a true one is lost in at most 2 % of the tables, however weak it is. [-]
 GROWN = 2.0
-"""Standard errors by which the movement must have grown. A term of the right size lowers it by as much as one of twice
-the right size leaves it the same: a true one is lost in at most 2 % of the tables, however weak it is. [-]"""
-
-ROUNDS = 2
-"""Times that the candidates are scored beside what was found before; the first changes most."""
+ROUNDS = 2  # Times that the candidates are scored beside what was found before; the first changes most.
 
 
 class SearchedTerm(ColumnTerm):

@@ -13,22 +13,16 @@ from dataclasses import dataclass
 from enum import Enum, StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.errors import FormatError
-from xosc_lateral.identification.timeline import Timeline
+from xosc_lateral.identification.timeline import FloatArray, Timeline
 
-FloatArray = NDArray[np.float64]
-
+# A clock goes on in at least half of so many minutes, and hardly ever back: share of its way that is the way from end
+# to end. A random walk's is below a half. [-]
 CLOCK_MINUTES, CLOCK_SHARE = 10, 0.95
-"""A clock goes on in at least half of so many minutes, and hardly ever back: share of its way that is the way from end
-to end. A random walk's is below a half. [-]"""
-
-MAX_LEVELS = 8
-"""More different whole numbers than this are a number, not levels. [-]"""
-
+MAX_LEVELS = 8  # More different whole numbers than this are a number, not levels. [-]
+# A level or presence on for less than this share of the road-following time (12 s of 50 min) tells nothing. [-]
 MIN_SHARE = 0.004
-"""A level or presence on for less than this share of the road-following time (12 s of 50 min) tells nothing. [-]"""
 
 
 class Role(StrEnum):
@@ -62,6 +56,7 @@ class Assigned:
         return self.source == "declared"
 
 
+# Words of a name that say what a column is; the first that fits counts: a lane departure is no lane.
 _WORDS: tuple[tuple[Role, frozenset[str]], ...] = tuple(
     (role, frozenset(words.split()))
     for role, words in (
@@ -78,10 +73,8 @@ _WORDS: tuple[tuple[Role, frozenset[str]], ...] = tuple(
         (Role.TIME, "time timestamp clock frame counter sequence odometer mileage soc battery fuel elapsed utc"),
     )
 )  # fmt: skip
-"""Words of a name that say what a column is; the first that fits counts: a lane departure is no lane."""
-
+# A name with one of these says nothing: a temperature of the car itself is no weather, a time of day may act.
 _SILENT = frozenset(["cabin", "tyre", "tire", "engine", "oil", "day"])
-"""A name with one of these says nothing: a temperature of the car itself is no weather, a time of day may act."""
 
 
 def proposed_role(column: str) -> Role:
@@ -156,27 +149,13 @@ class Values(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One context column that varies.
-
-    Parameters
-    ----------
-    name : str
-    values : Values
-        How it can act.
-    gaps : bool
-        NaN ("there is none") occurs often enough to tell.
-    levels : tuple of float
-        Values, for a switch or levels; those that are rare left out.
-    period : float
-        Full circle of an angle, else 0.
-    role : Role
-    """
+    """One context column that varies."""
 
     name: str
-    values: Values
-    gaps: bool
-    levels: tuple[float, ...] = ()
-    period: float = 0.0
+    values: Values  # How it can act.
+    gaps: bool  # NaN ("there is none") occurs often enough to tell.
+    levels: tuple[float, ...] = ()  # Values, for a switch or levels; those that are rare left out.
+    period: float = 0.0  # Full circle of an angle, else 0.
     role: Role = Role.UNKNOWN
 
 

@@ -17,37 +17,18 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.identification.regression import Fitted
 from xosc_lateral.identification.residual import simulated_runs
 from xosc_lateral.identification.significance import LEAST, LoopSeed
-from xosc_lateral.identification.timeline import Timeline, local_mean
+from xosc_lateral.identification.timeline import FloatArray, Timeline, local_mean
 
-FloatArray = NDArray[np.float64]
-
-TIMES_S = (0.4, 1.0, 2.0, 4.0, 8.0)
-"""Averaging times between which the bands lie. [s]"""
-
-BLOCK = 300
-"""Samples that one value per band is taken from: 60 s. [-]"""
-
-SHAPE_LEVEL = 0.003
-"""Probability of a false finding."""
-
-N_RUNS = 3
-"""Runs of the profile."""
-
-STILL = 1e-9
-"""Blocks that move by less stand still: their bands are nothing but rounding. [m]"""
-
+TIMES_S = (0.4, 1.0, 2.0, 4.0, 8.0)  # Averaging times between which the bands lie. [s]
+BLOCK = 300  # Samples that one value per band is taken from: 60 s. [-]
+SHAPE_LEVEL = 0.003  # Probability of a false finding.
+N_RUNS = 3  # Runs of the profile.
+STILL = 1e-9  # Blocks that move by less stand still: their bands are nothing but rounding. [m]
+# A difference below this share of a band's size is no reason for another core model, however sure it is. [-]
 WORTH_ADDING = 0.05
-"""A difference below this share of a band's size is no reason for another core model, however sure it is. [-]"""
-
-
-MIN_DRIVES = 8
-"""Fewer drives say nothing about a population."""
-
-MIN_SECONDS = 20
-"""Of road-following in either half of a drive that is counted. [s]"""
-
-DRIVERS_LEVEL = 0.002
-"""Probability of a false finding."""
+MIN_DRIVES = 8  # Fewer drives say nothing about a population.
+MIN_SECONDS = 20  # Of road-following in either half of a drive that is counted. [s]
+DRIVERS_LEVEL = 0.002  # Probability of a false finding.
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.identification.autocorrelation import Whitener
 from xosc_lateral.identification.innovations import CLIP, own_levels
@@ -21,17 +20,11 @@ from xosc_lateral.identification.regression import Coarse, Fitted, fit_model, jo
 from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.selection import Gain, Selection, select
 from xosc_lateral.identification.terms.base import Term
-from xosc_lateral.identification.timeline import Timeline, coarse_middle
+from xosc_lateral.identification.timeline import BoolArray, FloatArray, IntArray, Timeline, coarse_middle
 
-BoolArray = NDArray[np.bool_]
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
-
-FOLDS = 4
-"""Every part of the drives is held out once, and predicted from the other three."""
-
+FOLDS = 4  # Every part of the drives is held out once, and predicted from the other three.
+# Length of the blocks of a drive that are held out; drives shorter than three blocks are held out whole. [s]
 BLOCK_S = 150.0
-"""Length of the blocks of a drive that are held out; drives shorter than three blocks are held out whole. [s]"""
 
 
 def hold_out_blocks(timeline: Timeline) -> IntArray:

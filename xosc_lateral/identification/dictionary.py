@@ -21,50 +21,35 @@ from xosc_lateral.driver.effects import ColumnEffect
 from xosc_lateral.identification.autocorrelation import Whitener
 from xosc_lateral.identification.candidates import Candidate
 from xosc_lateral.identification.significance import MANY_DRIVES
-from xosc_lateral.identification.timeline import Timeline, coarse_mean, coarse_middle, start_anew
+from xosc_lateral.identification.timeline import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    Timeline,
+    coarse_mean,
+    coarse_middle,
+    start_anew,
+)
 
-FloatArray = NDArray[np.float64]
 SingleArray = NDArray[np.float32]
 Reals = NDArray[np.floating[Any]]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
-
+# Lags tried first, by time constant; refined later. What is smoothed by 4 s differs little from one second to the next.
+# [s]
 TIMINGS: Mapping[float, tuple[int, ...]] = {1.0: (-3, -2, -1, 0, 1, 2), 4.0: (-4, -2, 0, 2)}
-"""Lags tried first, by time constant; refined later. What is smoothed by 4 s differs little from one second to the
-next. [s]"""
-
+# The same for products, of which there are many more. [s]
 PRODUCT_TIMINGS: Mapping[float, tuple[int, ...]] = {2.0: (-2, -1, 0, 1)}
-"""The same for products, of which there are many more. [s]"""
-
-NULL_DRAWS = 400
-"""Rotated or re-signed residuals that the null is taken from."""
-
-LEAST_SHIFT_S = 60
-"""No rotation is shorter: a driver's response must be out of reach. [s]"""
-
-BLOCK_S = 300
-"""Length of the blocks that are dealt in random order: three times the memory that whitening sees. [s]"""
-
+NULL_DRAWS = 400  # Rotated or re-signed residuals that the null is taken from.
+LEAST_SHIFT_S = 60  # No rotation is shorter: a driver's response must be out of reach. [s]
+BLOCK_S = 300  # Length of the blocks that are dealt in random order: three times the memory that whitening sees. [s]
+# A quantity that rests on fewer seconds than this is not tested: anything may have happened just then. [s]
 MIN_SUPPORT_S = 45.0
-"""A quantity that rests on fewer seconds than this is not tested: anything may have happened just then. [s]"""
-
-LEFT_OVER = 0.05
-"""A candidate of which less than this share is left beside what is known is not tested. [-]"""
-
+LEFT_OVER = 0.05  # A candidate of which less than this share is left beside what is known is not tested. [-]
+# Directions of a column's cross-basis with less than this share of the largest variance are left in. [-]
 CROSS_BASIS = 0.01
-"""Directions of a column's cross-basis with less than this share of the largest variance are left in. [-]"""
-
-ROBUST = 200
-"""Entries whose scores are set beside the squares of their own rows: those that may be the best."""
-
-RESPONSES = 12
-"""Of one column's entries, the best so many stand for all that it may do; more of them span hardly more."""
-
-CHUNK = 48
-"""Candidates that are whitened at once: few enough to stay in a processor's cache."""
-
-TINY = 1e-30
-"""Keeps single precision from dividing by zero."""
+ROBUST = 200  # Entries whose scores are set beside the squares of their own rows: those that may be the best.
+RESPONSES = 12  # Of one column's entries, the best so many stand for all that it may do; more of them span hardly more.
+CHUNK = 48  # Candidates that are whitened at once: few enough to stay in a processor's cache.
+TINY = 1e-30  # Keeps single precision from dividing by zero.
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,22 +83,12 @@ class Quantities:
 
 @dataclass(frozen=True, eq=False)
 class Dictionary:
-    """Whitened candidates at every lag and response.
+    """Whitened candidates at every lag and response."""
 
-    Parameters
-    ----------
-    candidates : list of Candidate
-        One per entry.
-    lag, response : array, shape (entries,)
-        [s]
-    rows : array, shape (entries, seconds)
-        Length one each; valid seconds only.
-    """
-
-    candidates: list[Candidate]
-    lag: FloatArray
-    response: FloatArray
-    rows: SingleArray
+    candidates: list[Candidate]  # One per entry.
+    lag: FloatArray  # shape (entries,): [s]
+    response: FloatArray  # shape (entries,): [s]
+    rows: SingleArray  # shape (entries, seconds): Length one each; valid seconds only.
     costs: FloatArray = field(init=False)
 
     def __post_init__(self) -> None:
@@ -194,17 +169,10 @@ def _unit_rows(rows: FloatArray, before: FloatArray) -> tuple[FloatArray, FloatA
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """Scores of all entries, and the largest ones that the null gives.
+    """Scores of all entries, and the largest ones that the null gives."""
 
-    Parameters
-    ----------
-    scores : array, shape (entries,)
-        Squared score less cost; -inf: barred.
-    maxima : array, shape (NULL_DRAWS,)
-    """
-
-    scores: FloatArray
-    maxima: FloatArray
+    scores: FloatArray  # shape (entries,): Squared score less cost; -inf: barred.
+    maxima: FloatArray  # shape (NULL_DRAWS,)
 
     @property
     def best(self) -> int:

@@ -30,82 +30,50 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.identification.columns import Assigned, Column, Role, Values
-from xosc_lateral.identification.timeline import Timeline
+from xosc_lateral.identification.timeline import BoolArray, FloatArray, IntArray, Timeline
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
 ComplexArray = NDArray[np.complex128]
 
+# Samples per segment of the spectral estimate: 25.6 s, and 12.8 s where runs are too short for enough of those.
 SEGMENTS = (128, 64)
-"""Samples per segment of the spectral estimate: 25.6 s, and 12.8 s where runs are too short for enough of those."""
-
+# Edges of the parts of the band where a driver no longer responds, and sensors still see the car move. [Hz]
 BAND = (0.2, 0.3, 0.4, 0.6, 0.8)
-"""Edges of the parts of the band where a driver no longer responds, and sensors still see the car move. [Hz]"""
-
+# Squared coherence from which a column is feedback if the movement predicts it too, and from which it is doubtful if
+# not. Causes that change over ten seconds and more stay below 0.06, also where they move the car by 0.9 m; a switch
+# that moves a car of little movement of its own by 0.2 m has 0.29, gusts of 3 s that push a car by 0.8 m up to 0.49;
+# consequences are above 0.5, and 0.35 where most of the column is something else. [-]
 CLEAR, ALONE = 0.2, 0.5
-"""Squared coherence from which a column is feedback if the movement predicts it too, and from which it is doubtful if
-not. Causes that change over ten seconds and more stay below 0.06, also where they move the car by 0.9 m; a switch that
-moves a car of little movement of its own by 0.2 m has 0.29, gusts of 3 s that push a car by 0.8 m up to 0.49;
-consequences are above 0.5, and 0.35 where most of the column is something else. [-]"""
-
+# Share of a column's innovations that the movement predicts: from the first on it is feedback, from the second on
+# doubtful; below the last, coherence alone is doubtful too. Causes that share more than 0.2 (gusts that push a car by
+# 0.8 m) stay below 0.0006; a steering angle or a yaw rate that mostly follows the road's curves has 0.0065. [-]
 PREDICTED, PERHAPS, HARDLY = 0.05, 0.02, 0.003
-"""Share of a column's innovations that the movement predicts: from the first on it is feedback, from the second on
-doubtful; below the last, coherence alone is doubtful too. Causes that share more than 0.2 (gusts that push a car by
-0.8 m) stay below 0.0006; a steering angle or a yaw rate that mostly follows the road's curves has 0.0065. [-]"""
-
+# Squared coherence with its own mean given the present offset or lateral speed, from which a column is a function of
+# it. Warnings with hysteresis have 0.8, a lateral speed 0.4 to 0.7, causes below 0.06. [-]
 FUNCTION = 0.4
-"""Squared coherence with its own mean given the present offset or lateral speed, from which a column is a function of
-it. Warnings with hysteresis have 0.8, a lateral speed 0.4 to 0.7, causes below 0.06. [-]"""
-
+# Quantiles of the movement between which that mean is taken: finer at the ends, where warnings fire. [-]
 PARTS = np.concatenate([np.array([0.005, 0.01, 0.02]), np.linspace(0.04, 0.96, 24), np.array([0.98, 0.99, 0.995])])
-"""Quantiles of the movement between which that mean is taken: finer at the ends, where warnings fire. [-]"""
-
-PARTS_S = 150.0
-"""Stretches of so long are dealt to two halves; the mean of either half is taken from the other. [s]"""
-
+PARTS_S = 150.0  # Stretches of so long are dealt to two halves; the mean of either half is taken from the other. [s]
+# Past samples of the column, and of the movement, in the test of time's direction: 2 s and 1 s.
 OWN_PAST, MOVED_PAST = 10, 5
-"""Past samples of the column, and of the movement, in the test of time's direction: 2 s and 1 s."""
-
+# Over the number of segments: what unrelated columns' coherence stays below, the largest of 4 parts and 6 movements
+# (with 40 half-overlapping segments they reach 0.14). [-]
 CHANCE = 6.0
-"""Over the number of segments: what unrelated columns' coherence stays below, the largest of 4 parts and 6 movements
-(with 40 half-overlapping segments they reach 0.14). [-]"""
-
+# Rows per quantity that a regression needs to tell anything (F. Harrell, Regression Modeling Strategies, 2015). [-]
 ROWS_EACH = 15
-"""Rows per quantity that a regression needs to tell anything (F. Harrell, Regression Modeling Strategies, 2015). [-]"""
-
-MIN_SEGMENTS = 12
-"""Fewer segments of one length than this say little: the next length is taken."""
+MIN_SEGMENTS = 12  # Fewer segments of one length than this say little: the next length is taken.
 
 
 @dataclass(frozen=True, slots=True)
 class Feedback:
-    """A column that the movement itself brings about.
-
-    Parameters
-    ----------
-    column : str
-    coherence : float
-        Squared, above 0.2 Hz, with what it follows most. [-]
-    predicted_share : float
-        Share of its innovations that the movement predicts. [-]
-    function : float
-        Squared coherence, in the same band, with its own mean given the present movement. [-]
-    of : str
-        What it follows: "offset", "size of the offset", ...
-    doubtful : bool
-        No mark is clear.
-    source : str
-        "declared" or "name": it is said to be the car's own movement; empty: its values show it.
-    """
+    """A column that the movement itself brings about."""
 
     column: str
-    coherence: float
-    predicted_share: float
-    function: float
-    of: str
-    doubtful: bool
-    source: str = ""
+    coherence: float  # Squared, above 0.2 Hz, with what it follows most. [-]
+    predicted_share: float  # Share of its innovations that the movement predicts. [-]
+    function: float  # Squared coherence, in the same band, with its own mean given the present movement. [-]
+    of: str  # What it follows: "offset", "size of the offset", ...
+    doubtful: bool  # No mark is clear.
+    source: str = ""  # "declared" or "name": it is said to be the car's own movement; empty: its values show it.
 
 
 def find_feedback(

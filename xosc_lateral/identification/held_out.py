@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from msgspec import structs
-from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import ColumnEffect, Effect, TimeSmooth
 from xosc_lateral.driver.fitting import fit_population, fit_runs
@@ -38,18 +37,12 @@ from xosc_lateral.identification.significance import LoopSeed
 from xosc_lateral.identification.terms.base import Removal, Term
 from xosc_lateral.identification.terms.cycle import CycleTerm
 from xosc_lateral.identification.terms.time import StepTerm
-from xosc_lateral.identification.timeline import COARSE, Timeline
-from xosc_lateral.mask import true_slices
+from xosc_lateral.identification.timeline import COARSE, BoolArray, FloatArray, IntArray, Timeline
+from xosc_lateral.rows import true_slices
 
-BoolArray = NDArray[np.bool_]
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
-
-FINE_S = 1.0
-"""Movement within this time counts as fine when a spread is taken out. [s]"""
-
+FINE_S = 1.0  # Movement within this time counts as fine when a spread is taken out. [s]
+# By key ("mean 0", "step 0"): a term and what the profile gets for it.
 Estimates = Mapping[str, tuple[Term, tuple[Effect, ...]]]
-"""By key ("mean 0", "step 0"): a term and what the profile gets for it."""
 
 
 def estimate_all(fitted: Fitted) -> Estimates:
@@ -126,26 +119,15 @@ class Setting:
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """Summary statistics on held-out blocks, measured and expected of both profiles.
-
-    Parameters
-    ----------
-    statistics : SummaryStatistics
-    real, before, after : mapping of str to array
-        By group. [m]
-    runs_before, runs_after : array, shape (runs, n)
-        Of the profiles. [m]
-    halves : list of mapping of str to array
-        See `residual.half_samples`. [m]
-    """
+    """Summary statistics on held-out blocks, measured and expected of both profiles."""
 
     statistics: SummaryStatistics
-    real: dict[str, FloatArray]
-    before: dict[str, FloatArray]
-    after: dict[str, FloatArray]
-    runs_before: FloatArray
-    runs_after: FloatArray
-    halves: list[dict[str, FloatArray]]
+    real: dict[str, FloatArray]  # By group. [m]
+    before: dict[str, FloatArray]  # By group. [m]
+    after: dict[str, FloatArray]  # By group. [m]
+    runs_before: FloatArray  # shape (runs, n): Of the profiles. [m]
+    runs_after: FloatArray  # shape (runs, n): Of the profiles. [m]
+    halves: list[dict[str, FloatArray]]  # See `residual.half_samples`. [m]
 
     @property
     def errors(self) -> tuple[float, float]:
@@ -255,11 +237,8 @@ def _frequency(fitted: Fitted) -> float | None:
     return next((term.frequency for term in fitted.terms if isinstance(term, CycleTerm)), None)
 
 
-SNIPPET_ROWS = 51
-"""10 s at 5 Hz, both ends included."""
-
-SPLITS = 6
-"""Random halves of the blocks that distances are averaged over."""
+SNIPPET_ROWS = 51  # 10 s at 5 Hz, both ends included.
+SPLITS = 6  # Random halves of the blocks that distances are averaged over.
 
 
 @dataclass(frozen=True, eq=False)

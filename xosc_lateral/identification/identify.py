@@ -25,14 +25,11 @@ from xosc_lateral.identification.terms.spread import SpreadTerm
 from xosc_lateral.identification.terms.time import StepTerm, TimeMeanTerm, TimeSpreadTerm
 from xosc_lateral.identification.timeline import Timeline
 
+# Why a term that loses on held-out rows is rejected.
 VETOED = "significant, but chosen and estimated on other blocks it predicts the held-out ones worse than nothing"
-"""Why a term that loses on held-out rows is rejected."""
-
+# Why a column that goes one way is not tested.
 CLOCK = "a clock: what changes with it changes with time, which is tested as such"
-"""Why a column that goes one way is not tested."""
-
-Progress = Callable[[float, str], None]
-"""Gets the share that is done and what is being done."""
+Progress = Callable[[float, str], None]  # Gets the share that is done and what is being done.
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,26 +44,13 @@ class Usable:
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """What a table of drives calls for.
-
-    Parameters
-    ----------
-    usable : Usable
-    selection : Selection
-        Terms that are kept, each with its held-out gain, and everything rejected.
-    nested : Nested or None
-        Selections of all folds; None: nothing was found.
-    total : Gain or None
-        Of all kept terms together.
-    returned_base : str
-        Why nothing is kept although something was found; empty otherwise.
-    """
+    """What a table of drives calls for."""
 
     usable: Usable
-    selection: Selection
-    nested: Nested | None = None
-    total: Gain | None = None
-    returned_base: str = ""
+    selection: Selection  # Terms that are kept, each with its held-out gain, and everything rejected.
+    nested: Nested | None = None  # Selections of all folds; None: nothing was found.
+    total: Gain | None = None  # Of all kept terms together.
+    returned_base: str = ""  # Why nothing is kept although something was found; empty otherwise.
 
     @property
     def taken_back(self) -> tuple[Rejected, ...]:

@@ -3,37 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression, start_factors
-from xosc_lateral.identification.timeline import means_by_drive
+from xosc_lateral.identification.timeline import BoolArray, FloatArray, IntArray, means_by_drive
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
-
-ORDER = 12
-"""Past seconds that have a coefficient each in the movement's autoregression. [s]"""
-
-LONGEST = 96
-"""Past seconds that it sees as means over doubling times: drifts of a minute and a half. [s]"""
-
+ORDER = 12  # Past seconds that have a coefficient each in the movement's autoregression. [s]
+LONGEST = 96  # Past seconds that it sees as means over doubling times: drifts of a minute and a half. [s]
+# Shifts of a response that make up its smoothing: two standard deviations, to either side, of a Gaussian that leaves 9
+# % at 0.5 Hz. [s]
 SMOOTHING_S = (-2, -1, 1, 2)
-"""Shifts of a response that make up its smoothing: two standard deviations, to either side, of a Gaussian that leaves
-9 % at 0.5 Hz. [s]"""
-
-CLIP = 9.0
-"""Squared innovations (variance 1) beyond this count as this: three standard deviations. [-]"""
-
+CLIP = 9.0  # Squared innovations (variance 1) beyond this count as this: three standard deviations. [-]
+# Scale terms together change the movement by at most this factor's logarithm, 20 either way: scoring steps of a factor
+# that the movement contradicts grow without end. [-]
 MOST_LOG_SCALE = 3.0
-"""Scale terms together change the movement by at most this factor's logarithm, 20 either way: scoring steps of a factor
-that the movement contradicts grow without end. [-]"""
-
-CLUSTER_S = 60
-"""Length of one cluster of squares in errors of the log scale. [s]"""
-
-OWN_LEVEL_S = 30.0
-"""A drive's level of the scale is its own as far as it lasts longer than this. [s]"""
+CLUSTER_S = 60  # Length of one cluster of squares in errors of the log scale. [s]
+OWN_LEVEL_S = 30.0  # A drive's level of the scale is its own as far as it lasts longer than this. [s]
 
 
 def own_levels(squares: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:

@@ -23,37 +23,21 @@ from xosc_lateral.identification.dictionary import orthonormal
 from xosc_lateral.identification.innovations import LONGEST, ORDER
 from xosc_lateral.identification.regression import MIN_DRIFT_S, Coarse, Fitted
 from xosc_lateral.identification.significance import LEAST, upper_tail
+from xosc_lateral.identification.timeline import BoolArray, FloatArray
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-
+# Half cosines tried for the mean. The fit has the most of them, penalised: a test wants few, a curve its shape.
 ORDERS = (1, 2, 4, 8)
-"""Half cosines tried for the mean. The fit has the most of them, penalised: a test wants few, a curve its shape."""
-
-SPREAD_ORDERS = (1, 2, 4)
-"""Half cosines tried for the spread: its square scatters more than an offset does."""
-
-EDGE_S, STEP_GRID_S = 60, 15
-"""Least time on either side of a step, and between the moments that are tried. [s]"""
-
+SPREAD_ORDERS = (1, 2, 4)  # Half cosines tried for the spread: its square scatters more than an offset does.
+EDGE_S, STEP_GRID_S = 60, 15  # Least time on either side of a step, and between the moments that are tried. [s]
+# Half cosines whose period is down to this say how much the slower ones are by chance; four times as long as what a
+# regime lasts, so that regimes count as chance. [s]
 SHORTEST_S = 240.0
-"""Half cosines whose period is down to this say how much the slower ones are by chance; four times as long as what a
-regime lasts, so that regimes count as chance. [s]"""
-
-MEAN_SHORTEST_S = 120.0
-"""The same for the mean: people wander within a minute or two, which whitening knows. [s]"""
-
+MEAN_SHORTEST_S = 120.0  # The same for the mean: people wander within a minute or two, which whitening knows. [s]
+# Half cosines of longer periods are hidden from the autoregression: eight times as long as it sees. [s]
 UNSEEN_S = 750.0
-"""Half cosines of longer periods are hidden from the autoregression: eight times as long as it sees. [s]"""
-
-STEP_DRAWS = 2000
-"""Draws of white rows that the best smooth or step is compared with."""
-
-LEAST_OTHERS = 8
-"""So many of them at least, also on a short drive."""
-
-SAME_S = 90
-"""Steps of two fits that are so close are the same one. [s]"""
+STEP_DRAWS = 2000  # Draws of white rows that the best smooth or step is compared with.
+LEAST_OTHERS = 8  # So many of them at least, also on a short drive.
+SAME_S = 90  # Steps of two fits that are so close are the same one. [s]
 
 
 def slow_rows(fitted: Fitted) -> tuple[FloatArray, Whitener]:

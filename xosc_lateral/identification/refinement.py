@@ -14,7 +14,6 @@ from functools import cached_property
 
 import numpy as np
 from msgspec import structs
-from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import ColumnEffect, Product
 from xosc_lateral.driver.effects.product import Form
@@ -23,18 +22,11 @@ from xosc_lateral.identification.candidates import FINE_SCALES, Family, shapes_o
 from xosc_lateral.identification.columns import Column
 from xosc_lateral.identification.dictionary import orthonormal
 from xosc_lateral.identification.regression import Coarse
-from xosc_lateral.identification.timeline import COARSE
+from xosc_lateral.identification.timeline import COARSE, BoolArray, FloatArray, IntArray
 
-FloatArray = NDArray[np.float64]
-
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
-
-Alternatives = tuple[tuple[str, ...], ...]
-"""Columns of each effect that explains as much."""
-
+Alternatives = tuple[tuple[str, ...], ...]  # Columns of each effect that explains as much.
+# Standard errors by which the better of two has to be better: 5 %, one-sided; the better is known to be it. [-]
 CLEARLY = 1.645
-"""Standard errors by which the better of two has to be better: 5 %, one-sided; the better is known to be it. [-]"""
 
 
 def explains_as_much(chosen: FloatArray, other: FloatArray, observed: FloatArray, cluster: IntArray) -> bool:
@@ -64,58 +56,32 @@ def _squares(columns: FloatArray, observed: FloatArray) -> FloatArray:
     return np.asarray(np.square(observed - columns @ sizes))
 
 
-RESPONSES = (0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
-"""Time constants that are tried. [s]"""
-
+RESPONSES = (0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)  # Time constants that are tried. [s]
+# And in the end, a fifth apart: with a time constant half as long again the size is 15 % off. [s]
 FINE_RESPONSES = tuple(np.round(np.geomspace(0.3, 8.0, 19), 2).tolist())
-"""And in the end, a fifth apart: with a time constant half as long again the size is 15 % off. [s]"""
-
+# Quantiles at which a number may turn the sign of another column's effect. [-]
 CENTRES = tuple(np.round(np.arange(0.05, 0.96, 0.1), 2).tolist())
-"""Quantiles at which a number may turn the sign of another column's effect. [-]"""
-
-LAG_STEPS = (1.0, 0.4, 0.2)
-"""Lags are searched in steps that get finer. [s]"""
-
-LAG_LIMIT = 5.0
-"""Longest lag either way. [s]"""
+LAG_STEPS = (1.0, 0.4, 0.2)  # Lags are searched in steps that get finer. [s]
+LAG_LIMIT = 5.0  # Longest lag either way. [s]
 
 
 @dataclass(frozen=True, eq=False)
 class Refined:
-    """One effect, refined.
+    """One effect, refined."""
 
-    Parameters
-    ----------
-    effect : ColumnEffect
-        Without coefficients.
-    score : float
-        Squared score of all its coefficients, less log n for each beyond the first (Schwarz) and less its price.
-    price : float
-        Of its family, and of a finer choice within it than the dictionary has.
-    """
-
-    effect: ColumnEffect
+    effect: ColumnEffect  # Without coefficients.
+    # Squared score of all its coefficients, less log n for each beyond the first (Schwarz) and less its price.
     score: float
-    price: float
+    price: float  # Of its family, and of a finer choice within it than the dictionary has.
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """One linear regression, whitened: an ordinary one [2]_.
+    """One linear regression, whitened: an ordinary one [2]_."""
 
-    Parameters
-    ----------
-    whitener : Whitener
-        For series and columns.
-    series : array, shape (n,)
-        With what the model has of this component still in.
-    columns : array, shape (n, k)
-        What the model has already.
-    """
-
-    whitener: Whitener
-    series: FloatArray
-    columns: FloatArray
+    whitener: Whitener  # For series and columns.
+    series: FloatArray  # shape (n,): With what the model has of this component still in.
+    columns: FloatArray  # shape (n, k): What the model has already.
 
     @property
     def valid(self) -> BoolArray:

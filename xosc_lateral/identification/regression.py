@@ -18,7 +18,6 @@ from typing import Protocol
 
 import numpy as np
 from msgspec import structs
-from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect
 from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression, start_factors, unbiased
@@ -32,51 +31,39 @@ from xosc_lateral.identification.innovations import (
     own_levels,
     scoring_step,
 )
-from xosc_lateral.identification.timeline import Timeline, coarse_all, coarse_mean, coarse_middle, means_by_drive
+from xosc_lateral.identification.timeline import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    Timeline,
+    coarse_all,
+    coarse_mean,
+    coarse_middle,
+    means_by_drive,
+)
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
-
+# White noise that the model of a drive has beside what it shows: no table knows the lane better (in the motorway
+# recording the standard error of a lane's centre is 0.03 m; docs/real_data.md). Providers smooth their tracks,
+# responses and all; without a floor an effect is sized where the smoothing left nothing of it. [m]
 FLOOR = 0.03
-"""White noise that the model of a drive has beside what it shows: no table knows the lane better (in the motorway
-recording the standard error of a lane's centre is 0.03 m; docs/real_data.md). Providers smooth their tracks, responses
-and all; without a floor an effect is sized where the smoothing left nothing of it. [m]"""
-
+# Stretches of a drive that count as independent in the errors of sizes: far beyond what whitening leaves of the memory,
+# and the whole of a passing vehicle. [s]
 CLUSTER_S = 60
-"""Stretches of a drive that count as independent in the errors of sizes: far beyond what whitening leaves of the
-memory, and the whole of a passing vehicle. [s]"""
-
-ROUNDS = 4
-"""Turns of sizes, autoregression and scale; they settle in three."""
-
-MIN_DRIFT_S = 600.0
-"""A shorter drive tells nothing about drift or a trend of the variance. [s]"""
+ROUNDS = 4  # Turns of sizes, autoregression and scale; they settle in three.
+MIN_DRIFT_S = 600.0  # A shorter drive tells nothing about drift or a trend of the variance. [s]
 
 
 @dataclass(frozen=True, eq=False)
 class Coarse:
-    """The timeline at 1 Hz, and every column effect's response on it.
-
-    Parameters
-    ----------
-    timeline : Timeline
-    offset : array, shape (n,)
-        Mean of each second. [m]
-    valid : bool array, shape (n,)
-    drive : int array, shape (n,)
-    time : array, shape (n,)
-        [s]
-    context : mapping of str to array
-        Columns on the fine grid, lane width included, clipped to what occurs while road-following: a traffic jam that
-        is cut out must not stretch a column's range.
-    """
+    """The timeline at 1 Hz, and every column effect's response on it."""
 
     timeline: Timeline
-    offset: FloatArray
-    valid: BoolArray
-    drive: IntArray
-    time: FloatArray
+    offset: FloatArray  # shape (n,): Mean of each second. [m]
+    valid: BoolArray  # shape (n,)
+    drive: IntArray  # shape (n,)
+    time: FloatArray  # shape (n,): [s]
+    # Columns on the fine grid, lane width included, clipped to what occurs while road-following: a traffic jam that is
+    # cut out must not stretch a column's range.
     context: Mapping[str, FloatArray]
     _responses: dict[ColumnEffect, FloatArray] = field(default_factory=dict, repr=False)
 
@@ -166,47 +153,22 @@ class ModelTerm(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """Terms with sizes, and what is left.
-
-    Parameters
-    ----------
-    coarse : Coarse
-    terms : tuple of ModelTerm
-    whitener : Whitener
-    columns : array, shape (n, k)
-        Of the mean, term by term.
-    sizes, covariance : array, shape (k,), (k, k)
-        [m] per unit.
-    levels : array, shape (drives,)
-        Mean offset of every drive where all mean terms are at their mean. [m]
-    scales : array, shape (n, j)
-        Columns of the log scale, term by term.
-    log_sizes, log_covariance : array, shape (j,), (j, j)
-        Natural logarithm per unit.
-    rows : array, shape (n,)
-        Whitened residual, variance 1, 0 where invalid.
-    movement : array, shape (n,)
-        Offset less level and mean terms, over the scale; 0 where invalid. [m]
-    starts : array, shape (order + 1,)
-        Factor on the errors of the first rows of runs, for the likelihood.
-    log_likelihood : float
-        Gaussian, of the valid rows.
-    """
+    """Terms with sizes, and what is left."""
 
     coarse: Coarse
     terms: tuple[ModelTerm, ...]
     whitener: Whitener
-    columns: FloatArray
-    sizes: FloatArray
-    covariance: FloatArray
-    levels: FloatArray
-    scales: FloatArray
-    log_sizes: FloatArray
-    log_covariance: FloatArray
-    rows: FloatArray
-    movement: FloatArray
-    starts: FloatArray
-    log_likelihood: float
+    columns: FloatArray  # shape (n, k): Of the mean, term by term.
+    sizes: FloatArray  # shape (k,): [m] per unit.
+    covariance: FloatArray  # shape (k, k): [m] per unit.
+    levels: FloatArray  # shape (drives,): Mean offset of every drive where all mean terms are at their mean. [m]
+    scales: FloatArray  # shape (n, j): Columns of the log scale, term by term.
+    log_sizes: FloatArray  # shape (j,): Natural logarithm per unit.
+    log_covariance: FloatArray  # shape (j, j): Natural logarithm per unit.
+    rows: FloatArray  # shape (n,): Whitened residual, variance 1, 0 where invalid.
+    movement: FloatArray  # shape (n,): Offset less level and mean terms, over the scale; 0 where invalid. [m]
+    starts: FloatArray  # shape (order + 1,): Factor on the errors of the first rows of runs, for the likelihood.
+    log_likelihood: float  # Gaussian, of the valid rows.
 
     @property
     def scale(self) -> FloatArray:

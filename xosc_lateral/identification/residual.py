@@ -20,71 +20,39 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import OffsetSampler
 from xosc_lateral.driver.seeds import child
 from xosc_lateral.drives.resampling import in_digits
-from xosc_lateral.identification.timeline import LOCAL_S, PAD, Timeline, local_mean
+from xosc_lateral.identification.timeline import LOCAL_S, PAD, BoolArray, FloatArray, IntArray, Timeline, local_mean
 from xosc_lateral.segment import Segment
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
-
-N_BINS = 5
-"""Bins of a column, equally filled."""
-
-RESPONSE_S = 2.0
-"""Columns are smoothed as a driver responds before they are binned. [s]"""
-
-BANDS_S = (1.0, 3.0, 8.0, 20.0, 60.0, 200.0)
-"""Averaging times between which the bands of the movement lie. [s]"""
-
+N_BINS = 5  # Bins of a column, equally filled.
+RESPONSE_S = 2.0  # Columns are smoothed as a driver responds before they are binned. [s]
+BANDS_S = (1.0, 3.0, 8.0, 20.0, 60.0, 200.0)  # Averaging times between which the bands of the movement lie. [s]
+# Name of that group, and frequencies to each side that belong to it. [-]
 OSCILLATION, LINE_WIDTH = "movement at the weave's period", 2
-"""Name of that group, and frequencies to each side that belong to it. [-]"""
 
 LOCAL_QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
 
-N_RUNS = 24
-"""Runs of the profile that its expectation is taken over ..."""
-
-FEW_RUNS, MANY_DRIVES = 6, 50
-"""... and how many with so many drives, each of which is another sample already."""
-
-DRAWS = 64
-"""Half samples of the blocks."""
-
-LEVEL = 0.05
-"""Share of them that may be as far off as the refined profile. [-]"""
-
+N_RUNS = 24  # Runs of the profile that its expectation is taken over ...
+FEW_RUNS, MANY_DRIVES = 6, 50  # ... and how many with so many drives, each of which is another sample already.
+DRAWS = 64  # Half samples of the blocks.
+LEVEL = 0.05  # Share of them that may be as far off as the refined profile. [-]
+# A group of summary statistics so many times its own sampling error is named when something is left. [-]
 STANDS_OUT = 2.0
-"""A group of summary statistics so many times its own sampling error is named when something is left. [-]"""
-
-SPARE_ROWS = 75
-"""A bin with fewer rows (15 s) than this is left out. [-]"""
+SPARE_ROWS = 75  # A bin with fewer rows (15 s) than this is left out. [-]
 
 
 @dataclass(frozen=True, eq=False)
 class SummaryStatistics:
-    """What is compared, once for measured and sampled offsets alike.
-
-    Parameters
-    ----------
-    timeline : Timeline
-    labels : mapping of str to int array, shape (n,)
-        Bin of every row by group (a column's name, "time", ...), -1: none.
-    middles : mapping of str to array
-        Mean of the quantity per bin, for curves.
-    oscillation : float, optional
-        Frequency of a weave that was found. [1/s]
-    """
+    """What is compared, once for measured and sampled offsets alike."""
 
     timeline: Timeline
-    labels: Mapping[str, IntArray]
-    middles: Mapping[str, FloatArray]
-    oscillation: float | None = None
+    labels: Mapping[str, IntArray]  # shape (n,): Bin of every row by group (a column's name, "time", ...), -1: none.
+    middles: Mapping[str, FloatArray]  # Mean of the quantity per bin, for curves.
+    oscillation: float | None = None  # Frequency of a weave that was found. [1/s]
 
     def describe(self, offset: FloatArray, used: BoolArray) -> dict[str, FloatArray]:
         """Statistics of one series of offsets on the grid, shape (n,), by group. [m]"""

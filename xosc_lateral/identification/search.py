@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.identification.candidates import candidates_of
 from xosc_lateral.identification.columns import Column
@@ -19,44 +18,27 @@ from xosc_lateral.identification.dictionary import (
 )
 from xosc_lateral.identification.regression import Coarse
 from xosc_lateral.identification.significance import Budget
+from xosc_lateral.identification.timeline import FloatArray
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-
+# Products are tried among so many columns at most, those whose role is known first: sixty more columns must not cost
+# twenty times as much.
 MAX_PRODUCT_COLUMNS = 24
-"""Products are tried among so many columns at most, those whose role is known first: sixty more columns must not cost
-twenty times as much."""
-
+# Scored dictionaries that are kept, each of tens of megabytes: of the mean and of the spread beside the same fit.
 KEPT = 2
-"""Scored dictionaries that are kept, each of tens of megabytes: of the mean and of the spread beside the same fit."""
 
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """What stays the same in all tests.
-
-    Parameters
-    ----------
-    coarse : Coarse
-    columns : mapping of str to Column
-        That may act.
-    quantities : Quantities
-    seed : SeedSequence
-    budget : Budget
-        How surely each component has to be found.
-    progress : callable
-        Gets what is being done, in a few words.
-    wanted : mapping of str to int, optional
-        How many terms a component has in the table that this is a part of: so many are added, best first, whatever
-        their p-values, and components that have none are not tested. None: this is the table.
-    """
+    """What stays the same in all tests."""
 
     coarse: Coarse
-    columns: Mapping[str, Column]
+    columns: Mapping[str, Column]  # That may act.
     quantities: Quantities
     seed: np.random.SeedSequence
-    budget: Budget
-    progress: Callable[[str], None]
+    budget: Budget  # How surely each component has to be found.
+    progress: Callable[[str], None]  # Gets what is being done, in a few words.
+    # How many terms a component has in the table that this is a part of: so many are added, best first, whatever their
+    # p-values, and components that have none are not tested. None: this is the table.
     wanted: Mapping[str, int] | None = None
     _kept: dict[tuple[object, int], tuple[object, Any]] = field(default_factory=dict, init=False, repr=False)
 

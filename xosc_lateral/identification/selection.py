@@ -14,8 +14,8 @@ from xosc_lateral.identification.terms.base import Outcome, Stage, Term
 from xosc_lateral.normal import NORMAL_95
 from xosc_lateral.plugins import defined_in
 
+# Every term that a file of `terms` defines, by the file's name.
 TERMS: tuple[type[Term], ...] = defined_in(terms.__name__, Term)  # type: ignore[type-abstract]
-"""Every term that a file of `terms` defines, by the file's name."""
 
 
 def in_stages(kinds: tuple[type[Term], ...]) -> tuple[tuple[type[Term], ...], ...]:
@@ -31,31 +31,18 @@ def shared_among(kinds: tuple[type[Term], ...]) -> Budget:
     )
 
 
-STAGES = in_stages(TERMS)
-"""Of a stage, what has the smallest p-value is added first."""
-
-ERROR_BUDGET = shared_among(TERMS)
-"""Of all kinds of term."""
-
-MAX_TERMS = 8
-"""Terms of one table, at most."""
+STAGES = in_stages(TERMS)  # Of a stage, what has the smallest p-value is added first.
+ERROR_BUDGET = shared_among(TERMS)  # Of all kinds of term.
+MAX_TERMS = 8  # Terms of one table, at most.
 
 
 @dataclass(frozen=True, slots=True)
 class Gain:
-    """Gain in log-likelihood on rows that nothing was chosen or fitted on.
+    """Gain in log-likelihood on rows that nothing was chosen or fitted on."""
 
-    Parameters
-    ----------
-    mean, error : float
-        Over blocks, per block, with the standard error of the mean. [nat]
-    folds : int
-        In how many folds the term was chosen again.
-    """
-
-    mean: float
-    error: float
-    folds: int
+    mean: float  # Over blocks, per block, with the standard error of the mean. [nat]
+    error: float  # Over blocks, per block, with the standard error of the mean. [nat]
+    folds: int  # In how many folds the term was chosen again.
 
     @property
     def interval(self) -> tuple[float, float]:

@@ -7,70 +7,47 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from xosc_lateral.identification.timeline import FloatArray
 
 
 class LoopSeed(IntEnum):
     """Key of a source of chance."""
 
-    COLUMNS = 0
-    """Rotations that candidates of a column are compared with."""
-    REGIMES = 3
-    """Simulated loudness that regimes are compared with."""
-    LOW_FREQUENCY = 4
-    """Simulated rows and drawn signs that drifts and steps are compared with."""
-    BETWEEN = 5
-    """Places dealt anew to drives."""
+    COLUMNS = 0  # Rotations that candidates of a column are compared with.
+    REGIMES = 3  # Simulated loudness that regimes are compared with.
+    LOW_FREQUENCY = 4  # Simulated rows and drawn signs that drifts and steps are compared with.
+    BETWEEN = 5  # Places dealt anew to drives.
+    # Runs before and after on held-out folds. The key of `BETWEEN`, too: that draws nothing but an order of drives.
     FOLDS = 5
-    """Runs before and after on held-out folds. The key of `BETWEEN`, too: that draws nothing but an order of drives."""
-    SPECTRUM = 7
-    """Runs whose spectrum is compared with the drives'."""
-    BLOCKS = 9
-    """Half samples of the blocks."""
-    SNIPPETS = 11
-    """Halves of the blocks whose snippets are compared."""
+    SPECTRUM = 7  # Runs whose spectrum is compared with the drives'.
+    BLOCKS = 9  # Half samples of the blocks.
+    SNIPPETS = 11  # Halves of the blocks whose snippets are compared.
 
 
-LEAST = 1e-300
-"""p-values stay above: their logarithm is taken. [-]"""
-
+LEAST = 1e-300  # p-values stay above: their logarithm is taken. [-]
+# Probability that chance is named: on 39 tables of 40 nothing wrong is to be, and now and then what goes along with an
+# effect is taken for it. [-]
 BUDGET = 0.02
-"""Probability that chance is named: on 39 tables of 40 nothing wrong is to be, and now and then what goes along with an
-effect is taken for it. [-]"""
-
+# Share of a null of maxima that their tail is fitted on: they have an exponential one (Gumbel's law). [-]
 TAIL_SHARE = 0.25
-"""Share of a null of maxima that their tail is fitted on: they have an exponential one (Gumbel's law). [-]"""
-
-HEAVY_TAIL_SHARE = 0.1
-"""Share that the tail of a quadratic form is fitted on: further in it is no exponential yet. [-]"""
-
+HEAVY_TAIL_SHARE = 0.1  # Share that the tail of a quadratic form is fitted on: further in it is no exponential yet. [-]
+# So many independent draws that reach a score tell its probability to a third, without any law of the tail.
 ENOUGH = 10
-"""So many independent draws that reach a score tell its probability to a third, without any law of the tail."""
-
+# Mean excess in the far tail of a chi-square with one degree of freedom, and of maxima of many. [-]
 CHI_SQUARE_EXCESS = 2.0
-"""Mean excess in the far tail of a chi-square with one degree of freedom, and of maxima of many. [-]"""
-
+# From so many drives on a table tells what differs between them, and its null is drawn by whole drives.
 MANY_DRIVES = 20
-"""From so many drives on a table tells what differs between them, and its null is drawn by whole drives."""
 
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """How the error budget is shared among the components that are tested.
+    """How the error budget is shared among the components that are tested."""
 
-    Parameters
-    ----------
-    weights : mapping of str to float
-        Of each component. As shipped: as much for the mean within drives as between them; a quarter for what changes
-        the movement's size or its strength; the rest for hidden effects, which are few to choose among. [-]
-    least_drives : mapping of str to int
-        Drives from which a component is asked at all, where that is more than one.
-    """
-
+    # Of each component. As shipped: as much for the mean within drives as between them; a quarter for what changes the
+    # movement's size or its strength; the rest for hidden effects, which are few to choose among. [-]
     weights: Mapping[str, float]
-    least_drives: Mapping[str, int]
+    least_drives: Mapping[str, int]  # Drives from which a component is asked at all, where that is more than one.
 
     def level_of(self, component: str, drives: int) -> float:
         """Family-wise level that a component may spend.

@@ -10,26 +10,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression, moving_sum
 from xosc_lateral.identification.innovations import CLIP, ORDER, own_levels
 from xosc_lateral.identification.refinement import Problem
 from xosc_lateral.identification.regression import Coarse, Fitted
-from xosc_lateral.identification.timeline import COARSE, coarse_all, coarse_mean
+from xosc_lateral.identification.timeline import COARSE, BoolArray, FloatArray, coarse_all, coarse_mean
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-
-FINE_ORDER = 15
-"""Past samples (3 s) that the fine movement's autoregression sees."""
-
+FINE_ORDER = 15  # Past samples (3 s) that the fine movement's autoregression sees.
+# Past seconds of the squares that whitening sees: two time constants of the clusters of 6 s that are no regime. Beyond
+# `ORDER`, as means. [s]
 SQUARES_S = 12
-"""Past seconds of the squares that whitening sees: two time constants of the clusters of 6 s that are no regime. Beyond
-`ORDER`, as means. [s]"""
-
-SLOW_S = 8
-"""Whitened seconds that are averaged for the slower movement: below 1/16 Hz. [s]"""
+SLOW_S = 8  # Whitened seconds that are averaged for the slower movement: below 1/16 Hz. [s]
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -27,60 +27,30 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 
+# Samples of the 0.2 s grid per sample of the coarse one: effects take seconds, so they are tested at 1 Hz. [-]
 COARSE = 5
-"""Samples of the 0.2 s grid per sample of the coarse one: effects take seconds, so they are tested at 1 Hz. [-]"""
-
-PAD = 75
-"""Samples before and after each drive in which the context holds its outermost value: 15 s. [-]"""
-
+PAD = 75  # Samples before and after each drive in which the context holds its outermost value: 15 s. [-]
+# What is cut for tracing: a little more around lane changes than for fitting, or their last second looks like an effect
+# of the lane.
 TRACE_RULES = CutRules(lane_change_margin=6.0)
-"""What is cut for tracing: a little more around lane changes than for fitting, or their last second looks like an
-effect of the lane."""
-
-LOCAL_S = 20.0
-"""Movement slower than this counts as mean, faster as spread. [s]"""
-
-MIN_VALID_S = 120.0
-"""Road-following time below which nothing can be said. [s]"""
+LOCAL_S = 20.0  # Movement slower than this counts as mean, faster as spread. [s]
+MIN_VALID_S = 120.0  # Road-following time below which nothing can be said. [s]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Timeline:
-    """All drives on the 0.2 s grid.
+    """All drives on the 0.2 s grid."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        Drives.
-    drive : int array, shape (n,)
-        Index into `names`.
-    time : array, shape (n,)
-        The drive's own clock. [s]
-    offset : array, shape (n,)
-        0 outside `valid`. [m]
-    valid : bool array, shape (n,)
-        Road-following, not cut out.
-    lane_width : array, shape (n,)
-        [m]
-    context : mapping of str to array, shape (n,)
-        NaN: there is none.
-    levels : frozenset of str
-        Columns of whole numbers.
-    periods : mapping of str to float
-        Full circle of the columns that wrap around.
-    of_one_camera : frozenset of str
-        Columns measured by the camera that measured the offset, and misjudged markings: their errors are the offset's.
-    """
-
-    names: tuple[str, ...]
-    drive: IntArray
-    time: FloatArray
-    offset: FloatArray
-    valid: BoolArray
-    lane_width: FloatArray
-    context: Mapping[str, FloatArray]
-    levels: frozenset[str]
-    periods: Mapping[str, float] = field(default_factory=dict)
+    names: tuple[str, ...]  # Drives.
+    drive: IntArray  # shape (n,): Index into `names`.
+    time: FloatArray  # shape (n,): The drive's own clock. [s]
+    offset: FloatArray  # shape (n,): 0 outside `valid`. [m]
+    valid: BoolArray  # shape (n,): Road-following, not cut out.
+    lane_width: FloatArray  # shape (n,): [m]
+    context: Mapping[str, FloatArray]  # shape (n,): NaN: there is none.
+    levels: frozenset[str]  # Columns of whole numbers.
+    periods: Mapping[str, float] = field(default_factory=dict)  # Full circle of the columns that wrap around.
+    # Columns measured by the camera that measured the offset, and misjudged markings: their errors are the offset's.
     of_one_camera: frozenset[str] = frozenset()
 
     def __len__(self) -> int:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from msgspec import structs
-from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import ColumnEffect, Linear, Piecewise, Product, Proximity, Saturating, Threshold
 from xosc_lateral.identification.candidates import shapes_of
@@ -20,8 +19,7 @@ from xosc_lateral.identification.refinement import (
     other_scales,
 )
 from xosc_lateral.identification.regression import Coarse, Fitted
-
-FloatArray = NDArray[np.float64]
+from xosc_lateral.identification.timeline import FloatArray
 
 
 def driving_range(coarse: Coarse, effect: ColumnEffect) -> tuple[FloatArray, FloatArray]:
@@ -63,15 +61,12 @@ def _ends(values: FloatArray) -> FloatArray:
     return np.array([low, high] if high > low else [values.min(), values.max()])
 
 
-NEAR_S = 2.0
-"""Lags that differ from the estimate by up to this are compared. [s]"""
-
+NEAR_S = 2.0  # Lags that differ from the estimate by up to this are compared. [s]
+# Scales that are compared, as shares of the estimate, 7 % apart: between two that refinement tries, 40 % apart, the
+# change from the usual to the near end differs by a third.
 NEAR_SCALES = tuple(np.geomspace(0.5, 2.0, 21).tolist())
-"""Scales that are compared, as shares of the estimate, 7 % apart: between two that refinement tries, 40 % apart, the
-change from the usual to the near end differs by a third."""
-
+# 95 % quantile of chi-square with one degree of freedom: the interval gives up half as much log-likelihood. [-]
 CHI_SQUARE = 3.84
-"""95 % quantile of chi-square with one degree of freedom: the interval gives up half as much log-likelihood. [-]"""
 
 
 def widening(fitted: Fitted, effect: ColumnEffect, part: slice) -> float:

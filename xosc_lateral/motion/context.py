@@ -18,9 +18,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from xosc_lateral.motion.nearby import pairs_within
+from xosc_lateral.motion.nearby import stretches_within
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.road.network import RoadNetwork
+from xosc_lateral.rows import empty, give_back
 from xosc_lateral.scenario import BoundingBox
 from xosc_lateral.scenario.enums import VehicleCategory
 from xosc_lateral.scenario.environment import Environment, Weather
@@ -197,21 +198,27 @@ def _neighbours(
     around = Around.nobody(len(grid))
     groups = _own_lane_groups(own, network, grid, traffic.direction[index, columns])
     width = _own_lane_width(own, network, grid)
-    numbers = np.array([k for k in _in_sight(motion)[index] if motion.entities[k].entity.is_vehicle], dtype=np.int64)
     extent, box = traffic.extent, own.entity.bounding_box
     far = REACH + 0.5 * box.length + abs(box.center_x) + np.max(0.5 * extent.length + np.abs(extent.center_x)) + 1.0
-    together = max(1, CELLS // len(grid))
-    for begin in range(0, len(numbers), together):
-        others = numbers[begin : begin + together]
-        for members, own_u, path in groups:
-            u, offset = (np.tile(values, len(others)) for values in (own_u, own.offset[grid[members]]))
-            road, s, t, direction = traffic.of(others, columns[members])
-            seen = see_along(path, u, offset, road, s, t, direction, network.lane_centre_t)
-            k = np.flatnonzero(np.abs(seen.ahead) <= far)
-            seen = Others(seen.ahead[k], seen.left[k], seen.oncoming[k])
-            who, rows = others[k // len(members)], members[k % len(members)]
-            gap = free_space(seen, box, Extent(*(values[who] for values in extent)))
-            around.add(rows, seen, gap, width[rows], traffic.width[who], traffic.is_truck[who])
+    for stretch, in_sight in _in_sight(motion):
+        numbers = np.array([k for k in in_sight[index] if motion.entities[k].entity.is_vehicle], dtype=np.int64)
+        inside = [slice(*np.searchsorted(grid[rows], (stretch.start, stretch.stop))) for rows, _, _ in groups]
+        together = max(1, CELLS // max(1, *(part.stop - part.start for part in inside), 1))
+        for begin in range(0, len(numbers), together):
+            others = numbers[begin : begin + together]
+            for part, (of_group, own_u, path) in zip(inside, groups, strict=True):
+                members = of_group[part]
+                if not len(members):
+                    continue
+                u, offset = (np.tile(values, len(others)) for values in (own_u[part], own.offset[grid[members]]))
+                road, s, t, direction = traffic.of(others, columns[members])
+                seen = see_along(path, u, offset, road, s, t, direction, network.lane_centre_t)
+                k = np.flatnonzero(np.abs(seen.ahead) <= far)
+                seen = Others(seen.ahead[k], seen.left[k], seen.oncoming[k])
+                who, rows = others[k // len(members)], members[k % len(members)]
+                gap = free_space(seen, box, Extent(*(values[who] for values in extent)))
+                around.add(rows, seen, gap, width[rows], traffic.width[who], traffic.is_truck[who])
+            give_back()
     return around.columns(lanes)
 
 
@@ -239,22 +246,26 @@ class _Traffic(NamedTuple):
 def _traffic(motion: NominalMotion, network: RoadNetwork, first: int, every: int) -> _Traffic:
     """On every so many rows of the run."""
     names = ("road", "lane", "s", "offset", "activity", "heading_relative")
-    shape = len(motion.entities), len(motion.entities[0].time[first::every])
-    stacked = (np.concatenate([getattr(one, name)[first::every] for one in motion.entities]) for name in names)
-    road, lane, s, offset, activity, heading = stacked
-    present = ((activity & Activity.ACTIVE) != 0) & (road >= 0) & (lane != 0)
-    t = np.full(len(s), np.nan)
-    t[present] = network.offset_to_t(road[present], lane[present], s[present], offset[present])
-    direction = np.zeros(len(s), dtype=np.int8)
-    direction[present] = network.travel_directions(road[present], lane[present])
-    direction = np.where(np.cos(heading) < 0.0, -direction, direction)
+    count, n = len(motion.entities), len(motion.entities[0].time[first::every])
+    tables = [empty((count, n), kind) for kind in (np.int32, np.float64, np.float64, np.int8)]
+    together = max(1, CELLS // max(n, 1))
+    for begin in range(0, count, together):
+        entities = motion.entities[begin : begin + together]
+        stacked = (np.concatenate([getattr(one, name)[first::every] for one in entities]) for name in names)
+        road, lane, s, offset, activity, heading = stacked
+        present = ((activity & Activity.ACTIVE) != 0) & (road >= 0) & (lane != 0)
+        t = np.full(len(s), np.nan)
+        t[present] = network.offset_to_t(road[present], lane[present], s[present], offset[present])
+        direction = np.zeros(len(s), dtype=np.int8)
+        direction[present] = network.travel_directions(road[present], lane[present])
+        direction = np.where(np.cos(heading) < 0.0, -direction, direction)
+        for table, values in zip(tables, (road, s, t, direction), strict=True):
+            table[begin : begin + together] = values.reshape(-1, n)
+        give_back()
     boxes = [one.entity.bounding_box for one in motion.entities]
     length, centre, width = (np.array([getattr(b, name) for b in boxes]) for name in ("length", "center_x", "width"))
     is_truck = np.array([one.entity.vehicle_category in TRUCKS for one in motion.entities])
-    return _Traffic(
-        road.reshape(shape), s.reshape(shape), t.reshape(shape), direction.reshape(shape),
-        Extent(length, centre), width, is_truck,
-    )  # fmt: skip
+    return _Traffic._make([*tables, Extent(length, centre), width, is_truck])
 
 
 @dataclass(eq=False, slots=True)
@@ -386,18 +397,23 @@ _NONE = 1e-3
 
 
 @lru_cache(maxsize=1)  # asked for every entity of one motion after another
-def _in_sight(motion: NominalMotion) -> tuple[tuple[int, ...], ...]:
-    """For every entity those that it may see along its lane: whoever is not near in space is not near on the road."""
-    there = [(entity.activity & Activity.ACTIVE) != 0 for entity in motion.entities]
-    x, y = (
-        [np.where(on, values, np.nan) for on, values in zip(there, axis, strict=True)]
-        for axis in ([entity.x for entity in motion.entities], [entity.y for entity in motion.entities])
-    )
-    seen: list[list[int]] = [[] for _ in motion.entities]
-    for a, b in pairs_within(x, y, IN_SIGHT):
-        seen[a].append(b)
-        seen[b].append(a)
-    return tuple(tuple(sorted(others)) for others in seen)
+def _in_sight(motion: NominalMotion) -> list[tuple[slice, list[IntArray]]]:
+    """For rows of the run, and every entity, those that it may see along its lane then, in order.
+
+    Whoever is not near in space is not near on the road.
+    """
+
+    def where_active(axis: str) -> Iterator[FloatArray]:
+        for one in motion.entities:
+            yield np.where((one.activity & Activity.ACTIVE) != 0, getattr(one, axis), np.nan)
+
+    found = []
+    for rows, pairs in stretches_within(where_active("x"), where_active("y"), IN_SIGHT, blocks=64):
+        both = np.array([*pairs, *(pair[::-1] for pair in pairs)], dtype=np.int64)
+        both = both[np.lexsort((both[:, 1], both[:, 0]))]
+        ends = np.searchsorted(both[:, 0], np.arange(1, len(motion.entities)))
+        found.append((rows, np.split(both[:, 1].copy(), ends)))
+    return found
 
 
 def _own_lane_groups(

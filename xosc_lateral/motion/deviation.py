@@ -121,13 +121,14 @@ class Deviation(Struct, frozen=True, eq=False):
         starts = np.array([spline.knots[0] for spline in self.splines])
         ends = np.array([spline.knots[-1] for spline in self.splines])
         after = np.searchsorted(starts, distance, side="right") - 1
-        for k, spline in enumerate(self.splines):
-            inside = (after == k) & (distance <= ends[k])
-            result[inside] = spline(distance[inside])
-        for k in range(-1, len(self.splines)):
-            between = (after == k) & ((distance > ends[k]) if k >= 0 else np.full(distance.shape, True))
-            if between.any():
-                result[between] = self._lead_over(distance[between], k)
+        for k in range(int(after.min(initial=0)), int(after.max(initial=-1)) + 1):
+            here = after == k
+            if k >= 0:
+                inside = here & (distance <= ends[k])
+                result[inside] = self.splines[k](distance[inside])
+                here &= distance > ends[k]
+            if here.any():
+                result[here] = self._lead_over(distance[here], k)
         return result
 
     def _lead_over(self, distance: FloatArray, k: int) -> FloatArray:

@@ -8,13 +8,14 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from xosc_lateral.motion.nearby import pairs_within
+from xosc_lateral.motion.nearby import stretches_within
+from xosc_lateral.rows import BLOCK, give_back
 
 FloatArray = NDArray[np.float64]
 
@@ -86,28 +87,52 @@ def smallest_gaps(time: FloatArray, paths: Sequence[BoxPath], *, reach: float = 
     reach : float
         [m]
     """
-    near_pairs: list[tuple[BoxPath, BoxPath, NDArray[np.intp]]] = []
-    extent = max((np.hypot(path.length, path.width) / 2 + abs(path.centre) for path in paths), default=0.0)
-    for first, second in pairs_within([path.x for path in paths], [path.y for path in paths], reach + 2 * extent):
-        a, b = paths[first], paths[second]
-        half_diagonals = 0.5 * (np.hypot(a.length, a.width) + np.hypot(b.length, b.width))
-        between = np.hypot(a.x - b.x, a.y - b.y)
-        apart = between - half_diagonals - abs(a.centre) - abs(b.centre)
-        near = np.flatnonzero(apart <= reach)
-        if len(near):
-            # the exact distance is only needed where a lower bound of it undercuts the best upper bound
-            upper = np.min(between[near]) + abs(a.centre) + abs(b.centre)
-            near_pairs.append((a, b, near[apart[near] <= upper]))
-    gaps = []
-    for begin in range(0, len(near_pairs), TOGETHER):
-        part = near_pairs[begin : begin + TOGETHER]
-        boxes = corners([(a, near) for a, _, near in part]), corners([(b, near) for _, b, near in part])
-        ends = np.cumsum([len(near) for _, _, near in part])
-        for (a, b, near), distance in zip(part, np.split(box_distance(*boxes), ends[:-1]), strict=True):
+    smallest: dict[tuple[int, int], Gap] = {}
+    for part in _together(_near_pairs(paths, reach)):
+        a, b = ([(paths[pair[side]], near) for pair, near in part] for side in (0, 1))
+        distances = box_distance(corners(a), corners(b))
+        ends = np.cumsum([len(near) for _, near in part])
+        for (pair, near), distance in zip(part, np.split(distances, ends[:-1]), strict=True):
             best = int(np.argmin(distance))
-            if distance[best] <= reach:
-                gaps.append(Gap((a.name, b.name), float(distance[best]), float(time[near[best]])))
-    return tuple(gaps)
+            if distance[best] <= reach and not (pair in smallest and smallest[pair].distance <= distance[best]):
+                names = paths[pair[0]].name, paths[pair[1]].name
+                smallest[pair] = Gap(names, float(distance[best]), float(time[near[best]]))
+    return tuple(smallest[pair] for pair in sorted(smallest))
+
+
+_NearPair = tuple[tuple[int, int], NDArray[np.intp]]
+
+
+def _near_pairs(paths: Sequence[BoxPath], reach: float) -> Iterator[_NearPair]:
+    """Pairs that come near each other, and rows of a stretch on which their gap may be the smallest."""
+    extent = max((np.hypot(path.length, path.width) / 2 + abs(path.centre) for path in paths), default=0.0)
+    x, y = [path.x for path in paths], [path.y for path in paths]
+    for rows, pairs in stretches_within(x, y, reach + 2 * extent):
+        for first, second in pairs:
+            a, b = paths[first], paths[second]
+            half_diagonals = 0.5 * (np.hypot(a.length, a.width) + np.hypot(b.length, b.width))
+            between = np.hypot(a.x[rows] - b.x[rows], a.y[rows] - b.y[rows])
+            apart = between - half_diagonals - abs(a.centre) - abs(b.centre)
+            near = np.flatnonzero(apart <= reach)
+            if len(near):
+                # the exact distance is only needed where a lower bound of it undercuts the best upper bound
+                upper = np.min(between[near]) + abs(a.centre) + abs(b.centre)
+                yield (first, second), rows.start + near[apart[near] <= upper]
+        give_back()
+
+
+def _together(pairs: Iterator[_NearPair]) -> Iterator[list[_NearPair]]:
+    """As many as are looked at at once."""
+    part: list[_NearPair] = []
+    rows = 0
+    for pair in pairs:
+        part.append(pair)
+        rows += len(pair[1])
+        if len(part) == TOGETHER or rows >= BLOCK:
+            yield part
+            part, rows = [], 0
+    if part:
+        yield part
 
 
 def corners(boxes: Sequence[tuple[BoxPath, NDArray[np.intp]]]) -> FloatArray:

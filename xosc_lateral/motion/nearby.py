@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
+
+from xosc_lateral.rows import give_back
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -14,36 +16,44 @@ BLOCK = 64
 """Rows that one box around a vehicle's path covers: 1.3 s at 50 Hz, 40 m on a motorway. [-]"""
 
 
-def pairs_within(x: Sequence[FloatArray], y: Sequence[FloatArray], reach: float) -> list[tuple[int, int]]:
-    """Pairs of points that may come within `reach` of each other at some row; none that do is missing.
+def pairs_within(x: Iterable[FloatArray], y: Iterable[FloatArray], reach: float) -> list[tuple[int, int]]:
+    """`stretches_within` over all rows at once."""
+    return sorted({pair for _, pairs in stretches_within(x, y, reach) for pair in pairs})
+
+
+def stretches_within(
+    x: Iterable[FloatArray], y: Iterable[FloatArray], reach: float, blocks: int = 16
+) -> Iterator[tuple[slice, list[tuple[int, int]]]]:
+    """Pairs of points that may come within `reach` of each other, stretch by stretch; none that do is missing.
 
     The boxes around both paths, in blocks of rows, are swept along the longer side of the traffic: the work grows with
     the pairs that are near, not with all there are.
 
     Parameters
     ----------
-    x, y : sequences of array, shape (n,)
-        One pair of arrays per point, on one time grid; NaN where it is absent. [m]
+    x, y : iterables of array, shape (n,)
+        One pair of arrays per point, on one time grid; NaN where it is absent; each is looked at once. [m]
     reach : float
         [m]
+    blocks : int
+        Of `BLOCK` rows, in a stretch.
 
-    Returns
-    -------
-    list of (int, int)
-        Indices, the smaller one first, in lexical order.
+    Yields
+    ------
+    slice, list of (int, int)
+        Rows of a stretch with pairs; indices of these, the smaller one first, in lexical order.
     """
-    if len(x) < 2 or not len(x[0]):
-        return []
-    lows, highs = zip(*(_bounds(np.stack(axis)) for axis in (x, y)), strict=True)
-    found: set[tuple[int, int]] = set()
-    for block in range(lows[0].shape[1]):
-        low = np.stack([lows[0][:, block], lows[1][:, block]])
-        high = np.stack([highs[0][:, block], highs[1][:, block]])
-        there = np.flatnonzero(np.isfinite(low).all(axis=0))
-        if len(there) > 1:
-            first, second = _overlapping(low[:, there], high[:, there], there, reach)
-            found.update(zip(first.tolist(), second.tolist(), strict=True))
-    return sorted(found)
+    lows, highs = _bounds(x, y)
+    for begin in range(0, lows.shape[1], blocks):
+        found: set[tuple[int, int]] = set()
+        for block in range(begin, min(begin + blocks, lows.shape[1])):
+            low, high = lows[:, block], highs[:, block]
+            there = np.flatnonzero(np.isfinite(low).all(axis=0))
+            if len(there) > 1:
+                first, second = _overlapping(low[:, there], high[:, there], there, reach)
+                found.update(zip(first.tolist(), second.tolist(), strict=True))
+        if found:
+            yield slice(BLOCK * begin, BLOCK * (begin + blocks)), sorted(found)
 
 
 def pairs_now(x: FloatArray, y: FloatArray, reach: float) -> tuple[IntArray, IntArray]:
@@ -56,11 +66,19 @@ def pairs_now(x: FloatArray, y: FloatArray, reach: float) -> tuple[IntArray, Int
     return _overlapping(points, points, there, reach) if len(there) else (there, there)
 
 
-def _bounds(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Smallest and largest of each block of rows, shape (points, blocks); NaN where a point is absent throughout."""
-    starts = np.arange(0, values.shape[1], BLOCK)
-    low, high = (ufunc.reduceat(values, starts, axis=1) for ufunc in (np.fmin, np.fmax))  # they pass over NaN
-    return np.asarray(low), np.asarray(high)
+def _bounds(x: Iterable[FloatArray], y: Iterable[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Smallest and largest x and y of each point in each block of rows, shape (2, blocks, points) each. [m]
+
+    NaN where a point is absent throughout.
+    """
+    lows, highs = [np.empty((2, 0))], [np.empty((2, 0))]
+    for point in zip(x, y, strict=True):
+        starts = np.arange(0, len(point[0]), BLOCK)
+        for found, ufunc in ((lows, np.fmin), (highs, np.fmax)):  # they pass over NaN
+            found.append(np.stack([ufunc.reduceat(values, starts) for values in point]))
+        give_back()
+    low, high = (np.stack(found[1:] or found, axis=-1) for found in (lows, highs))
+    return low, high
 
 
 def _overlapping(low: FloatArray, high: FloatArray, names: IntArray, reach: float) -> tuple[IntArray, IntArray]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.motion.nominal import Activity, EntityMotion
 from xosc_lateral.road.network import RoadNetwork
+from xosc_lateral.rows import blocks
 
 MINIMUM_SPEED = 40.0 / 3.6
 """Below this the model says nothing [m/s] (Neis & Beyerer cut their data at 40 km/h)."""
@@ -104,45 +105,47 @@ def cut_segments(motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool
     tuple of SegmentSpan
         In order of time, without gaps: each row belongs to exactly one.
     """
-    kinds = row_kinds(motion, network, is_trailer=is_trailer)
-    placed_anew = (motion.activity & Activity.TELEPORTED) != 0
-    cut = np.flatnonzero((np.diff(kinds) != 0) | placed_anew[1:]) + 1
-    firsts = np.concatenate(([0], cut))
-    lasts = np.concatenate((cut - 1, [len(kinds) - 1]))
+    firsts: list[tuple[int, int]] = []  # rows at which segments begin, and their kinds
+    before = -1
+    for rows in blocks(len(motion.time)):
+        kinds = _row_kinds(motion, network, rows, is_trailer)
+        placed_anew = (motion.activity[rows] & Activity.TELEPORTED) != 0
+        cut = np.flatnonzero((np.diff(kinds, prepend=before) != 0) | placed_anew)
+        firsts += zip((rows.start + cut).tolist(), kinds[cut].tolist(), strict=True)
+        before = kinds[-1]
+    lasts = [*(first - 1 for first, _ in firsts[1:]), len(motion.time) - 1]
     return tuple(
-        SegmentSpan(_KINDS[kinds[a]], int(a), int(b), float(motion.time[a]), float(motion.time[b]))
-        for a, b in zip(firsts, lasts, strict=True)
+        SegmentSpan(_KINDS[kind], a, b, float(motion.time[a]), float(motion.time[b]))
+        for (a, kind), b in zip(firsts, lasts, strict=True)
     )
 
 
-def row_kinds(motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool = False) -> NDArray[np.int64]:
-    """Kind of every row, as its index in `SegmentKind`; the first reason that applies, in the enum's order.
-
-    Shape (n,). [-]
-    """
-    kinds = np.zeros(len(motion.time), dtype=np.int64)
-    for kind, applies in reversed(_reasons(motion, network, is_trailer).items()):
+def _row_kinds(motion: EntityMotion, network: RoadNetwork, rows: slice, is_trailer: bool) -> NDArray[np.int64]:
+    """Kind of each of these rows, as its index in `SegmentKind`; the first reason that applies, in the enum's order."""
+    kinds = np.zeros(rows.stop - rows.start, dtype=np.int64)
+    for kind, applies in reversed(_reasons(motion, network, rows, is_trailer).items()):
         kinds[applies] = _KINDS.index(kind)
     return kinds
 
 
-def _reasons(motion: EntityMotion, network: RoadNetwork, is_trailer: bool) -> dict[SegmentKind, NDArray[np.bool_]]:
-    """Where each kind applies, shape (n,) each, by the enum's order."""
-    entity, activity = motion.entity, motion.activity
-    n = len(motion.time)
-    on_road = (motion.road >= 0) & ((activity & Activity.OFF_ROAD) == 0)
-    in_driving_lane = np.zeros(n, dtype=bool)
-    in_driving_lane[on_road] = network.lane_index(motion.road[on_road], motion.lane[on_road], motion.s[on_road])[0] >= 0
+def _reasons(
+    motion: EntityMotion, network: RoadNetwork, rows: slice, is_trailer: bool
+) -> dict[SegmentKind, NDArray[np.bool_] | bool]:
+    """Where in these rows each kind applies, by the enum's order."""
+    activity, road, lane, s = motion.activity[rows], motion.road[rows], motion.lane[rows], motion.s[rows]
+    on_road = (road >= 0) & ((activity & Activity.OFF_ROAD) == 0)
+    in_driving_lane = np.zeros(len(road), dtype=bool)
+    in_driving_lane[on_road] = network.lane_index(road[on_road], lane[on_road], s[on_road])[0] >= 0
     return {
         SegmentKind.ABSENT: (activity & Activity.ACTIVE) == 0,
-        SegmentKind.NOT_A_VEHICLE: np.full(n, not entity.is_vehicle),
-        SegmentKind.TRAILER: np.full(n, is_trailer),
+        SegmentKind.NOT_A_VEHICLE: not motion.entity.is_vehicle,
+        SegmentKind.TRAILER: is_trailer,
         SegmentKind.OFF_ROAD: ~on_road,
         SegmentKind.TRAJECTORY: (activity & Activity.TRAJECTORY) != 0,
         SegmentKind.LATERAL_ACTION: (activity & Activity.LATERAL) != 0,
         SegmentKind.NOT_DRIVING_LANE: on_road & ~in_driving_lane,
         # Who overtakes on the lane of those who come towards him follows that lane.
-        SegmentKind.ACROSS_LANE: np.abs(np.sin(motion.heading_relative)) > np.sin(_ACROSS_LANE),
-        SegmentKind.SLOW: motion.speed < MINIMUM_SPEED * (1.0 - _SPEED_SLACK),
+        SegmentKind.ACROSS_LANE: np.abs(np.sin(motion.heading_relative[rows])) > np.sin(_ACROSS_LANE),
+        SegmentKind.SLOW: motion.speed[rows] < MINIMUM_SPEED * (1.0 - _SPEED_SLACK),
         SegmentKind.ROAD_END: (activity & Activity.ROAD_END) != 0,
     }

@@ -17,9 +17,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.mask import BLOCK, true_blocks
 from xosc_lateral.motion.nominal import Activity, EntityMotion
 from xosc_lateral.road.network import RoadNetwork
+from xosc_lateral.rows import blocks, columns, empty, rows_where, scratch
 
 FloatArray = NDArray[np.float64]
 
@@ -61,9 +61,15 @@ class WorldTrajectory:
 
 def distance_driven(motion: EntityMotion) -> FloatArray:
     """Distance driven on the nominal path up to each row, shape (n,); being placed anew is no driving. [m]"""
-    ahead = np.hypot(np.diff(motion.x), np.diff(motion.y))
-    placed_anew = (motion.activity[1:] & Activity.TELEPORTED) != 0
-    return np.concatenate(([0.0], np.cumsum(np.where(placed_anew, 0.0, ahead))))
+    distance = scratch(len(motion.x))
+    distance[:1] = 0.0
+    for rows in blocks(len(distance), 1):
+        around = slice(rows.start - 1, rows.stop)
+        ahead = np.hypot(np.diff(motion.x[around]), np.diff(motion.y[around]))
+        placed_anew = (motion.activity[rows] & Activity.TELEPORTED) != 0
+        steps = np.concatenate((distance[rows.start - 1 : rows.start], np.where(placed_anew, 0.0, ahead)))
+        distance[rows] = np.cumsum(steps)[1:]
+    return distance
 
 
 def leaps(motion: EntityMotion) -> list[tuple[float, float]]:
@@ -71,13 +77,20 @@ def leaps(motion: EntityMotion) -> list[tuple[float, float]]:
 
     What a scenario places anew is none (`Activity.TELEPORTED`).
     """
-    step = np.diff(motion.time)
-    driven = np.maximum(np.abs(motion.speed[1:]), np.abs(motion.speed[:-1])) * step
-    moved = np.hypot(np.diff(motion.x), np.diff(motion.y))
-    active = (motion.activity & Activity.ACTIVE) != 0
-    whole = active[1:] & active[:-1] & ((motion.activity[1:] & Activity.TELEPORTED) == 0)
-    found = np.flatnonzero(whole & (moved > driven + _LEAP + _ASIDE * step))
-    return [(float(motion.time[k + 1]), float(moved[k])) for k in found]
+
+    def moved(around: slice) -> FloatArray:
+        return np.hypot(np.diff(motion.x[around]), np.diff(motion.y[around]))
+
+    def leaps_there(rows: slice) -> NDArray[np.bool_]:
+        around = slice(rows.start - 1, rows.stop)
+        step, speed, activity = np.diff(motion.time[around]), np.abs(motion.speed[around]), motion.activity[around]
+        active = (activity & Activity.ACTIVE) != 0
+        whole = active[1:] & active[:-1] & ((activity[1:] & Activity.TELEPORTED) == 0)
+        driven = np.maximum(speed[1:], speed[:-1]) * step
+        return np.asarray(whole & (moved(around) > driven + _LEAP + _ASIDE * step))
+
+    found = rows_where(len(motion.time), leaps_there, 1)
+    return [(float(motion.time[k]), float(moved(slice(k - 1, k + 1))[0])) for k in found]
 
 
 def displace(motion: EntityMotion, network: RoadNetwork, deviation: FloatArray) -> WorldTrajectory:
@@ -90,67 +103,87 @@ def displace(motion: EntityMotion, network: RoadNetwork, deviation: FloatArray) 
     deviation : array, shape (n,)
         Added to the nominal offset, positive to the left of the vehicle's travel; ignored where it is on no road. [m]
     """
-    x, y, z, heading = motion.x.copy(), motion.y.copy(), motion.z.copy(), motion.heading
-    moved = (motion.road >= 0) & (deviation != 0.0)
-    for rows in true_blocks(moved):
-        # a vehicle that meets its lane's traffic head-on has its left on the lane's right
-        along_lane = np.where(np.cos(motion.heading_relative[rows]) >= 0.0, 1.0, -1.0)
-        road, lane, s, nominal = motion.road[rows], motion.lane[rows], motion.s[rows], motion.offset[rows]
-        before = network.lane_to_world(road, lane, s, nominal)
-        after = network.lane_to_world(road, lane, s, nominal + along_lane * deviation[rows])
-        # the nominal pose is kept to the bit and only the difference added, so that a zero deviation changes nothing
-        x[rows] += after.x - before.x
-        y[rows] += after.y - before.y
-        z[rows] += after.z - before.z
-    if moved.any():
-        heading = heading + _direction_change(motion, x, y)
+    n = len(motion.time)
+    x, y, z = columns(n, _shifted(motion, network, deviation)) if n else (motion.x, motion.y, motion.z)
+    heading = motion.heading
+    if any(_moves(motion, deviation, rows).any() for rows in blocks(n)):
+        heading = _turned(motion, x, y)
     return WorldTrajectory(motion.time, x, y, z, heading, motion.pitch, motion.roll, _speed(motion, x, y))
+
+
+def _moves(motion: EntityMotion, deviation: FloatArray, rows: slice) -> NDArray[np.bool_]:
+    return np.asarray((motion.road[rows] >= 0) & (deviation[rows] != 0.0))
+
+
+def _shifted(motion: EntityMotion, network: RoadNetwork, deviation: FloatArray) -> Iterator[list[FloatArray]]:
+    """x, y and z in blocks of rows. [m]"""
+    for part in blocks(len(motion.time)):
+        shifted = [values[part].copy() for values in (motion.x, motion.y, motion.z)]
+        moved = np.flatnonzero(_moves(motion, deviation, part))
+        if len(moved):
+            rows = moved + part.start
+            # a vehicle that meets its lane's traffic head-on has its left on the lane's right
+            along_lane = np.where(np.cos(motion.heading_relative[rows]) >= 0.0, 1.0, -1.0)
+            road, lane, s, nominal = motion.road[rows], motion.lane[rows], motion.s[rows], motion.offset[rows]
+            before = network.lane_to_world(road, lane, s, nominal)
+            after = network.lane_to_world(road, lane, s, nominal + along_lane * deviation[rows])
+            # the nominal pose is kept to the bit and only the difference added, so that none changes nothing
+            for values, name in zip(shifted, "xyz", strict=True):
+                values[moved] += getattr(after, name) - getattr(before, name)
+        yield shifted
 
 
 def _pieces(motion: EntityMotion) -> list[slice]:
     """Runs of rows between which the entity was not placed anew."""
-    cut = np.flatnonzero((motion.activity & Activity.TELEPORTED) != 0)
-    borders = sorted({0, *cut.tolist(), len(motion.time)})
+    n = len(motion.time)
+    cut = rows_where(n, lambda rows: (motion.activity[rows] & Activity.TELEPORTED) != 0)
+    borders = sorted({0, *cut.tolist(), n})
     return [slice(a, b) for a, b in pairwise(borders)]
 
 
 def _overlapping(piece: slice) -> Iterator[tuple[slice, slice, slice]]:
-    """Rows of a piece in blocks: counted in the piece; with a row more on each side, for derivatives; without it."""
-    for begin in range(piece.start, piece.stop, BLOCK):
-        end = min(begin + BLOCK, piece.stop)
-        first, last = max(begin - 1, piece.start), min(end + 1, piece.stop)
-        yield slice(begin - piece.start, end - piece.start), slice(first, last), slice(begin - first, end - first)
+    """Rows of a piece in blocks; with a row more on each side, for derivatives; those counted in these."""
+    for rows in blocks(piece.stop, piece.start):
+        first, last = max(rows.start - 1, piece.start), min(rows.stop + 1, piece.stop)
+        yield rows, slice(first, last), slice(rows.start - first, rows.stop - first)
 
 
-def _direction_change(motion: EntityMotion, x: FloatArray, y: FloatArray) -> FloatArray:
-    """Direction of the shifted path against the nominal one's, held where the vehicle stands. [rad]"""
-    change = np.zeros(len(x))
+def _turned(motion: EntityMotion, x: FloatArray, y: FloatArray) -> FloatArray:
+    """Nominal heading, and the shifted path's direction against the nominal one's, held where one stands. [rad]"""
+    heading = empty(len(x))
     for piece in _pieces(motion):
         if piece.stop - piece.start < 2:
+            heading[piece] = motion.heading[piece] + 0.0
             continue
-        turn, moving = np.empty(piece.stop - piece.start), np.empty(piece.stop - piece.start, dtype=bool)
-        for part, around, inside in _overlapping(piece):
+        held, waiting = 0.0, piece.start  # rows from `waiting` on stand at the piece's start: as where it moves first
+        for rows, around, inside in _overlapping(piece):
             nominal = np.gradient(motion.x[around]) + 1j * np.gradient(motion.y[around])
             shifted = np.gradient(x[around]) + 1j * np.gradient(y[around])
-            moving[part] = (np.minimum(np.abs(nominal), np.abs(shifted)) > _STANDSTILL)[inside]
-            turn[part] = np.angle(shifted * np.conj(nominal))[inside]
-        if not moving.any():
-            continue
-        last = np.maximum.accumulate(np.where(moving, np.arange(len(moving)), -1))
-        last[last < 0] = int(np.argmax(moving))
-        change[piece] = turn[last]
-    return change
+            moving = (np.minimum(np.abs(nominal), np.abs(shifted)) > _STANDSTILL)[inside]
+            turn = np.angle(shifted * np.conj(nominal))[inside]
+            last = np.maximum.accumulate(np.where(moving, np.arange(len(moving)), -1))
+            if waiting >= 0 and moving.any():
+                held = float(turn[int(np.argmax(moving))])
+                for earlier in blocks(rows.start, waiting):
+                    heading[earlier] = motion.heading[earlier] + held
+                waiting = -1
+            heading[rows] = motion.heading[rows] + np.where(last < 0, held, turn[last])
+            held = held if last[-1] < 0 else float(turn[last[-1]])
+    return heading
 
 
 def _speed(motion: EntityMotion, x: FloatArray, y: FloatArray) -> FloatArray:
     """Nominal speed times the ratio of path lengths, which stays right at a speed step. [m/s]"""
-    speed = motion.speed.copy()
+    speed = empty(len(x))
     for piece in _pieces(motion):
         if piece.stop - piece.start < 2:
+            speed[piece] = motion.speed[piece]
             continue
-        for part, around, inside in _overlapping(piece):
+        for rows, around, inside in _overlapping(piece):
             nominal = np.hypot(np.gradient(motion.x[around]), np.gradient(motion.y[around]))[inside]
             shifted = np.hypot(np.gradient(x[around]), np.gradient(y[around]))[inside]
             moving = nominal > _STANDSTILL
-            speed[piece][part][moving] *= (shifted / np.where(moving, nominal, 1.0))[moving]
+            part = motion.speed[rows].copy()
+            part[moving] *= (shifted / np.where(moving, nominal, 1.0))[moving]
+            speed[rows] = part
     return speed

@@ -30,6 +30,7 @@ from xosc_lateral.pipeline.load import Played, input_hashes, play_scenario, play
 from xosc_lateral.pipeline.meaning import Shift, keep_meaning, meaning_of
 from xosc_lateral.pipeline.modes import WritingPlan, chosen_egos, is_replay, writing_plan
 from xosc_lateral.pipeline.settings import ConvertSettings, OutputMode, relative
+from xosc_lateral.rows import BLOCK, beside, blocks
 from xosc_lateral.scenario import Scenario
 from xosc_lateral.scenario.dependence import Dependence, dependence
 from xosc_lateral.version import BEHAVIOUR, __version__
@@ -77,7 +78,7 @@ def convert_scenario(
     OSError
         When the output can't be written; nothing is left half-written.
     """
-    with guarding_inputs():
+    with guarding_inputs(), beside(output.parent if save else None):
         return _convert(source, output, settings, variant, report, save)
 
 
@@ -241,7 +242,8 @@ def _entropy(played: Played) -> dict[str, tuple[int, ...]]:
     """Seed words of each entity from where it starts and how fast: nothing that anybody else does changes them."""
     found = {}
     for entity in played.motion.entities:
-        row = int(np.argmax((entity.activity & Activity.ACTIVE) != 0))
+        there = ((entity.activity[rows] & Activity.ACTIVE) != 0 for rows in blocks(len(entity.activity)))
+        row = next((BLOCK * k + int(np.argmax(mask)) for k, mask in enumerate(there) if mask.any()), 0)
         on_road = int(entity.road[row])
         where = (entity.x[row], entity.y[row]) if on_road < 0 else (entity.s[row], entity.offset[row])
         road = "" if on_road < 0 else played.network.road_ids[on_road]
@@ -286,10 +288,12 @@ def _refuse_lanes_without_width(played: Played, enriched: Enriched) -> None:
     for entity in enriched.entities:
         motion = entity.motion
         for segment in entity.segments:
-            rows = slice(segment.span.first, segment.span.last + 1)
-            width = played.network.lane_width(motion.road[rows], motion.lane[rows], motion.s[rows])
-            if width.max() < NO_WIDTH:
-                first = segment.span.first
+            first, end = segment.span.first, segment.span.last + 1
+            widths = (
+                played.network.lane_width(motion.road[rows], motion.lane[rows], motion.s[rows])
+                for rows in blocks(end, first)
+            )
+            if all(width.max() < NO_WIDTH for width in widths):
                 raise FormatError(
                     f"lane {motion.lane[first]} has no width where {entity.name!r} follows it",
                     path=played.scenario.road_file,

@@ -9,23 +9,22 @@ from __future__ import annotations
 
 import ctypes
 import os
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TypeVar
 
 from xosc_lateral.errors import XoscLateralError
 from xosc_lateral.limits import JOB_MEMORY, JOB_TIMEOUT
+from xosc_lateral.rows import status_bytes
 
 
 @contextmanager
 def address_space(megabytes: float) -> Iterator[None]:
     """Let this process map so much more memory; without effect where the system has no such limit, or in a thread."""
-    size = _status_bytes(0)
+    size = status_bytes(0)
     if size == 0 or threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -40,17 +39,6 @@ def address_space(megabytes: float) -> Iterator[None]:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
-
-
-def resident() -> int:
-    """Memory that this process holds. [byte]; 0 where the system does not say."""
-    return _status_bytes(1)
-
-
-def _status_bytes(column: int) -> int:
-    if not sys.platform.startswith("linux"):
-        return 0
-    return int(Path("/proc/self/statm").read_bytes().split()[column]) * os.sysconf("SC_PAGE_SIZE")
 
 
 Task = TypeVar("Task")
@@ -121,7 +109,7 @@ class _Watch:
         self._limits, self.why = limits, ""
         self._ended, self._lock = threading.Event(), threading.Lock()
         self._job = threading.get_ident()
-        self._begin, self._resident = time.monotonic(), resident()
+        self._begin, self._resident = time.monotonic(), status_bytes(1)
 
     def __enter__(self) -> None:
         threading.Thread(target=self._run, daemon=True, name="watch job").start()
@@ -153,7 +141,7 @@ class _Watch:
     def _exceeded(self) -> str:
         if time.monotonic() - self._begin > self._limits.timeout:
             return f"took longer than {self._limits.timeout:g} s; --job-timeout raises the limit"
-        if resident() - self._resident > 1e6 * self._limits.memory:
+        if status_bytes(1) - self._resident > 1e6 * self._limits.memory:
             return _too_much(self._limits)
         return ""
 

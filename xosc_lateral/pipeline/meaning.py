@@ -205,7 +205,7 @@ def with_speeds(scenario: Scenario, motion: NominalMotion, egos: Collection[str]
     for entity in motion.entities:
         if entity.name in egos:
             dynamics = TransitionDynamics(DynamicsShape.LINEAR, DynamicsDimension.RATE, RATE)
-            speed = SpeedAction(AbsoluteTargetSpeed(factor * float(entity.speed[0])), dynamics, place)
+            speed = SpeedAction(AbsoluteTargetSpeed(factor * float(entity.speed[0])), dynamics, place=place)
             name = f"{STORY} {entity.name}"
             event = Event(name, Priority.OVERRIDE, (Action(name, speed, place, True),), trigger, place)
             actors = Actors((entity.name,), False, place)

@@ -14,7 +14,7 @@ from math import cos, hypot, sin
 import numpy as np
 
 from xosc_lateral.errors import PlaybackError
-from xosc_lateral.motion.nominal import CUT_OFF, Activity, NominalMotion, Note
+from xosc_lateral.motion.nominal import CUT_OFF, Activity, FloatArray, NominalMotion, Note
 from xosc_lateral.playback.drive import drive, halt_at_road_end
 from xosc_lateral.playback.recorder import NO_LANE
 from xosc_lateral.playback.simulation import Simulation
@@ -24,10 +24,14 @@ from xosc_lateral.playback.storyboard_builder import build_storyboard, init_acti
 from xosc_lateral.playback.trailers import align_trailers, connect, pull_trailers
 from xosc_lateral.playback.transition import EPSILON
 from xosc_lateral.road import RoadNetwork
+from xosc_lateral.rows import BLOCK, columns, give_back, kept
 from xosc_lateral.scenario import Scenario
 from xosc_lateral.scenario.private_actions import FollowTrajectoryAction, TeleportAction
 
 _LATERAL = int(Activity.LATERAL)  # plain: arithmetic of flags takes ten times as long
+
+LEAST_PUT_AWAY = 2048
+"""Frames after which rows are put away at the earliest: fewer in each piece would make too many of them."""
 
 STANDING = 1e-3
 """Below this speed an entity stands. [m/s]"""
@@ -88,6 +92,8 @@ class _Player:
         self._leave_out_later_entities()
         self.rows = list(simulation.unwatched.awake.values())
         self.times = array("d")
+        self._put_away_every = max(LEAST_PUT_AWAY, BLOCK // len(self.rows))
+        self._times_put_away: list[FloatArray] = []
 
     def play(self, time_limit: float) -> NominalMotion:
         """Run to the end."""
@@ -218,10 +224,22 @@ class _Player:
         for rows in unwatched.awake.values():
             rows.write(time)
         unwatched.frames += 1
+        if unwatched.frames % self._put_away_every == 0:
+            self._put_away()
+
+    def _put_away(self) -> None:
+        """Make place for rows to come."""
+        for rows in self.rows:
+            rows.put_away()
+        if self.times:
+            self._times_put_away.append(kept(np.array(self.times)))
+            del self.times[:]
+        give_back()
 
     def _result(self, ended_by: str, cut_off: Note | None) -> NominalMotion:
         simulation = self.simulation
-        time = np.frombuffer(self.times, dtype=np.float64).copy()
+        self._put_away()
+        time = columns(sum(map(len, self._times_put_away)), ([part] for part in self._times_put_away))[0]
         return NominalMotion(
             step=self.step_size,
             entities=tuple(rows.motion(simulation.network, time) for rows in self.rows),

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from array import array
+from collections.abc import Iterator
 from math import pi
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.errors import PlaybackError
-from xosc_lateral.mask import true_blocks
 from xosc_lateral.motion.nominal import Activity, EntityMotion, FloatArray, IntArray
 from xosc_lateral.playback.state import NOWHERE, EntityState
 from xosc_lateral.road import RoadNetwork
 from xosc_lateral.road.tables import turned_in_surface
+from xosc_lateral.rows import BLOCK, columns, give_back, kept
 
 NO_LANE = "none"
 """Lane type of what is beside the road, though the road describes it."""
@@ -36,19 +38,27 @@ _TELEPORTED, _ROAD_END = int(Activity.TELEPORTED), int(Activity.ROAD_END)  # pla
 
 
 class Rows:
-    """Rows of one entity."""
+    """Rows of one entity: in arrays as they come, and put away as bytes, column after column, every so many frames."""
 
     def __init__(self, state: EntityState) -> None:
         self.state = state
-        self._road = array("i")
-        self._lane = array("i")
         self._s = array("d")
         self._offset_t = array("d")
         self._relative_heading = array("d")
         self._speed = array("d")
+        self._road = array("i")
+        self._lane = array("i")
         self._activity = array("B")
+        self._columns = (
+            self._s, self._offset_t, self._relative_heading, self._speed, self._road, self._lane, self._activity
+        )  # fmt: skip
+        self._put_away: list[NDArray[np.uint8]] = []
+        self._rows_put_away = 0
         self._free_rows = array("q")
         self._free = array("d")
+        self._free_put_away: list[tuple[NDArray[np.int64], FloatArray]] = []
+        self._knows_height = True
+        """Of all rows whose road nobody has asked for."""
 
     def write(self, time: float) -> None:
         """Write down where the entity is now; raises `PlaybackError` where no entity can be. [s]"""
@@ -60,7 +70,7 @@ class Rows:
             words = ("s", "offset") if free is None else ("x", "y")
             raise self._implausible(time, f"{words[0]} = {x:g} m, {words[1]} = {y:g} m, speed = {state.speed:g} m/s")
         if free is not None:
-            self._free_rows.append(len(self._road))
+            self._free_rows.append(self._rows_put_away + len(self._road))
             self._free.extend(free)
         self._road.append(state.road if state._located else _UNKNOWN)
         self._lane.append(state.lane)
@@ -94,62 +104,96 @@ class Rows:
             element=place.element,
         )
 
-    def _check_jumps(self, time: FloatArray, pose: FloatArray, activity: NDArray[np.uint8]) -> None:
+    def put_away(self) -> None:
+        """Make place for rows to come."""
+        if not self._road:
+            return
+        if self._free_rows:
+            rows, free = np.array(self._free_rows), np.array(self._free).reshape(-1, 6)
+            unknown = np.array(self._road)[rows - self._rows_put_away] == _UNKNOWN
+            self._knows_height &= not np.isnan(free[unknown, 2]).any()
+            self._free_put_away.append((kept(rows), kept(free.ravel()).reshape(-1, 6)))
+        self._rows_put_away += len(self._road)
+        self._put_away.append(kept(np.frombuffer(b"".join(self._columns), dtype=np.uint8)))
+        for column in (*self._columns, self._free_rows, self._free):
+            del column[:]
+
+    def motion(self, network: RoadNetwork, time: FloatArray) -> EntityMotion:
+        """All rows, with world poses and directions of travel; what was written down is gone."""
+        self.put_away()
+        names = (
+            "x", "y", "z", "heading", "pitch", "roll",
+            "speed", "road", "lane", "s", "offset", "heading_relative", "activity",
+        )  # fmt: skip
+        found = columns(len(time), self._worked_out(network, time))
+        return EntityMotion(entity=self.state.entity, time=time, **dict(zip(names, found, strict=True)))
+
+    def _worked_out(self, network: RoadNetwork, time: FloatArray) -> Iterator[tuple[NDArray[Any], ...]]:
+        """Columns of `motion`, in blocks of rows."""
+        begin, before = 0, tuple[NDArray[Any], ...]()
+        for s, offset, along, speed, road, lane, activity in self._blocks():
+            n = len(s)
+            free_rows, free = self._free_within(begin, begin + n)
+            direction = np.ones(n)
+            unknown = road[free_rows] == _UNKNOWN
+            looked_up = free_rows[unknown]
+            known = road >= 0
+            if known.any():
+                direction[known] = network.travel_directions(road[known], lane[known])
+            offset *= direction
+            if len(looked_up):
+                height = free[unknown, 2] if self._knows_height else None
+                _look_up(network, looked_up, free[unknown], height, road, lane, s, offset, direction)
+            to_lane = along - np.where(direction > 0, 0.0, pi)
+            on_road = road >= 0
+            pose = _poses(network, road, lane, s, offset, to_lane)
+            _lay_over(pose, free_rows, free)
+            to_lane[looked_up] = pose[looked_up, 3] - _lane_heading(network, road, lane, s, offset, looked_up)
+            checked = (time[begin : begin + n], pose[:, 0], pose[:, 1], activity)
+            self._check_jumps(*(np.concatenate(two) for two in zip(before, checked, strict=True)) if begin else checked)
+            before = tuple(values[-1:].copy() for values in checked)
+            beside = _beside_road(network, road, lane, s, offset, pose, on_road)
+            activity[beside & (activity & np.uint8(Activity.ACTIVE) > 0)] |= np.uint8(Activity.OFF_ROAD)
+            road[~on_road], lane[~on_road], s[~on_road], offset[~on_road] = NOWHERE, 0, 0.0, 0.0
+            heading = np.mod(pose[:, 3], 2.0 * pi, out=pose[:, 3])
+            relative = (to_lane + pi) % (2.0 * pi) - pi
+            yield (*pose[:, :3].T, heading, *pose[:, 4:].T, speed, road, lane, s, offset, relative, activity)
+            begin += n
+            give_back()
+        self._put_away.clear()
+        self._free_put_away.clear()
+
+    def _blocks(self) -> Iterator[list[NDArray[Any]]]:
+        """What was put away, as arrays of its columns, shape (rows,) each."""
+        together: list[list[NDArray[Any]]] = []
+        kinds = [np.dtype(column.typecode) for column in self._columns]
+        size = sum(kind.itemsize for kind in kinds)
+        for number, data in enumerate(self._put_away, start=1):
+            rows = len(data) // size
+            ends = np.cumsum([rows * kind.itemsize for kind in kinds])
+            parts = np.split(data, ends[:-1])
+            together.append([part.view(kind) for part, kind in zip(parts, kinds, strict=True)])
+            if number == len(self._put_away) or sum(len(part[0]) for part in together) >= BLOCK:
+                yield [np.concatenate(column) for column in zip(*together, strict=True)]
+                together = []
+
+    def _free_within(self, begin: int, end: int) -> tuple[NDArray[np.int64], FloatArray]:
+        """World poses that were given, shape (n, 6), and their rows, counted from `begin`, before `end`."""
+        parts = [(rows, free) for rows, free in self._free_put_away if rows[0] < end and rows[-1] >= begin]
+        if not parts:
+            return np.empty(0, dtype=np.int64), np.empty((0, 6))
+        rows, free = (np.concatenate(column) for column in zip(*parts, strict=True))
+        inside = (rows >= begin) & (rows < end)
+        return rows[inside] - begin, free[inside]
+
+    def _check_jumps(self, time: FloatArray, x: FloatArray, y: FloatArray, activity: NDArray[np.uint8]) -> None:
         """Nobody moves this far in a frame without being placed anew."""
-        moved = np.hypot(np.diff(pose[:, 0]), np.diff(pose[:, 1]))
+        moved = np.hypot(np.diff(x), np.diff(y))
         there = (activity[1:] & activity[:-1] & np.uint8(Activity.ACTIVE)) != 0
         far = there & ((activity[1:] & np.uint8(Activity.TELEPORTED)) == 0) & (moved > FARTHEST_IN_A_FRAME)
         if far.any():
             k = int(np.flatnonzero(far)[0]) + 1
             raise self._implausible(float(time[k]), f"{moved[k - 1]:g} m in one frame")
-
-    def motion(self, network: RoadNetwork, time: FloatArray) -> EntityMotion:
-        """All rows, with world poses and directions of travel."""
-        # The rows themselves, not copies: nobody writes on.
-        road: IntArray = np.frombuffer(self._road, dtype=np.int32)
-        lane: IntArray = np.frombuffer(self._lane, dtype=np.int32)
-        s, offset, along, speed = (
-            np.frombuffer(column, dtype=np.float64)
-            for column in (self._s, self._offset_t, self._relative_heading, self._speed)
-        )
-        activity = np.frombuffer(self._activity, dtype=np.uint8)
-        free_rows = np.frombuffer(self._free_rows, dtype=np.int64)
-        free = np.frombuffer(self._free, dtype=np.float64).reshape(-1, 6)
-
-        direction = np.ones(len(road))
-        looked_up = free_rows[road[free_rows] == _UNKNOWN]
-        known = road >= 0
-        if known.any():
-            direction[known] = network.travel_directions(road[known], lane[known])
-        offset *= direction
-        if len(looked_up):
-            _look_up(network, looked_up, free[road[free_rows] == _UNKNOWN], road, lane, s, offset, direction)
-        to_lane = along - np.where(direction > 0, 0.0, pi)
-        on_road = road >= 0
-        pose = _poses(network, road, lane, s, offset, to_lane)
-        _lay_over(pose, free_rows, free)
-        to_lane[looked_up] = pose[looked_up, 3] - _lane_heading(network, road, lane, s, offset, looked_up)
-        self._check_jumps(time, pose, activity)
-        beside = _beside_road(network, road, lane, s, offset, pose, on_road)
-        activity[beside & (activity & np.uint8(Activity.ACTIVE) > 0)] |= np.uint8(Activity.OFF_ROAD)
-        road[~on_road], lane[~on_road], s[~on_road], offset[~on_road] = NOWHERE, 0, 0.0, 0.0
-        return EntityMotion(
-            entity=self.state.entity,
-            time=time,
-            x=pose[:, 0],
-            y=pose[:, 1],
-            z=pose[:, 2],
-            heading=np.mod(pose[:, 3], 2.0 * pi, out=pose[:, 3]),
-            pitch=pose[:, 4],
-            roll=pose[:, 5],
-            speed=speed,
-            road=road,
-            lane=lane,
-            s=s,
-            offset=offset,
-            heading_relative=(to_lane + pi) % (2.0 * pi) - pi,
-            activity=activity,
-        )
 
 
 def _poses(
@@ -158,10 +202,10 @@ def _poses(
     """World poses of the rows that are on a road, shape (n, 6), turned by `to_lane` [rad] against their lanes."""
     on_road = road >= 0
     pose = np.zeros((len(road), 6), order="F")  # each column is then an array of its own
-    for rows in true_blocks(on_road):
+    rows = np.flatnonzero(on_road)
+    if len(rows):
         pose[rows] = np.column_stack(network.lane_to_world(road[rows], lane[rows], s[rows], offset[rows]))
     _turn(pose, to_lane, on_road)
-
     return pose
 
 
@@ -169,6 +213,7 @@ def _look_up(
     network: RoadNetwork,
     rows: NDArray[np.int64],
     free: FloatArray,
+    height: FloatArray | None,
     road: IntArray,
     lane: IntArray,
     s: FloatArray,
@@ -179,8 +224,7 @@ def _look_up(
     if not network.road_ids:
         road[rows] = NOWHERE
         return
-    z = free[:, 2]
-    found = network.world_to_lane(free[:, 0], free[:, 1], None if np.isnan(z).any() else z)
+    found = network.world_to_lane(free[:, 0], free[:, 1], height)
     road[rows], lane[rows], s[rows], offset[rows] = found.road, found.lane, found.s, found.offset
     direction[rows] = network.travel_directions(found.road, found.lane)
 
@@ -228,23 +272,14 @@ def _beside_road(
     beside = ~on_road
     if not on_road.any():
         return beside
-    suspects = _suspects(network, road, lane, s, offset, on_road)
+    rows = np.flatnonzero(on_road)
+    half = 0.5 * network.lane_width(road[rows], lane[rows], s[rows])
+    suspects = rows[np.abs(offset[rows]) > half + _TOUCH]  # beyond their own lane
     if len(suspects):
         types = {lane.type for r in network.roads for section in r.sections for lane in section.lanes} - {NO_LANE}
         found = network.world_to_lane(pose[suspects, 0], pose[suspects, 1], lane_types=types)
         beside[suspects] = ~(found.distance <= _TOUCH)
     return beside
-
-
-def _suspects(
-    network: RoadNetwork, road: IntArray, lane: IntArray, s: FloatArray, offset: FloatArray, on_road: NDArray[np.bool_]
-) -> NDArray[np.int64]:
-    """Rows that lie beyond their own lane."""
-    suspects = [np.empty(0, dtype=np.int64)]
-    for rows in true_blocks(on_road):
-        half = 0.5 * network.lane_width(road[rows], lane[rows], s[rows])
-        suspects.append(rows[np.abs(offset[rows]) > half + _TOUCH])
-    return np.concatenate(suspects)
 
 
 _TOUCH = 1e-3

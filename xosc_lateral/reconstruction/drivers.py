@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.evaluation.metrics import free_runs
-from xosc_lateral.mask import true_slices
 from xosc_lateral.motion.segments import MINIMUM_SPEED
 from xosc_lateral.reconstruction.plan import Residuals, VehiclePlan
+from xosc_lateral.rows import true_slices
 
 FloatArray = NDArray[np.float64]
 

@@ -9,9 +9,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.mask import true_slices
 from xosc_lateral.reconstruction.recorded import RecordedVehicle
 from xosc_lateral.reconstruction.transitions import SHAPES, Rough, Transition, fit_transition
+from xosc_lateral.rows import true_slices
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

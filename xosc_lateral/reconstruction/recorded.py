@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.mask import true_slices
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.road.positions import Poses
+from xosc_lateral.rows import true_slices
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -14,11 +14,11 @@ from xosc_lateral.evaluation.spectra import gapped_spectrum
 from xosc_lateral.identification.close import Finding, LoopResult
 from xosc_lateral.identification.cross_validation import hold_out_blocks
 from xosc_lateral.identification.held_out import Scorecard
-from xosc_lateral.mask import true_slices
 from xosc_lateral.report.figures import BLUE, GRID, MUTED, VERMILLION, figure_style, new_figure, new_panels
 from xosc_lateral.report.loop_curves import Curve, curve_of
 from xosc_lateral.report.loop_words import SPREAD, column_label, product_label
 from xosc_lateral.report.violins import LABELS, density_over
+from xosc_lateral.rows import true_slices
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

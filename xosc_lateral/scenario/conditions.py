@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
+from typing import Annotated
 
 from msgspec import Struct
 
@@ -18,208 +19,187 @@ from xosc_lateral.scenario.enums import (
     StoryboardElementState,
     StoryboardElementType,
 )
-from xosc_lateral.scenario.place import Place
+from xosc_lateral.scenario.place import (
+    AnyNumber,
+    Content,
+    EntityRef,
+    EntityRefs,
+    No,
+    ParameterRef,
+    Place,
+    Zero,
+    called,
+)
 from xosc_lateral.scenario.position import Position
 from xosc_lateral.scenario.storyboard import Condition, ConditionGroup, Trigger
 
+DistanceType = called("relativeDistanceType")
 
-class ParameterCondition(Struct, frozen=True):
+
+class ParameterCondition(Content, frozen=True):
     """`value` is text: numbers are compared as numbers where both are."""
 
-    parameter_ref: str
+    parameter_ref: ParameterRef
     value: str
     rule: Rule
-    place: Place
 
 
-class VariableCondition(Struct, frozen=True):
+class VariableCondition(Content, frozen=True):
     """`value` is text: numbers are compared as numbers where both are."""
 
-    variable_ref: str
+    variable_ref: ParameterRef
     value: str
     rule: Rule
-    place: Place
 
 
-class SimulationTimeCondition(Struct, frozen=True):
+class SimulationTimeCondition(Content, frozen=True):
     """[s]"""
 
-    value: float
+    value: AnyNumber
     rule: Rule
-    place: Place
 
 
 def at_time(moment: float, name: str, place: Place) -> Trigger:
     """Trigger of our own that holds from a moment on. [s]"""
-    condition = SimulationTimeCondition(moment, Rule.GREATER_THAN, place)
-    return Trigger((ConditionGroup((Condition(name, 0.0, ConditionEdge.NONE, condition, None, place),)),), place)
+    content = SimulationTimeCondition(moment, Rule.GREATER_THAN, place=place)
+    return Trigger((ConditionGroup((Condition(name, 0.0, ConditionEdge.NONE, content, None, place),)),), place)
 
 
-class TimeOfDayCondition(Struct, frozen=True):
+class TimeOfDayCondition(Content, frozen=True):
     """Against the environment's clock."""
 
     date_time: datetime
     rule: Rule
-    place: Place
 
 
-class StoryboardElementStateCondition(Struct, frozen=True):
+class StoryboardElementStateCondition(Content, frozen=True):
     """State or transition of a storyboard element; `element_ref` is the trailing part of ``story::act::...::name``."""
 
-    element_type: StoryboardElementType
-    element_ref: str
+    element_type: Annotated[StoryboardElementType, called("storyboardElementType")]
+    element_ref: Annotated[str, called("storyboardElementRef")]
     state: StoryboardElementState
-    place: Place
 
 
-class TrafficSignalCondition(Struct, frozen=True):
+class TrafficSignalCondition(Content, frozen=True):
     """A signal shows a state."""
 
     name: str
     state: str
-    place: Place
 
 
-class TrafficSignalControllerCondition(Struct, frozen=True):
+class TrafficSignalControllerCondition(Content, frozen=True):
     """A signal controller is in a phase."""
 
-    controller_ref: str
+    controller_ref: Annotated[str, called("trafficSignalControllerRef")]
     phase: str
-    place: Place
 
 
-class UserDefinedValueCondition(Struct, frozen=True):
+class UserDefinedValueCondition(Content, frozen=True):
     """A value from outside: never known while playing."""
 
     name: str
     value: str
     rule: Rule
-    place: Place
 
 
-class EndOfRoadCondition(Struct, frozen=True):
+class EndOfRoadCondition(Content, frozen=True):
     """At the end of its road for this long. [s]"""
 
     duration: float
-    place: Place
 
 
-class CollisionCondition(Struct, frozen=True):
+class CollisionCondition(Content, frozen=True):
     """Touches that entity, or any of that category."""
 
-    place: Place
     entity_ref: str | None = None
     by_type: EntityCategory | None = None
 
 
-class OffroadCondition(Struct, frozen=True):
+class OffroadCondition(Content, frozen=True):
     """Off the road for this long. [s]"""
 
     duration: float
-    place: Place
 
 
-class TimeHeadwayCondition(Struct, frozen=True):
-    """Distance to an entity over own speed. [s] `along_route` (1.0) None: not said."""
+class Measured(Content, frozen=True, kw_only=True):
+    """A distance, or what is made of one, against a value. `along_route` (1.0) None: not said."""
 
-    entity_ref: str
-    value: float
+    value: AnyNumber
     rule: Rule
-    freespace: bool
-    place: Place
+    freespace: No
     coordinate_system: CoordinateSystem | None = None
-    distance_type: RelativeDistanceType | None = None
+    distance_type: Annotated[RelativeDistanceType | None, DistanceType] = None
     along_route: bool | None = None
     routing_algorithm: RoutingAlgorithm | None = None
 
 
-class TimeToCollisionCondition(Struct, frozen=True):
+class TimeHeadwayCondition(Measured, frozen=True):
+    """Distance to an entity over own speed. [s]"""
+
+    entity_ref: EntityRef
+
+
+class TimeToCollisionCondition(Measured, frozen=True):
     """Distance to an entity or position over closing speed. [s]"""
 
     target: str | Position
-    value: float
-    rule: Rule
-    freespace: bool
-    place: Place
-    coordinate_system: CoordinateSystem | None = None
-    distance_type: RelativeDistanceType | None = None
-    along_route: bool | None = None
-    routing_algorithm: RoutingAlgorithm | None = None
 
 
-class AccelerationCondition(Struct, frozen=True):
+class AccelerationCondition(Content, frozen=True):
     """[m/s2]; `direction` None: the magnitude."""
 
-    value: float
+    value: AnyNumber
     rule: Rule
-    place: Place
     direction: DirectionalDimension | None = None
 
 
-class StandStillCondition(Struct, frozen=True):
+class StandStillCondition(Content, frozen=True):
     """Stands for this long. [s]"""
 
     duration: float
-    place: Place
 
 
-class SpeedCondition(Struct, frozen=True):
+class SpeedCondition(Content, frozen=True):
     """[m/s]; `direction` None: the scalar speed."""
 
-    value: float
+    value: AnyNumber
     rule: Rule
-    place: Place
     direction: DirectionalDimension | None = None
 
 
-class RelativeSpeedCondition(Struct, frozen=True):
+class RelativeSpeedCondition(SpeedCondition, frozen=True, kw_only=True):
     """Own speed minus that of an entity. [m/s]"""
 
-    entity_ref: str
-    value: float
-    rule: Rule
-    place: Place
-    direction: DirectionalDimension | None = None
+    entity_ref: EntityRef
 
 
-class TraveledDistanceCondition(Struct, frozen=True):
+class TraveledDistanceCondition(Content, frozen=True):
     """Since the scenario's start. [m]"""
 
-    value: float
-    place: Place
+    value: AnyNumber
 
 
-class ReachPositionCondition(Struct, frozen=True):
+class ReachPositionCondition(Content, frozen=True):
     """Within `tolerance` of a position. [m]"""
 
     position: Position
     tolerance: float
-    place: Place
 
 
-class DistanceCondition(Struct, frozen=True):
+class DistanceCondition(Measured, frozen=True):
     """Distance to a position. [m]"""
 
     position: Position
-    value: float
-    rule: Rule
-    freespace: bool
-    place: Place
-    coordinate_system: CoordinateSystem | None = None
-    distance_type: RelativeDistanceType | None = None
-    along_route: bool | None = None
-    routing_algorithm: RoutingAlgorithm | None = None
 
 
-class RelativeDistanceCondition(Struct, frozen=True):
+class RelativeDistanceCondition(Content, frozen=True):
     """Distance to an entity. [m]"""
 
-    entity_ref: str
-    value: float
+    entity_ref: EntityRef
+    value: AnyNumber
     rule: Rule
-    freespace: bool
-    distance_type: RelativeDistanceType
-    place: Place
+    freespace: No
+    distance_type: Annotated[RelativeDistanceType, DistanceType] = RelativeDistanceType.EUCLIDIAN
     coordinate_system: CoordinateSystem | None = None
     routing_algorithm: RoutingAlgorithm | None = None
 
@@ -227,38 +207,31 @@ class RelativeDistanceCondition(Struct, frozen=True):
 class RelativeLaneRange(Struct, frozen=True):
     """Lanes `from_lane` to `to_lane`, relative to the own one; None: open."""
 
-    from_lane: int | None
-    to_lane: int | None
+    from_lane: Annotated[int | None, called("from")]
+    to_lane: Annotated[int | None, called("to")]
 
 
-class RelativeClearanceCondition(Struct, frozen=True):
+class RelativeClearanceCondition(Content, frozen=True):
     """Nobody (of `entity_refs`, or at all when empty) in these lanes within these distances. [m]"""
 
-    opposite_lanes: bool
-    freespace: bool
-    place: Place
-    distance_forward: float = 0.0
-    distance_backward: float = 0.0
+    opposite_lanes: No
+    freespace: Annotated[bool, called("freeSpace", "freespace", default=False)]
+    distance_forward: Zero
+    distance_backward: Zero
     lane_ranges: tuple[RelativeLaneRange, ...] = ()
-    entity_refs: tuple[str, ...] = ()
+    entity_refs: EntityRefs = ()
 
 
-class AngleCondition(Struct, frozen=True):
+class AngleCondition(Content, frozen=True):
     """Own angle within a tolerance. [rad]"""
 
     angle_type: AngleType
     angle: float
-    tolerance: float
-    place: Place
+    tolerance: Annotated[float, called("angleTolerance")]
     coordinate_system: CoordinateSystem | None = None
 
 
-class RelativeAngleCondition(Struct, frozen=True):
+class RelativeAngleCondition(AngleCondition, frozen=True, kw_only=True):
     """Angle relative to an entity's within a tolerance. [rad]"""
 
-    entity_ref: str
-    angle_type: AngleType
-    angle: float
-    tolerance: float
-    place: Place
-    coordinate_system: CoordinateSystem | None = None
+    entity_ref: EntityRef

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Annotated
 
 from msgspec import Struct, field
 
 from xosc_lateral.scenario.enums import EntityCategory, VehicleCategory
-from xosc_lateral.scenario.place import Place
+from xosc_lateral.scenario.place import Name, Place, Zero, called
 
 
 class BoundingBox(Struct, frozen=True):
     """Box around the entity; its centre in the entity's frame (x ahead of the reference point, y left, z up). [m]"""
 
-    center_x: float
-    center_y: float
-    center_z: float
-    length: float
-    width: float
-    height: float
+    center_x: Annotated[float, called("Center/x")]
+    center_y: Annotated[float, called("Center/y")]
+    center_z: Annotated[float, called("Center/z", default=0.0)]
+    length: Annotated[float, called("Dimensions/length")]
+    width: Annotated[float, called("Dimensions/width")]
+    height: Annotated[float, called("Dimensions/height")]
 
 
 class Performance(Struct, frozen=True):
@@ -34,19 +35,19 @@ class Performance(Struct, frozen=True):
 class Axle(Struct, frozen=True):
     """An axle; `position_x` ahead of the reference point. [m], [rad]"""
 
-    max_steering: float
-    position_x: float
-    position_z: float
-    track_width: float
-    wheel_diameter: float
+    max_steering: Zero
+    position_x: Zero
+    position_z: Zero
+    track_width: Zero
+    wheel_diameter: Zero
 
 
 class Axles(Struct, frozen=True):
     """Front (a trailer may have none), rear and further axles."""
 
-    front: Axle | None
-    rear: Axle | None
-    additional: tuple[Axle, ...] = ()
+    front: Annotated[Axle | None, called("FrontAxle")]
+    rear: Annotated[Axle | None, called("RearAxle")]
+    additional: Annotated[tuple[Axle, ...], called("AdditionalAxle")] = ()
 
     @property
     def wheelbase(self) -> float | None:
@@ -57,7 +58,7 @@ class Axles(Struct, frozen=True):
 class Controller(Struct, frozen=True):
     """A controller by name. It is named and reported; playback uses the default driver instead."""
 
-    name: str
+    name: Name
     place: Place
     properties: Mapping[str, str] = field(default_factory=dict)
     object_name: str | None = None

@@ -204,3 +204,11 @@ class ParameterType(StrEnum):
     STRING = "string"
     UNSIGNED_INT = "unsignedInt"
     UNSIGNED_SHORT = "unsignedShort"
+
+
+SYNONYMS: dict[type[StrEnum], dict[str, StrEnum]] = {
+    Priority: {"overwrite": Priority.OVERRIDE},
+    ParameterType: {"integer": ParameterType.INT, "bool": ParameterType.BOOLEAN, "float": ParameterType.DOUBLE},
+    RelativeDistanceType: dict.fromkeys(("cartesianDistance", "euclideanDistance"), RelativeDistanceType.EUCLIDIAN),
+}
+"""What older versions and other tools write: ``overwrite``, ``integer`` and ``cartesianDistance`` are words of 1.0."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from datetime import datetime
+from typing import Annotated
 
 from msgspec import Struct
 
-from xosc_lateral.scenario.place import Place
+from xosc_lateral.scenario.place import Content, Name, Xml, called
 
 
 class TimeOfDay(Struct, frozen=True):
@@ -37,26 +38,25 @@ class Weather(Struct, frozen=True):
         [K], [Pa]
     """
 
-    cloud_state: str | None = None
-    illuminance: float | None = None
-    sun_azimuth: float | None = None
-    sun_elevation: float | None = None
-    visual_range: float | None = None
-    precipitation_type: str | None = None
+    cloud_state: Annotated[str | None, called("cloudState", "fractionalCloudCover")] = None
+    illuminance: Annotated[float | None, called("Sun/illuminance", "Sun/intensity")] = None
+    sun_azimuth: Annotated[float | None, called("Sun/azimuth")] = None
+    sun_elevation: Annotated[float | None, called("Sun/elevation")] = None
+    visual_range: Annotated[float | None, Xml(("Fog/visualRange",), finite=False)] = None
+    precipitation_type: Annotated[str | None, called("Precipitation/precipitationType")] = None
     precipitation_intensity: float | None = None
     precipitation_fraction: float | None = None
-    wind_speed: float | None = None
-    wind_direction: float | None = None
+    wind_speed: Annotated[float | None, called("Wind/speed")] = None
+    wind_direction: Annotated[float | None, called("Wind/direction")] = None
     temperature: float | None = None
     atmospheric_pressure: float | None = None
 
 
-class Environment(Struct, frozen=True):
+class Environment(Content, frozen=True):
     """A named environment; parts that a file does not state are None."""
 
-    name: str
-    place: Place
+    name: Name
     time_of_day: TimeOfDay | None = None
     weather: Weather | None = None
-    friction_scale_factor: float | None = None
-    wetness: str | None = None
+    friction_scale_factor: Annotated[float | None, called("RoadCondition/frictionScaleFactor")] = None
+    wetness: Annotated[str | None, called("RoadCondition/wetness")] = None

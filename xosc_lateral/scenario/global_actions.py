@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from enum import StrEnum
-
-from msgspec import Struct
+from typing import Annotated
 
 from xosc_lateral.scenario.environment import Environment
-from xosc_lateral.scenario.place import Place
+from xosc_lateral.scenario.place import Content, EntityRef, ParameterRef, called
 from xosc_lateral.scenario.position import Position
 
 
-class EnvironmentAction(Struct, frozen=True):
+class EnvironmentAction(Content, frozen=True):
     """Set the environment; parts that are None stay as they are."""
 
     environment: Environment
-    place: Place
 
 
 class ModifyOperation(StrEnum):
@@ -25,89 +23,78 @@ class ModifyOperation(StrEnum):
     MULTIPLY = "MultiplyByValue"
 
 
-class ParameterSetAction(Struct, frozen=True):
+class ParameterSetAction(Content, frozen=True):
     """The parameter gets this value."""
 
-    parameter_ref: str
+    parameter_ref: ParameterRef
     value: str
-    place: Place
 
 
-class ParameterModifyAction(Struct, frozen=True):
+class ParameterModifyAction(Content, frozen=True):
     """The parameter's number is changed."""
 
-    parameter_ref: str
+    parameter_ref: ParameterRef
     operation: ModifyOperation
     value: float
-    place: Place
 
 
-class VariableSetAction(Struct, frozen=True):
+class VariableSetAction(Content, frozen=True):
     """The variable gets this value."""
 
-    variable_ref: str
+    variable_ref: ParameterRef
     value: str
-    place: Place
 
 
-class VariableModifyAction(Struct, frozen=True):
+class VariableModifyAction(Content, frozen=True):
     """The variable's number is changed."""
 
-    variable_ref: str
+    variable_ref: ParameterRef
     operation: ModifyOperation
     value: float
-    place: Place
 
 
-class SetMonitorAction(Struct, frozen=True):
+class SetMonitorAction(Content, frozen=True):
     """A monitor is set (1.3); nothing in playback reads it."""
 
     monitor_ref: str
     value: bool
-    place: Place
 
 
-class TrafficSignalStateAction(Struct, frozen=True):
+class TrafficSignalStateAction(Content, frozen=True):
     """One signal gets a state."""
 
     name: str
     state: str
-    place: Place
 
 
-class TrafficSignalControllerAction(Struct, frozen=True):
+class TrafficSignalControllerAction(Content, frozen=True):
     """A signal controller goes to a phase."""
 
-    controller_ref: str
+    controller_ref: Annotated[str, called("trafficSignalControllerRef")]
     phase: str
-    place: Place
 
 
-class AddEntityAction(Struct, frozen=True):
+class AddEntityAction(Content, frozen=True):
     """The entity appears."""
 
-    entity_ref: str
+    entity_ref: EntityRef
     position: Position
-    place: Place
 
 
-class DeleteEntityAction(Struct, frozen=True):
+class DeleteEntityAction(Content, frozen=True):
     """The entity is gone."""
 
-    entity_ref: str
-    place: Place
+    entity_ref: EntityRef
 
 
-class TrafficAction(Struct, frozen=True):
+class TrafficAction(Content, frozen=True):
     """Traffic source, sink, swarm, area, stop: kept and named, not played: its cars are the tool's own."""
 
     kind: str
-    place: Place
 
 
-class UserDefinedAction(Struct, frozen=True):
+class UserDefinedAction(Content, frozen=True):
     """`type` and the text of a CustomCommandAction."""
 
     type: str
     content: str
-    place: Place

@@ -5,10 +5,12 @@ Lane `offset` and road `t` are here as written: along the road's t-axis (the roa
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from msgspec import Struct
 
 from xosc_lateral.scenario.enums import ReferenceContext, RouteStrategy
-from xosc_lateral.scenario.place import Place, Unsupported
+from xosc_lateral.scenario.place import Content, EntityRef, Name, No, Unsupported, Xml, Zero, called
 
 
 class Orientation(Struct, frozen=True):
@@ -20,77 +22,70 @@ class Orientation(Struct, frozen=True):
     type: ReferenceContext | None = None
 
 
-class WorldPosition(Struct, frozen=True):
+class WorldPosition(Content, frozen=True):
     """In world coordinates [m], [rad]; None where the file has none."""
 
     x: float
     y: float
-    place: Place
     z: float | None = None
     h: float | None = None
     p: float | None = None
     r: float | None = None
 
 
-class RelativeWorldPosition(Struct, frozen=True):
+class RelativeWorldPosition(Content, frozen=True):
     """World axes, from an entity's reference point; without dz, on the road. [m]"""
 
-    entity_ref: str
-    dx: float
-    dy: float
-    place: Place
+    entity_ref: EntityRef
+    dx: Zero
+    dy: Zero
     dz: float | None = None
     orientation: Orientation | None = None
 
 
-class RelativeObjectPosition(Struct, frozen=True):
+class RelativeObjectPosition(Content, frozen=True):
     """The entity's own axes, from its reference point; without dz, on the road. [m]"""
 
-    entity_ref: str
-    dx: float
-    dy: float
-    place: Place
+    entity_ref: EntityRef
+    dx: Zero
+    dy: Zero
     dz: float | None = None
     orientation: Orientation | None = None
 
 
-class RoadPosition(Struct, frozen=True):
+class RoadPosition(Content, frozen=True):
     """Road coordinates. [m]"""
 
     road_id: str
     s: float
-    t: float
-    place: Place
+    t: Zero
     orientation: Orientation | None = None
 
 
-class RelativeRoadPosition(Struct, frozen=True):
+class RelativeRoadPosition(Content, frozen=True):
     """Road coordinates from an entity's. [m]"""
 
-    entity_ref: str
+    entity_ref: EntityRef
     ds: float
     dt: float
-    place: Place
     orientation: Orientation | None = None
 
 
-class LanePosition(Struct, frozen=True):
+class LanePosition(Content, frozen=True):
     """Lane coordinates; `offset` along +t as the standard has it. [m]"""
 
     road_id: str
     lane_id: int
     s: float
-    place: Place
     offset: float = 0.0
     orientation: Orientation | None = None
 
 
-class RelativeLanePosition(Struct, frozen=True):
+class RelativeLanePosition(Content, frozen=True):
     """Lane coordinates from an entity's: `d_lane` lanes, and `ds` along the road or `ds_lane` along its lane. [m]"""
 
-    entity_ref: str
+    entity_ref: EntityRef
     d_lane: int
-    place: Place
     ds: float | None = None
     ds_lane: float | None = None
     offset: float = 0.0
@@ -100,14 +95,14 @@ class RelativeLanePosition(Struct, frozen=True):
 class FromCurrentEntity(Struct, frozen=True):
     """On the route, where that entity is."""
 
-    entity_ref: str
+    entity_ref: EntityRef
 
 
 class FromRoadCoordinates(Struct, frozen=True):
     """On the route, in road coordinates. [m]"""
 
     path_s: float
-    t: float
+    t: Zero
 
 
 class FromLaneCoordinates(Struct, frozen=True):
@@ -121,32 +116,29 @@ class FromLaneCoordinates(Struct, frozen=True):
 InRoutePosition = FromCurrentEntity | FromRoadCoordinates | FromLaneCoordinates
 
 
-class RoutePosition(Struct, frozen=True):
+class RoutePosition(Content, frozen=True):
     """On a route. `route` None: the reference is missing (an error of the file that the player names)."""
 
     route: Route | None
     in_route: InRoutePosition | None
-    place: Place
     orientation: Orientation | None = None
 
 
-class TrajectoryPosition(Struct, frozen=True):
+class TrajectoryPosition(Content, frozen=True):
     """On a trajectory. [m]"""
 
-    trajectory: Trajectory
+    trajectory: Annotated[Trajectory, called("")]
     s: float
-    place: Place
     t: float = 0.0
     orientation: Orientation | None = None
 
 
-class GeoPosition(Struct, frozen=True):
+class GeoPosition(Content, frozen=True):
     """Latitude and longitude [rad] (degree attributes of 1.2 are converted), height [m]."""
 
     latitude: float
     longitude: float
-    place: Place
-    altitude: float | None = None
+    altitude: Annotated[float | None, called("altitude", "height")] = None
     orientation: Orientation | None = None
 
 
@@ -169,16 +161,15 @@ class Waypoint(Struct, frozen=True):
     """A place to pass, and how to come to it."""
 
     position: Position
-    strategy: RouteStrategy
+    strategy: Annotated[RouteStrategy, called("routeStrategy", default=RouteStrategy.SHORTEST)]
 
 
-class Route(Struct, frozen=True):
+class Route(Content, frozen=True):
     """At least two waypoints."""
 
-    name: str
+    name: Name
     waypoints: tuple[Waypoint, ...]
-    closed: bool
-    place: Place
+    closed: No
 
 
 class Vertex(Struct, frozen=True):
@@ -199,7 +190,7 @@ class Clothoid(Struct, frozen=True):
 
     position: Position
     curvature: float
-    curvature_prime: float
+    curvature_prime: Annotated[float, called("curvaturePrime", "curvatureDot", default=0.0)]  # the name of 1.0
     length: float
     start_time: float | None = None
     stop_time: float | None = None
@@ -213,7 +204,7 @@ class ClothoidSplineSegment(Struct, frozen=True):
     length: float
     h_offset: float = 0.0
     time_start: float | None = None
-    position_start: Position | None = None
+    position_start: Annotated[Position | None, called("PositionStart")] = None
 
 
 class ClothoidSpline(Struct, frozen=True):
@@ -242,18 +233,17 @@ class Nurbs(Struct, frozen=True):
 Shape = Polyline | Clothoid | ClothoidSpline | Nurbs | Unsupported
 
 
-class Trajectory(Struct, frozen=True):
+class Trajectory(Content, frozen=True):
     """A named path, with or without times."""
 
-    name: str
+    name: Name
     shape: Shape
-    closed: bool
-    place: Place
+    closed: No
 
 
 class Timing(Struct, frozen=True):
     """Trajectory times to scenario time: ``time * scale + offset`` [s], absolute or from the action's start."""
 
-    domain: ReferenceContext
-    scale: float
-    offset: float
+    domain: Annotated[ReferenceContext, called("domainAbsoluteRelative", default=ReferenceContext.ABSOLUTE)]
+    scale: Annotated[float, Xml(default=1.0)]
+    offset: Zero

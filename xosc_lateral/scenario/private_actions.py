@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from msgspec import Struct
 
 from xosc_lateral.scenario.entity import Controller
@@ -14,27 +16,35 @@ from xosc_lateral.scenario.enums import (
     LongitudinalDisplacement,
     SpeedTargetValueType,
 )
-from xosc_lateral.scenario.place import Place
+from xosc_lateral.scenario.place import AnyNumber, Content, EntityRef, No, Xml, called
 from xosc_lateral.scenario.position import Position, Route, Timing, Trajectory
+
+Limit = Annotated[float | None, Xml(finite=False)]
+ValueType = Annotated[SpeedTargetValueType, called("speedTargetValueType", default=SpeedTargetValueType.DELTA)]
+FOLLOWING_MODE = called("TrajectoryFollowingMode/followingMode", default=FollowingMode.FOLLOW)
+SteadyStates = called("TargetDistanceSteadyState", "TargetTimeSteadyState")
 
 
 class TransitionDynamics(Struct, frozen=True):
-    """Shape, dimension and value of a transition; `value` in s, m, or 1/s of the quantity (peak rate)."""
+    """Shape, dimension and value of a transition; `value` in s, m, or 1/s of the quantity (peak rate).
 
-    shape: DynamicsShape
-    dimension: DynamicsDimension
-    value: float
+    The reference player takes a missing dimension for time; a step has no use for either.
+    """
+
+    shape: Annotated[DynamicsShape, called("dynamicsShape", default=DynamicsShape.STEP)]
+    dimension: Annotated[DynamicsDimension, called("dynamicsDimension", default=DynamicsDimension.TIME)]
+    value: AnyNumber
     following_mode: FollowingMode = FollowingMode.POSITION
 
 
 class DynamicConstraints(Struct, frozen=True):
     """Limits of one action; None where the file has none (the performance holds then). [m/s], [m/s2], [m/s3]"""
 
-    max_acceleration: float | None = None
-    max_deceleration: float | None = None
-    max_speed: float | None = None
-    max_acceleration_rate: float | None = None
-    max_deceleration_rate: float | None = None
+    max_acceleration: Limit = None
+    max_deceleration: Limit = None
+    max_speed: Limit = None
+    max_acceleration_rate: Limit = None
+    max_deceleration_rate: Limit = None
 
 
 class AbsoluteTargetSpeed(Struct, frozen=True):
@@ -46,18 +56,17 @@ class AbsoluteTargetSpeed(Struct, frozen=True):
 class RelativeTargetSpeed(Struct, frozen=True):
     """From an entity's speed: plus `value` [m/s] or times `value` [-]; `continuous`: for ever."""
 
-    entity_ref: str
+    entity_ref: EntityRef
     value: float
-    value_type: SpeedTargetValueType
-    continuous: bool
+    value_type: ValueType
+    continuous: No
 
 
-class SpeedAction(Struct, frozen=True):
+class SpeedAction(Content, frozen=True):
     """Go to a speed."""
 
-    target: AbsoluteTargetSpeed | RelativeTargetSpeed
-    dynamics: TransitionDynamics
-    place: Place
+    target: Annotated[AbsoluteTargetSpeed | RelativeTargetSpeed, called("SpeedActionTarget")]
+    dynamics: Annotated[TransitionDynamics, called("SpeedActionDynamics")]
 
 
 class SpeedProfileEntry(Struct, frozen=True):
@@ -67,23 +76,21 @@ class SpeedProfileEntry(Struct, frozen=True):
     time: float | None
 
 
-class SpeedProfileAction(Struct, frozen=True):
+class SpeedProfileAction(Content, frozen=True):
     """Speeds over time; with `entity_ref`, relative to that entity's speed."""
 
     entries: tuple[SpeedProfileEntry, ...]
-    following_mode: FollowingMode
-    place: Place
-    entity_ref: str | None = None
+    following_mode: Annotated[FollowingMode, Xml(default=FollowingMode.POSITION)]
+    entity_ref: Annotated[str | None, Xml(is_entity=True)] = None
     constraints: DynamicConstraints | None = None
 
 
-class LongitudinalDistanceAction(Struct, frozen=True):
+class LongitudinalDistanceAction(Content, frozen=True):
     """Keep a distance [m] or time gap [s] to an entity; both None: the present distance."""
 
-    entity_ref: str
-    continuous: bool
-    freespace: bool
-    place: Place
+    entity_ref: EntityRef
+    continuous: No
+    freespace: No
     distance: float | None = None
     time_gap: float | None = None
     displacement: LongitudinalDisplacement | None = None
@@ -94,22 +101,21 @@ class LongitudinalDistanceAction(Struct, frozen=True):
 class AbsoluteTargetLane(Struct, frozen=True):
     """By lane id."""
 
-    lane_id: int
+    lane_id: Annotated[int, called("value")]
 
 
 class RelativeTargetLane(Struct, frozen=True):
     """`value` lanes from an entity's lane."""
 
-    entity_ref: str
+    entity_ref: EntityRef
     value: int
 
 
-class LaneChangeAction(Struct, frozen=True):
+class LaneChangeAction(Content, frozen=True):
     """Change to a lane; `target_lane_offset` along +t. [m]"""
 
-    target: AbsoluteTargetLane | RelativeTargetLane
-    dynamics: TransitionDynamics
-    place: Place
+    target: Annotated[AbsoluteTargetLane | RelativeTargetLane, called("LaneChangeTarget")]
+    dynamics: Annotated[TransitionDynamics, called("LaneChangeActionDynamics")]
     target_lane_offset: float = 0.0
 
 
@@ -122,27 +128,25 @@ class AbsoluteTargetLaneOffset(Struct, frozen=True):
 class RelativeTargetLaneOffset(Struct, frozen=True):
     """Along +t from an entity's position. [m]"""
 
-    entity_ref: str
+    entity_ref: EntityRef
     value: float
 
 
-class LaneOffsetAction(Struct, frozen=True):
+class LaneOffsetAction(Content, frozen=True):
     """Move inside the lane; `max_lateral_acc` None: as fast as can be (DESIGN: the player's default). [m/s2]"""
 
-    target: AbsoluteTargetLaneOffset | RelativeTargetLaneOffset
+    target: Annotated[AbsoluteTargetLaneOffset | RelativeTargetLaneOffset, called("LaneOffsetTarget")]
     shape: DynamicsShape
-    continuous: bool
-    place: Place
+    continuous: No
     max_lateral_acc: float | None = None
 
 
-class LateralDistanceAction(Struct, frozen=True):
+class LateralDistanceAction(Content, frozen=True):
     """Keep a lateral distance [m] to an entity; `distance` None: the present one."""
 
-    entity_ref: str
-    continuous: bool
-    freespace: bool
-    place: Place
+    entity_ref: EntityRef
+    continuous: No
+    freespace: No
     distance: float | None = None
     displacement: LateralDisplacement = LateralDisplacement.ANY
     coordinate_system: CoordinateSystem | None = None
@@ -160,120 +164,106 @@ class AbsoluteSpeed(Struct, frozen=True):
     """[m/s]"""
 
     value: float
-    steady_state: SteadyState | None = None
+    steady_state: Annotated[SteadyState | None, SteadyStates] = None
 
 
 class RelativeSpeedToMaster(Struct, frozen=True):
     """From the master's speed: plus `value` [m/s] or times `value` [-]."""
 
     value: float
-    value_type: SpeedTargetValueType
-    steady_state: SteadyState | None = None
+    value_type: ValueType
+    steady_state: Annotated[SteadyState | None, SteadyStates] = None
 
 
-class SynchronizeAction(Struct, frozen=True):
+class SynchronizeAction(Content, frozen=True):
     """Tolerances None: not said. [m]"""
 
-    master_entity_ref: str
-    target_position_master: Position
-    target_position: Position
-    place: Place
-    final_speed: AbsoluteSpeed | RelativeSpeedToMaster | None = None
+    master_entity_ref: EntityRef
+    target_position_master: Annotated[Position, called("TargetPositionMaster")]
+    target_position: Annotated[Position, called("TargetPosition")]
+    final_speed: Annotated[AbsoluteSpeed | RelativeSpeedToMaster | None, called("FinalSpeed")] = None
     target_tolerance_master: float | None = None
     target_tolerance: float | None = None
 
 
-class AssignRouteAction(Struct, frozen=True):
+class AssignRouteAction(Content, frozen=True):
     """Take this route at junctions."""
 
-    route: Route
-    place: Place
+    route: Annotated[Route, called("")]
 
 
-class AcquirePositionAction(Struct, frozen=True):
+class AcquirePositionAction(Content, frozen=True):
     """Take the route from here to there."""
 
     position: Position
-    place: Place
 
 
-class FollowTrajectoryAction(Struct, frozen=True):
+class FollowTrajectoryAction(Content, frozen=True):
     """Follow a path; `timing` None: with the entity's own speed. `initial_distance_offset` [m]"""
 
-    trajectory: Trajectory
-    timing: Timing | None
-    following_mode: FollowingMode
-    place: Place
+    trajectory: Annotated[Trajectory, called("")]
+    timing: Annotated[Timing | None, called("TimeReference/Timing")]
+    following_mode: Annotated[FollowingMode, FOLLOWING_MODE]
     initial_distance_offset: float = 0.0
 
 
-class TeleportAction(Struct, frozen=True):
+class TeleportAction(Content, frozen=True):
     """At once."""
 
     position: Position
-    place: Place
 
 
-class AssignControllerAction(Struct, frozen=True):
+class AssignControllerAction(Content, frozen=True):
     """Assign, and perhaps activate on a domain (None: not said)."""
 
-    controller: Controller | None
-    place: Place
+    controller: Annotated[Controller | None, called("")]
     activate_lateral: bool | None = None
     activate_longitudinal: bool | None = None
 
 
-class ActivateControllerAction(Struct, frozen=True):
+class ActivateControllerAction(Content, frozen=True):
     """Activate or deactivate on a domain (None: unchanged)."""
 
-    place: Place
     lateral: bool | None = None
     longitudinal: bool | None = None
-    controller_ref: str | None = None
+    controller_ref: Annotated[str | None, called("objectControllerRef", "controllerRef")] = None
 
 
-class OverrideControllerValueAction(Struct, frozen=True):
+class OverrideControllerValueAction(Content, frozen=True):
     """Pedals, gear, steering wheel; `overrides` holds their names and values."""
 
     overrides: tuple[tuple[str, bool, float | None], ...]
-    place: Place
 
 
-class ConnectTrailerAction(Struct, frozen=True):
+class ConnectTrailerAction(Content, frozen=True):
     """Hitch that entity."""
 
-    trailer_ref: str
-    place: Place
+    trailer_ref: EntityRef
 
 
-class DisconnectTrailerAction(Struct, frozen=True):
+class DisconnectTrailerAction(Content, frozen=True):
     """Leave it where it is."""
 
-    place: Place
 
-
-class VisibilityAction(Struct, frozen=True):
+class VisibilityAction(Content, frozen=True):
     """Seen by graphics, sensors, other traffic."""
 
-    graphics: bool
-    sensors: bool
-    traffic: bool
-    place: Place
+    graphics: Annotated[bool, Xml(default=True)]
+    sensors: Annotated[bool, Xml(default=True)]
+    traffic: Annotated[bool, Xml(default=True)]
 
 
-class LightStateAction(Struct, frozen=True):
+class LightStateAction(Content, frozen=True):
     """A light goes on, off, or flashes."""
 
     light: str
     mode: str
-    place: Place
     transition_time: float = 0.0
 
 
-class AnimationAction(Struct, frozen=True):
+class AnimationAction(Content, frozen=True):
     """A component or a pedestrian is animated; `duration` [s]."""
 
     kind: str
-    place: Place
     loop: bool = False
-    duration: float = 0.0
+    duration: Annotated[float, called("animationDuration")] = 0.0

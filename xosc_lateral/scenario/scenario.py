@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated
 
 from msgspec import Struct
 
 from xosc_lateral.scenario.entity import Entity
 from xosc_lateral.scenario.enums import ParameterType
-from xosc_lateral.scenario.place import Place, Unsupported
+from xosc_lateral.scenario.place import Name, Place, Unsupported, Zero, called
 from xosc_lateral.scenario.storyboard import Storyboard
 
 
@@ -46,7 +47,7 @@ class Parameter(Struct, frozen=True):
 class TrafficSignalPhase(Struct, frozen=True):
     """States of signals during one phase; `duration` [s]"""
 
-    name: str
+    name: Name
     duration: float
     states: tuple[tuple[str, str], ...]
 
@@ -55,9 +56,9 @@ class TrafficSignalController(Struct, frozen=True):
     """Phases one after another, for ever; `delay` [s] to the `reference` controller."""
 
     name: str
-    delay: float
+    delay: Zero
     reference: str | None
-    phases: tuple[TrafficSignalPhase, ...]
+    phases: Annotated[tuple[TrafficSignalPhase, ...], called("Phase")]
     place: Place
 
 

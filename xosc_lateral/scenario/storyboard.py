@@ -4,27 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Annotated
 
 from msgspec import Struct
 
 from xosc_lateral.scenario.enums import ConditionEdge, Priority, TriggeringEntitiesRule
-from xosc_lateral.scenario.place import Content, Place
+from xosc_lateral.scenario.place import Content, EntityRefs, Name, No, Place, Unsupported, Xml, Zero, called
+
+StartTrigger = called("StartTrigger")
+StopTrigger = called("StopTrigger")
 
 
 class TriggeringEntities(Struct, frozen=True):
     """Whose state a condition looks at; entity selections are already replaced by their members."""
 
-    rule: TriggeringEntitiesRule
-    entity_refs: tuple[str, ...]
+    rule: Annotated[TriggeringEntitiesRule, called("triggeringEntitiesRule", default=TriggeringEntitiesRule.ANY)]
+    entity_refs: EntityRefs
 
 
 class Condition(Struct, frozen=True):
     """One condition. `triggering_entities` is None for value conditions. `delay` [s]"""
 
-    name: str
-    delay: float
-    edge: ConditionEdge
-    content: Content
+    name: Name
+    delay: Zero
+    edge: Annotated[ConditionEdge, called("conditionEdge", default=ConditionEdge.NONE)]
+    content: Content | Unsupported
     triggering_entities: TriggeringEntities | None
     place: Place
 
@@ -62,7 +66,7 @@ class Action:
     """
 
     name: str
-    content: Content
+    content: Content | Unsupported
     place: Place
     is_private: bool
     scope: Mapping[str, str] = field(default_factory=dict, repr=False, compare=False)
@@ -71,10 +75,10 @@ class Action:
 class Event(Struct, frozen=True):
     """`start_trigger` None: starts at once. Counts from 1."""
 
-    name: str
-    priority: Priority
+    name: Name
+    priority: Annotated[Priority, Xml(default=Priority.PARALLEL)]
     actions: tuple[Action, ...]
-    start_trigger: Trigger | None
+    start_trigger: Annotated[Trigger | None, StartTrigger]
     place: Place
     maximum_execution_count: int = 1
 
@@ -82,7 +86,7 @@ class Event(Struct, frozen=True):
 class Maneuver(Struct, frozen=True):
     """Events side by side."""
 
-    name: str
+    name: Name
     events: tuple[Event, ...]
     place: Place
 
@@ -90,15 +94,15 @@ class Maneuver(Struct, frozen=True):
 class Actors(Struct, frozen=True):
     """Who acts; entity selections are already replaced by their members."""
 
-    entity_refs: tuple[str, ...]
-    select_triggering_entities: bool
+    entity_refs: EntityRefs
+    select_triggering_entities: No
     place: Place
 
 
 class ManeuverGroup(Struct, frozen=True):
     """Actors and their maneuvers (those from catalogs included, in file order)."""
 
-    name: str
+    name: Name
     actors: Actors
     maneuvers: tuple[Maneuver, ...]
     place: Place
@@ -108,17 +112,17 @@ class ManeuverGroup(Struct, frozen=True):
 class Act(Struct, frozen=True):
     """`start_trigger` None: starts at once."""
 
-    name: str
+    name: Name
     maneuver_groups: tuple[ManeuverGroup, ...]
-    start_trigger: Trigger | None
-    stop_trigger: Trigger | None
+    start_trigger: Annotated[Trigger | None, StartTrigger]
+    stop_trigger: Annotated[Trigger | None, StopTrigger]
     place: Place
 
 
 class Story(Struct, frozen=True):
     """Acts side by side."""
 
-    name: str
+    name: Name
     acts: tuple[Act, ...]
     place: Place
 
@@ -144,5 +148,5 @@ class Storyboard(Struct, frozen=True):
 
     init: Init
     stories: tuple[Story, ...]
-    stop_trigger: Trigger | None
+    stop_trigger: Annotated[Trigger | None, StopTrigger]
     place: Place

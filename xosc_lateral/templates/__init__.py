@@ -1,34 +1,24 @@
 """Maneuver-based motorway scenarios to start from, with their roads.
 
-They lie as plain files in the top-level folder ``templates``, where anybody can add to them. Here is a builder for
-those whose road depends on their settings (length, lane width, side of traffic): what lies there is what it makes of
-the defaults.
+They lie as plain files in the top-level folder ``templates``, where anybody can add to them. For those that ship,
+`plots` says what the road, starts and times are by their settings: what lies there is what it makes of the defaults.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from xosc_lateral.errors import XoscLateralError
 from xosc_lateral.plugins import plugins
 from xosc_lateral.shipped import shipped_folder
-from xosc_lateral.templates.braking_leader import BRAKING_LEADER
-from xosc_lateral.templates.curves import CURVES
-from xosc_lateral.templates.cut_in import CUT_IN
-from xosc_lateral.templates.dense_traffic import DENSE_TRAFFIC
-from xosc_lateral.templates.jam_end import JAM_END
-from xosc_lateral.templates.overtake_truck import OVERTAKE_TRUCK
 from xosc_lateral.templates.plain import PlainTemplate, plain_templates
+from xosc_lateral.templates.plots import TEMPLATES
 from xosc_lateral.templates.template import Template
 
-__all__ = ["TEMPLATES", "AnyTemplate", "PlainTemplate", "Template", "all_templates", "find_template", "read_settings"]
+__all__ = ["TEMPLATES", "AnyTemplate", "PlainTemplate", "Template", "all_templates", "find_template"]
 
 GROUP = "xosc_lateral.templates"
 """Entry points of further templates."""
-
-TEMPLATES = (CUT_IN, BRAKING_LEADER, OVERTAKE_TRUCK, CURVES, JAM_END, DENSE_TRAFFIC)
-
 
 AnyTemplate = Template | PlainTemplate
 
@@ -53,14 +43,3 @@ def find_template(name: str) -> AnyTemplate:
         if one.name == name:
             return one
     raise XoscLateralError(f"unknown template {name!r}; there are {', '.join(each.name for each in all_templates())}")
-
-
-def read_settings(texts: Sequence[str]) -> dict[str, str]:
-    """Settings from ``KEY=VALUE`` texts, the last one of a key counts; `XoscLateralError` if one has another form."""
-    settings = {}
-    for text in texts:
-        key, equals, value = text.partition("=")
-        if not (equals and key.strip() and value.strip()):
-            raise XoscLateralError(f"setting {text!r}: expected KEY=VALUE")
-        settings[key.strip()] = value.strip()
-    return settings

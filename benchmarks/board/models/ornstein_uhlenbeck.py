@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from benchmarks.board.models.batch import SegmentBatch
 from benchmarks.board.models.calibration import Bounds, calibrate
 from benchmarks.board.models.simulated import SimulatedModel, driver_means_of
+from examples.driver_simulator.motorway import first_order
 from xosc_lateral.drives.drive import Run
-from xosc_lateral.drives.filters import first_order
 
 FloatArray = NDArray[np.float64]
 

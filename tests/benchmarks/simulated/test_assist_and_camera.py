@@ -8,8 +8,8 @@ import pytest
 
 from benchmarks.simulated.assist import FLAG, OPENLKA_MAP, LaneKeepingAssist, openlka_layout
 from benchmarks.simulated.camera_plants import ShakyCamera
-from xosc_lateral.datasets.motorway import STEP
-from xosc_lateral.datasets.plants import Context, Intent, SimulatedResponse, saturating, threshold
+from examples.driver_simulator.motorway import STEP
+from examples.driver_simulator.plants import Context, Intent, SimulatedResponse, saturating, threshold
 from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.formats.mapping import parse_map
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.datasets.motorway import least_jerk
+from examples.driver_simulator.motorway import least_jerk
 
 FINE = np.concatenate([[0.0], least_jerk(20_000)])
 STEP = 1.0 / 20_000

@@ -8,7 +8,7 @@ from scipy import signal, stats
 
 from benchmarks.simulated import movements
 from benchmarks.simulated.movements import MOVEMENT_STEP, Movement, record_movement
-from xosc_lateral.datasets.motorway import STEP
+from examples.driver_simulator.motorway import STEP
 
 N = round(3600.0 / MOVEMENT_STEP)
 

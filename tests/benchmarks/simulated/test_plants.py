@@ -10,8 +10,8 @@ import pytest
 from benchmarks.simulated.camera_plants import CameraStep, SensorDrift
 from benchmarks.simulated.hidden_plants import Companion, CyclicTarget, Distraction, DriftingTarget, Fatigue
 from benchmarks.simulated.spread_plants import RestoringBy, SpreadBy
-from xosc_lateral.datasets.motorway import STEP, draw_motorway
-from xosc_lateral.datasets.plants import (
+from examples.driver_simulator.motorway import STEP, draw_motorway
+from examples.driver_simulator.plants import (
     Context,
     Intent,
     LanePreference,

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from examples.driver_simulator import simulate_drive
 from tests.driver.models.made_models import POPULATION, STEADY
 from tests.profiles import as_drive
-from xosc_lateral.datasets import simulate_drive
 from xosc_lateral.driver.jit_kernel import worth_compiling
 from xosc_lateral.driver.models.autoregressive.fit import fit_autoregressive
 from xosc_lateral.driver.models.autoregressive.fit_matching import simulate
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
-from xosc_lateral.driver.models.autoregressive.parameters import FitSettings
+from xosc_lateral.driver.models.autoregressive.settings import FitSettings
 from xosc_lateral.driver.models.autoregressive.volatility import Volatility
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.records import plain, read_as

@@ -17,7 +17,7 @@ from xosc_lateral.driver.models.autoregressive.coarse import (
     phases,
     split_bands,
 )
-from xosc_lateral.driver.models.autoregressive.parameters import AutoregressiveParameters
+from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
 from xosc_lateral.driver.models.autoregressive.parts import COARSE, FINE, Factors, begin_factors, draw_drivers
 from xosc_lateral.driver.models.autoregressive.volatility import Volatility
 from xosc_lateral.driver.models.base import Start
@@ -28,9 +28,9 @@ STEP = 0.2
 
 
 @pytest.fixture(scope="module")
-def model() -> AutoregressiveParameters:
+def model() -> AutoregressiveModel:
     profile = read_profile(shipped_folder("driver_profiles") / "motorway.json")
-    assert isinstance(profile.model, AutoregressiveParameters)
+    assert isinstance(profile.model, AutoregressiveModel)
     return profile.model
 
 
@@ -90,7 +90,7 @@ def test_slow_movement_given_once_a_second_is_met_five_times_a_second() -> None:
 
 # ---- drivers ---------------------------------------------------------------------------------------------------------
 def test_drivers_have_the_population_s_mean_and_spread_and_factors_of_mean_square_one(
-    model: AutoregressiveParameters,
+    model: AutoregressiveModel,
 ) -> None:
     n = 20_000
     drivers = draw_drivers(model, None, np.random.default_rng(1), n)
@@ -101,7 +101,7 @@ def test_drivers_have_the_population_s_mean_and_spread_and_factors_of_mean_squar
         assert np.mean(factor**2) == pytest.approx(1.0, abs=0.12)
 
 
-def test_logs_of_both_factors_are_correlated(model: AutoregressiveParameters) -> None:
+def test_logs_of_both_factors_are_correlated(model: AutoregressiveModel) -> None:
     sized = replace(
         model, coarse_volatility=Volatility(0.1, 0.1, 5.0), fine_volatility=Volatility(0.2, 0.1, 5.0), correlation=0.6
     )
@@ -110,7 +110,7 @@ def test_logs_of_both_factors_are_correlated(model: AutoregressiveParameters) ->
 
 
 @pytest.mark.parametrize("away", [-0.2, 0.0, 0.3])
-def test_who_is_found_at_a_start_is_the_normal_posterior(model: AutoregressiveParameters, away: float) -> None:
+def test_who_is_found_at_a_start_is_the_normal_posterior(model: AutoregressiveModel, away: float) -> None:
     """One size of movement: prior N(mean, between^2) and a place whose own variance is known give Bayes' normal."""
     alike = replace(model, coarse_volatility=Volatility(0.0, 0.1, 5.0), fine_volatility=Volatility(0.0, 0.1, 5.0))
     drivers = draw_drivers(alike, Start(rel_offset=model.mean + away), np.random.default_rng(3), 20_000)
@@ -121,7 +121,7 @@ def test_who_is_found_at_a_start_is_the_normal_posterior(model: AutoregressivePa
     assert drivers.mean.var() == pytest.approx(between * (1.0 - share), rel=0.05)
 
 
-def test_who_is_found_far_out_moves_more_than_others(model: AutoregressiveParameters) -> None:
+def test_who_is_found_far_out_moves_more_than_others(model: AutoregressiveModel) -> None:
     varied = replace(model, coarse_volatility=Volatility(0.3, 0.1, 5.0))
     far = draw_drivers(varied, Start(rel_offset=model.mean + 0.45), np.random.default_rng(4), 4000)
     near = draw_drivers(varied, Start(rel_offset=model.mean), np.random.default_rng(4), 4000)
@@ -129,7 +129,7 @@ def test_who_is_found_far_out_moves_more_than_others(model: AutoregressiveParame
 
 
 # ---- volatility ------------------------------------------------------------------------------------------------------
-def varying(model: AutoregressiveParameters) -> AutoregressiveParameters:
+def varying(model: AutoregressiveModel) -> AutoregressiveModel:
     return replace(
         model,
         coarse_volatility=Volatility(0.0, 0.3, 6.0, 0.1),
@@ -138,11 +138,11 @@ def varying(model: AutoregressiveParameters) -> AutoregressiveParameters:
     )
 
 
-def factors_of(model: AutoregressiveParameters, drivers: int = 1, seed: int = 1) -> Factors:
+def factors_of(model: AutoregressiveModel, drivers: int = 1, seed: int = 1) -> Factors:
     return Factors(model, begin_factors(model, np.random.SeedSequence(seed), drivers))
 
 
-def test_factors_have_mean_square_one_and_their_logs_the_variance_of_all_parts(model: AutoregressiveParameters) -> None:
+def test_factors_have_mean_square_one_and_their_logs_the_variance_of_all_parts(model: AutoregressiveModel) -> None:
     both = factors_of(varying(model), drivers=400)
     coarse, fine = both.take(COARSE, 500), both.take(FINE, 500)
     for factor, variance in ((coarse, 0.4), (fine, 0.2)):
@@ -155,7 +155,7 @@ def test_factors_have_mean_square_one_and_their_logs_the_variance_of_all_parts(m
     assert quick == pytest.approx(0.5 * np.sqrt(0.3 * 0.2) * lessened / np.sqrt(0.4 * 0.2), abs=0.05)
 
 
-def test_the_log_of_a_factor_forgets_with_its_own_memory(model: AutoregressiveParameters) -> None:
+def test_the_log_of_a_factor_forgets_with_its_own_memory(model: AutoregressiveModel) -> None:
     logs = np.log(factors_of(varying(model), drivers=400).take(FINE, 500))
     logs -= logs.mean()
     for lag in (1, 3, 6):
@@ -164,9 +164,7 @@ def test_the_log_of_a_factor_forgets_with_its_own_memory(model: AutoregressivePa
 
 
 @pytest.mark.parametrize("sizes", [(1,) * 20, (7, 13), (20,), (0, 20)])
-def test_parts_take_their_factors_in_pieces_of_their_own(
-    model: AutoregressiveParameters, sizes: tuple[int, ...]
-) -> None:
+def test_parts_take_their_factors_in_pieces_of_their_own(model: AutoregressiveModel, sizes: tuple[int, ...]) -> None:
     whole = factors_of(varying(model), 2)
     coarse, fine = whole.take(COARSE, 20), whole.take(FINE, 20)
     pieces = factors_of(varying(model), 2)
@@ -174,7 +172,7 @@ def test_parts_take_their_factors_in_pieces_of_their_own(
     np.testing.assert_array_equal(np.concatenate([pieces.take(FINE, n) for n in reversed(sizes)]), fine)
 
 
-def test_factors_are_stationary_from_the_first_step_on(model: AutoregressiveParameters) -> None:
+def test_factors_are_stationary_from_the_first_step_on(model: AutoregressiveModel) -> None:
     first = np.log(factors_of(varying(model), drivers=4000).take(COARSE, 1)[0])
     later = np.log(factors_of(varying(model), drivers=4000, seed=2).take(COARSE, 40)[-1])
     assert stats.ks_2samp(first, later).pvalue > 0.001

@@ -15,7 +15,7 @@ from xosc_lateral.driver.models.autoregressive.coarse import (
     split_bands,
 )
 from xosc_lateral.driver.models.autoregressive.fit_coarse import _far_covariance, _restored, fit_coarse
-from xosc_lateral.driver.models.autoregressive.parameters import DEFAULT_SETTINGS
+from xosc_lateral.driver.models.autoregressive.settings import DEFAULT_SETTINGS
 
 STEP = 0.2
 MEMORY = 6.0

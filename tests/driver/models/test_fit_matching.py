@@ -27,7 +27,7 @@ from xosc_lateral.driver.models.autoregressive.fit_matching import (
     matched,
     simulate,
 )
-from xosc_lateral.driver.models.autoregressive.parameters import DEFAULT_SETTINGS
+from xosc_lateral.driver.models.autoregressive.settings import DEFAULT_SETTINGS
 
 NOTHING, SLOPES = np.zeros(7), np.ones(2)
 

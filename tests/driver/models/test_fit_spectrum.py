@@ -10,7 +10,7 @@ from scipy.signal import welch
 from tests.driver.models.made_models import STEADY
 from xosc_lateral.driver.models.autoregressive.coarse import Autoregression
 from xosc_lateral.driver.models.autoregressive.fit_coarse import _shaped, _typical_power, fit_spectrum, window_of
-from xosc_lateral.driver.models.autoregressive.parameters import DEFAULT_SETTINGS
+from xosc_lateral.driver.models.autoregressive.settings import DEFAULT_SETTINGS
 from xosc_lateral.driver.models.noise import NOISE_VARIANCE, ShapedNoise
 
 KNOTS = np.linspace(0.0, 2.5, DEFAULT_SETTINGS.n_knots)

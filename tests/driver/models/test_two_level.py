@@ -10,8 +10,7 @@ import pytest
 
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.models.two_level.fit import fit_two_level, split_levels
-from xosc_lateral.driver.models.two_level.model import TwoLevelModel
-from xosc_lateral.driver.models.two_level.settings import PAPER_SETTINGS, TwoLevelSettings
+from xosc_lateral.driver.models.two_level.model import PAPER_SETTINGS, TwoLevelModel, TwoLevelSettings
 from xosc_lateral.driver.records import plain, read_as
 from xosc_lateral.errors import DriverProfileError
 

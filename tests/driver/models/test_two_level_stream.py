@@ -9,8 +9,7 @@ import pytest
 
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.models.two_level.fit import fit_two_level
-from xosc_lateral.driver.models.two_level.model import TwoLevelModel, TwoLevelState, _fade_out, _first_bins
-from xosc_lateral.driver.models.two_level.settings import TwoLevelSettings
+from xosc_lateral.driver.models.two_level.model import TwoLevelModel, TwoLevelSettings, TwoLevelState, _first_bins
 from xosc_lateral.driver.records import plain, read_as
 from xosc_lateral.driver.seeds import TwoLevelSeed, generator
 from xosc_lateral.errors import DriverProfileError
@@ -64,9 +63,9 @@ def test_a_start_under_a_larger_spread_lies_nearer_to_the_mean(model: TwoLevelMo
 
 
 def test_what_a_start_lacks_fades_out_as_half_a_cosine() -> None:
-    fade = _fade_out(TwoLevelSettings())
+    fade = TwoLevelSettings().fade_out
     np.testing.assert_allclose(fade, np.cos(0.1 * np.pi * np.arange(5)) ** 2)  # 0.2 s each, gone after one second
-    assert len(_fade_out(TwoLevelSettings(start_fade=0.01))) == 1
+    assert len(TwoLevelSettings(start_fade=0.01).fade_out) == 1
 
 
 def test_after_a_second_a_start_s_fade_is_gone(model: TwoLevelModel) -> None:

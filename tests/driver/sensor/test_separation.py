@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from examples.driver_simulator.simulator import simulate_drive
 from tests.benchmarks.models.made_runs import made_run
-from xosc_lateral.datasets.driver_simulator import simulate_drive
 from xosc_lateral.driver.drivability import fit_warnings
 from xosc_lateral.driver.fitting import fit_runs
 from xosc_lateral.driver.records import plain, read_as

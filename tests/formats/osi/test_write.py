@@ -164,7 +164,7 @@ def test_a_missing_extra_is_named(tmp_path, network, motion, monkeypatch, capsys
 
 def test_lights_are_on_from_when_the_scenario_switches_them_until_it_does_again(tmp_path, network, motion) -> None:
     def switch(light: str, mode: str, start: float, actor: str = "Ego") -> PlayedAction:
-        action = LightStateAction(light, mode, Place("a.xosc", 1, "LightStateAction"))
+        action = LightStateAction(light, mode, place=Place("a.xosc", 1, "LightStateAction"))
         return PlayedAction(action, actor, ("story",), start, start)
 
     switched = (

@@ -25,8 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.mask import true_slices
 from xosc_lateral.normal import MAD_TO_SD
+from xosc_lateral.rows import true_slices
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

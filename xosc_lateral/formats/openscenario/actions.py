@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from msgspec import Struct
 
-from xosc_lateral.formats.openscenario.context import Context
-from xosc_lateral.formats.openscenario.declarations import parameter_name
+from xosc_lateral.formats.openscenario.context import Context, Reader, declared, read_struct
 from xosc_lateral.formats.openscenario.element import XmlElement
 from xosc_lateral.formats.openscenario.entities import read_environment
-from xosc_lateral.formats.openscenario.positions import read_position_in
+from xosc_lateral.formats.openscenario.positions import read_position
 from xosc_lateral.formats.openscenario.private_actions import PRIVATE_ACTIONS
 from xosc_lateral.scenario.global_actions import (
     AddEntityAction,
@@ -25,7 +24,7 @@ from xosc_lateral.scenario.global_actions import (
     VariableModifyAction,
     VariableSetAction,
 )
-from xosc_lateral.scenario.place import Content, Unsupported
+from xosc_lateral.scenario.place import Unsupported
 from xosc_lateral.scenario.storyboard import Action
 
 # Elements that only group others; what they hold is the action.
@@ -67,73 +66,47 @@ def _contents(owner: XmlElement) -> list[XmlElement]:
     return found
 
 
-def _environment(e: XmlElement, context: Context) -> Content:
-    return EnvironmentAction(read_environment(e, context), e.place())
+def _environment(e: XmlElement, context: Context) -> EnvironmentAction:
+    return EnvironmentAction(read_environment(e, context), place=e.place())
 
 
-def _entity(e: XmlElement, context: Context) -> Content:
-    add = e.child("AddEntityAction")
-    if add is not None:
-        return AddEntityAction(context.entity(e), read_position_in(add, context), e.place())
+def _entity(e: XmlElement, context: Context) -> AddEntityAction | DeleteEntityAction:
+    if (add := e.child("AddEntityAction")) is not None:
+        return AddEntityAction(context.entity(e), read_position(add.required("Position"), context), place=e.place())
     e.required("DeleteEntityAction")
-    return DeleteEntityAction(context.entity(e), e.place())
+    return DeleteEntityAction(context.entity(e), place=e.place())
 
 
-def _parameter(e: XmlElement, _: Context) -> Content:
-    name = parameter_name(e.raw("parameterRef") or e.text("parameterRef"))
-    change = e.child("SetAction")
-    if change is not None:
-        return ParameterSetAction(name, change.text("value"), e.place())
-    operation, value = _modification(e)
-    return ParameterModifyAction(name, operation, value, e.place())
+def _setting(sets: type[Struct], modifies: type[Struct]) -> Reader:
+    """Of a parameter or a variable."""
+
+    def read(e: XmlElement, context: Context) -> Struct:
+        if (change := e.child("SetAction")) is not None:
+            return read_struct(sets, e, context, value=change.text("value"))
+        rule = e.required("ModifyAction").required("Rule").required("AddValue", "MultiplyByValue")
+        return read_struct(modifies, e, context, operation=ModifyOperation(rule.tag), value=rule.number("value"))
+
+    return read
 
 
-def _variable(e: XmlElement, _: Context) -> Content:
-    name = parameter_name(e.raw("variableRef") or e.text("variableRef"))
-    change = e.child("SetAction")
-    if change is not None:
-        return VariableSetAction(name, change.text("value"), e.place())
-    operation, value = _modification(e)
-    return VariableModifyAction(name, operation, value, e.place())
-
-
-def _modification(e: XmlElement) -> tuple[ModifyOperation, float]:
-    rule = e.required("ModifyAction").required("Rule").required("AddValue", "MultiplyByValue")
-    return ModifyOperation(rule.tag), rule.number("value")
-
-
-def _monitor(e: XmlElement, _: Context) -> Content:
-    return SetMonitorAction(e.text("monitorRef"), e.boolean("value"), e.place())
-
-
-def _signal_state(e: XmlElement, _: Context) -> Content:
-    return TrafficSignalStateAction(e.text("name"), e.text("state"), e.place())
-
-
-def _signal_controller(e: XmlElement, _: Context) -> Content:
-    return TrafficSignalControllerAction(e.text("trafficSignalControllerRef"), e.text("phase"), e.place())
-
-
-def _traffic(e: XmlElement, _: Context) -> Content:
+def _traffic(e: XmlElement, _: Context) -> TrafficAction:
     content = e.child()
-    return TrafficAction(content.tag if content else e.tag, e.place())
+    return TrafficAction(content.tag if content else e.tag, place=e.place())
 
 
-def _user_defined(e: XmlElement, _: Context) -> Content:
+def _user_defined(e: XmlElement, _: Context) -> UserDefinedAction:
     command = e.child("CustomCommandAction")
     if command is None:
-        return UserDefinedAction("", "", e.place())
-    return UserDefinedAction(command.text("type", ""), (command.xml.text or "").strip(), e.place())
+        return UserDefinedAction("", "", place=e.place())
+    return UserDefinedAction(command.text("type", ""), (command.xml.text or "").strip(), place=e.place())
 
 
-GLOBAL_ACTIONS: dict[str, Callable[[XmlElement, Context], Content]] = {
+GLOBAL_ACTIONS: dict[str, Reader] = {
+    **declared(SetMonitorAction, TrafficSignalStateAction, TrafficSignalControllerAction),
     "EnvironmentAction": _environment,
     "EntityAction": _entity,
-    "ParameterAction": _parameter,
-    "VariableAction": _variable,
-    "SetMonitorAction": _monitor,
-    "TrafficSignalStateAction": _signal_state,
-    "TrafficSignalControllerAction": _signal_controller,
+    "ParameterAction": _setting(ParameterSetAction, ParameterModifyAction),
+    "VariableAction": _setting(VariableSetAction, VariableModifyAction),
     "TrafficAction": _traffic,
     "UserDefinedAction": _user_defined,
 }

@@ -11,8 +11,6 @@ from xosc_lateral.scenario.parameters import Scope, satisfies
 from xosc_lateral.scenario.place import Unsupported
 from xosc_lateral.scenario.scenario import Parameter
 
-TYPE_SYNONYMS = {"integer": ParameterType.INT, "bool": ParameterType.BOOLEAN, "float": ParameterType.DOUBLE}
-
 
 def parameter_name(text: str) -> str:
     """Name without the ``$`` that references in field files carry."""
@@ -85,7 +83,7 @@ def read_variables(root: XmlElement) -> dict[str, Parameter]:
     declarations = root.child("VariableDeclarations")
     for declaration in declarations.children("VariableDeclaration") if declarations else ():
         name, value = parameter_name(declaration.text("name")), declaration.text("value", "")
-        kind = declaration.choice("variableType", ParameterType, ParameterType.STRING, TYPE_SYNONYMS)
+        kind = declaration.choice("variableType", ParameterType, ParameterType.STRING)
         variables[name] = Parameter(name, kind, value, declaration.place())
     return variables
 
@@ -107,5 +105,5 @@ def _read_parameter(declaration: XmlElement, type_attribute: str, scope: Scope) 
         value = scope.value(name)
     except ExpressionError as error:
         declaration.fail(f"value: {error}")
-    kind = declaration.choice(type_attribute, ParameterType, ParameterType.STRING, TYPE_SYNONYMS)
+    kind = declaration.choice(type_attribute, ParameterType, ParameterType.STRING)
     return Parameter(name, kind, value, declaration.place())

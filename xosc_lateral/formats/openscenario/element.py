@@ -11,11 +11,13 @@ from typing import NoReturn, TypeVar, cast
 from lxml import etree
 
 from xosc_lateral.errors import FormatError
+from xosc_lateral.scenario.enums import SYNONYMS
 from xosc_lateral.scenario.expressions import ExpressionError
 from xosc_lateral.scenario.parameters import Scope
 from xosc_lateral.scenario.place import Place
 
 E = TypeVar("E", bound=StrEnum)
+V = TypeVar("V")
 
 LARGEST = 1e15
 """Largest finite number that is taken: its square is still far from overflow, and no unit makes sense of it."""
@@ -84,15 +86,6 @@ class XmlElement:
         except ExpressionError as error:
             self.fail(f"{name}: {error}")
 
-    def text(self, name: str, default: str | None = None) -> str:
-        """Attribute as text."""
-        found = self.optional_text(name)
-        if found is None:
-            found = default
-        if found is None:
-            self.fail(f"attribute '{name}' is missing")
-        return found
-
     def optional_number(self, name: str, *, finite: bool = True) -> float | None:
         """Attribute as a number; None where it is missing or empty. NaN is refused, infinity where `finite`."""
         text = self.optional_text(name)
@@ -108,15 +101,6 @@ class XmlElement:
             self.fail(f"{name}='{text[:60]}' is implausibly large (at most {LARGEST:g})")
         return value
 
-    def number(self, name: str, default: float | None = None, *, finite: bool = True) -> float:
-        """Attribute as a number."""
-        found = self.optional_number(name, finite=finite)
-        if found is None:
-            found = default
-        if found is None:
-            self.fail(f"attribute '{name}' is missing")
-        return found
-
     def optional_integer(self, name: str) -> int | None:
         """Attribute as a whole number; ``2.0000000000`` of an expression is one."""
         value = self.optional_number(name)
@@ -125,15 +109,6 @@ class XmlElement:
         if value != round(value) or abs(value) > 2**53:
             self.fail(f"{name}='{self.text(name)}' is not a whole number")
         return round(value)
-
-    def integer(self, name: str, default: int | None = None) -> int:
-        """Attribute as a whole number."""
-        found = self.optional_integer(name)
-        if found is None:
-            found = default
-        if found is None:
-            self.fail(f"attribute '{name}' is missing")
-        return found
 
     def optional_boolean(self, name: str) -> bool | None:
         """Attribute as a truth value, in any case and as 0 and 1; None where it is missing or empty."""
@@ -146,33 +121,42 @@ class XmlElement:
             return False
         self.fail(f"{name}='{text[:60]}' is neither true nor false")
 
-    def boolean(self, name: str, default: bool | None = None) -> bool:
-        """Attribute as a truth value."""
-        found = self.optional_boolean(name)
-        if found is None:
-            found = default
-        if found is None:
-            self.fail(f"attribute '{name}' is missing")
-        return found
-
-    def optional_choice(self, name: str, kind: type[E], synonyms: dict[str, E] | None = None) -> E | None:
+    def optional_choice(self, name: str, kind: type[E]) -> E | None:
         """Attribute as an option code; None where it is missing or empty. The case of letters does not count."""
         text = self.optional_text(name)
         if text is None or not text.strip():
             return None
         word = text.strip()
-        if synonyms and word in synonyms:
-            return synonyms[word]
+        older = SYNONYMS.get(kind, {}).get(word)
+        if older is not None:
+            return cast("E", older)
         for member in kind:
             if member.value.lower() == word.lower():
                 return member
         self.fail(f"{name}='{text[:60]}' is none of {', '.join(kind)}")
 
-    def choice(self, name: str, kind: type[E], default: E | None = None, synonyms: dict[str, E] | None = None) -> E:
+    def text(self, name: str, default: str | None = None) -> str:
+        """Attribute as text."""
+        return self._required(name, self.optional_text(name), default)
+
+    def number(self, name: str, default: float | None = None, *, finite: bool = True) -> float:
+        """Attribute as a number."""
+        return self._required(name, self.optional_number(name, finite=finite), default)
+
+    def integer(self, name: str, default: int | None = None) -> int:
+        """Attribute as a whole number."""
+        return self._required(name, self.optional_integer(name), default)
+
+    def boolean(self, name: str, default: bool | None = None) -> bool:
+        """Attribute as a truth value."""
+        return self._required(name, self.optional_boolean(name), default)
+
+    def choice(self, name: str, kind: type[E], default: E | None = None) -> E:
         """Attribute as an option code."""
-        found = self.optional_choice(name, kind, synonyms)
-        if found is None:
-            found = default
+        return self._required(name, self.optional_choice(name, kind), default)
+
+    def _required(self, name: str, found: V | None, default: V | None) -> V:
+        found = default if found is None else found
         if found is None:
             self.fail(f"attribute '{name}' is missing")
         return found

@@ -7,10 +7,10 @@ from datetime import datetime
 from msgspec.structs import replace
 
 from xosc_lateral.errors import FormatError, MissingFileError
-from xosc_lateral.formats.openscenario.context import Context
+from xosc_lateral.formats.openscenario.context import Context, read_struct
 from xosc_lateral.formats.openscenario.declarations import local_scope
 from xosc_lateral.formats.openscenario.element import XmlElement
-from xosc_lateral.scenario.entity import Axle, Axles, BoundingBox, Controller, Entity, Performance
+from xosc_lateral.scenario.entity import Axles, BoundingBox, Controller, Entity, Performance
 from xosc_lateral.scenario.enums import EntityCategory, VehicleCategory
 from xosc_lateral.scenario.environment import Environment, TimeOfDay, Weather
 
@@ -24,15 +24,14 @@ def read_environment(owner: XmlElement, context: Context) -> Environment:
         reference = owner.required("CatalogReference")
         environment = context.optional_entry(reference)
         if environment is None:
-            return Environment(reference.text("entryName"), reference.place())
-    road = environment.child("RoadCondition")
-    return Environment(
-        environment.text("name", ""),
-        environment.place(),
-        _time_of_day(environment.child("TimeOfDay"), context),
-        _weather(environment.child("Weather"), context),
-        None if road is None else road.optional_number("frictionScaleFactor"),
-        None if road is None else road.optional_text("wetness"),
+            return Environment(reference.text("entryName"), place=reference.place())
+    time, weather = environment.child("TimeOfDay"), environment.child("Weather")
+    return read_struct(
+        Environment,
+        environment,
+        context,
+        time_of_day=None if time is None else _time_of_day(time, context),
+        weather=None if weather is None else _weather(weather, context),
     )
 
 
@@ -44,9 +43,7 @@ def read_date_time(element: XmlElement, name: str = "dateTime") -> datetime | No
         return None
 
 
-def _time_of_day(element: XmlElement | None, context: Context) -> TimeOfDay | None:
-    if element is None:
-        return None
+def _time_of_day(element: XmlElement, context: Context) -> TimeOfDay | None:
     moment = read_date_time(element)
     if moment is None:
         context.remark(element, f"dateTime='{element.text('dateTime')}' is not a date and time")
@@ -54,32 +51,15 @@ def _time_of_day(element: XmlElement | None, context: Context) -> TimeOfDay | No
     return TimeOfDay(moment, element.boolean("animation", False))
 
 
-def _weather(element: XmlElement | None, context: Context) -> Weather | None:
-    if element is None:
-        return None
-    sun, fog, wind = element.child("Sun"), element.child("Fog"), element.child("Wind")
+def _weather(element: XmlElement, context: Context) -> Weather:
+    """`Precipitation/@intensity` was a share in version 1.0, and is read as mm/h from 1.1 on."""
     rain = element.child("Precipitation")
-    old = context.version == (1, 0)
-    return Weather(
-        cloud_state=element.optional_text("cloudState") or element.optional_text("fractionalCloudCover"),
-        illuminance=_first_number(sun, "illuminance", "intensity"),
-        sun_azimuth=_first_number(sun, "azimuth"),
-        sun_elevation=_first_number(sun, "elevation"),
-        visual_range=None if fog is None else fog.optional_number("visualRange", finite=False),
-        precipitation_type=None if rain is None else rain.optional_text("precipitationType"),
-        precipitation_intensity=_first_number(rain, "precipitationIntensity", *(() if old else ("intensity",))),
-        precipitation_fraction=_first_number(rain, "intensity") if old else None,
-        wind_speed=_first_number(wind, "speed"),
-        wind_direction=_first_number(wind, "direction"),
-        temperature=element.optional_number("temperature"),
-        atmospheric_pressure=element.optional_number("atmosphericPressure"),
-    )
-
-
-def _first_number(element: XmlElement | None, *names: str) -> float | None:
-    if element is None:
-        return None
-    return next((value for name in names if (value := element.optional_number(name)) is not None), None)
+    intensity = None if rain is None else rain.optional_number("precipitationIntensity")
+    given = None if rain is None else rain.optional_number("intensity")
+    if context.version == (1, 0):
+        return read_struct(Weather, element, context, precipitation_intensity=intensity, precipitation_fraction=given)
+    intensity = given if intensity is None else intensity
+    return read_struct(Weather, element, context, precipitation_intensity=intensity, precipitation_fraction=None)
 
 
 DEFAULT_BOX = BoundingBox(1.5, 0.0, 0.9, 5.0, 2.0, 1.8)
@@ -151,15 +131,15 @@ def _read_object(item: XmlElement, context: Context, name: str | None = None) ->
     if category is None:
         item.fail(f"catalog entry '{content.raw('name')}' is a {content.tag}, which can't be a scenario object")
     trailer, inner = _read_trailer(content, name, context)
-    box = content.child("BoundingBox")
+    box, axles = content.child("BoundingBox"), content.child("Axles")
     entity = Entity(
         name=name,
         category=category,
         place=item.place(),
-        bounding_box=DEFAULT_BOX if box is None else _bounding_box(box),
+        bounding_box=DEFAULT_BOX if box is None else _bounding_box(box, context),
         vehicle_category=_vehicle_category(content, context) if category is EntityCategory.VEHICLE else None,
         performance=_performance(content.child("Performance"), context),
-        axles=_axles(content.child("Axles")),
+        axles=None if axles is None else read_struct(Axles, axles, context),
         controllers=_controllers(item, context),
         object_name=content.text("name", ""),
         kind=content.text(_KIND_ATTRIBUTE.get(content.tag, "name"), "") if content.tag in _KIND_ATTRIBUTE else "",
@@ -212,9 +192,7 @@ def _read_trailer(vehicle: XmlElement, tractor: str, context: Context) -> tuple[
         return reference.text("entityRef", "") or None, []
     if inner is None:
         return None, []
-    context.enter(inner)
-    entities = _read_object(inner, context, f"{tractor}+")
-    context.leave()
+    entities = context.nested(inner, lambda inner, context: _read_object(inner, context, f"{tractor}+"))
     return entities[0].name, entities
 
 
@@ -229,12 +207,12 @@ def _coupling(vehicle: XmlElement, tag: str) -> float | None:
     return None if element is None else element.number("dx")
 
 
-def _bounding_box(box: XmlElement) -> BoundingBox:
-    center, size = box.required("Center"), box.required("Dimensions")
-    length, width, height = size.number("length"), size.number("width"), size.number("height")
-    if min(length, width, height) < 0:
-        size.fail(f"negative dimension ({length} m x {width} m x {height} m)")
-    return BoundingBox(center.number("x"), center.number("y"), center.number("z", 0.0), length, width, height)
+def _bounding_box(element: XmlElement, context: Context) -> BoundingBox:
+    box = read_struct(BoundingBox, element, context)
+    if min(box.length, box.width, box.height) < 0:
+        size = element.required("Dimensions")
+        size.fail(f"negative dimension ({box.length} m x {box.width} m x {box.height} m)")
+    return box
 
 
 def _performance(element: XmlElement | None, context: Context) -> Performance:
@@ -251,22 +229,6 @@ def _performance(element: XmlElement | None, context: Context) -> Performance:
         if not limit >= 0.0:
             element.fail(f"{name} {limit:g}, expected 0 or more")
     return Performance(*limits)
-
-
-def _axles(element: XmlElement | None) -> Axles | None:
-    if element is None:
-        return None
-    front, rear = element.child("FrontAxle"), element.child("RearAxle")
-    return Axles(
-        None if front is None else _axle(front),
-        None if rear is None else _axle(rear),
-        tuple(_axle(axle) for axle in element.children("AdditionalAxle")),
-    )
-
-
-def _axle(axle: XmlElement) -> Axle:
-    names = ("maxSteering", "positionX", "positionZ", "trackWidth", "wheelDiameter")
-    return Axle(*(axle.number(name, 0.0) for name in names))
 
 
 def _controllers(item: XmlElement, context: Context) -> tuple[Controller, ...]:

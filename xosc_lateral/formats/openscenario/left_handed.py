@@ -34,9 +34,8 @@ def mirrored(position: Position) -> Position:
             return replace(position, y=-position.y, h=_negative(position.h), p=_negative(position.p))
         case RelativeObjectPosition():
             turned = _turned(position.orientation)
-            return RelativeWorldPosition(
-                position.entity_ref, position.dx, -position.dy, position.place, position.dz, turned
-            )
+            x, y, z = position.dx, -position.dy, position.dz
+            return RelativeWorldPosition(position.entity_ref, x, y, z, turned, place=position.place)
         case RelativeWorldPosition():
             return replace(position, dy=-position.dy, orientation=_turned(position.orientation))
         case RoadPosition() | TrajectoryPosition():

@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from itertools import pairwise
+from typing import Any
 
-from xosc_lateral.formats.openscenario.context import Context
+from xosc_lateral.formats.openscenario.context import Context, Reader, declared, read_struct
 from xosc_lateral.formats.openscenario.declarations import local_scope
 from xosc_lateral.formats.openscenario.element import XmlElement
 from xosc_lateral.formats.openscenario.left_handed import mirrored, mirrored_shape
-from xosc_lateral.scenario.enums import ReferenceContext, RouteStrategy
 from xosc_lateral.scenario.place import Unsupported
 from xosc_lateral.scenario.position import (
     Clothoid,
     ClothoidSpline,
-    ClothoidSplineSegment,
-    ControlPoint,
     FromCurrentEntity,
     FromLaneCoordinates,
     FromRoadCoordinates,
     GeoPosition,
-    InRoutePosition,
     LanePosition,
     Nurbs,
-    Orientation,
     Polyline,
     Position,
     RelativeLanePosition,
@@ -37,61 +32,44 @@ from xosc_lateral.scenario.position import (
     Shape,
     Trajectory,
     TrajectoryPosition,
-    Vertex,
-    Waypoint,
     WorldPosition,
 )
 
 
 def read_position(owner: XmlElement, context: Context) -> Position:
     """The position inside an element of type Position (``Position``, ``TargetPosition`` ...)."""
-    content = owner.child()
-    if content is None:
-        owner.fail("contains no position")
-    reader = _POSITIONS.get(content.tag)
-    if reader is None:
-        return Unsupported(content.tag, content.place())
-    context.enter(content)
-    position = reader(content, context)
-    context.leave()
+    position: Position = _choice(owner, "position", _POSITIONS, context)
     return mirrored(position) if context.left_handed else position
 
 
-def read_position_in(owner: XmlElement, context: Context) -> Position:
-    """The position in the ``Position`` child of an element."""
-    return read_position(owner.required("Position"), context)
+def _choice(owner: XmlElement, what: str, readers: dict[str, Reader], context: Context) -> Any:
+    """The only child; one that nobody reads is unsupported."""
+    content = owner.child()
+    if content is None:
+        owner.fail(f"contains no {what}")
+    reader = readers.get(content.tag)
+    return Unsupported(content.tag, content.place()) if reader is None else context.nested(content, reader)
 
 
 def read_route(owner: XmlElement, context: Context) -> Route:
     """Route, given inline or from a catalog, inside `owner`."""
-    route = _inline_or_entry(owner, "Route", context)
-    waypoints = tuple(
-        Waypoint(
-            read_position_in(waypoint, context),
-            waypoint.choice("routeStrategy", RouteStrategy, RouteStrategy.SHORTEST),
-        )
-        for waypoint in route.children("Waypoint")
-    )
-    if len(waypoints) < 2:
-        route.fail(f"a route needs at least 2 waypoints, this one has {len(waypoints)}")
-    return Route(route.text("name", ""), waypoints, route.boolean("closed", False), route.place())
+    element = _inline_or_entry(owner, "Route", context)
+    route = read_struct(Route, element, context)
+    if len(route.waypoints) < 2:
+        element.fail(f"a route needs at least 2 waypoints, this one has {len(route.waypoints)}")
+    return route
 
 
 def read_trajectory(owner: XmlElement, context: Context) -> Trajectory:
     """Trajectory, given inline, in a TrajectoryRef (1.1) or from a catalog, inside `owner`."""
-    reference = owner.child("TrajectoryRef")
-    trajectory = _inline_or_entry(reference or owner, "Trajectory", context)
-    shape_owner = trajectory.required("Shape")
-    content = shape_owner.child()
-    if content is None:
-        shape_owner.fail("contains no shape")
-    reader = _SHAPES.get(content.tag)
-    context.enter(content)
-    shape = Unsupported(content.tag, content.place()) if reader is None else reader(content, context)
-    context.leave()
-    if context.left_handed:
-        shape = mirrored_shape(shape)
-    return Trajectory(trajectory.text("name", ""), shape, trajectory.boolean("closed", False), trajectory.place())
+    return read_struct(
+        Trajectory, _inline_or_entry(owner.child("TrajectoryRef") or owner, "Trajectory", context), context
+    )
+
+
+def _shape(owner: XmlElement, context: Context) -> Shape:
+    shape: Shape = _choice(owner, "shape", _SHAPES, context)
+    return mirrored_shape(shape) if context.left_handed else shape
 
 
 def _inline_or_entry(owner: XmlElement, tag: str, context: Context) -> XmlElement:
@@ -105,99 +83,12 @@ def _inline_or_entry(owner: XmlElement, tag: str, context: Context) -> XmlElemen
     return entry
 
 
-def _orientation(owner: XmlElement) -> Orientation | None:
-    element = owner.child("Orientation")
-    if element is None:
-        return None
-    return Orientation(
-        element.optional_number("h"),
-        element.optional_number("p"),
-        element.optional_number("r"),
-        element.optional_choice("type", ReferenceContext),
-    )
+def _road(e: XmlElement, context: Context) -> RoadPosition:
+    return read_struct(RoadPosition, e, context, road_id=_road_id(e))
 
 
-def _world(e: XmlElement, _: Context) -> Position:
-    return WorldPosition(
-        e.number("x"),
-        e.number("y"),
-        e.place(),
-        e.optional_number("z"),
-        e.optional_number("h"),
-        e.optional_number("p"),
-        e.optional_number("r"),
-    )
-
-
-def _relative_world(e: XmlElement, context: Context) -> Position:
-    x, y, z = e.number("dx", 0.0), e.number("dy", 0.0), e.optional_number("dz")
-    return RelativeWorldPosition(context.entity(e), x, y, e.place(), z, _orientation(e))
-
-
-def _relative_object(e: XmlElement, context: Context) -> Position:
-    x, y, z = e.number("dx", 0.0), e.number("dy", 0.0), e.optional_number("dz")
-    return RelativeObjectPosition(context.entity(e), x, y, e.place(), z, _orientation(e))
-
-
-def _road(e: XmlElement, _: Context) -> Position:
-    return RoadPosition(_road_id(e), e.number("s"), e.number("t", 0.0), e.place(), _orientation(e))
-
-
-def _relative_road(e: XmlElement, context: Context) -> Position:
-    return RelativeRoadPosition(context.entity(e), e.number("ds"), e.number("dt"), e.place(), _orientation(e))
-
-
-def _lane(e: XmlElement, _: Context) -> Position:
-    return LanePosition(
-        _road_id(e), e.integer("laneId"), e.number("s"), e.place(), e.number("offset", 0.0), _orientation(e)
-    )
-
-
-def _relative_lane(e: XmlElement, context: Context) -> Position:
-    ds, ds_lane = e.optional_number("ds"), e.optional_number("dsLane")
-    if ds is None and ds_lane is None:
-        ds = 0.0
-    lanes = e.optional_integer("dLane")
-    if lanes is None:
-        context.remark(e, "dLane is missing: taken as 0, the same lane")
-    return RelativeLanePosition(
-        context.entity(e), lanes or 0, e.place(), ds, ds_lane, e.number("offset", 0.0), _orientation(e)
-    )
-
-
-def _route(e: XmlElement, context: Context) -> Position:
-    reference = e.child("RouteRef")
-    route = read_route(reference, context) if reference is not None else None
-    owner = e.child("InRoutePosition")
-    content = owner.child() if owner is not None else None
-    return RoutePosition(route, _in_route(content, context) if content else None, e.place(), _orientation(e))
-
-
-def _in_route(e: XmlElement, context: Context) -> InRoutePosition | None:
-    if e.tag == "FromCurrentEntity":
-        return FromCurrentEntity(context.entity(e))
-    if e.tag == "FromRoadCoordinates":
-        return FromRoadCoordinates(e.number("pathS"), e.number("t", 0.0))
-    if e.tag == "FromLaneCoordinates":
-        return FromLaneCoordinates(e.number("pathS"), e.integer("laneId"), e.number("laneOffset", 0.0))
-    context.remark(e)
-    return None
-
-
-def _trajectory(e: XmlElement, context: Context) -> Position:
-    return TrajectoryPosition(
-        read_trajectory(e, context), e.number("s"), e.place(), e.number("t", 0.0), _orientation(e)
-    )
-
-
-def _geo(e: XmlElement, _: Context) -> Position:
-    latitude, longitude = e.optional_number("latitude"), e.optional_number("longitude")
-    if latitude is None or longitude is None:
-        latitude, longitude = math.radians(e.number("latitudeDeg")), math.radians(e.number("longitudeDeg"))
-    altitude = e.optional_number("altitude")
-    if altitude is None:
-        altitude = e.optional_number("height")
-    return GeoPosition(latitude, longitude, e.place(), altitude, _orientation(e))
+def _lane(e: XmlElement, context: Context) -> LanePosition:
+    return read_struct(LanePosition, e, context, road_id=_road_id(e))
 
 
 def _road_id(e: XmlElement) -> str:
@@ -208,65 +99,66 @@ def _road_id(e: XmlElement) -> str:
     return text
 
 
-_POSITIONS: dict[str, Callable[[XmlElement, Context], Position]] = {
-    "WorldPosition": _world,
-    "RelativeWorldPosition": _relative_world,
-    "RelativeObjectPosition": _relative_object,
+def _relative_lane(e: XmlElement, context: Context) -> RelativeLanePosition:
+    ds, lanes = e.optional_number("ds"), e.optional_integer("dLane")
+    if ds is None and e.optional_number("dsLane") is None:
+        ds = 0.0
+    if lanes is None:
+        context.remark(e, "dLane is missing: taken as 0, the same lane")
+    return read_struct(RelativeLanePosition, e, context, d_lane=lanes or 0, ds=ds)
+
+
+def _route(e: XmlElement, context: Context) -> RoutePosition:
+    reference, owner = e.child("RouteRef"), e.child("InRoutePosition")
+    route = read_route(reference, context) if reference is not None else None
+    content = owner.child() if owner is not None else None
+    place = _in_route(content, context) if content else None
+    return read_struct(RoutePosition, e, context, route=route, in_route=place)
+
+
+_IN_ROUTE = declared(FromCurrentEntity, FromRoadCoordinates, FromLaneCoordinates)
+
+
+def _in_route(e: XmlElement, context: Context) -> Any:
+    reader = _IN_ROUTE.get(e.tag)
+    if reader is None:
+        context.remark(e)
+    return None if reader is None else reader(e, context)
+
+
+def _geo(e: XmlElement, context: Context) -> GeoPosition:
+    latitude, longitude = e.optional_number("latitude"), e.optional_number("longitude")
+    if latitude is None or longitude is None:
+        latitude, longitude = math.radians(e.number("latitudeDeg")), math.radians(e.number("longitudeDeg"))
+    return read_struct(GeoPosition, e, context, latitude=latitude, longitude=longitude)
+
+
+_POSITIONS: dict[str, Reader] = {
+    **declared(WorldPosition, RelativeWorldPosition, RelativeObjectPosition, RelativeRoadPosition, TrajectoryPosition),
     "RoadPosition": _road,
-    "RelativeRoadPosition": _relative_road,
     "LanePosition": _lane,
     "RelativeLanePosition": _relative_lane,
     "RoutePosition": _route,
-    "TrajectoryPosition": _trajectory,
     "GeoPosition": _geo,
 }
 
 
-def _polyline(e: XmlElement, context: Context) -> Shape:
-    vertices = tuple(Vertex(read_position_in(v, context), v.optional_number("time")) for v in e.children("Vertex"))
-    if len(vertices) < 2:
-        e.fail(f"a polyline needs at least 2 vertices, this one has {len(vertices)}")
-    return Polyline(vertices)
+def _polyline(e: XmlElement, context: Context) -> Polyline:
+    polyline = read_struct(Polyline, e, context)
+    if len(polyline.vertices) < 2:
+        e.fail(f"a polyline needs at least 2 vertices, this one has {len(polyline.vertices)}")
+    return polyline
 
 
-def _clothoid(e: XmlElement, context: Context) -> Shape:
-    prime = e.optional_number("curvaturePrime")
-    return Clothoid(
-        read_position_in(e, context),
-        e.number("curvature"),
-        e.number("curvatureDot", 0.0) if prime is None else prime,  # the name of 1.0
-        e.number("length"),
-        e.optional_number("startTime"),
-        e.optional_number("stopTime"),
-    )
-
-
-def _clothoid_spline(e: XmlElement, context: Context) -> Shape:
-    segments = []
-    for piece in e.children("ClothoidSplineSegment"):
-        start = piece.child("PositionStart")
-        segments.append(
-            ClothoidSplineSegment(
-                piece.number("curvatureStart"),
-                piece.number("curvatureEnd"),
-                piece.number("length"),
-                piece.number("hOffset", 0.0),
-                piece.optional_number("timeStart"),
-                read_position(start, context) if start is not None else None,
-            )
-        )
-    if not segments:
+def _clothoid_spline(e: XmlElement, context: Context) -> ClothoidSpline:
+    if e.child("ClothoidSplineSegment") is None:
         e.fail("a clothoid spline needs a segment")
-    return ClothoidSpline(tuple(segments), e.optional_number("timeEnd"))
+    return read_struct(ClothoidSpline, e, context)
 
 
-def _nurbs(e: XmlElement, context: Context) -> Shape:
-    order = e.integer("order")
-    points = tuple(
-        ControlPoint(read_position_in(p, context), p.optional_number("time"), p.number("weight", 1.0))
-        for p in e.children("ControlPoint")
-    )
-    knots = tuple(knot.number("value") for knot in e.children("Knot"))
+def _nurbs(e: XmlElement, context: Context) -> Nurbs:
+    nurbs = read_struct(Nurbs, e, context, knots=tuple(knot.number("value") for knot in e.children("Knot")))
+    order, points, knots = nurbs.order, nurbs.control_points, nurbs.knots
     if order < 2 or len(points) < order:
         e.fail(f"order {order} with {len(points)} control points")
     if len(knots) != len(points) + order:
@@ -277,12 +169,14 @@ def _nurbs(e: XmlElement, context: Context) -> Shape:
         e.fail("the knots span no curve")
     if any(point.weight <= 0 for point in points):
         e.fail("a weight is not positive")
-    return Nurbs(order, points, knots)
+    return nurbs
 
 
-_SHAPES: dict[str, Callable[[XmlElement, Context], Shape]] = {
+_SHAPES: dict[str, Reader] = {
+    **declared(Clothoid),
     "Polyline": _polyline,
-    "Clothoid": _clothoid,
     "ClothoidSpline": _clothoid_spline,
     "Nurbs": _nurbs,
 }
+
+READERS: dict[object, Reader] = {Position: read_position, Shape: _shape, Route: read_route, Trajectory: read_trajectory}

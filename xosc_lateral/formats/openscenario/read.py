@@ -12,15 +12,16 @@ from msgspec import Struct
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.openscenario.catalogs import Boundary, Catalogs, allowed_roots
-from xosc_lateral.formats.openscenario.context import Context
+from xosc_lateral.formats.openscenario.context import Context, read_struct
 from xosc_lateral.formats.openscenario.declarations import read_declarations, read_variables
 from xosc_lateral.formats.openscenario.element import XmlElement, local_name, means_true
 from xosc_lateral.formats.openscenario.entities import read_entities
-from xosc_lateral.formats.openscenario.storyboard import read_storyboard
+from xosc_lateral.formats.openscenario.storyboard import READERS
 from xosc_lateral.formats.xml import read_document
 from xosc_lateral.scenario import (
     FileHeader,
     Scenario,
+    Storyboard,
     TrafficSignalController,
     TrafficSignalPhase,
     Unsupported,
@@ -149,12 +150,19 @@ def read_scenario(
     boundary = Boundary(path.parent, allowed_roots(path, allowed))
     locations = _catalog_locations(root)
     catalogs = Catalogs(locations, boundary, remarks)
-    context = Context(header.version, catalogs, remarks, strict=strict, left_handed=header.is_left_handed)
+    context = Context(
+        header.version,
+        catalogs,
+        remarks,
+        {**READERS, TrafficSignalPhase: _phase},
+        strict=strict,
+        left_handed=header.is_left_handed,
+    )
     if header.is_left_handed:
         remarks.append(Unsupported("FileHeader", root.place(), LEFT_HANDED))
-    road_file, road_place, scene_graph, signals = _road_network(root, boundary, remarks, roads)
+    road_file, road_place, scene_graph, signals = _road_network(root, boundary, context, roads)
     entities = read_entities(root, context)
-    storyboard = read_storyboard(root, context)
+    storyboard = read_struct(Storyboard, root.required("Storyboard"), context)
     return Scenario(
         path=path,
         header=header,
@@ -206,7 +214,7 @@ def _catalog_locations(root: XmlElement) -> dict[str, tuple[str, Place]]:
 
 
 def _road_network(
-    root: XmlElement, boundary: Boundary, remarks: list[Unsupported], roads: RoadSearch
+    root: XmlElement, boundary: Boundary, context: Context, roads: RoadSearch
 ) -> tuple[Path | None, Place | None, str | None, tuple[TrafficSignalController, ...]]:
     network = root.child("RoadNetwork")
     if network is None:
@@ -214,12 +222,13 @@ def _road_network(
     logic = network.child("LogicFile", "Logics")
     road: Path | None = None
     if logic is not None and logic.text("filepath", "").strip():
-        road = _road_file(logic, boundary, remarks, roads)
+        road = _road_file(logic, boundary, context.remarks, roads)
     elif roads.file is not None:
         road = roads.file
     graph = network.child("SceneGraphFile")
     signals = network.child("TrafficSignals")
-    controllers = () if signals is None else tuple(map(_signal_controller, signals.children("TrafficSignalController")))
+    found = () if signals is None else signals.children("TrafficSignalController")
+    controllers = tuple(read_struct(TrafficSignalController, one, context) for one in found)
     return road, logic.place() if logic else None, graph.text("filepath", "") if graph else None, controllers
 
 
@@ -276,17 +285,7 @@ def is_town(reference: str) -> bool:
     return bool(reference.strip()) and not any(sign in reference for sign in "./\\")
 
 
-def _signal_controller(element: XmlElement) -> TrafficSignalController:
-    phases = []
-    for phase in element.children("Phase"):
-        states = tuple(
-            (state.text("trafficSignalId"), state.text("state")) for state in phase.children("TrafficSignalState")
-        )
-        phases.append(TrafficSignalPhase(phase.text("name", ""), phase.number("duration"), states))
-    return TrafficSignalController(
-        element.text("name"),
-        element.number("delay", 0.0),
-        element.optional_text("reference"),
-        tuple(phases),
-        element.place(),
-    )
+def _phase(element: XmlElement, context: Context) -> TrafficSignalPhase:
+    shown = element.children("TrafficSignalState")
+    states = tuple((state.text("trafficSignalId"), state.text("state")) for state in shown)
+    return read_struct(TrafficSignalPhase, element, context, states=states)

@@ -4,34 +4,15 @@ from __future__ import annotations
 
 from xosc_lateral.formats.openscenario.actions import read_actions
 from xosc_lateral.formats.openscenario.conditions import read_trigger
-from xosc_lateral.formats.openscenario.context import Context
+from xosc_lateral.formats.openscenario.context import Context, Reader, read_struct
 from xosc_lateral.formats.openscenario.declarations import local_scope
 from xosc_lateral.formats.openscenario.element import XmlElement
-from xosc_lateral.scenario.enums import Priority
-from xosc_lateral.scenario.storyboard import (
-    Act,
-    Actors,
-    Event,
-    Init,
-    Maneuver,
-    ManeuverGroup,
-    Private,
-    Story,
-    Storyboard,
-)
-
-PRIORITY_SYNONYMS = {"overwrite": Priority.OVERRIDE}
-
-
-def read_storyboard(root: XmlElement, context: Context) -> Storyboard:
-    """The whole storyboard."""
-    element = root.required("Storyboard")
-    return Storyboard(
-        _read_init(element.required("Init"), context),
-        tuple(_read_story(story, context) for story in element.children("Story")),
-        read_trigger(element.child("StopTrigger"), context),
-        element.place(),
-    )
+from xosc_lateral.formats.openscenario.entities import read_controller
+from xosc_lateral.formats.openscenario.positions import READERS as POSITION_READERS
+from xosc_lateral.formats.openscenario.private_actions import read_transition
+from xosc_lateral.scenario.entity import Controller
+from xosc_lateral.scenario.private_actions import TransitionDynamics
+from xosc_lateral.scenario.storyboard import Actors, Event, Init, Maneuver, ManeuverGroup, Private, Story, Trigger
 
 
 def _read_init(element: XmlElement, context: Context) -> Init:
@@ -52,51 +33,22 @@ def _read_init(element: XmlElement, context: Context) -> Init:
 
 
 def _read_story(element: XmlElement, context: Context) -> Story:
-    story = element.within(local_scope(element))
-    acts = tuple(_read_act(act, context) for act in story.children("Act"))
-    return Story(story.text("name", ""), acts, story.place())
-
-
-def _read_act(element: XmlElement, context: Context) -> Act:
-    return Act(
-        element.text("name", ""),
-        tuple(_read_group(group, context) for group in element.children("ManeuverGroup")),
-        read_trigger(element.child("StartTrigger"), context),
-        read_trigger(element.child("StopTrigger"), context),
-        element.place(),
-    )
+    return read_struct(Story, element.within(local_scope(element)), context)
 
 
 def _read_group(element: XmlElement, context: Context) -> ManeuverGroup:
     maneuvers = []
     for child in element.children("Maneuver", "CatalogReference"):
         if child.tag == "Maneuver":
-            maneuvers.append(_read_maneuver(child.within(local_scope(child)), context))
+            maneuver = child.within(local_scope(child))
         else:
-            entry = context.catalogs.entry(child)
-            if entry.tag != "Maneuver":
-                child.fail(f"catalog entry '{entry.raw('name')}' is a {entry.tag}, not a Maneuver")
-            maneuvers.append(_read_maneuver(entry, context))
-    return ManeuverGroup(
-        element.text("name", ""),
-        _read_actors(element, context),
-        tuple(maneuvers),
-        element.place(),
-        element.integer("maximumExecutionCount", 1),
-    )
-
-
-def _read_actors(group: XmlElement, context: Context) -> Actors:
-    element = group.child("Actors")
-    if element is None:
-        return Actors((), False, group.place())
-    names = [name for reference in element.children("EntityRef") for name in context.members(reference)]
-    return Actors(tuple(names), element.boolean("selectTriggeringEntities", False), element.place())
-
-
-def _read_maneuver(element: XmlElement, context: Context) -> Maneuver:
-    events = tuple(_read_event(event, context) for event in element.children("Event"))
-    return Maneuver(element.text("name", ""), events, element.place())
+            maneuver = context.catalogs.entry(child)
+            if maneuver.tag != "Maneuver":
+                child.fail(f"catalog entry '{maneuver.raw('name')}' is a {maneuver.tag}, not a Maneuver")
+        maneuvers.append(read_struct(Maneuver, maneuver, context))
+    owner = element.child("Actors")
+    actors = Actors((), False, element.place()) if owner is None else read_struct(Actors, owner, context)
+    return read_struct(ManeuverGroup, element, context, maneuvers=tuple(maneuvers), actors=actors)
 
 
 def _read_event(element: XmlElement, context: Context) -> Event:
@@ -107,11 +59,16 @@ def _read_event(element: XmlElement, context: Context) -> Event:
             item.fail("contains no PrivateAction, GlobalAction or UserDefinedAction")
         for content in contents:
             actions.extend(read_actions(content, item.text("name", ""), context))
-    return Event(
-        element.text("name", ""),
-        element.choice("priority", Priority, Priority.PARALLEL, PRIORITY_SYNONYMS),
-        tuple(actions),
-        read_trigger(element.child("StartTrigger"), context),
-        element.place(),
-        element.integer("maximumExecutionCount", 1),
-    )
+    return read_struct(Event, element, context, actions=tuple(actions))
+
+
+READERS: dict[object, Reader] = {
+    **POSITION_READERS,
+    Controller: read_controller,
+    Event: _read_event,
+    Init: _read_init,
+    ManeuverGroup: _read_group,
+    Story: _read_story,
+    TransitionDynamics: read_transition,
+    Trigger: read_trigger,
+}

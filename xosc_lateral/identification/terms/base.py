@@ -8,16 +8,13 @@ from enum import IntEnum
 from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect
 from xosc_lateral.identification.regression import Coarse, Fitted
-from xosc_lateral.identification.timeline import on_fine_grid
+from xosc_lateral.identification.timeline import FloatArray, on_fine_grid
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
-
-FloatArray = NDArray[np.float64]
 
 
 class Stage(IntEnum):
@@ -38,49 +35,25 @@ class Stage(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """A term in numbers that a report can put into words.
+    """A term in numbers that a report can put into words."""
 
-    Parameters
-    ----------
-    name : str
-        Short name of the effect.
-    shape : str
-    size : float
-        [m], or a factor.
-    error : float
-        Standard error of the size.
-    statistic : str
-        Group of summary statistics that shows it best.
-    measure : str
-        What the errors before and after compare.
-    lag_s, response_s : float or None
-    """
-
-    name: str
+    name: str  # Short name of the effect.
     shape: str
-    size: float
-    error: float
-    statistic: str
-    measure: str
+    size: float  # [m], or a factor.
+    error: float  # Standard error of the size.
+    statistic: str  # Group of summary statistics that shows it best.
+    measure: str  # What the errors before and after compare.
     lag_s: float | None = None
     response_s: float | None = None
 
 
 @dataclass(eq=False)
 class Removal:
-    """What all terms together did to the measured offsets, on the 0.2 s grid, shape (n,) each.
+    """What all terms together did to the measured offsets, on the 0.2 s grid, shape (n,) each."""
 
-    Parameters
-    ----------
-    location : array
-        [m]
-    spread, fine : array
-        Natural logarithm of a factor.
-    """
-
-    location: FloatArray
-    spread: FloatArray = field(init=False)
-    fine: FloatArray = field(init=False)
+    location: FloatArray  # [m]
+    spread: FloatArray = field(init=False)  # Natural logarithm of a factor.
+    fine: FloatArray = field(init=False)  # Natural logarithm of a factor.
 
     def __post_init__(self) -> None:
         """Nothing but the location so far."""
@@ -89,46 +62,28 @@ class Removal:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What a test says.
+    """What a test says."""
 
-    Parameters
-    ----------
-    term : Term or None
-        To be added, or None: nothing that could be.
-    columns : tuple of str
-    p_value : float
-        Family-wise over everything that the test tried.
-    after : Fitted, optional
-        Fit with the term, where the test has made it.
-    together : tuple of Term
-        Found with it, as one finding.
-    """
-
-    term: Term | None
+    term: Term | None  # To be added, or None: nothing that could be.
     columns: tuple[str, ...]
-    p_value: float
-    after: Fitted | None = None
-    together: tuple[Term, ...] = ()
+    p_value: float  # Family-wise over everything that the test tried.
+    after: Fitted | None = None  # Fit with the term, where the test has made it.
+    together: tuple[Term, ...] = ()  # Found with it, as one finding.
 
 
 class Term(ABC):
     """One term. Frozen and small; sizes are in the fit, not in the term."""
 
-    component: ClassVar[str]
-    """Key of its share of the error budget."""
-    kind: ClassVar[str]
-    """As in the report's schema."""
-    stages: ClassVar[tuple[Stage, ...]] = ()
-    """At which it is tested; none: with another term, which it competes with."""
+    component: ClassVar[str]  # Key of its share of the error budget.
+    kind: ClassVar[str]  # As in the report's schema.
+    stages: ClassVar[tuple[Stage, ...]] = ()  # At which it is tested; none: with another term, which it competes with.
+    # Among those of a stage: smaller ones are asked first, and first where two are equally sure; then by name. [-]
     place: ClassVar[int] = 0
-    """Among those of a stage: smaller ones are asked first, and first where two are equally sure; then by name. [-]"""
-    weight: ClassVar[float]
-    """Of its component in the error budget; one for each kind of hidden effect. [-]"""
-    least_drives: ClassVar[int] = 1
-    """In a table in which it is tested."""
+    weight: ClassVar[float]  # Of its component in the error budget; one for each kind of hidden effect. [-]
+    least_drives: ClassVar[int] = 1  # In a table in which it is tested.
+    # Whether the mean or the innovations' scale follow terms of this class on held-out rows: not the latent path of a
+    # cycle, nor what changes the slow movement alone.
     seen_held_out: ClassVar[bool] = True
-    """Whether the mean or the innovations' scale follow terms of this class on held-out rows: not the latent path of a
-    cycle, nor what changes the slow movement alone."""
 
     @property
     def columns(self) -> tuple[str, ...]:

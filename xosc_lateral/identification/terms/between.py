@@ -21,6 +21,7 @@ from xosc_lateral.identification.regression import Fitted
 from xosc_lateral.identification.significance import MANY_DRIVES, LoopSeed
 from xosc_lateral.identification.terms.base import Description, Outcome, Stage
 from xosc_lateral.identification.terms.column import ColumnTerm, of_kind
+from xosc_lateral.identification.timeline import BoolArray, FloatArray
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
@@ -31,20 +32,13 @@ from collections.abc import Sequence
 from xosc_lateral.identification.dictionary import NULL_DRAWS
 from xosc_lateral.identification.significance import as_one_degree, upper_tail
 
-FloatArray = NDArray[np.float64]
-
+# Response time of an effect between drives: what a drive usually meets, as far as a run can know it. [s]
 USUAL_S = 60.0
-"""Response time of an effect between drives: what a drive usually meets, as far as a run can know it. [s]"""
-
-MIN_SECONDS = 10
-"""Of road-following in a drive that is counted. [s]"""
-
+MIN_SECONDS = 10  # Of road-following in a drive that is counted. [s]
+# Rounds of Newton's method at most, and the share of the variance that the last one may change it by: the sum of
+# squares falls and is convex in the variance, so that rounds from zero approach the root from below.
 ROUNDS, SETTLED = 50, 1e-9
-"""Rounds of Newton's method at most, and the share of the variance that the last one may change it by: the sum of
-squares falls and is convex in the variance, so that rounds from zero approach the root from below."""
-
-MIN_SUPPORT = 8.0
-"""A quantity that rests on fewer drives than this is not tested."""
+MIN_SUPPORT = 8.0  # A quantity that rests on fewer drives than this is not tested.
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,21 +121,12 @@ def between_shift(fitted: Fitted) -> FloatArray:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Places:
-    """Places that drives keep.
+    """Places that drives keep."""
 
-    Parameters
-    ----------
-    place : array, shape (drives,)
-        Levels. [m]
-    weight : array, shape (drives,)
-        One over the variance of a place about what is known; 0: the drive is too short. [1/m^2]
-    known : array, shape (drives, k)
-        A one and the effects between drives that are in the model.
-    """
-
-    place: FloatArray
+    place: FloatArray  # shape (drives,): Levels. [m]
+    # shape (drives,): One over the variance of a place about what is known; 0: the drive is too short. [1/m^2]
     weight: FloatArray
-    known: FloatArray
+    known: FloatArray  # shape (drives, k): A one and the effects between drives that are in the model.
 
     @classmethod
     def of(cls, fitted: Fitted) -> _Places:
@@ -185,26 +170,16 @@ class _Places:
         return (inverse @ (weighed.T @ self.place))[1:], np.sqrt(np.diag(inverse))[1:]
 
 
-BoolArray = NDArray[np.bool_]
-
+# Share of either member's variance that the other must leave: below, the two are one quantity twice. [-]
 LEAST_APART = 0.1
-"""Share of either member's variance that the other must leave: below, the two are one quantity twice. [-]"""
 
 
 @dataclass(frozen=True, slots=True)
 class Best:
-    """What explains most.
+    """What explains most."""
 
-    Parameters
-    ----------
-    members : tuple of int
-        One candidate, or two.
-    p_value : float
-        Family-wise over all candidates and pairs.
-    """
-
-    members: tuple[int, ...]
-    p_value: float
+    members: tuple[int, ...]  # One candidate, or two.
+    p_value: float  # Family-wise over all candidates and pairs.
 
 
 def best_of_drives(
@@ -247,18 +222,11 @@ def best_of_drives(
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Pairs:
-    """Pairs of candidates that are two quantities.
+    """Pairs of candidates that are two quantities."""
 
-    Parameters
-    ----------
-    first, second : int array, shape (pairs,)
-    product : array, shape (pairs,)
-        Cosine of the angle between the two.
-    """
-
-    first: NDArray[np.intp]
-    second: NDArray[np.intp]
-    product: FloatArray
+    first: NDArray[np.intp]  # shape (pairs,)
+    second: NDArray[np.intp]  # shape (pairs,)
+    product: FloatArray  # shape (pairs,): Cosine of the angle between the two.
 
     @classmethod
     def of(cls, quantities: FloatArray, columns: Sequence[str]) -> _Pairs:

@@ -7,39 +7,27 @@ from typing import ClassVar, Self
 
 import numpy as np
 from msgspec import structs
-from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.identification.refinement import Alternatives
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.terms.base import Description, Removal, Term
+from xosc_lateral.identification.timeline import FloatArray
 from xosc_lateral.identification.timing import span
 
-FloatArray = NDArray[np.float64]
-
+# Responses between which a factor on the movement is believed; the report tells its size between the same. [-]
 FACTOR_QUANTILES = (0.05, 0.95)
-"""Responses between which a factor on the movement is believed; the report tells its size between the same. [-]"""
 
 
 @dataclass(frozen=True, eq=False)
 class ColumnTerm(Term):
-    """An effect of one or two columns.
-
-    Parameters
-    ----------
-    effect : ColumnEffect
-        Without coefficients.
-    alike : tuple of tuple of str
-        Columns of each other effect that explains as much.
-    """
+    """An effect of one or two columns."""
 
     acts: ClassVar[Acts]
-    what: ClassVar[str]
-    """What it acts on, in words."""
-    group: ClassVar[str] = "spread"
-    """Mean or spread: which summary statistics show it."""
-    effect: ColumnEffect
-    alike: Alternatives = ()
+    what: ClassVar[str]  # What it acts on, in words.
+    group: ClassVar[str] = "spread"  # Mean or spread: which summary statistics show it.
+    effect: ColumnEffect  # Without coefficients.
+    alike: Alternatives = ()  # Columns of each other effect that explains as much.
 
     @property
     def columns(self) -> tuple[str, ...]:

@@ -11,50 +11,36 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Cycle, Effect
 from xosc_lateral.identification.regression import MIN_DRIFT_S, Coarse, Fitted
 from xosc_lateral.identification.significance import LEAST
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term, centred
+from xosc_lateral.identification.timeline import FloatArray
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.timeline import on_fine_grid
 
-FloatArray = NDArray[np.float64]
-
-PERIODS_S = (4.0, 60.0)
-"""Periods that are tested. [s]"""
-
+PERIODS_S = (4.0, 60.0)  # Periods that are tested. [s]
+# Neighbouring frequencies taken together: a cycle keeps its phase for the whole drive, or for a part. [-]
 WIDTHS = (1, 3, 7)
-"""Neighbouring frequencies taken together: a cycle keeps its phase for the whole drive, or for a part. [-]"""
-
-SURROUNDINGS = 60
-"""Frequencies to each side that say how high the spectrum is without a cycle. [-]"""
+SURROUNDINGS = 60  # Frequencies to each side that say how high the spectrum is without a cycle. [-]
 
 STATISTIC = "movement at the weave's period"
 
 
 @dataclass(frozen=True, eq=False)
 class CycleTerm(Term):
-    """Sines and cosines of neighbouring frequencies.
-
-    Parameters
-    ----------
-    frequency : float
-        [1/s]
-    width : int
-        Number of neighbouring frequencies: its phase drifts.
-    """
+    """Sines and cosines of neighbouring frequencies."""
 
     component: ClassVar[str] = "cycle"
     kind: ClassVar[str] = "periodic"
     stages: ClassVar[tuple[Stage, ...]] = (Stage.LOW_FREQUENCY,)
     weight: ClassVar[float] = 1.0
     seen_held_out: ClassVar[bool] = False
-    frequency: float
-    width: int = 1
+    frequency: float  # [1/s]
+    width: int = 1  # Number of neighbouring frequencies: its phase drifts.
 
     def mean_columns(self, coarse: Coarse) -> FloatArray:
         """Cosines and sines for each drive, shape (n, 2 * width * drives)."""

@@ -7,17 +7,14 @@ from typing import ClassVar
 
 import numpy as np
 from msgspec import structs
-from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, Effect
 from xosc_lateral.identification.column_search import SearchedTerm
 from xosc_lateral.identification.refinement import Problem
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.terms.base import Stage, Term
-from xosc_lateral.identification.timeline import coarse_mean
+from xosc_lateral.identification.timeline import FloatArray, coarse_mean
 from xosc_lateral.identification.timing import widening
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

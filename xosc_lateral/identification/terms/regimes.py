@@ -27,14 +27,12 @@ from xosc_lateral.identification.significance import HEAVY_TAIL_SHARE, LoopSeed,
 from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, quick_squares, slow_squares
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term
 from xosc_lateral.identification.terms.spread import known_log_scale, what_a_column_may_do, what_columns_do
+from xosc_lateral.identification.timeline import BoolArray, FloatArray
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.timeline import on_fine_grid
 from xosc_lateral.jit import njit
-
-BoolArray = NDArray[np.bool_]
-FloatArray = NDArray[np.float64]
 
 
 @njit
@@ -71,35 +69,20 @@ def forward_backward(squares, valid, quiet, loud, go, leave):  # type: ignore[no
     return on, went, left, likelihood
 
 
-ITERATIONS = 60
-"""Of expectation maximisation; converges well before."""
-
+ITERATIONS = 60  # Of expectation maximisation; converges well before.
+# Factor between the regimes and mean length [s] that the fit starts from; the likelier end is kept.
 STARTS = ((1.6, 15.0), (2.2, 40.0))
-"""Factor between the regimes and mean length [s] that the fit starts from; the likelier end is kept."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RegimeFit:
-    """Two regimes of a movement.
+    """Two regimes of a movement."""
 
-    Parameters
-    ----------
-    factor : float
-        Spread in the loud regime over the quiet one. [-]
-    on_s, off_s : float
-        Mean length of either. [s]
-    on : array, shape (n,)
-        Probability that the loud regime is on, given the whole drive.
-    quiet : float
-        Standard deviation of the innovations in the quiet regime. [-]
-    log_likelihood : float
-    """
-
-    factor: float
-    on_s: float
-    off_s: float
-    on: FloatArray
-    quiet: float
+    factor: float  # Spread in the loud regime over the quiet one. [-]
+    on_s: float  # Mean length of either. [s]
+    off_s: float  # Mean length of either. [s]
+    on: FloatArray  # shape (n,): Probability that the loud regime is on, given the whole drive.
+    quiet: float  # Standard deviation of the innovations in the quiet regime. [-]
     log_likelihood: float
 
 
@@ -131,28 +114,17 @@ def _fit(
     return quiet, loud, go, leave, on, likelihood
 
 
-MEMORIES_S = (6.0, 15.0, 40.0)
-"""Lengths of regimes that are tested. [s]"""
-
+MEMORIES_S = (6.0, 15.0, 40.0)  # Lengths of regimes that are tested. [s]
+# Loudness that persists for up to this is how people steer, by a correction now and then and what it takes to settle,
+# and no regime. [s]
 CLUSTER_S = 15
-"""Loudness that persists for up to this is how people steer, by a correction now and then and what it takes to settle,
-and no regime. [s]"""
-
-SHORTEST_S = 12
-"""Lags are compared from here on. [s]"""
-
-DRAWS = 2000
-"""Orders of the blocks that are the null."""
+SHORTEST_S = 12  # Lags are compared from here on. [s]
+DRAWS = 2000  # Orders of the blocks that are the null.
 
 
 @dataclass(frozen=True, eq=False)
 class RegimesTerm(Term):
-    """Two-state Markov chain in the log scale.
-
-    Parameters
-    ----------
-    fit : RegimeFit
-    """
+    """Two-state Markov chain in the log scale."""
 
     component: ClassVar[str] = "regimes"
     kind: ClassVar[str] = "regime"

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.identification.column_search import SearchedTerm, likely_response
@@ -23,20 +22,18 @@ from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes,
 from xosc_lateral.identification.terms.base import Stage, Term
 from xosc_lateral.identification.terms.column import ColumnTerm, columns_on_size, of_kind
 from xosc_lateral.identification.terms.mean import MeanTerm
+from xosc_lateral.identification.timeline import FloatArray
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
 
 
-FloatArray = NDArray[np.float64]
-
+# A column that p-values up to this speak for may be what makes stretches loud, rain for one (factors of 1.3 and 2 with
+# p = 0.01 and 0.05: beside rain p of regimes is 0.2, without it 3e-4 and 1e-10). The best of all columns taken out,
+# whatever its p-value, costs true regimes of a minute up to 19 orders of magnitude. [-]
 MAY_ACT = 0.1
-"""A column that p-values up to this speak for may be what makes stretches loud, rain for one (factors of 1.3 and 2 with
-p = 0.01 and 0.05: beside rain p of regimes is 0.2, without it 3e-4 and 1e-10). The best of all columns taken out,
-whatever its p-value, costs true regimes of a minute up to 19 orders of magnitude. [-]"""
-
+# The fine noise follows an effect on the spread when it is that many standard errors from not doing so. [-]
 FINE_TWIN_Z = 2.0
-"""The fine noise follows an effect on the spread when it is that many standard errors from not doing so. [-]"""
 
 
 @dataclass(frozen=True, eq=False)

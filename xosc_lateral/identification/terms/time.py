@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect, Step, TimeSmooth
 from xosc_lateral.identification.low_frequencies import (
@@ -40,38 +39,26 @@ from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes,
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term, centred
 from xosc_lateral.identification.terms.cycle import latent_path
 from xosc_lateral.identification.terms.spread import what_a_column_may_do, what_columns_do
+from xosc_lateral.identification.timeline import FloatArray
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.timeline import on_fine_grid
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-
-
-STEP_PARAMETERS = 2
-"""Of a step: its height and its moment."""
-
-SURER = 0.01
-"""Where it is surer than the best column by this factor, what that column may do is left to time. [-]"""
+STEP_PARAMETERS = 2  # Of a step: its height and its moment.
+SURER = 0.01  # Where it is surer than the best column by this factor, what that column may do is left to time. [-]
 
 
 @dataclass(frozen=True, eq=False)
 class StepTerm(Term):
-    """The mean jumps once.
-
-    Parameters
-    ----------
-    at : int
-        Row of the 1 Hz grid.
-    """
+    """The mean jumps once."""
 
     component: ClassVar[str] = "time_mean"
     kind: ClassVar[str] = "step"
     stages: ClassVar[tuple[Stage, ...]] = (Stage.LOW_FREQUENCY,)
     weight: ClassVar[float] = 3.0
     seen_held_out: ClassVar[bool] = False
-    at: int
+    at: int  # Row of the 1 Hz grid.
 
     def mean_columns(self, coarse: Coarse) -> FloatArray:
         """0 before, 1 after, shape (n, 1). [-]"""
@@ -134,18 +121,12 @@ class StepTerm(Term):
 
 @dataclass(frozen=True, eq=False)
 class TimeMeanTerm(Term):
-    """The mean is a smooth function of time; `StepTerm` tests both.
-
-    Parameters
-    ----------
-    order : int
-        Half cosines that it is made of.
-    """
+    """The mean is a smooth function of time; `StepTerm` tests both."""
 
     component: ClassVar[str] = "time_mean"
     kind: ClassVar[str] = "drift"
     weight: ClassVar[float] = 3.0
-    order: int = max(ORDERS)
+    order: int = max(ORDERS)  # Half cosines that it is made of.
 
     def mean_columns(self, coarse: Coarse) -> FloatArray:
         """Half cosines, within -1..1, shape (n, order). [-]"""
@@ -185,22 +166,14 @@ class TimeMeanTerm(Term):
 
 @dataclass(frozen=True, eq=False)
 class TimeSpreadTerm(Term):
-    """The logarithm of the spread is a smooth function of time.
-
-    Parameters
-    ----------
-    order : int
-        Half cosines that it is made of.
-    slow : bool
-        Of the slower movement only.
-    """
+    """The logarithm of the spread is a smooth function of time."""
 
     component: ClassVar[str] = "time_spread"
     kind: ClassVar[str] = "scale"
     stages: ClassVar[tuple[Stage, ...]] = (Stage.SPREAD,)
     weight: ClassVar[float] = 2.0
-    order: int = max(ORDERS)
-    slow: bool = False
+    order: int = max(ORDERS)  # Half cosines that it is made of.
+    slow: bool = False  # Of the slower movement only.
 
     @property
     def predictable(self) -> bool:

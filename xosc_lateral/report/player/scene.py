@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.enrich.result import Enriched, EntityResult
-from xosc_lateral.mask import true_slices
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.report.path_dynamics import lateral_dynamics
 from xosc_lateral.report.player.roads import CENTIMETRE_PER_SECOND, MILLIMETRE, MILLIRADIAN_TENTH, pack, road_shapes
 from xosc_lateral.road import RoadNetwork
 from xosc_lateral.road.geometry import simplify
+from xosc_lateral.rows import true_slices
 
 FloatArray = NDArray[np.float64]
 RowArray = NDArray[np.int64]

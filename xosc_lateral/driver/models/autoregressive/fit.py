@@ -25,7 +25,7 @@ from xosc_lateral.driver.models.autoregressive.coarse import FREQUENCIES, Autore
 from xosc_lateral.driver.models.autoregressive.fit_coarse import fit_coarse, fit_spectrum
 from xosc_lateral.driver.models.autoregressive.fit_matching import matched, with_volatility
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
-from xosc_lateral.driver.models.autoregressive.parameters import DEFAULT_SETTINGS, FitSettings
+from xosc_lateral.driver.models.autoregressive.settings import DEFAULT_SETTINGS, FitSettings
 from xosc_lateral.driver.models.autoregressive.volatility import Volatility
 from xosc_lateral.errors import NotEnoughDataError
 

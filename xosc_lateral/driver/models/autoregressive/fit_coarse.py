@@ -27,7 +27,7 @@ from xosc_lateral.driver.models.autoregressive.coarse import (
     measuring_low_pass,
     stabilise,
 )
-from xosc_lateral.driver.models.autoregressive.parameters import FitSettings
+from xosc_lateral.driver.models.autoregressive.settings import FitSettings
 from xosc_lateral.driver.models.noise import NOISE_VARIANCE, ShapedNoise
 from xosc_lateral.drives.periodogram import Detrend, periodograms
 

@@ -27,7 +27,7 @@ from xosc_lateral.driver.models.autoregressive.coarse import (
 )
 from xosc_lateral.driver.models.autoregressive.fit_coarse import rise, scaled_spectrum, window_of
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
-from xosc_lateral.driver.models.autoregressive.parameters import FitSettings
+from xosc_lateral.driver.models.autoregressive.settings import FitSettings
 from xosc_lateral.driver.models.autoregressive.volatility import Volatility, averaged_covariance
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.drives.periodogram import Detrend, periodograms

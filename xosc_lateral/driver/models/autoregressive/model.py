@@ -11,18 +11,22 @@ Two levels as in the paper's, x = kappa + phi, each repaired where it falls shor
 
 Sampled in pieces of any length, of one driver or of several at once. Every source of chance has a generator of its own,
 drawn in order, step by step and within a step driver by driver.
+
+References
+----------
+.. [1] N. Neis, J. Beyerer, arXiv:2405.17080, 2024: coarse and fine part of the offset, here with other processes.
 """
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import ClassVar
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.models.autoregressive.coarse import COARSE_EVERY, TICKS
-from xosc_lateral.driver.models.autoregressive.parameters import AutoregressiveParameters
+from xosc_lateral.driver.models.autoregressive.coarse import COARSE_EVERY, TICKS, Autoregression, building_low_pass
 from xosc_lateral.driver.models.autoregressive.parts import (
     CoarsePart,
     CoarseState,
@@ -33,9 +37,13 @@ from xosc_lateral.driver.models.autoregressive.parts import (
     begin_factors,
     draw_drivers,
 )
-from xosc_lateral.driver.models.base import Start
+from xosc_lateral.driver.models.autoregressive.volatility import Volatility
+from xosc_lateral.driver.models.base import CoreModel, Start
 from xosc_lateral.driver.models.mean_reversion import ClockState, take_at_rate
+from xosc_lateral.driver.models.noise import NOISE_VARIANCE, ShapedNoise
 from xosc_lateral.driver.seeds import AutoregressiveSeed, generator
+from xosc_lateral.drives.resampling import STEP
+from xosc_lateral.errors import DriverProfileError
 
 FloatArray = NDArray[np.float64]
 
@@ -74,10 +82,130 @@ class AutoregressiveState(msgspec.Struct):
     single: bool = True
 
 
+START_LAGS = 300
+"""Steps after which a drive has forgotten the offset that it was made to start at: 60 s. [-]"""
+
+
+class AutoregressiveModel(CoreModel, frozen=True, eq=False, dict=True):
+    """Parameters of the model, and what follows from them.
+
+    Raises `DriverProfileError` if a number is out of its range.
+
+    Parameters
+    ----------
+    mean : float
+        Mean offset of all drivers. [lane widths]
+    between_drivers : float
+        Standard deviation of the drivers' means. [lane widths]
+    limits : tuple of float
+        Coarse movement bends back before these: the range of the data, the markings at most. [lane widths]
+    coarse : Autoregression
+        Of the coarse movement about the driver's mean, one step a second. [lane widths]
+    fine : ShapedNoise
+        Damping of the fine noise. [lane widths]
+    coarse_volatility, fine_volatility : Volatility
+    correlation : float
+        Between the logarithms of the two factors. [-]
+    step : float
+        [s]
+    """
+
+    State: ClassVar[type] = AutoregressiveState
+
+    mean: float
+    between_drivers: float
+    limits: tuple[float, float]
+    coarse: Autoregression
+    fine: ShapedNoise
+    coarse_volatility: Volatility
+    fine_volatility: Volatility
+    correlation: float
+    step: float = STEP
+
+    def __post_init__(self) -> None:
+        low, high = self.limits
+        if not -1.0 <= low < self.mean < high <= 1.0:
+            raise DriverProfileError(f"mean {self.mean} outside the limits {low} and {high}, or these beyond -1 and 1")
+        if not (0.0 <= self.between_drivers < 1.0 and -1.0 <= self.correlation <= 1.0):
+            raise DriverProfileError(f"between drivers {self.between_drivers}, correlation {self.correlation}")
+
+    @cached_property
+    def kernel(self) -> FloatArray:
+        """Kernel of the fine noise, shape (n_taps,). [lane widths]"""
+        return self.fine.kernel
+
+    @cached_property
+    def coarse_covariance(self) -> FloatArray:
+        """Of the coarse movement about the driver's mean at lags of 0.2 s, mean over the phases of a coarse step.
+
+        Shape (START_LAGS,). [lane widths squared]
+        """
+        n_ticks = START_LAGS // COARSE_EVERY + 20
+        ticks = self.coarse.covariance(n_ticks)
+        spread = np.zeros(2 * n_ticks * COARSE_EVERY - 1)
+        middle = n_ticks * COARSE_EVERY - 1
+        spread[middle::COARSE_EVERY][:n_ticks] = ticks
+        spread[middle::-COARSE_EVERY][:n_ticks] = ticks
+        kernel = building_low_pass()
+        both = np.convolve(kernel, kernel) / COARSE_EVERY
+        return np.asarray(np.convolve(spread, both, "same")[middle : middle + START_LAGS])
+
+    @cached_property
+    def fine_covariance(self) -> FloatArray:
+        """Of the fine movement at lags of 0.2 s, shape (START_LAGS,). [lane widths squared]"""
+        kernel = self.kernel
+        full = np.convolve(kernel, kernel)[len(kernel) - 1 :] * NOISE_VARIANCE
+        result = np.zeros(START_LAGS)
+        result[: len(full)] = full[:START_LAGS]
+        return result
+
+    @cached_property
+    def start_factor(self) -> FloatArray:
+        """Lower triangle that turns white noise into a stationary past, shape (order, order). [lane widths]"""
+        order = self.coarse.order
+        covariance = self.coarse.covariance(order)
+        if not covariance[0] > 0.0:  # coarse movement that is none has a past of none
+            return np.zeros((order, order))
+        matrix = covariance[np.abs(np.subtract.outer(np.arange(order), np.arange(order)))]
+        return np.asarray(np.linalg.cholesky(matrix + 1e-9 * covariance[0] * np.eye(order)))
+
+    def stream(
+        self, seed: np.random.SeedSequence, start: Start | None = None, *, drivers: int | None = None
+    ) -> AutoregressiveStream:
+        """Begin a drive, with a driver of its own; see `CoreModel.stream`."""
+        m = drivers or 1
+        setup = generator(seed, AutoregressiveSeed.DRIVER)
+        driver = draw_drivers(self, start, setup, m)
+        skip = setup.integers(COARSE_EVERY, size=m)  # no sample of the 5 Hz grid is special
+        past = self.start_factor @ setup.standard_normal((self.coarse.order, m))
+        knees, limits = _bends(self, driver.mean)
+        half = len(self.kernel) // 2
+        # The coarse part begins at sample COARSE_EVERY * TICKS after step 0, the fine one at sample `half`.
+        first = max(half, COARSE_EVERY * TICKS) + skip
+        state = AutoregressiveState(
+            driver=driver,
+            factors=begin_factors(self, seed, m),
+            coarse=CoarseState.begin(generator(seed, AutoregressiveSeed.COARSE), past, first - COARSE_EVERY * TICKS),
+            fine=FineState.begin(generator(seed, AutoregressiveSeed.FINE), first - half),
+            knees=knees,
+            limits=limits,
+            clock=ClockState(),
+            single=drivers is None,
+        )
+        stream = AutoregressiveStream(self, state)
+        if start is not None:
+            stream.meet(start, self)
+        return stream
+
+    def resume(self, state: AutoregressiveState) -> AutoregressiveStream:
+        """Go on from a state."""
+        return AutoregressiveStream(self, state)
+
+
 class AutoregressiveStream:
     """See `CoreStream`."""
 
-    def __init__(self, model: AutoregressiveParameters, state: AutoregressiveState) -> None:
+    def __init__(self, model: AutoregressiveModel, state: AutoregressiveState) -> None:
         self.state = state
         self._coarse = CoarsePart(model, state.driver, state.coarse, state.factors)
         self._fine = FinePart(model, state.driver, state.fine, state.factors)
@@ -94,7 +222,7 @@ class AutoregressiveStream:
         fine = self._fine.take(n)
         return (coarse[:, 0], fine[:, 0]) if self.state.single else (coarse, fine)
 
-    def meet(self, start: Start, model: AutoregressiveParameters) -> None:
+    def meet(self, start: Start, model: AutoregressiveModel) -> None:
         """Condition the movement on its start: add what the covariance with the first value makes of what it lacks."""
         driver = self.state.driver
         coarse, fine = self._coarse.first(), self._fine.first()
@@ -121,36 +249,7 @@ class AutoregressiveStream:
         return values
 
 
-def begin(
-    model: AutoregressiveParameters, seed: np.random.SeedSequence, start: Start | None, drivers: int | None
-) -> AutoregressiveStream:
-    """Begin drives; see `CoreModel.stream`."""
-    m = drivers or 1
-    setup = generator(seed, AutoregressiveSeed.DRIVER)
-    driver = draw_drivers(model, start, setup, m)
-    skip = setup.integers(COARSE_EVERY, size=m)  # no sample of the 5 Hz grid is special
-    past = model.start_factor @ setup.standard_normal((model.coarse.order, m))
-    knees, limits = _bends(model, driver.mean)
-    half = len(model.kernel) // 2
-    # The coarse part begins at sample COARSE_EVERY * TICKS after step 0, the fine one at sample `half`.
-    first = max(half, COARSE_EVERY * TICKS) + skip
-    state = AutoregressiveState(
-        driver=driver,
-        factors=begin_factors(model, seed, m),
-        coarse=CoarseState.begin(generator(seed, AutoregressiveSeed.COARSE), past, first - COARSE_EVERY * TICKS),
-        fine=FineState.begin(generator(seed, AutoregressiveSeed.FINE), first - half),
-        knees=knees,
-        limits=limits,
-        clock=ClockState(),
-        single=drivers is None,
-    )
-    stream = AutoregressiveStream(model, state)
-    if start is not None:
-        stream.meet(start, model)
-    return stream
-
-
-def _bends(model: AutoregressiveParameters, first: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _bends(model: AutoregressiveModel, first: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Knees and limits, each of shape (2, drivers); both lie beyond where a drive starts."""
     knees, limits = np.empty((2, len(first))), np.empty((2, len(first)))
     for row, (limit, side) in enumerate(zip(model.limits, (-1.0, 1.0), strict=True)):
@@ -159,19 +258,3 @@ def _bends(model: AutoregressiveParameters, first: FloatArray) -> tuple[FloatArr
         knees[row] = np.where(outside, first, knee)
         limits[row] = np.where(outside, side * np.maximum(side * limit, side * first + HEADROOM), limit)
     return knees, limits
-
-
-class AutoregressiveModel(AutoregressiveParameters, frozen=True, eq=False, dict=True):
-    """See `AutoregressiveParameters`."""
-
-    State: ClassVar[type] = AutoregressiveState
-
-    def stream(
-        self, seed: np.random.SeedSequence, start: Start | None = None, *, drivers: int | None = None
-    ) -> AutoregressiveStream:
-        """Begin a drive, with a driver of its own; see `CoreModel.stream`."""
-        return begin(self, seed, start, drivers)
-
-    def resume(self, state: AutoregressiveState) -> AutoregressiveStream:
-        """Go on from a state."""
-        return AutoregressiveStream(self, state)

@@ -8,7 +8,7 @@ References
 
 from __future__ import annotations
 
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import msgspec
 import numpy as np
@@ -16,10 +16,12 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.linear_filters import convolve, recur
 from xosc_lateral.driver.models.autoregressive.coarse import COARSE_EVERY, TICKS, interpolate
-from xosc_lateral.driver.models.autoregressive.parameters import AutoregressiveParameters
 from xosc_lateral.driver.models.autoregressive.volatility import SLOW_CORRELATION_TIME
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.seeds import AutoregressiveSeed, generator
+
+if TYPE_CHECKING:
+    from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -56,7 +58,7 @@ class FactorState(msgspec.Struct):
 class Factors:
     """Factors with a mean square of 1; each part takes its own in pieces of its own."""
 
-    def __init__(self, model: AutoregressiveParameters, state: FactorState) -> None:
+    def __init__(self, model: AutoregressiveModel, state: FactorState) -> None:
         self.state = state
         step = model.step * COARSE_EVERY
         parts = (model.coarse_volatility, model.fine_volatility)
@@ -104,7 +106,7 @@ class _Pair:
         return np.asarray(series[:, 1:])
 
 
-def begin_factors(model: AutoregressiveParameters, seed: np.random.SeedSequence, drivers: int) -> FactorState:
+def begin_factors(model: AutoregressiveModel, seed: np.random.SeedSequence, drivers: int) -> FactorState:
     """Stationary from the start."""
 
     def begin(key: int, name: str) -> PairState:
@@ -211,7 +213,7 @@ class CoarsePart(_Part):
     """Coarse movement about the driver's mean; its first block belongs to coarse step `TICKS`."""
 
     def __init__(
-        self, model: AutoregressiveParameters, driver: DriverState, state: CoarseState, factors: FactorState
+        self, model: AutoregressiveModel, driver: DriverState, state: CoarseState, factors: FactorState
     ) -> None:
         self.state: CoarseState = state
         self._model, self._driver, self._factors = model, driver, Factors(model, factors)
@@ -235,9 +237,7 @@ class CoarsePart(_Part):
 class FinePart(_Part):
     """Fine movement; its first value is centred half a kernel after step 0."""
 
-    def __init__(
-        self, model: AutoregressiveParameters, driver: DriverState, state: FineState, factors: FactorState
-    ) -> None:
+    def __init__(self, model: AutoregressiveModel, driver: DriverState, state: FineState, factors: FactorState) -> None:
         self.state: FineState = state
         self._kernel, self._driver, self._factors = model.kernel, driver, Factors(model, factors)
         if not len(state.last_factor):
@@ -280,7 +280,7 @@ class DriverState(msgspec.Struct):
     fine: FloatArray
 
 
-def draw_drivers(model: AutoregressiveParameters, start: Start | None, rng: np.random.Generator, n: int) -> DriverState:
+def draw_drivers(model: AutoregressiveModel, start: Start | None, rng: np.random.Generator, n: int) -> DriverState:
     """Draw n drivers from the population; given a start, each from those found there."""
     coarse_normal, fine_normal = rng.standard_normal((2, n, CANDIDATES))
     coarse = _factor(model.coarse_volatility.between, coarse_normal)

@@ -16,25 +16,16 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.linear_filters import convolve
 from xosc_lateral.driver.models.noise import fit_shaped_noise
 from xosc_lateral.driver.models.two_level.markov import N_BINS, MarkovChain, bin_of
-from xosc_lateral.driver.models.two_level.model import TwoLevelModel
-from xosc_lateral.driver.models.two_level.settings import PAPER_SETTINGS, TwoLevelSettings
+from xosc_lateral.driver.models.two_level.model import PAPER_SETTINGS, TwoLevelModel, TwoLevelSettings
 from xosc_lateral.errors import NotEnoughDataError
 
 FloatArray = NDArray[np.float64]
 
 
 def split_levels(rel_offset: FloatArray, settings: TwoLevelSettings = PAPER_SETTINGS) -> tuple[FloatArray, FloatArray]:
-    """Split a measured run into its coarse part and its capped fine part.
+    """Coarse part and capped fine part of a measured run at the model's step, shape (n,) each. [-]
 
-    Parameters
-    ----------
-    rel_offset : array, shape (n,)
-        One run at the model's step. [-]
-
-    Returns
-    -------
-    coarse, fine : array, shape (n,)
-        Bin centres smoothed (at the run's ends with the kernel's part that lies inside), and what is left, capped. [-]
+    Bin centres smoothed (at the run's ends with the kernel's part that lies inside), and what is left, capped.
     """
     rel_offset = np.asarray(rel_offset, dtype=np.float64)
     levels = (bin_of(rel_offset, settings.n_bins) + 0.5) / settings.n_bins - 0.5
@@ -46,16 +37,9 @@ def split_levels(rel_offset: FloatArray, settings: TwoLevelSettings = PAPER_SETT
 
 
 def fit_markov_chain(rel_offsets: Sequence[FloatArray], *, n_bins: int = N_BINS) -> MarkovChain:
-    """Count transitions inside each run; none across two runs.
+    """Count transitions inside each run of relative offsets [-], shape (n_i,) each; none across two runs.
 
     Raises `NotEnoughDataError` when there is no transition.
-
-    Parameters
-    ----------
-    rel_offsets : sequence of array, shape (n_i,)
-        Relative offsets, one array per run, evenly sampled. [-]
-    n_bins : int
-        Over [-0.5, 0.5].
     """
     counts = np.zeros((n_bins, n_bins), dtype=np.int64)
     for run in rel_offsets:
@@ -68,8 +52,6 @@ def fit_markov_chain(rel_offsets: Sequence[FloatArray], *, n_bins: int = N_BINS)
 
 def fit_two_level(rel_offsets: Sequence[FloatArray], settings: TwoLevelSettings = PAPER_SETTINGS) -> TwoLevelModel:
     """Fit to relative offsets [-], one array of shape (n_i,) per run, evenly sampled at the model's step.
-
-    Reference: arXiv:2405.17080, section III.
 
     Raises `NotEnoughDataError` when there is no transition, or no run of 5 s.
     """

@@ -25,7 +25,7 @@ IntArray = NDArray[np.int64]
 
 
 def open_traps(counts: IntArray) -> IntArray:
-    """Counts with a way out of every bin that has none; see the module. Shape as `counts`. [-]"""
+    """Counts with a way out of every bin that has none, towards the nearest of the others. Shape as `counts`. [-]"""
     bins = np.arange(len(counts))
     visited = (counts.sum(axis=0) + counts.sum(axis=1)) > 0
     main = _main_part(counts)
@@ -85,7 +85,6 @@ class MarkovChain:
     counts: IntArray
 
     def __post_init__(self) -> None:
-        """Check, copy and freeze."""
         counts = np.array(self.counts, dtype=np.int64)
         if counts.ndim != 2 or counts.shape[0] != counts.shape[1] or len(counts) < 2:
             raise DriverProfileError(f"Markov chain: counts of shape {counts.shape}, expected (n, n) with n >= 2")

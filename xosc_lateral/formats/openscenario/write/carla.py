@@ -22,6 +22,7 @@ From its published sources (0.9.16: `openscenario_configuration`, `openscenario_
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from math import cos, sin
 
 import numpy as np
@@ -31,7 +32,7 @@ from numpy.typing import NDArray
 from xosc_lateral.formats.openscenario.element import local_name
 from xosc_lateral.formats.openscenario.write import build
 from xosc_lateral.formats.openscenario.write.losses import Losses, remove
-from xosc_lateral.formats.openscenario.write.moving import Moving, add_vertices
+from xosc_lateral.formats.openscenario.write.moving import Moving, add_vertices, wrapped
 from xosc_lateral.formats.openscenario.write.non_motion_actions import Pose
 from xosc_lateral.formats.openscenario.write.path_pieces import VERTEX_SPACING, PathPiece, vertex_times
 from xosc_lateral.formats.openscenario.write.vertices import Vertices
@@ -83,8 +84,14 @@ def add_drives(maneuver: etree._Element, item: Moving, vertices: Vertices, *, fl
         times, columns = _vertices(item, pieces, begin)
         if flat:
             columns[4] = np.zeros_like(columns[4])
-        add_vertices(build.private_action(event, name), name, vertices, VERSION, times, columns)
+        columns = [times, *columns[:3], wrapped(columns[3]), *columns[4:]]
+        of_block = partial(_of_block, columns)
+        add_vertices(build.private_action(event, name), name, vertices, VERSION, len(times), of_block)
         build.time_trigger(event, "StartTrigger", begin, VERSION)
+
+
+def _of_block(columns: Sequence[FloatArray], part: slice) -> list[FloatArray]:
+    return [values[part] for values in columns]
 
 
 def _drives(pieces: Sequence[PathPiece]) -> list[list[PathPiece]]:

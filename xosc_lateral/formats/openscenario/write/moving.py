@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from lxml import etree
@@ -22,6 +23,7 @@ from xosc_lateral.formats.openscenario.write.path_pieces import (
 from xosc_lateral.formats.openscenario.write.vertices import TimedVertices, Vertices
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.motion.trajectory import WorldTrajectory
+from xosc_lateral.rows import blocks, columns, kept
 from xosc_lateral.scenario.enums import Priority
 
 FloatArray = NDArray[np.float64]
@@ -39,12 +41,9 @@ class Moving:
 
     def __init__(self, entity: EntityMotion, path: WorldTrajectory, motion: NominalMotion) -> None:
         self.name, self.end = entity.name, motion.end_time
-        active = (entity.activity & Activity.ACTIVE) != 0
-        teleported = (entity.activity & Activity.TELEPORTED) != 0
-        _check(entity, path, active)
-        self.active_at_start = bool(active[0])
-        pieces = cut_path(path.time, path.x, path.y, active, teleported)
-        self.path, self.pieces = _stopping_in_time(path, pieces)
+        _check(entity, path)
+        self.active_at_start = bool(entity.activity[0] & Activity.ACTIVE)
+        self.path, self.pieces = _stopping_in_time(path, cut_path(path.time, path.x, path.y, entity.activity))
 
     @property
     def start(self) -> tuple[Pose, float] | None:
@@ -57,8 +56,8 @@ class Moving:
     def pose(self, row: int) -> Pose:
         """Pose in one row."""
         path = self.path
-        arrays = (path.x, path.y, path.z, _wrapped(path.heading), path.pitch, path.roll)
-        x, y, z, h, p, r = (float(values[row]) for values in arrays)
+        heading = wrapped(path.heading[row])
+        x, y, z, h, p, r = map(float, (path.x[row], path.y[row], path.z[row], heading, path.pitch[row], path.roll[row]))
         return x, y, z, h, p, r
 
     def pose_after(self, moment: float) -> Pose:
@@ -69,7 +68,7 @@ class Moving:
     def poses_at(self, moments: FloatArray, rows: slice) -> list[FloatArray]:
         """x, y, z [m], heading, pitch, roll [rad] at any times, held before and after some rows of the path."""
         path = self.path
-        arrays = (path.x[rows], path.y[rows], path.z[rows], np.unwrap(path.heading[rows]), path.pitch[rows])
+        arrays = (path.x[rows], path.y[rows], path.z[rows], _unwrapped(path.heading[rows]), path.pitch[rows])
         return [np.interp(moments, path.time[rows], values) for values in (*arrays, path.roll[rows])]
 
     def trigger_time(self, piece: PathPiece) -> float:
@@ -87,13 +86,19 @@ def _stopping_in_time(path: WorldTrajectory, pieces: Sequence[PathPiece]) -> tup
     early = {piece for piece in sudden if _way(path, piece.last) < 0.5 * VERTEX_SPACING}
     if not sudden:
         return path, list(pieces)
-    rows = np.arange(len(path.time))
-    rows[[piece.last - 1 for piece in early]] += 1
-    arrays = {name: getattr(path, name)[rows] for name in ("x", "y", "z", "heading", "pitch", "roll")}
+    names, n = ("x", "y", "z", "heading", "pitch", "roll"), len(path.time)
+    arrays = dict(
+        zip(names, columns(n, ([getattr(path, name)[r].copy() for name in names] for r in blocks(n))), strict=True)
+    )
+    for row in (piece.last - 1 for piece in early):
+        for name in names:
+            if arrays[name].flags.writeable:  # else all are the same
+                arrays[name][row] = getattr(path, name)[row + 1]
     for last in (piece.last for piece in sudden - early):
         share = (VERTEX_SPACING - _way(path, last)) / _way(path, last - 1)
         for name in ("x", "y", "z"):
-            arrays[name][last - 1] += share * (arrays[name][last - 2] - arrays[name][last - 1])
+            if arrays[name].flags.writeable:
+                arrays[name][last - 1] += share * (arrays[name][last - 2] - arrays[name][last - 1])
     ends = [structs.replace(piece, last=piece.last - 1, stops=True) if piece in early else piece for piece in pieces]
     return replace(path, **arrays), ends
 
@@ -109,12 +114,14 @@ def _way(path: WorldTrajectory, row: int) -> float:
     return float(np.hypot(path.x[row] - path.x[row - 1], path.y[row] - path.y[row - 1]))
 
 
-def _check(entity: EntityMotion, path: WorldTrajectory, active: NDArray[np.bool_]) -> None:
+def _check(entity: EntityMotion, path: WorldTrajectory) -> None:
     arrays = (path.time, path.x, path.y, path.z, path.heading, path.pitch, path.roll)
     if any(len(values) != len(entity.time) for values in arrays):
         raise ValueError(f"trajectory of '{entity.name}' does not have the {len(entity.time)} rows of its motion")
-    if any(not np.isfinite(values[active]).all() for values in arrays):
-        raise ValueError(f"trajectory of '{entity.name}' is not finite")
+    for rows in blocks(len(entity.time)):
+        active = (entity.activity[rows] & Activity.ACTIVE) != 0
+        if any(not np.isfinite(values[rows][active]).all() for values in arrays):
+            raise ValueError(f"trajectory of '{entity.name}' is not finite")
 
 
 def add_trajectories(maneuver: etree._Element, item: Moving, version: build.Version, vertices: Vertices) -> None:
@@ -164,15 +171,60 @@ def _add_trajectory(
     vertices: Vertices,
 ) -> None:
     rows = slice(piece.first, piece.last + 1)
-    time = path.time[rows]
-    arrays = (path.x, path.y, path.z, np.unwrap(path.heading[rows]), path.pitch, path.roll)
-    columns = [np.interp(times, time, values if len(values) == len(time) else values[rows]) for values in arrays]
-    columns[3] = np.interp(_heading_times(times), time, np.unwrap(path.heading[rows]))
-    speed = path.speed[rows]
-    motion = None
-    if version >= MOTION_SINCE:
-        motion = [np.interp(times, time, values) for values in (speed, np.gradient(speed, time))]
-    add_vertices(owner, name, vertices, version, times, columns, motion)
+    time, speed, heading = path.time[rows], path.speed[rows], _unwrapped(path.heading[rows])
+    arrays = [values[rows] for values in (path.x, path.y, path.z, path.pitch, path.roll)]
+    times, later = kept(times), kept(_heading_times(times))
+
+    def columns_of(part: slice) -> list[FloatArray]:
+        around = _around(time, times[part])
+        x, y, z, p, r = (np.interp(times[part], time[around], values[around]) for values in arrays)
+        turned = _around(time, later[part])
+        h = np.interp(later[part], time[turned], heading[turned])
+        found = [times[part], x, y, z, wrapped(h), p, r]
+        if version >= MOTION_SINCE:
+            rates = _rate(speed, time, around)
+            found += [np.interp(times[part], time[around], values) for values in (speed[around], rates)]
+        return found
+
+    add_vertices(owner, name, vertices, version, len(times), columns_of)
+
+
+def _around(time: FloatArray, moments: FloatArray) -> slice:
+    """Rows between which all moments lie."""
+    first, last = np.searchsorted(time, (moments.min(), moments.max()), side="right")
+    return slice(max(int(first) - 1, 0), int(last) + 1)
+
+
+def _rate(values: FloatArray, time: FloatArray, rows: slice) -> FloatArray:
+    """Of change per second on some rows: as `np.gradient` has it, to the bit, over all of them."""
+    first, last = max(rows.start - 1, 0), min(rows.stop + 1, len(time))
+    while last - first < len(time) and np.ptp(np.diff(time[first:last])) == 0.0:
+        # steps that are all the same have a formula of their own, which is not that of the whole run
+        first, last = max(2 * first - last, 0), min(2 * last - first, len(time))
+    return np.asarray(np.gradient(values[first:last], time[first:last])[rows.start - first :][: len(time[rows])])
+
+
+def _unwrapped(heading: FloatArray) -> FloatArray:
+    """`np.unwrap`, to the bit, in blocks of rows."""
+    n = len(heading)
+
+    def steps(rows: slice) -> FloatArray:
+        return np.diff(heading[rows.start - 1 : rows.stop])
+
+    if not any((np.abs(steps(rows)) >= np.pi).any() for rows in blocks(n, 1)):
+        return heading
+
+    def unwrapped() -> Iterator[list[FloatArray]]:
+        yield [heading[:1]]
+        turned = np.zeros(1)
+        for rows in blocks(n, 1):
+            step = steps(rows)
+            turn = np.mod(step + np.pi, 2.0 * np.pi) - np.pi
+            turn = np.where((turn == -np.pi) & (step > 0.0), np.pi, turn) - step
+            turned = np.cumsum(np.append(turned[-1:], np.where(np.abs(step) < np.pi, 0.0, turn)))
+            yield [heading[rows] + turned[1:]]
+
+    return columns(n, unwrapped())[0]
 
 
 def _heading_times(times: FloatArray) -> FloatArray:
@@ -194,9 +246,8 @@ def add_vertices(
     name: str,
     vertices: Vertices,
     version: build.Version,
-    times: FloatArray,
-    columns: Sequence[FloatArray],
-    motion: Sequence[FloatArray] | None = None,
+    count: int,
+    columns_of: Callable[[slice], Sequence[FloatArray]],
 ) -> None:
     """Add a FollowTrajectoryAction along a polyline.
 
@@ -209,24 +260,19 @@ def add_vertices(
     vertices : Vertices
         Of the document: takes those of this trajectory.
     version : Version
-    times : array, shape (n,)
-        Of its vertices. [s]
-    columns : six arrays, shape (n,)
-        x, y, z [m], heading, pitch, roll [rad].
-    motion : two arrays, shape (n,), optional
-        Speed [m/s] and acceleration [m/s2] along the path; from version 1.4 on.
+    count, columns_of : int, callable
+        See `TimedVertices`; speed and acceleration from version 1.4 on.
     """
     follow = build.sub(build.sub(owner, "RoutingAction"), "FollowTrajectoryAction")
     holder = follow if version < (1, 1) else build.sub(follow, "TrajectoryRef")
     trajectory = build.sub(holder, "Trajectory", name=name, closed="false")
-    x, y, z, h, p, r = columns
     polyline = build.sub(build.sub(trajectory, "Shape"), "Polyline")
-    vertices.add(polyline, TimedVertices(times, (x, y, z, _wrapped(h), p, r), motion))
+    vertices.add(polyline, TimedVertices(count, columns_of))
     timing = build.sub(follow, "TimeReference")
     build.sub(timing, "Timing", domainAbsoluteRelative="absolute", scale="1", offset="0")
     build.sub(follow, "TrajectoryFollowingMode", followingMode="position")
 
 
-def _wrapped(angle: FloatArray) -> FloatArray:
+def wrapped(angle: Any) -> Any:
     """Into (-pi, pi]."""
     return np.pi - np.mod(np.pi - angle, 2.0 * np.pi)

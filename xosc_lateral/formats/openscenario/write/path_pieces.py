@@ -9,14 +9,15 @@ enough, at a sudden change of speed, a vertex is added.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from xosc_lateral.mask import true_slices
+from xosc_lateral.motion.nominal import Activity
+from xosc_lateral.rows import blocks, give_back, rows_where, scratch, slices_where
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -64,21 +65,26 @@ class PathPiece(Struct, frozen=True):
     stops: bool
 
 
-def cut_path(
-    time: FloatArray, x: FloatArray, y: FloatArray, active: BoolArray, teleported: BoolArray
-) -> list[PathPiece]:
+def cut_path(time: FloatArray, x: FloatArray, y: FloatArray, activity: NDArray[np.uint8]) -> list[PathPiece]:
     """Pieces of one entity's path, in order.
 
     Parameters
     ----------
     time, x, y : array, shape (n,)
         [s], [m]
-    active, teleported : array of bool, shape (n,)
-        The entity exists; it was placed anew in the step that ends with this row.
+    activity : array of uint8, shape (n,)
+        `Activity` bits.
     """
+
+    def active(rows: slice) -> BoolArray:
+        return np.asarray((activity[rows] & Activity.ACTIVE) != 0)
+
+    def teleported(rows: slice) -> BoolArray:
+        return np.asarray((activity[rows] & Activity.TELEPORTED) != 0)
+
     pieces: list[PathPiece] = []
-    for part in true_slices(active):
-        cuts = [part.start, *(row for row in range(part.start + 1, part.stop) if teleported[row]), part.stop]
+    for part in slices_where(len(time), active):
+        cuts = [part.start, *rows_where(part.stop, teleported, part.start + 1).tolist(), part.stop]
         for begin, end in pairwise(cuts):
             placed = begin > 0
             pieces.extend(_cut_at_stops(time, x, y, begin, end - 1, placed))
@@ -91,11 +97,15 @@ def vertex_times(time: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
     Every `VERTEX_STEP` (or evenly more often, for sharp bends), but never closer than `VERTEX_SPACING`. Counted from
     the start, and near the end from the end, so that the last stretch before a stop is not longer than it has to be.
     """
-    way = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))))
-    if way[-1] < LEAST_SPACING:
+    way, driven = scratch(len(time)), np.zeros(1)
+    way[:1] = 0.0
+    for rows in blocks(len(time), 1):
+        around = slice(rows.start - 1, rows.stop)
+        driven = np.cumsum(np.append(driven[-1:], np.hypot(np.diff(x[around]), np.diff(y[around]))))
+        # Strictly increasing distance, so that it can be turned into time where the entity creeps.
+        way[rows] = driven[1:] + np.arange(rows.start, rows.stop) * 1e-12
+    if driven[-1] < LEAST_SPACING:
         return time[:1]
-    # Strictly increasing distance, so that it can be turned into time where the entity creeps.
-    way = way + np.arange(len(way)) * 1e-12
     step = _step(time, way, x, y)
     tail = _tail(time, way, step)
     if _way_at(tail[0], time, way) < 2.0 * VERTEX_SPACING and len(tail) > 1:
@@ -104,17 +114,22 @@ def vertex_times(time: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
     else:
         head = _head(time, way, tail[0], step)
         while len(head) > 1 and _way_at(tail[0], time, way) - _way_at(head[-1], time, way) < LEAST_SPACING:
-            head.pop()
-        times = np.array([*head, *tail])
+            head = head[:-1]
+        times = np.append(head, tail)
     error = _error(times, time, x, y)
     for replace in (False, True):
         for _ in range(REFINEMENTS):
             refined = _refined(times, time, way, error, replace=replace)
             after = error if refined is times else _error(refined, time, x, y)
-            if after.max() >= error.max():
+            if after.largest >= error.largest:
                 break
             times, error = refined, after
-    return _apart(times, np.interp(times, time, x), np.interp(times, time, y))
+    return _apart(times, _interpolated(times, time, x), _interpolated(times, time, y))
+
+
+def _interpolated(moments: FloatArray, time: FloatArray, values: FloatArray) -> FloatArray:
+    """`np.interp` in blocks of moments."""
+    return np.concatenate([np.interp(moments[part], time, values) for part in blocks(len(moments))])
 
 
 def _apart(times: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
@@ -138,42 +153,49 @@ def _apart(times: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
     return times[kept]
 
 
-def _error(times: FloatArray, time: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
-    """How far straight motion between the vertices is from each row. [m]"""
-    written_x = np.interp(time, times, np.interp(times, time, x))
-    written_y = np.interp(time, times, np.interp(times, time, y))
-    return np.hypot(x - written_x, y - written_y)
+class _Error(NamedTuple):
+    """How far straight motion between the vertices is from the path: at most, and on rows beyond the tolerance. [m]"""
+
+    largest: float
+    rows: NDArray[np.intp]
+    there: FloatArray
 
 
-def _refined(times: FloatArray, time: FloatArray, way: FloatArray, error: FloatArray, *, replace: bool) -> FloatArray:
+def _error(times: FloatArray, time: FloatArray, x: FloatArray, y: FloatArray) -> _Error:
+    at_x, at_y = _interpolated(times, time, x), _interpolated(times, time, y)
+    largest, found, there = 0.0, [np.empty(0, dtype=np.intp)], [np.empty(0)]
+    for rows in blocks(len(time)):
+        away = np.hypot(x[rows] - np.interp(time[rows], times, at_x), y[rows] - np.interp(time[rows], times, at_y))
+        beyond = np.flatnonzero(away > TOLERANCE)
+        largest = max(largest, float(away.max()))
+        found.append(rows.start + beyond)
+        there.append(away[beyond])
+    return _Error(largest, np.concatenate(found), np.concatenate(there))
+
+
+def _refined(times: FloatArray, time: FloatArray, way: FloatArray, error: _Error, *, replace: bool) -> FloatArray:
     """With a vertex in every gap that needs one, on its worst row.
 
     `replace`: only where the error is large, but then vertices too close to that row give way to it, but for the ends.
     """
-    at = np.interp(times, time, way)
-    gap = np.searchsorted(times, time, side="right")
-    room = _room(at, way, gap, replace=replace)
-    candidates = np.flatnonzero((error > (LARGE_ERROR if replace else TOLERANCE)) & (room >= LEAST_SPACING))
-    if len(candidates) == 0:
+    at = _interpolated(times, time, way)
+    gap = np.searchsorted(times, time[error.rows], side="right")
+    if replace:
+        room = np.minimum(way[error.rows], way[-1] - way[error.rows])  # way to the ends
+    else:
+        before = np.clip(gap - 1, 0, len(at) - 2)
+        room = np.minimum(way[error.rows] - at[before], at[before + 1] - way[error.rows])  # to the next vertices
+    wanted = np.flatnonzero((error.there > (LARGE_ERROR if replace else TOLERANCE)) & (room >= LEAST_SPACING))
+    if len(wanted) == 0:
         return times
-    order = candidates[np.lexsort((-error[candidates], gap[candidates]))]
+    order = wanted[np.lexsort((-error.there[wanted], gap[wanted]))]
     _, worst = np.unique(gap[order], return_index=True)
-    added = _spaced(order[worst], way)
+    added = _spaced(error.rows[order[worst]], way)
     taken = np.concatenate(([-np.inf], way[added], [np.inf]))
     after = np.searchsorted(taken, at)
     keep = np.minimum(at - taken[after - 1], taken[after] - at) >= LEAST_SPACING
     keep[[0, -1]] = True
     return np.sort(np.concatenate((times[keep], time[added])))
-
-
-def _room(at: FloatArray, way: FloatArray, gap: NDArray[np.int64], *, replace: bool) -> FloatArray:
-    """Way from every row to the next vertices, or to the ends, shape (n,). [m]"""
-    if replace:
-        room = np.minimum(way, way[-1] - way)
-    else:
-        before = np.clip(gap - 1, 0, len(at) - 2)
-        room = np.minimum(way - at[before], at[before + 1] - way)
-    return np.asarray(room)
 
 
 def _spaced(rows: NDArray[np.intp], way: FloatArray) -> NDArray[np.intp]:
@@ -203,27 +225,35 @@ def _cut_at_stops(
 
 def _stops(time: FloatArray, x: FloatArray, y: FloatArray, first: int, last: int) -> list[tuple[int, int]]:
     """Rows between which it stands, and those in which it turns round, in order."""
-    rows = slice(first, last + 1)
-    step = np.diff(time[rows])
-    still = np.hypot(np.diff(x[rows]), np.diff(y[rows])) < STANDSTILL_SPEED * step
+
+    def still(rows: slice) -> BoolArray:
+        around = slice(rows.start, rows.stop + 1)
+        moved = np.hypot(np.diff(x[around]), np.diff(y[around]))
+        return np.asarray(moved < STANDSTILL_SPEED * np.diff(time[around]))
+
     stops = [
-        (first + part.start, first + part.stop)
-        for part in true_slices(still)
-        if part.start == 0
-        or first + part.stop == last
-        or time[first + part.stop] - time[first + part.start] >= STANDSTILL_TIME
+        (part.start, part.stop)
+        for part in slices_where(last, still, first)
+        if part.start == first or part.stop == last or time[part.stop] - time[part.start] >= STANDSTILL_TIME
     ]
-    turned = first + _reversals(x[rows], y[rows])
-    stops += [(row, row) for row in turned.tolist() if not any(begin <= row <= end for begin, end in stops)]
+    turned = _reversals(x, y, first, last)
+    stops += [(row, row) for row in turned if not any(begin <= row <= end for begin, end in stops)]
     return sorted(stops)
 
 
-def _reversals(x: FloatArray, y: FloatArray) -> NDArray[np.intp]:
+def _reversals(x: FloatArray, y: FloatArray, first: int, last: int) -> list[int]:
     """Rows at which the entity goes back the way it came: a path that is followed by its length has no such fold."""
-    step = np.diff(x) + 1j * np.diff(y)
-    moving = np.flatnonzero(np.abs(step) > LEAST_STEP)
-    back = (step[moving[1:]] * np.conj(step[moving[:-1]])).real < 0.0
-    return np.asarray(moving[1:][back], dtype=np.intp)
+    found: list[int] = []
+    before = np.empty(0, dtype=np.complex128)
+    for rows in blocks(last, first):
+        around = slice(rows.start, rows.stop + 1)
+        step = np.diff(x[around]) + 1j * np.diff(y[around])
+        moving = np.flatnonzero(np.abs(step) > LEAST_STEP)
+        moved = np.append(before, step[moving])
+        back = (moved[1:] * np.conj(moved[:-1])).real < 0.0
+        found += (rows.start + moving[len(moving) - len(back) :][back]).tolist()
+        before = moved[-1:]
+    return found
 
 
 def _step(time: FloatArray, way: FloatArray, x: FloatArray, y: FloatArray) -> float:
@@ -232,38 +262,45 @@ def _step(time: FloatArray, way: FloatArray, x: FloatArray, y: FloatArray) -> fl
     The same everywhere: where gaps change, a player that turns the car within half a gap turns it more sharply.
     """
     for step in (VERTEX_STEP, VERTEX_STEP / 2.0):
-        if not _is_cut([*_head(time, way, float(time[-1]), step), float(time[-1])], time, x, y):
+        if not _is_cut(np.append(_head(time, way, float(time[-1]), step), time[-1]), time, x, y):
             return step
     return float(time[1] - time[0])
 
 
-def _is_cut(times: Sequence[float], time: FloatArray, x: FloatArray, y: FloatArray) -> bool:
+def _is_cut(times: FloatArray, time: FloatArray, x: FloatArray, y: FloatArray) -> bool:
     """A bend, which is more than a kink: too far from straight in the middle of several gaps in a row."""
-    ends = np.array([np.interp(times, time, x), np.interp(times, time, y)])
-    middle = 0.5 * (np.asarray(times)[1:] + np.asarray(times)[:-1])
-    chord = np.diff(ends)
-    away = np.array([np.interp(middle, time, x), np.interp(middle, time, y)]) - ends[:, :-1]
-    aside = np.abs(chord[0] * away[1] - chord[1] * away[0]) / np.maximum(np.hypot(*chord), LEAST_STEP)
-    return any(part.stop - part.start >= BEND for part in true_slices(aside > TOLERANCE / 2.0))
+
+    def far(gaps: slice) -> BoolArray:
+        moments = times[gaps.start : gaps.stop + 1]
+        ends = np.array([np.interp(moments, time, x), np.interp(moments, time, y)])
+        middle = 0.5 * (moments[1:] + moments[:-1])
+        chord = np.diff(ends)
+        away = np.array([np.interp(middle, time, x), np.interp(middle, time, y)]) - ends[:, :-1]
+        aside = np.abs(chord[0] * away[1] - chord[1] * away[0]) / np.maximum(np.hypot(*chord), LEAST_STEP)
+        return np.asarray(aside > TOLERANCE / 2.0)
+
+    return any(part.stop - part.start >= BEND for part in slices_where(len(times) - 1, far))
 
 
-def _head(time: FloatArray, way: FloatArray, until: float, step: float) -> list[float]:
+def _head(time: FloatArray, way: FloatArray, until: float, step: float) -> FloatArray:
     """Vertices up to where those of the tail begin; evenly, since a player turns the car within half a gap."""
-    times = [float(time[0])]
-    step = (until - times[0]) / max(1, round((until - times[0]) / step))
+    times = [time[:1]]
+    step = (until - float(time[0])) / max(1, round((until - float(time[0])) / step))
     count = 16
     while True:
         # As long as neither bound counts many at once, the more the longer that holds.
-        even = np.add.accumulate(np.array([times[-1], *[step] * count]))
+        even = np.add.accumulate(np.array([times[-1][-1], *[step] * count]))
         at = np.interp(even[:-1], time, way)
         nearest, farthest = (np.interp(at + far, way, time, right=np.inf) for far in (VERTEX_SPACING, FARTHEST))
         following = np.minimum(np.maximum(even[1:], nearest), farthest)
         count = 1 + int(np.argmax(np.append(following != even[1:], True)))
-        for moment in following[:count].tolist():
-            if moment >= until - 1e-9:
-                return times
-            times.append(moment)
+        following = following[:count]
+        over = following >= until - 1e-9
+        if over.any():
+            return np.concatenate([*times, following[: int(np.argmax(over))]])
+        times.append(following)
         count = min(2 * count, 10_000)
+        give_back()
 
 
 def _tail(time: FloatArray, way: FloatArray, step: float) -> list[float]:

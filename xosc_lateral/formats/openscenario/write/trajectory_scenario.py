@@ -36,6 +36,7 @@ from xosc_lateral.formats.openscenario.write.vertices import Vertices, rewrite_p
 from xosc_lateral.formats.xml import parse_xml
 from xosc_lateral.motion.nominal import NominalMotion, PlayedAction
 from xosc_lateral.motion.trajectory import WorldTrajectory
+from xosc_lateral.rows import blocks, columns
 from xosc_lateral.scenario import Scenario
 from xosc_lateral.scenario.conditions import SimulationTimeCondition
 from xosc_lateral.scenario.parameters import Scope
@@ -266,4 +267,6 @@ def _child(parent: etree._Element, tag: str) -> etree._Element:
 
 def _mirrored(path: WorldTrajectory) -> WorldTrajectory:
     """In the left-handed coordinates of a scenario written for CARLA."""
-    return replace(path, y=-path.y, heading=-path.heading, pitch=-path.pitch)
+    n, turned = len(path.time), (path.y, path.heading, path.pitch)
+    y, heading, pitch = columns(n, ([-values[rows] for values in turned] for rows in blocks(n)))
+    return replace(path, y=y, heading=heading, pitch=pitch)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from xosc_lateral.formats.openscenario.element import local_name
 from xosc_lateral.formats.openscenario.read import is_town
 from xosc_lateral.formats.openscenario.write import build
+from xosc_lateral.rows import give_back
 from xosc_lateral.scenario import Scenario
 from xosc_lateral.scenario.expressions import ExpressionError
 from xosc_lateral.scenario.parameters import Scope
@@ -35,24 +36,21 @@ class TimedVertices(Struct, frozen=True, eq=False):
 
     Parameters
     ----------
-    times : array, shape (n,)
-        [s]
-    pose : six arrays, shape (n,)
-        x, y, z [m], heading, pitch, roll [rad].
-    motion : two arrays, shape (n,), or None
-        Speed [m/s] and acceleration [m/s2].
+    count : int
+        How many they are.
+    columns_of : callable
+        Gives, for some of them, time [s], x, y, z [m], heading, pitch, roll [rad] and, where vertices have a motion,
+        speed [m/s] and acceleration [m/s2]; shape (n,) each.
     """
 
-    times: FloatArray
-    pose: Sequence[FloatArray]
-    motion: Sequence[FloatArray] | None
+    count: int
+    columns_of: Callable[[slice], Sequence[FloatArray]]
 
     def text(self, indent: str, unit: str) -> Iterator[str]:
         """XML of the vertices, set out at `indent`, each level below by `unit` more; the first without its indent."""
-        columns = np.stack((self.times, *self.pose, *(self.motion or ())))
         inner, innermost = f"\n{indent}{unit}", f"\n{indent}{unit}{unit}"
-        for begin in range(0, len(self.times), BLOCK):
-            block = columns[:, begin : begin + BLOCK]
+        for begin in range(0, self.count, BLOCK):
+            block = np.stack(self.columns_of(slice(begin, begin + BLOCK)))
             varies = np.ptp(block, axis=1) != 0.0
             digits = _DIGITS[: len(block)]
             time, *values = ("%s" if varies[k] else build.decimal(block[k, 0], count) for k, count in enumerate(digits))
@@ -68,6 +66,7 @@ class TimedVertices(Struct, frozen=True, eq=False):
             numbers = build.decimals(block[varies].T, [_DIGITS[k] for k in np.flatnonzero(varies)])
             text = f"\n{indent}".join([vertex] * block.shape[1]) % numbers
             yield (f"\n{indent}" if begin else "") + text
+            give_back()
 
 
 class Vertices:

@@ -5,14 +5,12 @@ Speeds and distances are numbers or names of declared parameters (``"$ego_speed"
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
 from xosc_lateral.templates.motorway import FIXED_DATE, ROAD, Motorway, document
-from xosc_lateral.templates.parameter import Number, Parameter, Settings
-from xosc_lateral.templates.surroundings import environment_action
 
 Value = float | str
 
@@ -111,8 +109,6 @@ class Plot:
     steps : tuple of PlannedEvent
     duration : float
         The scenario ends then. [s]
-    declared : tuple of str
-        Settings that become declared parameters of the scenario, as they are used by name in it.
     """
 
     what: str
@@ -120,42 +116,33 @@ class Plot:
     actors: tuple[Actor, ...]
     steps: tuple[PlannedEvent, ...] = field(default=())
     duration: float = 50.0
-    declared: tuple[str, ...] = ()
 
-    def to_xml(self, road_file: str, settings: Settings, parameters: Sequence[Parameter]) -> str:
+    def to_xml(self, road_file: str) -> str:
         """The scenario as an OpenSCENARIO document, the same bytes each time."""
         from scenariogeneration import xosc
 
-        minor = int(settings.text("version").split(".")[1])
         # the library writes elements after the version of the last scenario made: begin with this one
-        xosc.VersionBase().setVersion(minor=minor)
-        by_name = {parameter.name: parameter for parameter in parameters}
-        declarations = xosc.ParameterDeclarations()
-        for name in self.declared:
-            assert isinstance(by_name[name], Number), "only numbers are declared"
-            value = f"{settings.number(name):g}"
-            declarations.add_parameter(xosc.Parameter(name, xosc.ParameterType.double, value))
+        xosc.VersionBase().setVersion(minor=2)
         entities = xosc.Entities()
         for actor in self.actors:
             entities.add_scenario_object(actor.name, actor.vehicle.definition(is_ego=actor is self.actors[0]))
         scenario = xosc.Scenario(
             self.what,
             "xosc-lateral",
-            declarations,
+            xosc.ParameterDeclarations(),
             entities,
-            self._storyboard(environment_action(settings)),
+            self._storyboard(),
             xosc.RoadNetwork(road_file),
             xosc.Catalog(),
-            osc_minor_version=minor,
+            osc_minor_version=2,
             creation_date=FIXED_DATE,
         )
         return document(scenario.get_element())
 
-    def _storyboard(self, environment: Any) -> Any:
+    def _storyboard(self) -> Any:
         from scenariogeneration import xosc
 
         init = xosc.Init()
-        init.add_global_action(environment)
         for actor in self.actors:
             place = xosc.LanePosition(actor.s, 0, self.motorway.lane(actor.lane), ROAD)
             init.add_init_action(actor.name, xosc.TeleportAction(place))
@@ -216,63 +203,3 @@ def at_time(time: Value, *, point: str = "start") -> Any:
         xosc.SimulationTimeCondition(time, xosc.Rule.greaterOrEqual),
         triggeringpoint=point,
     )
-
-
-def after(event: str, delay: Value = 0, *, state: str = "endTransition") -> Any:
-    """Once another event has ended (or, with ``startTransition``, begun) and a delay has passed."""
-    from scenariogeneration import xosc
-
-    condition = xosc.StoryboardElementStateCondition(
-        xosc.StoryboardElementType.event, event, getattr(xosc.StoryboardElementState, state)
-    )
-    return xosc.ValueTrigger(f"After{event}", delay, xosc.ConditionEdge.none, condition)
-
-
-def headway(follower: str, leader: str, rule: str, value: Value, *, not_before: float = 0.0) -> Any:
-    """Once the time headway of `follower` to `leader`, along the road, is ``lessThan`` or ``greaterThan`` a value [s].
-
-    `not_before` holds the trigger back [s]: some players also measure a headway to a vehicle that is still behind.
-    """
-    from scenariogeneration import xosc
-
-    condition = xosc.TimeHeadwayCondition(
-        leader,
-        value,
-        getattr(xosc.Rule, rule),
-        freespace=False,
-        distance_type=xosc.RelativeDistanceType.longitudinal,
-        coordinate_system=xosc.CoordinateSystem.road,
-    )
-    return _held_back(_entity_trigger(f"{follower}HeadwayTo{leader}", condition, follower), not_before)
-
-
-def closer_than(follower: str, leader: str, distance: Value) -> Any:
-    """Once the reference points are closer than that along the road. [m]"""
-    from scenariogeneration import xosc
-
-    condition = xosc.RelativeDistanceCondition(
-        distance,
-        xosc.Rule.lessThan,
-        xosc.RelativeDistanceType.longitudinal,
-        leader,
-        freespace=False,
-        coordinate_system=xosc.CoordinateSystem.road,
-    )
-    return _entity_trigger(f"{follower}CloseTo{leader}", condition, follower)
-
-
-def _entity_trigger(name: str, condition: Any, triggering: str) -> Any:
-    from scenariogeneration import xosc
-
-    return xosc.EntityTrigger(name, 0, xosc.ConditionEdge.none, condition, triggering)
-
-
-def _held_back(trigger: Any, not_before: float) -> Any:
-    from scenariogeneration import xosc
-
-    if not_before <= 0.0:
-        return trigger
-    group = xosc.ConditionGroup()
-    group.add_condition(at_time(round(not_before, 3)))
-    group.add_condition(trigger)
-    return group

@@ -1,18 +1,10 @@
-"""A driver simulator that is no relative of the package's model: a first try without measured drives, and tests.
+"""A driver simulator that shares nothing with the package's models: for a first try without measured drives, and tests.
 
 `simulate_drive` gives a drive table with the truth behind it. Effects are planted by arguments and act through the
 simulated driver: see `plants`.
 """
 
-from xosc_lateral.datasets.driver_simulator import (
-    Driver,
-    SimulatedDrive,
-    Truth,
-    draw_driver,
-    simulate_drive,
-    simulate_population,
-)
-from xosc_lateral.datasets.plants import (
+from .plants import (
     LanePreference,
     Plant,
     Shape,
@@ -24,6 +16,14 @@ from xosc_lateral.datasets.plants import (
     saturating,
     threshold,
     truck_avoidance,
+)
+from .simulator import (
+    Driver,
+    SimulatedDrive,
+    Truth,
+    draw_driver,
+    simulate_drive,
+    simulate_population,
 )
 
 __all__ = [

@@ -8,8 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from xosc_lateral.datasets.motorway import STEP
-from xosc_lateral.drives.filters import first_order
+from .motorway import STEP, first_order
 
 Context = dict[str, np.ndarray]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.mask import true_slices
+from xosc_lateral.rows import true_slices
 
 
 @pytest.mark.parametrize(

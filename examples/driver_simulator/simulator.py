@@ -22,10 +22,10 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 import pandas as pd
+from numba import njit
 
-from xosc_lateral.datasets.motorway import N_LANES, STEP, draw_motorway
-from xosc_lateral.datasets.plants import Context, Intent, Plant
-from xosc_lateral.jit import njit
+from .motorway import N_LANES, STEP, draw_motorway
+from .plants import Context, Intent, Plant
 
 WHEELBASE = 2.8  # [m]
 STEERING_RATIO = 15.0  # steering wheel angle over road wheel angle [-]
@@ -168,8 +168,8 @@ def simulate_drive(
 
     Returns
     -------
-    Drive
-        `table` with the columns of DESIGN, section 4, and `truth`.
+    SimulatedDrive
+        `table` with the columns of docs/formats.md, and `truth`.
     """
     streams = np.random.default_rng([20260, seed]).spawn(5)
     context = draw_motorway(duration, streams[0])
@@ -228,7 +228,7 @@ def _eased(values: np.ndarray) -> np.ndarray:
     return np.asarray(np.convolve(padded, window / window.sum(), mode="valid"))
 
 
-@njit
+@njit(nogil=True)  # not cached: the cache holds the module's name, which depends on where this is started
 def _loop(aim, aim_rate, path, curvature, speed, tolerance, gain, care, attention, noise, traits):  # type: ignore[no-untyped-def]
     """Car and human, step by step: place [m] in the frame of lane 0's centre, wheel angle [rad], yaw rate [rad/s]."""
     base_tolerance, preview, delay, base_gain, refractory, motor, tremor, blur, drift_size, drift_time, gusts = traits

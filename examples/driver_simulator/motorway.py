@@ -4,7 +4,31 @@ from __future__ import annotations
 
 import numpy as np
 
-from xosc_lateral.drives.filters import first_order
+
+def first_order(
+    values: np.ndarray, keep: float, *, gain: float = 1.0, before: float | None = None, axis: int = -1
+) -> np.ndarray:
+    """``y[k] = keep * y[k - 1] + gain * values[k]``: a first-order lag, or the noise of an autoregression.
+
+    Parameters
+    ----------
+    values : array
+        Even in time along `axis`. [any unit]
+    keep, gain : float
+        exp(-step / time constant), 0 to 1; the gain is ``1 - keep`` for a lag that comes to rest at its input. [-]
+    before : float, optional
+        y before the first row, of a single series; 0 unless given. [unit of the values]
+
+    Returns
+    -------
+    array, shape of `values`
+        In the same unit.
+    """
+    from scipy.signal import lfilter
+
+    if before is None:
+        return np.asarray(lfilter([gain], [1.0, -keep], values, axis=axis), dtype=np.float64)
+    return np.asarray(lfilter([gain], [1.0, -keep], values, axis=axis, zi=[keep * before])[0], dtype=np.float64)
 
 
 def least_jerk(length: int) -> np.ndarray:

@@ -1,0 +1,214 @@
+"""Columns of a run: what is beyond a fixed amount of memory lies in a file, and is worked on in blocks of rows.
+
+A run of a day has millions of rows, one of an hour with hundreds of cars a hundred million. Whoever works on all of
+them does so with `blocks`, and makes columns that last with `columns`, `kept` and `empty`. Within `beside`, columns
+beyond `IN_MEMORY` are mapped from a file without a name, which is gone with the last of them, however the process ends.
+Pages of it that are in memory are given back after a block as soon as they are more than `MAPPED`; nothing is lost by
+that, since the mapping is shared with the file (madvise(2), MADV_DONTNEED). Where the system can't, all is in memory.
+"""
+
+from __future__ import annotations
+
+import errno
+import mmap
+import os
+import sys
+import tempfile
+import weakref
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+BLOCK = 65_536
+"""Rows that are worked on at a time where all of a long run would take much memory: half a megabyte each. [-]"""
+
+IN_MEMORY = 100e6
+"""Columns of one run that are in memory before others go to the file: 2.5 h of one car, as of 100 for 90 s. [byte]"""
+
+MAPPED = 50e6
+"""Pages of the file that may be in memory after a block: what two or three passes over a block touch. [byte]"""
+
+CHUNK = 64 << 20
+"""Least that the file grows by; a long one grows by an eighth, since each piece takes one of the open files. [byte]"""
+
+
+def status_bytes(column: int) -> int:
+    """Memory of this process, of the columns of /proc/self/statm (0: all, 1: resident, 2: of files). [byte]
+
+    0 where the system does not say.
+    """
+    if not sys.platform.startswith("linux"):
+        return 0
+    return int(Path("/proc/self/statm").read_bytes().split()[column]) * mmap.PAGESIZE
+
+
+# ---- where columns lie -----------------------------------------------------------------------------------------------
+class _Store:
+    """The columns of one run."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = next(parent for parent in (folder.absolute(), *folder.absolute().parents) if parent.is_dir())
+        self.memory = IN_MEMORY
+        """Left of it. [byte]"""
+        self._chunk: mmap.mmap | None = None
+        self._free = self._size = 0
+
+    def empty(self, shape: tuple[int, ...], kind: np.dtype[Any]) -> NDArray[Any]:
+        """Of this shape and kind."""
+        size = int(np.prod(shape)) * kind.itemsize
+        self.memory -= size
+        if self.memory >= 0 or size == 0:
+            return np.empty(shape, kind)
+        if self._chunk is None or len(self._chunk) - self._free < size:
+            self._chunk, self._free = self.grown(max(CHUNK, self._size // 8, size)), 0
+        values = np.frombuffer(self._chunk, kind, size // kind.itemsize, self._free).reshape(shape)
+        self._free += -(-size // 64) * 64  # a line of the processor's cache
+        return values
+
+    def grown(self, size: int) -> mmap.mmap:
+        """A piece of the file that is gone with what lies in it."""
+        size = -(-size // mmap.PAGESIZE) * mmap.PAGESIZE
+        try:
+            with tempfile.TemporaryFile(dir=self.folder) as file:
+                os.posix_fallocate(file.fileno(), 0, size)  # a full disk is an error here, and not a signal later
+                chunk = mmap.mmap(file.fileno(), size)
+        except OSError as error:
+            if error.errno == errno.ENOMEM:
+                raise MemoryError from error  # a limit of this process (`RLIMIT_AS`)
+            what = f"{error.strerror}, and {size / 1e6:.0f} MB are needed there for the rows of a long run"
+            raise OSError(error.errno, what, str(self.folder)) from error
+        self._size += size
+        _chunks.add(chunk)
+        return chunk
+
+
+_chunks = weakref.WeakSet[mmap.mmap]()  # of all runs whose columns somebody still has
+_others = 0  # pages of other files: libraries [byte]
+_store: ContextVar[_Store | None] = ContextVar("store", default=None)
+
+
+@contextmanager
+def beside(folder: Path | None) -> Iterator[None]:
+    """Columns beyond `IN_MEMORY` lie in a file in this folder, or above it where it is not there yet; None: in memory.
+
+    They may be used after it. Raises `OSError` (with the folder) where its disk is full.
+    """
+    can = status_bytes(2) > 0 and hasattr(mmap, "MADV_DONTNEED")
+    token = _store.set(_Store(folder) if can and folder is not None else None)
+    try:
+        yield
+    finally:
+        _store.reset(token)
+
+
+def give_back() -> None:
+    """After work on some rows: pages of the file leave memory if they are too many."""
+    global _others
+    if _chunks and status_bytes(2) - _others > MAPPED:
+        for chunk in tuple(_chunks):
+            chunk.madvise(mmap.MADV_DONTNEED)
+        _others = status_bytes(2)
+
+
+def empty(shape: int | tuple[int, ...], kind: DTypeLike = np.float64) -> NDArray[Any]:
+    """A column, or several, to be filled."""
+    shape = (shape,) if isinstance(shape, int) else shape
+    store = _store.get()
+    return np.empty(shape, kind) if store is None else store.empty(shape, np.dtype(kind))
+
+
+def scratch(n: int) -> NDArray[np.float64]:
+    """A column to be filled that is gone after the work on one vehicle: in memory, unless it is long."""
+    store = _store.get()
+    if store is None or 8 * n <= MAPPED / 10:
+        return np.empty(n)
+    return np.frombuffer(store.grown(8 * n), dtype=np.float64, count=n)
+
+
+def kept(values: NDArray[Any]) -> NDArray[Any]:
+    """Values as a column that lasts, shape (n,): themselves while there is memory, read-only where all are the same."""
+    store = _store.get()
+    if store is None or store.memory >= values.nbytes or not len(values):
+        if store is not None:
+            store.memory -= values.nbytes
+        return values
+    if _is_all(values, values[:1]):
+        return np.broadcast_to(values[:1].copy(), values.shape)
+    column = store.empty(values.shape, values.dtype)
+    column[:] = values
+    return column
+
+
+def columns(n: int, parts: Iterable[Sequence[NDArray[Any]]]) -> list[NDArray[Any]]:
+    """Columns that last, shape (n,) each, from blocks of their rows in order; read-only where all values are the same.
+
+    Parameters
+    ----------
+    n : int
+        Rows in all, 1 or more.
+    parts : iterable of sequence of array
+        The same columns each time, shape (rows of the block,) each.
+    """
+    found: list[NDArray[Any]] = []
+    begin = 0
+    for part in parts:
+        end = begin + len(part[0])
+        if end - begin == n:
+            return [kept(values) for values in part]
+        found = found or [values[:1].copy() for values in part]
+        for k, values in enumerate(part):
+            if len(found[k]) == 1 and not _is_all(values, found[k]):
+                column = empty(n, values.dtype)
+                column[:begin], found[k] = found[k], column
+            if len(found[k]) == n:
+                found[k][begin:end] = values
+        begin = end
+    return [values if len(values) == n else np.broadcast_to(values, n) for values in found]
+
+
+def _is_all(values: NDArray[Any], first: NDArray[Any]) -> bool:
+    """Whether all values are the first one to the bit: a negative zero is another."""
+    bits = f"u{values.dtype.itemsize}"
+    return bool((np.ascontiguousarray(values).view(bits) == first.view(bits)).all())
+
+
+# ---- work on them ----------------------------------------------------------------------------------------------------
+def blocks(n: int, begin: int = 0) -> Iterator[slice]:
+    """Rows from `begin` to n, at most `BLOCK` at a time."""
+    for first in range(begin, n, BLOCK):
+        yield slice(first, min(first + BLOCK, n))
+        give_back()
+
+
+def rows_where(n: int, holds: Callable[[slice], NDArray[np.bool_]], begin: int = 0) -> NDArray[np.intp]:
+    """Rows from `begin` to n where something holds, which is asked block by block."""
+    found = [np.flatnonzero(holds(rows)) + rows.start for rows in blocks(n, begin)]
+    return np.concatenate(found) if found else np.empty(0, dtype=np.intp)
+
+
+def true_slices(mask: NDArray[np.bool_]) -> list[slice]:
+    """The longest slices in which a mask is True throughout, in order.
+
+    Parameters
+    ----------
+    mask : array of bool, shape (n,)
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
+    return [slice(first, stop) for first, stop in edges.reshape(-1, 2).tolist()]
+
+
+def slices_where(n: int, holds: Callable[[slice], NDArray[np.bool_]], begin: int = 0) -> list[slice]:
+    """The longest slices of rows from `begin` to n where something holds, which is asked block by block."""
+    found: list[slice] = []
+    for rows in blocks(n, begin):
+        for part in true_slices(holds(rows)):
+            first, stop = rows.start + part.start, rows.start + part.stop
+            if found and found[-1].stop == first:
+                first = found.pop().start
+            found.append(slice(first, stop))
+    return found
