@@ -15,11 +15,10 @@ from xosc_lateral.formats.hashes import file_hash
 from xosc_lateral.formats.openscenario.catalogs import require_folders
 from xosc_lateral.formats.profiles import find_profile, profile_hash
 from xosc_lateral.limits import BATCH_JOBS, VARIANTS
-from xosc_lateral.pipeline.concrete import concrete
 from xosc_lateral.pipeline.convert import numbered
 from xosc_lateral.pipeline.drivers import auto_profile, hidden_by_libraries, uses_auto
 from xosc_lateral.pipeline.manifest import ManifestRow, printable
-from xosc_lateral.pipeline.request import DocumentKind, Request, document_kind, find_requests
+from xosc_lateral.pipeline.request import DocumentKind, Request, concrete, document_kind, find_requests
 from xosc_lateral.pipeline.settings import AUTO, ConvertSettings
 from xosc_lateral.version import BEHAVIOUR, __version__
 
@@ -173,8 +172,7 @@ def plan_batch(
         if request.variants > VARIANTS.value:
             raise FormatError(VARIANTS.refusal(request.variants), path=request.scenario)
         kind = document_kind(request.scenario)
-        ours_or_catalog = kind in (DocumentKind.CATALOG, DocumentKind.CONVERTED, DocumentKind.VARIANTS)
-        if ours_or_catalog and not request.listed:
+        if kind in (DocumentKind.CATALOG, DocumentKind.CONVERTED) and not request.listed:
             left_out.append((request.scenario, kind))
             continue
         before = asked.setdefault(request.scenario, set())
