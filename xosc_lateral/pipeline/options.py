@@ -55,13 +55,7 @@ class Option:
     entry: Cell | None = None
 
     def value(self, name: str, said: Any) -> Any:
-        """The field's value.
-
-        Raises
-        ------
-        ValueError
-            With the option's name before it.
-        """
+        """The field's value; `ValueError` with the option's name before it."""
         try:
             return self.read(said)
         except (TypeError, ValueError) as error:
