@@ -1,4 +1,9 @@
-"""Where jobs run: in this process, on this machine's cores (joblib's executor), on a dask.distributed cluster."""
+"""Where jobs run: in this process, on this machine's cores (joblib's executor), on a dask.distributed cluster.
+
+Workers may die: what was lost is tried again, what kills its worker is found. All of them are pools around
+`concurrent.futures` executors, so the loop that feeds them is the same. joblib's `Parallel` is not in between because
+it ends, and on dask waits for ever, when one task takes its worker down; here that costs one row.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +13,77 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from itertools import islice
 from types import TracebackType
-from typing import Any
+from typing import Any, Self, TypeVar
 
+from xosc_lateral.errors import XoscLateralError
 from xosc_lateral.pipeline.guard import let_worker_die
-from xosc_lateral.pipeline.tasks import AHEAD, ClusterError, Pool, Result, Task
 from xosc_lateral.version import __version__
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+AHEAD = 2
+"""Tasks handed out per worker: one at work, one to begin with at once."""
+
+LONG_TRY = 60.0
+"""A task that was alone and worked for so long before its worker died is not tried again: that was no accident. [s]"""
+
+TRIES_ALONE = 3
+"""Tries of a task that may have killed its worker; more than one, for a worker may be killed from outside as well."""
+
+CHECK_EVERY = 5.0
+"""How often it is looked whether a pool that does not answer still has workers. [s]"""
+
+
+class ClusterError(XoscLateralError):
+    """The cluster can't be reached, or is gone."""
+
+
+class WorkerDiedError(XoscLateralError):
+    """A task took down its worker, time and again."""
+
+
+class Pool:
+    """Workers, used as a context: here none, a task runs in this process when it is handed out.
+
+    Attributes
+    ----------
+    tries_alone : int
+        How often a task that may have killed its worker is tried by itself.
+    """
+
+    tries_alone = TRIES_ALONE
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
+        """End the workers: at once after an error."""
+
+    def capacity(self) -> int:
+        """How many tasks may be handed out at once."""
+        return 1
+
+    def submit(self, work: Callable[[Task], Result], task: Task) -> Future[Result]:
+        """Hand out a task."""
+        future: Future[Result] = Future()
+        future.set_result(work(task))
+        return future
+
+    def recover(self) -> None:
+        """Get fit again after a worker died; raises `ClusterError` if that can't be."""
+
+    def lost(self, error: BaseException) -> bool:
+        """Whether a future's error means that its worker died, rather than that the task raised it."""
+        return False
+
+    def check(self) -> None:
+        """Raise `ClusterError` when no result can come any more; called every few seconds without one."""
+
 
 PARENT_CHECK = 0.5
 """How often a worker looks whether its run is still there. [s]"""
@@ -86,24 +154,14 @@ WORKERLESS = 120.0
 
 
 class _Cluster(Pool):
-    """Workers of a running dask.distributed cluster.
+    """Workers of a dask.distributed cluster that runs at an address such as ``tcp://10.0.0.1:8786``.
 
     They have to see the same files under the same paths, and have the same version of this package. The scheduler
     itself gives a dead worker's tasks to another. Whoever can talk to the scheduler can run code on the workers and
     here: it has to be trusted.
-
-    Parameters
-    ----------
-    address : str
-        Of the scheduler, as in ``tcp://10.0.0.1:8786``.
-
-    Raises
-    ------
-    ClusterError
-        The extra ``cluster`` is not installed, nobody answers, or a worker has another version of this package.
     """
 
-    tries_alone = 1
+    tries_alone = 1  # the scheduler has had a task on several workers before it gives it up, and a try costs some more
 
     def __init__(self, address: str) -> None:
         try:
@@ -193,3 +251,71 @@ def open_pool(workers: int, cluster: str | None) -> Pool:
     if workers < 0:
         raise ValueError(f"{workers} workers; at least 0 (this process), or -1 for one per core")
     return Pool() if workers == 0 else _LocalProcesses(workers)
+
+
+def run_tasks(
+    pool: Pool, work: Callable[[Task], Result], tasks: Iterable[Task]
+) -> Iterator[tuple[Task, Result | WorkerDiedError]]:
+    """Results as they come, in any order.
+
+    When a worker dies, whatever had been handed out is tried again, one by one: what kills its worker then as well is
+    the culprit and gives a `WorkerDiedError`; the rest is fine.
+
+    Raises
+    ------
+    ClusterError
+        When the cluster is gone.
+    Exception
+        What `work` raises.
+    """
+    waiting = iter(tasks)
+    running: dict[Future[Result], Task] = {}
+    suspects: list[Task] = []
+    while True:
+        if not suspects:
+            for task in islice(waiting, max(pool.capacity() - len(running), 0)):
+                try:
+                    running[pool.submit(work, task)] = task
+                except BrokenExecutor:
+                    suspects.append(task)
+                    break
+        if not running:
+            if not suspects:
+                return
+            pool.recover()
+            while suspects:
+                task = suspects.pop(0)
+                yield task, _alone(pool, work, task)
+            continue
+        done = wait(running, CHECK_EVERY, FIRST_COMPLETED).done
+        if not done:
+            pool.check()
+        for future in done:
+            task = running.pop(future)
+            try:
+                result = future.result()
+            except (Exception, CancelledError) as error:
+                if not pool.lost(error):
+                    raise
+                suspects.append(task)
+            else:
+                yield task, result
+
+
+def _alone(pool: Pool, work: Callable[[Task], Result], task: Task) -> Result | WorkerDiedError:
+    deaths = 1
+    for _ in range(pool.tries_alone):
+        begin = time.monotonic()
+        try:
+            future = pool.submit(work, task)
+            while not wait([future], CHECK_EVERY).done:
+                pool.check()
+            return future.result()
+        except (Exception, CancelledError) as error:
+            if not pool.lost(error):
+                raise
+            pool.recover()
+        deaths += 1
+        if time.monotonic() - begin > LONG_TRY:
+            break
+    return WorkerDiedError(f"its worker process died {deaths} times (killed, out of memory, or a crash in a library)")
