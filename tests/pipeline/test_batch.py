@@ -67,6 +67,30 @@ def test_two_workers_leave_the_same_bytes_as_one(tmp_path: Path) -> None:
     assert one == tree(tmp_path / "two")
 
 
+def test_outputs_whose_state_is_known_are_not_read_and_every_edit_changes_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("xosc_lateral.pipeline.journal.CLOCK_TICK", -1)
+    inputs, out = make_inputs(tmp_path / "in", 3), tmp_path / "out"
+    run(inputs, out)
+    edited = out / "001.xosc"
+    before, kept = edited.stat(), edited.read_bytes()
+    time.sleep(0.05)  # more than a tick of the file system's clock
+    edited.write_bytes(kept[:-1] + b"!")
+    os.utime(edited, ns=(before.st_atime_ns, before.st_mtime_ns))
+    hashed: list[Path] = []
+
+    def noting(path: Path) -> str:
+        hashed.append(path)
+        return file_hash(path)
+
+    monkeypatch.setattr("xosc_lateral.pipeline.batch.file_hash", noting)
+    found = {outcome.row.output: outcome.why for outcome in run(inputs, out)}
+    assert found == {"000.xosc": "", "001.xosc": "changed or gone", "002.xosc": ""}
+    assert edited.read_bytes() == kept
+    assert {path.name for path in hashed if path.parent == out} == {"001.xosc"}
+
+
 def test_a_second_run_converts_nothing_and_touches_nothing(tmp_path: Path) -> None:
     inputs = make_inputs(tmp_path / "in", 3)
     run(inputs, tmp_path / "out", convert_and_log)

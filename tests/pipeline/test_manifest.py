@@ -9,7 +9,14 @@ import pandas as pd
 import pytest
 
 from xosc_lateral.errors import FormatError
-from xosc_lateral.pipeline.manifest import ManifestRow, read_manifest, read_timings, write_manifest, write_timings
+from xosc_lateral.pipeline.manifest import (
+    ManifestRow,
+    Timing,
+    read_manifest,
+    read_timings,
+    write_manifest,
+    write_timings,
+)
 
 ROW = ManifestRow(
     output="a/x.xosc",
@@ -71,6 +78,7 @@ def test_a_foreign_file_of_that_name_is_refused(tmp_path: Path) -> None:
 
 
 def test_timings_come_back(tmp_path: Path) -> None:
-    write_timings([("a", 0.5), ("b", 1.0)], tmp_path / "t")
-    assert read_timings(tmp_path / "t") == {"a": 0.5, "b": 1.0}
+    written = {"a": Timing(0.5), "b": Timing(1.0, "1 2 3 4")}
+    write_timings(written.items(), tmp_path / "t")
+    assert read_timings(tmp_path / "t") == written
     assert read_timings(tmp_path / "none") == {}

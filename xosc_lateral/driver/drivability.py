@@ -107,14 +107,9 @@ def strain(offset: FloatArray, step: float, speed: FloatArray) -> Strain:
     acceleration = np.abs(np.diff(offset, 2)) / step**2
     hardest = _hardest_jerk(offset, step)
     bound = comfort(speed)[1:-1]
-    uncomfortable = float(np.quantile(acceleration / bound, 1.0 - SELDOM))
     largest = float(acceleration.max())
-    return Strain(
-        float(np.quantile(acceleration, 1.0 - SELDOM)),
-        largest,
-        hardest,
-        max(uncomfortable, largest / LIMIT, hardest / JERK_LIMIT),
-    )
+    seldom, uncomfortable = np.quantile([acceleration, acceleration / bound], 1.0 - SELDOM, axis=1).tolist()
+    return Strain(seldom, largest, hardest, max(uncomfortable, largest / LIMIT, hardest / JERK_LIMIT))
 
 
 def _hardest_jerk(offset: FloatArray, step: float) -> float:

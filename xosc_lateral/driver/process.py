@@ -89,7 +89,8 @@ class DriveProcess:
         self._hidden = tuple(effect for effect in profile.effects if isinstance(effect, HiddenEffect))
         columned = [effect for effect in profile.effects if isinstance(effect, ColumnEffect)]
         self.columned = tuple(
-            effect.of_one_driver(generator(seed, DriveSeed.SLOPES, index)) for index, effect in enumerate(columned)
+            effect.of_one_driver(generator(seed, DriveSeed.SLOPES, index)) if any(effect.between_drivers) else effect
+            for index, effect in enumerate(columned)
         )
         """The effects of columns, with this driver's own coefficients; their terms are given from outside."""
         self.state = DriveState(

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import deepcopy
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects import EffectTerms
+from xosc_lateral.driver.effects import ColumnEffect, EffectTerms
+from xosc_lateral.driver.effects.base import step_of
 from xosc_lateral.driver.jit_kernel import prepare
 from xosc_lateral.driver.process import DriveProcess, combine
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]
+Responses = Sequence[FloatArray | None]
 
 STEP_TOLERANCE = 0.1
 """A segment's step may differ from the model's by this share: the movement is then a little faster or slower. [-]"""
@@ -41,7 +44,7 @@ class OffsetSampler:
         own = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
         self._process = DriveProcess(profile, own)
 
-    def sample(self, segment: Segment, *, start: float | None = None) -> FloatArray:
+    def sample(self, segment: Segment, *, start: float | None = None, responses: Responses | None = None) -> FloatArray:
         """Next offsets, one per row inside the segment.
 
         Raises `ValueError` if the segment has another step or lies before the last one, or `start` is given in the
@@ -53,6 +56,8 @@ class OffsetSampler:
             At the model's step (5 Hz), not earlier than the last one.
         start : float, optional
             Offset at the first row [m]; at the start of a drive only. Without it the drive starts as chance has it.
+        responses : sequence of array or None, optional
+            What `responses_to` gave for this profile and segment, where that was asked before.
 
         Returns
         -------
@@ -64,7 +69,7 @@ class OffsetSampler:
         n = len(width)
         if not n:
             return np.empty(0)
-        terms = self._terms(segment)
+        terms = self._terms(segment, responses)
         if start is not None and self._process.has_begun:
             raise ValueError("a drive that continues from a state has no start")
         prepare(n)
@@ -84,17 +89,38 @@ class OffsetSampler:
         """A sampler in the same state that goes on by itself."""
         return deepcopy(self)
 
-    def _terms(self, segment: Segment) -> EffectTerms:
-        inside = segment.inside
-        time = segment.time[inside]
-        found = [self._process.hidden_terms(time)]
-        if self._process.columned:
-            context = {"lane_width": segment.lane_width, **segment.context}
-            if np.isfinite(segment.speed).any():
-                context.setdefault("speed", segment.speed)
-            unused = np.random.default_rng(0)
-            found += [effect.terms(segment.time, context, unused).rows(inside) for effect in self._process.columned]
+    def _terms(self, segment: Segment, responses: Responses | None) -> EffectTerms:
+        found = [self._process.hidden_terms(segment.time[segment.inside])]
+        if responses is None:
+            responses = responses_to(segment, self.profile)
+        found += [
+            effect.acting(response)
+            for effect, response in zip(self._process.columned, responses, strict=True)
+            if response is not None
+        ]
         return combine(found)
+
+
+def responses_to(segment: Segment, profile: DriverProfile) -> Responses:
+    """What every driver of a profile responds to in the same way on a segment; drivers differ in how strongly.
+
+    Returns
+    -------
+    tuple of array or None
+        Per effect of columns, in the profile's order, what `ColumnEffect.response` gives for the rows inside, shape
+        (n, k); None where a column is not known.
+    """
+    columned = [effect for effect in profile.effects if isinstance(effect, ColumnEffect)]
+    if not columned:
+        return ()
+    step, inside = step_of(segment.time), segment.inside
+    context = {"lane_width": segment.lane_width, **segment.context}
+    if np.isfinite(segment.speed).any():
+        context.setdefault("speed", segment.speed)
+    return tuple(
+        effect.response(step, context)[inside] if all(column in context for column in effect.columns) else None
+        for effect in columned
+    )
 
 
 def sample_offsets(

@@ -14,19 +14,34 @@ from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.rows import blocks, give_back, kept, slices_where
 
+FloatArray = NDArray[np.float64]
+
 GAP_STEP = 0.1
 """Rows that gaps are looked for on. [s]"""
 
 
-def lane_departures(entity: EntityResult, network: RoadNetwork) -> list[LaneDeparture]:
-    """Where the enriched reference point is outside the nominal lane although the nominal one is inside: worst row."""
-    found = []
+HalfWidths = dict[tuple[str, int], FloatArray]
+"""Half of the width of lanes from a row of an entity on, shape (n,). [m]"""
+
+
+def lane_departures(entity: EntityResult, network: RoadNetwork, known: HalfWidths | None = None) -> list[LaneDeparture]:
+    """Where the enriched reference point is outside the nominal lane although the nominal one is inside: worst row.
+
+    `known` keeps half widths for other variants of the same motion.
+    """
+    found: list[LaneDeparture] = []
     motion = entity.motion
+    if not entity.deviation.any():
+        return found
     spans = [(segment.span.first, segment.span.last) for segment in entity.segments]
     for first, last in spans + _lateral_within_a_lane(motion):
         worst: LaneDeparture | None = None
         for rows in blocks(last + 1, first):
-            half = 0.5 * network.lane_width(motion.road[rows], motion.lane[rows], motion.s[rows])
+            half = None if known is None else known.get((entity.name, rows.start))
+            if half is None:
+                half = 0.5 * network.lane_width(motion.road[rows], motion.lane[rows], motion.s[rows])
+            if known is not None:
+                known[entity.name, rows.start] = half
             along_lane = np.where(np.cos(motion.heading_relative[rows]) >= 0.0, 1.0, -1.0)
             beyond = np.abs(motion.offset[rows] + along_lane * entity.deviation[rows]) - half
             left = (beyond > 0.0) & (np.abs(motion.offset[rows]) <= half)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import zlib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +16,14 @@ from xosc_lateral.driver.drivability import drivable
 from xosc_lateral.driver.plausibility import check_offsets
 from xosc_lateral.driver.profile import COLUMNS, SIDES, Basis, DriverProfile
 from xosc_lateral.driver.sampled_offsets import known_sensor, sensor_error
-from xosc_lateral.driver.sampling import OffsetSampler
-from xosc_lateral.enrich.consequences import gaps_of, lane_departures
+from xosc_lateral.driver.sampling import OffsetSampler, Responses, responses_to
+from xosc_lateral.enrich.consequences import HalfWidths, gaps_of, lane_departures
 from xosc_lateral.enrich.give_way import SampledVehicle, give_way, mirrored, other_side
 from xosc_lateral.enrich.result import Enriched, EntityResult, Neighbours, SampledSegment
+from xosc_lateral.errors import FormatError
 from xosc_lateral.motion.context import entity_context
 from xosc_lateral.motion.deviation import SETTLING_TIME, SampledDeviation, deviation_through
+from xosc_lateral.motion.gaps import Gap
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.motion.segments import SegmentSpan, cut_segments
 from xosc_lateral.motion.trajectory import WorldTrajectory, displace, distance_driven
@@ -98,37 +102,38 @@ def enrich(
         When the sensor is asked for and a profile knows of none.
     """
     trailers, words = trailers or {}, entropy or {}
-    spans = {
-        entity.name: cut_segments(entity, network, is_trailer=entity.name in trailers) for entity in motion.entities
-    }
-    gaps_before = gaps_of(motion, [_nominal(entity) for entity in motion.entities])
-    certain = replace(motion, entities=tuple(one for one in motion.entities if one.name not in uncertain))
+    rows = sum(len(entity.time) for entity in motion.entities)
+    few = rows <= FEW and not context
+    run = (_run if few else _run.__wrapped__)(motion, network, frozenset(trailers), frozenset(uncertain), neighbours)
+
+    def drawn_for(index: int, attempt: int) -> _Drawn:
+        entity = motion.entities[index]
+        driver, spans = drivers.get(entity.name, "not chosen"), run.spans[index]
+        if isinstance(driver, str):
+            return _Drawn(entity, spans, None, driver)
+        whose, met = run.met.get(index, (None, None))
+        if met is None or whose is not driver:
+            among = replace(motion, entities=(entity,)) if entity.name in uncertain else run.certain
+            met = _meet(entity, among, network, spans, driver, context or {}, neighbours)
+            if few:
+                run.met[index] = driver, met
+        own = np.random.SeedSequence(
+            [seed, variant, attempt, zlib.crc32(entity.name.encode()), *words.get(entity.name, ())]
+        )
+        return _draw(entity, spans, driver, met, own, with_sensor, round(at_least / SAMPLE_STEP))
+
     best: Enriched | None = None
     for attempt in range(max(1, attempts)):
-        drawn = [
-            _draw(
-                entity,
-                replace(motion, entities=(entity,)) if entity.name in uncertain else certain,
-                network,
-                spans[entity.name],
-                drivers.get(entity.name, "not chosen"),
-                np.random.SeedSequence(
-                    [seed, variant, attempt, zlib.crc32(entity.name.encode()), *words.get(entity.name, ())]
-                ),
-                context or {},
-                with_sensor,
-                neighbours,
-                round(at_least / SAMPLE_STEP),
-            )
-            for entity in motion.entities
-        ]
+        drawn = [drawn_for(index, attempt) for index in range(len(motion.entities))]
         if neighbours is Neighbours.BORROW:
             drawn = _apart(drawn, motion, network, uncertain)
         entities = tuple(_result(one, network) for one in drawn)
         entities = _with_trailers(entities, network, trailers)
         gaps_after = gaps_of(motion, [entity.trajectory for entity in entities])
-        departures = tuple(found for entity in entities for found in lane_departures(entity, network))
-        result = Enriched(motion, network, entities, gaps_before, gaps_after, departures, seed, variant, attempt)
+        departures = tuple(
+            found for entity in entities for found in lane_departures(entity, network, run.half_widths if few else None)
+        )
+        result = Enriched(motion, network, entities, run.gaps, gaps_after, departures, seed, variant, attempt)
         if best is None or _trouble(result) < _trouble(best):
             best = result
         if not _trouble(result):
@@ -211,32 +216,98 @@ class _Drawn:
         return columns(len(distance), ([through(distance[part])] for part in blocks(len(distance))))[0]
 
 
-def _draw(
+class _Stretch(NamedTuple):
+    """A road-following segment as its driver meets it.
+
+    Parameters
+    ----------
+    span : SegmentSpan
+    knots : array of int, shape (n,)
+        Rows of the motion that are sampled.
+    seen : Segment
+        In a mirror where the profile is one of the other hand's traffic: `side` -1 then, else 1.
+    responses : sequence of array or None
+        See `responses_to`.
+    """
+
+    span: SegmentSpan
+    knots: IntArray
+    seen: Segment
+    side: float
+    responses: Responses
+
+
+class _Met(NamedTuple):
+    """What an entity's driver meets on its way, and what is known of how he answers; see `_Drawn`."""
+
+    stretches: tuple[_Stretch, ...]
+    neutral: tuple[str, ...]
+    responds: frozenset[str]
+    alone: frozenset[str]
+
+
+FEW = 100_000
+"""Rows of all entities of a run up to which what drivers meet is kept for its next variant: a run like that of 16 cars
+for two minutes then keeps about 10 MB. [-]"""
+
+
+class _Run(NamedTuple):
+    """What all variants of a run have in common.
+
+    Parameters
+    ----------
+    spans : tuple of tuple of SegmentSpan
+        Of each entity.
+    gaps : tuple of Gap
+        Of the nominal motion.
+    certain : NominalMotion
+        Those alone whose place is.
+    met : dict
+        By the number of the entity, its last driver and what he meets.
+    half_widths : dict
+        See `lane_departures`.
+    """
+
+    spans: tuple[tuple[SegmentSpan, ...], ...]
+    gaps: tuple[Gap, ...]
+    certain: NominalMotion
+    met: dict[int, tuple[DriverProfile, _Met]]
+    half_widths: HalfWidths
+
+
+@lru_cache(maxsize=2)  # variants of one run come one after another
+def _run(
+    motion: NominalMotion,
+    network: RoadNetwork,
+    pulled: frozenset[str],
+    uncertain: frozenset[str],
+    neighbours: Neighbours,
+) -> _Run:
+    spans = tuple(cut_segments(entity, network, is_trailer=entity.name in pulled) for entity in motion.entities)
+    gaps = gaps_of(motion, [_nominal(entity) for entity in motion.entities])
+    certain = tuple(one for one in motion.entities if one.name not in uncertain)
+    return _Run(spans, gaps, replace(motion, entities=certain), {}, {})
+
+
+def _meet(
     entity: EntityMotion,
     motion: NominalMotion,
     network: RoadNetwork,
     spans: tuple[SegmentSpan, ...],
-    driver: DriverProfile | str,
-    seed: np.random.SeedSequence,
+    driver: DriverProfile,
     foreign_context: Mapping[str, tuple[FloatArray, FloatArray]],
-    with_sensor: bool,
     neighbours: Neighbours,
-    least: int,
-) -> _Drawn:
-    """Offsets of one entity; `motion` is the run with those alone whose place beside it is certain."""
+) -> _Met:
+    """What a driver meets; `motion` is the run with those alone whose place beside him is certain."""
     index = next(k for k, one in enumerate(motion.entities) if one is entity)
-    if isinstance(driver, str):
-        return _Drawn(entity, spans, None, driver)
-    sampler, sensor = OffsetSampler(driver, seed), known_sensor(driver) if with_sensor else None
     every = max(1, round(SAMPLE_STEP / motion.step))
-    segments: list[tuple[SegmentSpan, IntArray, FloatArray]] = []
-    errors: list[FloatArray] = []
-    beyond: list[FloatArray] = []
+    stretches: list[_Stretch] = []
     neutral, responds, alone = set[str](), set[str](), set[str]()
     for span in spans:
         knots = kept(np.arange(span.first, span.last + 1, every))
         if not span.is_road_following or len(knots) < 2:
             continue
+        _refuse_no_width(entity, span, network)
         segment = _segment(motion, network, index, knots, every, foreign_context)
         if neighbours is Neighbours.NONE:
             segment = _with_nobody_beside(segment)
@@ -245,22 +316,55 @@ def _draw(
         responds |= sides_known(driver, {Basis.POPULATION}, other_hand=other_hand)
         alone |= sides_known(driver, {Basis.MEASURED, Basis.DECLARED}, other_hand=other_hand)
         seen, side = (mirrored(segment), -1.0) if other_hand else (segment, 1.0)
-        wanted = side * sampler.sample(seen)
-        later = _going_on(seen, max(least - len(knots), 0))
+        stretches.append(_Stretch(span, knots, seen, side, responses_to(seen, driver)))
+    return _Met(tuple(stretches), tuple(sorted(neutral)), frozenset(responds), frozenset(alone))
+
+
+NO_WIDTH = 0.01
+"""A lane narrower than this is none. [m]"""
+
+
+def _refuse_no_width(entity: EntityMotion, span: SegmentSpan, network: RoadNetwork) -> None:
+    """A lane may begin or end with no width, but nobody follows one that has none all along."""
+    for rows in blocks(span.last + 1, span.first):
+        if network.lane_width(entity.road[rows], entity.lane[rows], entity.s[rows]).max() >= NO_WIDTH:
+            return
+    raise FormatError(
+        f"lane {entity.lane[span.first]} has no width where {entity.name!r} follows it",
+        path=network.path,
+        element=f"road {network.road_ids[entity.road[span.first]]!r}",
+    )
+
+
+def _draw(
+    entity: EntityMotion,
+    spans: tuple[SegmentSpan, ...],
+    driver: DriverProfile,
+    met: _Met,
+    seed: np.random.SeedSequence,
+    with_sensor: bool,
+    least: int,
+) -> _Drawn:
+    """Offsets of one entity."""
+    if not met.stretches:
+        return _Drawn(entity, spans, None, "no road-following segment")
+    sampler, sensor = OffsetSampler(driver, seed), known_sensor(driver) if with_sensor else None
+    segments: list[tuple[SegmentSpan, IntArray, FloatArray]] = []
+    errors: list[FloatArray] = []
+    beyond: list[FloatArray] = []
+    for span, knots, seen, side, responses in met.stretches:
+        wanted = side * sampler.sample(seen, responses=responses)
+        more = least - len(knots)
         give_back()
-        beyond.append(side * sampler.copy().sample(later) if later.time.size > later.before else np.empty(0))
-        inside = segment.inside
+        beyond.append(side * sampler.copy().sample(_going_on(seen, more)) if more > 0 else np.empty(0))
+        inside = seen.inside
         who = f"profile {driver.name} for {entity.name!r}"
-        check_offsets(wanted, segment.lane_width[inside], who, segment.time[inside])
+        check_offsets(wanted, seen.lane_width[inside], who, seen.time[inside])
         errors.append(kept(sensor_error(sensor, wanted, SAMPLE_STEP, seed, part=len(segments))))
         segments.append((span, knots, kept(wanted)))
-    if not segments:
-        return _Drawn(entity, spans, None, "no road-following segment")
-    unknown = tuple(sorted(neutral))
     return _Drawn(
-        entity, spans, driver, "", tuple(segments), unknown, tuple(errors), frozenset(responds), frozenset(alone),
-        tuple(beyond),
-    )  # fmt: skip
+        entity, spans, driver, "", tuple(segments), met.neutral, tuple(errors), met.responds, met.alone, tuple(beyond)
+    )
 
 
 def sides_known(driver: DriverProfile, known: set[Basis], *, other_hand: bool) -> set[str]:

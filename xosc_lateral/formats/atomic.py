@@ -65,20 +65,36 @@ def refuse_outputs(outputs: Iterable[Path | None], inputs: Iterable[Path] = ()) 
     inputs : iterable of Path
         Files that are read.
     """
-    taken = {path.resolve(): "is an input; choose another output" for path in inputs}
+    folders: dict[Path, str] = {}
+    taken = {real_path(path, folders): "is an input; choose another output" for path in inputs}
+    writable: set[Path] = set()
     for output in outputs:
         if output is None:
             continue
         if output.is_dir():
             raise FormatError("is a folder, not a file to write to", path=output)
-        if (why := taken.get(output.resolve())) is not None:
+        real = real_path(output, folders)
+        if (why := taken.get(real)) is not None:
             raise FormatError(why, path=output)
-        taken[output.resolve()] = "is named for two outputs"
+        taken[real] = "is named for two outputs"
+        if output.parent in writable:
+            continue
         parent = next(folder for folder in output.absolute().parents if folder.exists())
         if not parent.is_dir():
             raise FormatError(f"can't be written: {parent} is a file, not a folder", path=output)
         if not os.access(parent, os.W_OK | os.X_OK):
             raise FormatError(f"can't be written: no permission to write to {parent}", path=output)
+        writable.add(output.parent)
+
+
+def real_path(path: Path, folders: dict[Path, str]) -> str:
+    """Path with links followed; `folders` remembers those of folders, for many files are in the same few."""
+    folder = path.parent
+    if path.is_symlink() or path.name in ("", ".."):
+        return os.path.realpath(path)
+    if folder not in folders:
+        folders[folder] = os.path.realpath(folder)
+    return f"{folders[folder].rstrip(os.sep)}{os.sep}{path.name}"
 
 
 @contextmanager

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 
-from xosc_lateral.formats.source import check_regular, last_read
+from xosc_lateral.formats.source import check_regular, last_read, state_key
 
 
 def file_hash(path: Path) -> str:
@@ -15,8 +15,15 @@ def file_hash(path: Path) -> str:
 
     Raises `OSError` when it can't be read; `FormatError` when it is not there, or no regular file.
     """
-    state = check_regular(path)
-    return _file_hash(path, state.st_ino, state.st_ctime_ns, state.st_mtime_ns, state.st_size)
+    return _file_hash(path, state_key(check_regular(path)))
+
+
+def file_state(path: Path) -> str:
+    """Text that is another one whenever the file was replaced or written to since; empty if it is not there."""
+    try:
+        return " ".join(map(str, state_key(path.stat())))
+    except OSError:
+        return ""
 
 
 def parsed_hash(path: Path) -> str:
@@ -40,6 +47,6 @@ def parsed_hashes(paths: Iterable[Path]) -> dict[str, str]:
 
 
 @lru_cache(maxsize=1024)
-def _file_hash(path: Path, *_state: int) -> str:
+def _file_hash(path: Path, _state: tuple[int, ...]) -> str:
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

@@ -20,7 +20,7 @@ from xosc_lateral.formats.atomic import write_atomically
 from xosc_lateral.formats.configuration import configured_libraries
 from xosc_lateral.formats.json_text import canonical_json, parse_json
 from xosc_lateral.formats.output_paths import file_name
-from xosc_lateral.formats.source import read_source
+from xosc_lateral.formats.source import check_regular, guard_input, read_source, state_key
 from xosc_lateral.formats.tables import foreign_errors
 from xosc_lateral.limits import PROFILE_SIZE
 from xosc_lateral.plugins import plugins
@@ -109,7 +109,9 @@ SCHEMA = Path(__file__).resolve().parents[1] / "resources" / "driver_profile.sch
 
 
 def read_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -> DriverProfile:
-    """Read a profile by its path, or by its name in the folders or among those shipped.
+    """Read a profile by its path or name, once per process for as long as its file stays the same.
+
+    A name is looked for in the folders, then among those shipped.
 
     Raises `DriverProfileError` if no profile of that name is known; lists those that are; `FormatError` if the file is
     not there or no valid profile, or a folder isn't one.
@@ -122,6 +124,13 @@ def read_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -
         Looked through first, in this order.
     """
     path = find_profile(name_or_path, folders)
+    state = check_regular(path)
+    guard_input(path)
+    return _read_profile(path, state_key(state))
+
+
+@lru_cache(maxsize=128)
+def _read_profile(path: Path, _state: tuple[int, ...]) -> DriverProfile:
     values = parse_json(read_source(path, PROFILE_SIZE).data, path)
     try:
         with foreign_errors(path, "not a driver profile"):

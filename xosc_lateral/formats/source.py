@@ -136,6 +136,11 @@ def check_regular(path: Path) -> os.stat_result:
     return state
 
 
+def state_key(state: os.stat_result) -> tuple[int, ...]:
+    """Changes whenever a file is replaced or written to, also by tools that put its time of change back."""
+    return state.st_ino, state.st_ctime_ns, state.st_mtime_ns, state.st_size
+
+
 def check_unpacked(unpacked: int, packed: int, path: Path) -> None:
     """Refuse a packed file that would take all memory.
 

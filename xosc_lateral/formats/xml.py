@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from functools import lru_cache
 from pathlib import Path
@@ -12,7 +11,7 @@ from lxml import etree
 from msgspec import Struct
 
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.source import check_regular, guard_input, read_source
+from xosc_lateral.formats.source import check_regular, guard_input, read_source, state_key
 from xosc_lateral.limits import XML_TREE
 
 MAX_CACHED_BYTES = 1_000_000
@@ -103,17 +102,12 @@ def read_document(path: Path) -> XmlDocument:
     guard_input(path)
     if state.st_size > MAX_CACHED_BYTES:
         return _read(path)
-    return _read_cached(str(path), _state_key(state))
+    return _read_cached(str(path), state_key(state))
 
 
 @lru_cache(maxsize=16)  # catalogs are named by thousands of scenarios; a changed file has another key
 def _read_cached(path: str, _state: tuple[int, ...]) -> XmlDocument:
     return _read(Path(path))
-
-
-def _state_key(state: os.stat_result) -> tuple[int, ...]:
-    """Changes whenever a file is replaced or written to, also by tools that put its time of change back."""
-    return state.st_ino, state.st_ctime_ns, state.st_mtime_ns, state.st_size
 
 
 def _read(path: Path) -> XmlDocument:

@@ -45,15 +45,13 @@ def stretches_within(
     """
     lows, highs = _bounds(x, y)
     for begin in range(0, lows.shape[1], blocks):
-        found: set[tuple[int, int]] = set()
-        for block in range(begin, min(begin + blocks, lows.shape[1])):
-            low, high = lows[:, block], highs[:, block]
-            there = np.flatnonzero(np.isfinite(low).all(axis=0))
-            if len(there) > 1:
-                first, second = _overlapping(low[:, there], high[:, there], there, reach)
-                found.update(zip(first.tolist(), second.tolist(), strict=True))
-        if found:
-            yield slice(BLOCK * begin, BLOCK * (begin + blocks)), sorted(found)
+        low, high = lows[:, begin : begin + blocks], highs[:, begin : begin + blocks]
+        block, there = np.nonzero(np.isfinite(low).all(axis=0))
+        if len(there) > 1:
+            first, second = _overlapping(low[:, block, there], high[:, block, there], there, reach, block)
+            if len(first):
+                found = set(zip(first.tolist(), second.tolist(), strict=True))
+                yield slice(BLOCK * begin, BLOCK * (begin + blocks)), sorted(found)
 
 
 def pairs_now(x: FloatArray, y: FloatArray, reach: float) -> tuple[IntArray, IntArray]:
@@ -81,16 +79,25 @@ def _bounds(x: Iterable[FloatArray], y: Iterable[FloatArray]) -> tuple[FloatArra
     return low, high
 
 
-def _overlapping(low: FloatArray, high: FloatArray, names: IntArray, reach: float) -> tuple[IntArray, IntArray]:
-    """Pairs of boxes that are within reach of each other, the smaller name first, shape (pairs,) each."""
+def _overlapping(
+    low: FloatArray, high: FloatArray, names: IntArray, reach: float, block: IntArray | None = None
+) -> tuple[IntArray, IntArray]:
+    """Pairs of boxes that are within reach of each other, the smaller name first, shape (pairs,) each.
+
+    Boxes of other blocks are none: they lie far away on the axis that is swept, shape (n,).
+    """
     axis = int(np.argmax(high.max(axis=1) - low.min(axis=1)))
-    order = np.argsort(low[axis], kind="stable")
-    low, high, names = low[:, order], high[:, order], names[order]
-    ends = np.searchsorted(low[axis], high[axis] + reach, side="right")
+    begin, end = low[axis], high[axis] + reach
+    if block is not None:
+        apart = block * (float(end.max()) - float(begin.min()) + 1.0)
+        begin, end = begin + apart, end + apart
+    order = np.argsort(begin, kind="stable")
+    ends = np.searchsorted(begin[order], end[order], side="right")
     counts = np.maximum(ends - np.arange(len(order)) - 1, 0)
     first = np.repeat(np.arange(len(order)), counts)
     second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(counts) - counts, counts)
+    one, two = order[first], order[second]
     other = 1 - axis
-    near = (low[other, second] <= high[other, first] + reach) & (low[other, first] <= high[other, second] + reach)
-    one, two = names[first[near]], names[second[near]]
+    near = (low[other, two] <= high[other, one] + reach) & (low[other, one] <= high[other, two] + reach)
+    one, two = names[one[near]], names[two[near]]
     return np.minimum(one, two), np.maximum(one, two)

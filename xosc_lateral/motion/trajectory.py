@@ -105,10 +105,10 @@ def displace(motion: EntityMotion, network: RoadNetwork, deviation: FloatArray) 
     """
     n = len(motion.time)
     x, y, z = columns(n, _shifted(motion, network, deviation)) if n else (motion.x, motion.y, motion.z)
-    heading = motion.heading
+    heading, speed = motion.heading, motion.speed
     if any(_moves(motion, deviation, rows).any() for rows in blocks(n)):
-        heading = _turned(motion, x, y)
-    return WorldTrajectory(motion.time, x, y, z, heading, motion.pitch, motion.roll, _speed(motion, x, y))
+        heading, speed = _turned_and_longer(motion, x, y)
+    return WorldTrajectory(motion.time, x, y, z, heading, motion.pitch, motion.roll, speed)
 
 
 def _moves(motion: EntityMotion, deviation: FloatArray, rows: slice) -> NDArray[np.bool_]:
@@ -125,11 +125,10 @@ def _shifted(motion: EntityMotion, network: RoadNetwork, deviation: FloatArray) 
             # a vehicle that meets its lane's traffic head-on has its left on the lane's right
             along_lane = np.where(np.cos(motion.heading_relative[rows]) >= 0.0, 1.0, -1.0)
             road, lane, s, nominal = motion.road[rows], motion.lane[rows], motion.s[rows], motion.offset[rows]
-            before = network.lane_to_world(road, lane, s, nominal)
-            after = network.lane_to_world(road, lane, s, nominal + along_lane * deviation[rows])
+            points = network.lane_points(road, lane, s, nominal, nominal + along_lane * deviation[rows])
             # the nominal pose is kept to the bit and only the difference added, so that none changes nothing
-            for values, name in zip(shifted, "xyz", strict=True):
-                values[moved] += getattr(after, name) - getattr(before, name)
+            for values, before, after in zip(shifted, *points, strict=True):
+                values[moved] += after - before
         yield shifted
 
 
@@ -148,19 +147,26 @@ def _overlapping(piece: slice) -> Iterator[tuple[slice, slice, slice]]:
         yield rows, slice(first, last), slice(rows.start - first, rows.stop - first)
 
 
-def _turned(motion: EntityMotion, x: FloatArray, y: FloatArray) -> FloatArray:
-    """Nominal heading, and the shifted path's direction against the nominal one's, held where one stands. [rad]"""
-    heading = empty(len(x))
+def _turned_and_longer(motion: EntityMotion, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Heading and speed on a shifted path, shape (n,) each. [rad], [m/s]
+
+    Nominal heading, and the shifted path's direction against the nominal one's, held where one stands. Nominal speed
+    times the ratio of path lengths, which stays right at a speed step.
+    """
+    heading, speed = empty(len(x)), empty(len(x))
     for piece in _pieces(motion):
         if piece.stop - piece.start < 2:
-            heading[piece] = motion.heading[piece] + 0.0
+            heading[piece], speed[piece] = motion.heading[piece] + 0.0, motion.speed[piece]
             continue
         held, waiting = 0.0, piece.start  # rows from `waiting` on stand at the piece's start: as where it moves first
         for rows, around, inside in _overlapping(piece):
-            nominal = np.gradient(motion.x[around]) + 1j * np.gradient(motion.y[around])
-            shifted = np.gradient(x[around]) + 1j * np.gradient(y[around])
-            moving = (np.minimum(np.abs(nominal), np.abs(shifted)) > _STANDSTILL)[inside]
-            turn = np.angle(shifted * np.conj(nominal))[inside]
+            nominal = (np.gradient(motion.x[around]) + 1j * np.gradient(motion.y[around]))[inside]
+            shifted = (np.gradient(x[around]) + 1j * np.gradient(y[around]))[inside]
+            moving = np.minimum(np.abs(nominal), np.abs(shifted)) > _STANDSTILL
+            turn = np.angle(shifted * np.conj(nominal))
+            length, longer = (np.hypot(step.real, step.imag) for step in (nominal, shifted))
+            driven = length > _STANDSTILL
+            speed[rows] = motion.speed[rows] * np.where(driven, longer / np.where(driven, length, 1.0), 1.0)
             last = np.maximum.accumulate(np.where(moving, np.arange(len(moving)), -1))
             if waiting >= 0 and moving.any():
                 held = float(turn[int(np.argmax(moving))])
@@ -169,21 +175,4 @@ def _turned(motion: EntityMotion, x: FloatArray, y: FloatArray) -> FloatArray:
                 waiting = -1
             heading[rows] = motion.heading[rows] + np.where(last < 0, held, turn[last])
             held = held if last[-1] < 0 else float(turn[last[-1]])
-    return heading
-
-
-def _speed(motion: EntityMotion, x: FloatArray, y: FloatArray) -> FloatArray:
-    """Nominal speed times the ratio of path lengths, which stays right at a speed step. [m/s]"""
-    speed = empty(len(x))
-    for piece in _pieces(motion):
-        if piece.stop - piece.start < 2:
-            speed[piece] = motion.speed[piece]
-            continue
-        for rows, around, inside in _overlapping(piece):
-            nominal = np.hypot(np.gradient(motion.x[around]), np.gradient(motion.y[around]))[inside]
-            shifted = np.hypot(np.gradient(x[around]), np.gradient(y[around]))[inside]
-            moving = nominal > _STANDSTILL
-            part = motion.speed[rows].copy()
-            part[moving] *= (shifted / np.where(moving, nominal, 1.0))[moving]
-            speed[rows] = part
-    return speed
+    return heading, speed

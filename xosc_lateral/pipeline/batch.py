@@ -14,11 +14,11 @@ from functools import partial
 from pathlib import Path
 
 from xosc_lateral.errors import FormatError, XoscLateralError
-from xosc_lateral.formats.hashes import file_hash
+from xosc_lateral.formats.hashes import file_hash, file_state
 from xosc_lateral.pipeline.guard import JobLimitError, JobLimits, within_limits
 from xosc_lateral.pipeline.jobs import Batch, Job
 from xosc_lateral.pipeline.journal import Journal, folder_lock
-from xosc_lateral.pipeline.manifest import ManifestRow
+from xosc_lateral.pipeline.manifest import ManifestRow, Timing
 from xosc_lateral.pipeline.workers import WorkerDiedError, open_pool, run_tasks
 from xosc_lateral.version import BEHAVIOUR, __version__
 
@@ -52,15 +52,8 @@ class JobState(StrEnum):
 class JobOutcome:
     """What became of a job.
 
-    Parameters
-    ----------
-    state : JobState
-    row : ManifestRow
-        As in the manifest.
-    seconds : float
-        The conversion took. [s]
-    why : str
-        Why an output that was there is made anew, or would be; empty: there was none.
+    `row`: as in the manifest; `seconds`: the conversion took. [s]; `why`: why an output that was there is made anew, or
+    would be; empty: there was none.
     """
 
     state: JobState
@@ -178,11 +171,11 @@ def _locked(
             failed: set[Path] = set()
             for job in batch.jobs:
                 former = journal.row(job.name) if job.name in journal else None
-                why = _why_anew(job, former)
+                why = _why_anew(job, former, "" if former is None else journal.timing(job.name).state)
                 if former is not None and not again and (not why or (keep_old and why in CHANGES)):
                     row = replace(former, error="", stale=bool(why))
                     if row != former:
-                        journal.add(row, journal.seconds(job.name))
+                        journal.add(row, journal.timing(job.name))
                     yield JobOutcome(JobState.KEPT if why else JobState.UP_TO_DATE, row, 0.0, why)
                 else:
                     todo.append(job)
@@ -215,6 +208,8 @@ class _Reply:
     row: ManifestRow
     seconds: float
     stop: str = ""
+    state: str = ""
+    """`file_state` of the output."""
 
 
 def _run(converter: Converter, limits: JobLimits, job: Job) -> _Reply:
@@ -235,7 +230,8 @@ def _run(converter: Converter, limits: JobLimits, job: Job) -> _Reply:
         row = job.row(_one_line(error))
     except Exception as error:  # a bug of ours must not cost the other ten thousand; the row says that it is one
         row = job.row(f"{job.source}: internal error: {type(error).__name__}: {_one_line(error)}{_origin(error)}")
-    return _Reply(row, time.perf_counter() - start)
+    written = not row.error and job.page is None  # while a page is written, much can happen to an output
+    return _Reply(row, time.perf_counter() - start, state=file_state(job.output) if written else "")
 
 
 def _noted(job: Job, reply: _Reply | WorkerDiedError, journal: Journal, why: str) -> JobOutcome:
@@ -246,7 +242,7 @@ def _noted(job: Job, reply: _Reply | WorkerDiedError, journal: Journal, why: str
     row = reply.row
     if row.error and job.name in journal:
         row = _kept(job, journal.row(job.name), row)
-    journal.add(row, reply.seconds)
+    journal.add(row, Timing(reply.seconds, reply.state))
     return JobOutcome(JobState.FAILED if row.error else JobState.WRITTEN, row, reply.seconds, why)
 
 
@@ -256,11 +252,14 @@ def _kept(job: Job, former: ManifestRow, failed: ManifestRow) -> ManifestRow:
     return replace(former, error=failed.error, stale=True) if there else failed
 
 
-def _why_anew(job: Job, row: ManifestRow | None) -> str:
-    """Why an output is not what a conversion would write now; empty if it is, or if there is no output."""
+def _why_anew(job: Job, row: ManifestRow | None, state: str) -> str:
+    """Why an output is not what a conversion would write now; empty if it is, or if there is no output.
+
+    An output in the same `file_state` as when it was written is not read: `verify` does that.
+    """
     if job.error or row is None or not row.output_sha256:
         return "" if row is None else "could not be made"
-    if not _are({job.output: row.output_sha256}):
+    if not (state and state == file_state(job.output)) and not _are({job.output: row.output_sha256}):
         return "changed or gone"
     if job.page is not None and not job.page.is_file():
         return "its page is gone"

@@ -42,8 +42,6 @@ many times the nominal run. A fifth slower takes a quarter longer; a file of tra
 SUPPLY = 10.0
 """For so long at least, where it may last longer in another run, a stretch has movement of its own. What comes after it
 is the same again; some of the slow movement of a driver is seen in that time. [s]"""
-NO_WIDTH = 0.01
-"""A lane narrower than this is none. [m]"""
 
 
 def convert_scenario(
@@ -57,26 +55,15 @@ def convert_scenario(
 ) -> ConvertedScenario:
     """Convert one scenario and write it.
 
-    Parameters
-    ----------
-    source : Path
-        Maneuver-based scenario.
-    output : Path
-        Where the converted one goes; its folder has to exist.
-    settings : ConvertSettings
-    variant : int
-        Number of the variant: another one, other offsets.
-    report : Path or None
-        Where the caller will write a report: refused like the output if it can't be meant, before anything is written.
-    save : bool
-        Write the output; else the result holds its bytes, with file references as seen from `output`'s folder.
+    - `source`: maneuver-based scenario
+    - `output`: where the converted one goes; its folder has to exist
+    - `variant`: number of the variant: another one, other offsets
+    - `report`: where the caller will write a report: refused like the output if it can't be meant, before anything is
+      written
+    - `save`: write the output; else the result holds its bytes, with file references as seen from `output`'s folder
 
-    Raises
-    ------
-    XoscLateralError
-        When the input is at fault; nothing is written then.
-    OSError
-        When the output can't be written; nothing is left half-written.
+    Raises `XoscLateralError`: when the input is at fault; nothing is written then; `OSError`: when the output can't be
+    written; nothing is left half-written.
     """
     with guarding_inputs(), beside(output.parent if save else None):
         return _convert(source, output, settings, variant, report, save)
@@ -130,7 +117,6 @@ def _convert(
         )
     except DriverProfileError as error:  # found in the movement: who sampled knows the profile by its name alone
         raise DriverProfileError(f"{source}: {error}") from error
-    _refuse_lanes_without_width(played, enriched)
     names = [entity.name for entity in enriched.entities if entity.is_enriched]
     plan = writing_plan(played.scenario, settings, depends, names, pulled=played.trailers, sampled=sampled)
     making = _Making(played, lasting, settings, variant, inputs, egos, depends, output, save)
@@ -281,24 +267,6 @@ def _provenance(
         modes={name: mode for name, mode in plan.modes().items() if enriched.entity(name).is_enriched},
         content_sha256=PENDING,
     )
-
-
-def _refuse_lanes_without_width(played: Played, enriched: Enriched) -> None:
-    """A lane may begin or end with no width, but nobody follows one that has none all along."""
-    for entity in enriched.entities:
-        motion = entity.motion
-        for segment in entity.segments:
-            first, end = segment.span.first, segment.span.last + 1
-            widths = (
-                played.network.lane_width(motion.road[rows], motion.lane[rows], motion.s[rows])
-                for rows in blocks(end, first)
-            )
-            if all(width.max() < NO_WIDTH for width in widths):
-                raise FormatError(
-                    f"lane {motion.lane[first]} has no width where {entity.name!r} follows it",
-                    path=played.scenario.road_file,
-                    element=f"road {played.network.road_ids[motion.road[first]]!r}",
-                )
 
 
 def _write(

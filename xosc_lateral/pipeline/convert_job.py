@@ -31,13 +31,7 @@ def write_page_and_thumbnail(conversion: ConvertedScenario, page: Path) -> None:
 
 
 def write_batch_index(batch: Batch, folder: Path) -> Path:
-    """Write ``index.html`` over the pages of a finished batch, what needs attention first.
-
-    Returns
-    -------
-    Path
-        Of the index.
-    """
+    """Write ``index.html`` over the pages of a finished batch, what needs attention first."""
     from xosc_lateral.report.batch import BatchEntry, batch_page
 
     same = [name for name in BatchEntry.__slots__ if name not in ("page", "thumbnail", "enriched")]
@@ -57,12 +51,7 @@ def write_batch_index(batch: Batch, folder: Path) -> Path:
 def convert_job(job: Job) -> ManifestRow:
     """Convert and describe.
 
-    Raises
-    ------
-    XoscLateralError
-        When the input is at fault.
-    OSError
-        When the output can't be written.
+    Raises `XoscLateralError`: when the input is at fault; `OSError`: when the output can't be written.
     """
     _refuse_changes(job)
     job.output.parent.mkdir(parents=True, exist_ok=True)

@@ -49,24 +49,14 @@ TRUCK_HALF_WIDTH = 1.275
 class Asked:
     """Figures that a driver is to have; None: the base's.
 
-    Parameters
-    ----------
-    sdlp : float, optional
-        Standard deviation of lateral position, as the highway driving test has it. [m]
-    sdlp_change : float, optional
-        The same, as a difference from the base's. [m]
-    mean : float, optional
-        Mean offset, positive left. [m]
-    restlessness : float, optional
-        Standard deviation of lateral speed. [m/s]
-    memory : float, optional
-        After which a deviation is correlated with itself by 1/e. [s]
-    near_line : float, optional
-        Share of time with a side of the vehicle within 0.2 m of a marking, or beyond it. [-]
-    speed : float, optional
-        At which the figures hold. [m/s]
-    vehicle : str, optional
-        "truck": what the base knows of trucks.
+    - `sdlp`: standard deviation of lateral position, as the highway driving test has it. [m]
+    - `sdlp_change`: the same, as a difference from the base's. [m]
+    - `mean`: mean offset, positive left. [m]
+    - `restlessness`: standard deviation of lateral speed. [m/s]
+    - `memory`: after which a deviation is correlated with itself by 1/e. [s]
+    - `near_line`: share of time with a side of the vehicle within 0.2 m of a marking, or beyond it. [-]
+    - `speed`: at which the figures hold. [m/s]
+    - `vehicle`: "truck": what the base knows of trucks
     """
 
     sdlp: float | None = None
@@ -176,20 +166,8 @@ class Derived(NamedTuple):
 def derive(base: DriverProfile, asked: Asked, name: str, *, preset: Preset | None = None) -> Derived:
     """A driver with stated figures.
 
-    Parameters
-    ----------
-    base : DriverProfile
-        Gives what is not stated.
-    asked : Asked
-    name : str
-        The new profile's id.
-    preset : Preset, optional
-        That the figures are of.
-
-    Raises
-    ------
-    DriverProfileError
-        If figures contradict each other, are too far from the base's, or no car could drive them.
+    `base`: gives what is not stated; `name`: the new profile's id; `preset`: that the figures are of. Raises
+    `DriverProfileError`: if figures contradict each other, are too far from the base's, or no car could drive them.
     """
     asked.check()
     speed = HIGHWAY_SPEED if asked.speed is None else asked.speed

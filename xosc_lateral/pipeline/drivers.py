@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
 from pathlib import Path
 
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.enrich.enrich import Drivers
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.profiles import SHIPPED, find_profile, read_profile
-from xosc_lateral.formats.source import check_regular, guard_input
 from xosc_lateral.pipeline.settings import AUTO, ConvertSettings
 from xosc_lateral.scenario import Entity, Scenario
 from xosc_lateral.scenario.enums import VehicleCategory
@@ -31,12 +29,8 @@ NO_DRIVER = {
 def choose_drivers(scenario: Scenario, settings: ConvertSettings, egos: Mapping[str, str] | None = None) -> Drivers:
     """Per entity its profile, or why it gets none; `egos` are the vehicles under test, and why each is one.
 
-    Raises
-    ------
-    FormatError
-        If the settings name an entity that the scenario doesn't have.
-    DriverProfileError
-        If a profile is not known.
+    Raises `FormatError`: if the settings name an entity that the scenario doesn't have; `DriverProfileError`: if a
+    profile is not known.
     """
     known = {entity.name for entity in scenario.entities}
     asked = (("--entity", settings.entity), ("--only", settings.only or ()), ("--ego", settings.ego or ()))
@@ -62,7 +56,7 @@ def _driver(entity: Entity, settings: ConvertSettings) -> DriverProfile | str:
         if category in NO_DRIVER:
             return NO_DRIVER[category]
         named = AUTO_PROFILE
-    return named if isinstance(named, DriverProfile) else load_profile(named, settings.library)
+    return named if isinstance(named, DriverProfile) else read_profile(named, settings.library)
 
 
 def uses_auto(settings: ConvertSettings) -> bool:
@@ -74,16 +68,3 @@ def hidden_by_libraries(libraries: tuple[Path, ...]) -> tuple[str, ...]:
     """A line where "auto" takes one of the user's profiles in place of the shipped one."""
     path = find_profile(AUTO_PROFILE, libraries)
     return () if path.parent == SHIPPED else (f"{path} hides the shipped profile {AUTO_PROFILE!r}: auto takes it",)
-
-
-def load_profile(name_or_path: str, libraries: tuple[Path, ...]) -> DriverProfile:
-    """Read a profile, once per process for as long as its file stays the same."""
-    path = find_profile(name_or_path, libraries)
-    state = check_regular(path)
-    guard_input(path)
-    return _load_profile(path, state.st_ino, state.st_ctime_ns, state.st_mtime_ns, state.st_size)
-
-
-@lru_cache(maxsize=128)
-def _load_profile(path: Path, *_state: int) -> DriverProfile:
-    return read_profile(path)

@@ -66,12 +66,7 @@ class _Interrupted(BaseException):
 class JobLimits:
     """What one job may take.
 
-    Parameters
-    ----------
-    timeout : float
-        [s]
-    memory : float
-        On top of what the process has when the job begins. [MB]
+    `timeout`: [s]; `memory`: on top of what the process has when the job begins. [MB]
     """
 
     timeout: float = JOB_TIMEOUT.value
@@ -87,10 +82,7 @@ def let_worker_die() -> None:
 def within_limits(work: Callable[[Task], Result], task: Task, limits: JobLimits) -> Result:
     """Run ``work(task)``.
 
-    Raises
-    ------
-    JobLimitError
-        It took too long, or too much memory.
+    Raises `JobLimitError`: it took too long, or too much memory.
     """
     watch = _Watch(limits)
     try:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.errors import FormatError, XoscLateralError
+from xosc_lateral.formats.atomic import real_path
 from xosc_lateral.formats.hashes import file_hash
 from xosc_lateral.formats.openscenario.catalogs import require_folders
 from xosc_lateral.formats.profiles import find_profile, profile_hash
@@ -27,26 +28,14 @@ from xosc_lateral.version import BEHAVIOUR, __version__
 class Job:
     """One output to make; plain values, so that it can be sent to another process.
 
-    Parameters
-    ----------
-    name : str
-        Path of the output below the output folder, with forward slashes: names its row in the manifest.
-    scenario : str
-        Path of the input below `base`, with forward slashes.
-    source, output : Path
-        Absolute.
-    base : Path
-        Folder that the output tree mirrors. Absolute.
-    settings : ConvertSettings
-    variant : int
-    fingerprint : str
-        SHA-256 over everything but the input files and the program that decides on the output's bytes.
-    error : str
-        Why it can't even be tried (a distribution that can't be read); empty normally.
-    page : Path or None
-        Where a report page about it is written, and its thumbnail beside that. Absolute.
-    package_version : str
-        Of the process that planned it: a worker with another one refuses.
+    - `name`: path of the output below the output folder, with forward slashes: names its row in the manifest
+    - `scenario`: path of the input below `base`, with forward slashes
+    - `source`, `output`: absolute
+    - `base`: folder that the output tree mirrors. Absolute
+    - `fingerprint`: SHA-256 over everything but the input files and the program that decides on the output's bytes
+    - `error`: why it can't even be tried (a distribution that can't be read); empty normally
+    - `page`: where a report page about it is written, and its thumbnail beside that. Absolute
+    - `package_version`: of the process that planned it: a worker with another one refuses
     """
 
     name: str
@@ -95,18 +84,11 @@ class Job:
 class Batch:
     """What `convert_many` does.
 
-    Parameters
-    ----------
-    folder : Path
-        Output tree. Absolute.
-    base : Path
-        Folder that it mirrors. Absolute.
-    jobs : tuple of Job
-        By name.
-    left_out : tuple of (Path, DocumentKind)
-        Files found in folders that are not to be converted: catalogs, outputs of former conversions.
-    notes : tuple of str
-        What a user has to know before it begins, a line each.
+    - `folder`: output tree. Absolute
+    - `base`: folder that it mirrors. Absolute
+    - `jobs`: by name
+    - `left_out`: files found in folders that are not to be converted: catalogs, outputs of former conversions
+    - `notes`: what a user has to know before it begins, a line each
     """
 
     folder: Path
@@ -129,32 +111,17 @@ def plan_batch(
 ) -> Batch:
     """Plan a batch; nothing is converted or written yet.
 
-    Parameters
-    ----------
-    inputs : sequence of str, Path or Request
-        Files, folders, globs, tables (see `find_requests`), or requests with settings of their own.
-    folder : str or Path
-        Output tree. It mirrors the inputs below their common folder: ``db/a/x.xosc`` of the input ``db`` becomes
-        ``folder/a/x.xosc``, its variants ``folder/a/x_01.xosc`` and so on, the scenarios that a parameter value
-        distribution stands for ``folder/a/x_p00000.xosc`` and so on. A row of a table
-        with settings of its own becomes ``folder/a/x_PROFILE_HASH.xosc``: its profile, and a hash of what else it says.
-    settings : ConvertSettings, optional
-        For every input that has none of its own.
-    variants : int
-        Outputs per scenario.
-    report : str or Path, optional
-        Folder for a report page per output, in a tree like that of the outputs.
+    - `inputs`: files, folders, globs, tables (see `find_requests`), or requests with settings of their own
+    - `folder`: output tree. It mirrors the inputs below their common folder: ``db/a/x.xosc`` of the input ``db``
+      becomes ``folder/a/x.xosc``, its variants ``folder/a/x_01.xosc`` and so on, the scenarios that a parameter value
+      distribution stands for ``folder/a/x_p00000.xosc`` and so on. A row of a table with settings of its own becomes
+      ``folder/a/x_PROFILE_HASH.xosc``: its profile, and a hash of what else it says
+    - `settings`: for every input that has none of its own
+    - `variants`: outputs per scenario
+    - `report`: folder for a report page per output, in a tree like that of the outputs
 
-    Returns
-    -------
-    Batch
-
-    Raises
-    ------
-    FormatError
-        An input or allowed folder that isn't there, two inputs with the same output, an output on top of an input.
-    DriverProfileError
-        A profile that is unknown.
+    Raises `FormatError`: an input or allowed folder that isn't there, two inputs with the same output, an output on top
+    of an input; `DriverProfileError`: a profile that is unknown.
     """
     settings = settings or ConvertSettings()
     require_folders(settings.allow)
@@ -238,15 +205,16 @@ def _jobs(request: Request, kind: DocumentKind, base: Path, root: Path, fingerpr
     stem = request.name.removesuffix(relative.suffix) or f"{relative.stem}{request.label}"
     for one in concrete(request, kind):
         source, settings, error = one.source, one.settings, one.error
+        named = relative.with_name(f"{stem}{one.suffix}{relative.suffix}")
+        scenario = printable(Path(os.path.relpath(source, base)).as_posix())
         for variant in range(request.variants):
-            named = relative.with_name(f"{stem}{one.suffix}{relative.suffix}")
             output = numbered(named, variant, request.variants)
             name = printable(output.as_posix())
             if name != output.as_posix():
                 error = error or f"{printable(str(source))}: the file's name is not valid UTF-8; rename it"
             yield Job(
                 name=name,
-                scenario=printable(Path(os.path.relpath(source, base)).as_posix()),
+                scenario=scenario,
                 source=source,
                 output=root / output,
                 base=base,
@@ -259,9 +227,10 @@ def _jobs(request: Request, kind: DocumentKind, base: Path, root: Path, fingerpr
 
 def _refuse_overwriting(jobs: Iterable[Job]) -> None:
     jobs = list(jobs)
-    sources = {os.path.realpath(job.source) for job in jobs}
+    sources = set(map(os.path.realpath, {job.source for job in jobs}))
+    folders: dict[Path, str] = {}
     for job in jobs:
-        if os.path.realpath(job.output) in sources:
+        if real_path(job.output, folders) in sources:
             raise FormatError("is an input: choose another output folder", path=job.output)
 
 
@@ -275,15 +244,23 @@ class _Fingerprints:
     """Hashes of settings; files that settings name count by their bytes, not by their place."""
 
     _profiles: dict[tuple[str, tuple[Path, ...]], str] = field(default_factory=dict)
+    _last: tuple[ConvertSettings, dict[str, str]] | None = None
 
     def of(self, settings: ConvertSettings, variant: int) -> str:
+        if self._last is None or self._last[0] is not settings:  # variants come one after another
+            self._last = settings, self._texts(settings)
+        texts = self._last[1] | {"variant": str(variant)}
+        text = ", ".join(f'"{name}": {texts[name]}' for name in sorted(texts))
+        return hashlib.sha256(f"{{{text}}}".encode()).hexdigest()
+
+    def _texts(self, settings: ConvertSettings) -> dict[str, str]:
+        """JSON of each setting."""
         values = settings.record(Path()) | {"strict": settings.strict}
         values["profile"] = self._profile(settings.profile, settings.library)
         values["entity"] = {name: self._profile(one, settings.library) for name, one in settings.entity.items()}
         for name, path in (("context", settings.context), ("road", settings.road)):
             values[name] = None if path is None else _hash_or_missing(path)
-        values["variant"] = variant
-        return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
+        return {name: json.dumps(value, sort_keys=True) for name, value in values.items()}
 
     def _profile(self, name: str | DriverProfile, libraries: tuple[Path, ...]) -> str:
         if isinstance(name, DriverProfile):

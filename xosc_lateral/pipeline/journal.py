@@ -7,6 +7,7 @@ import math
 import os
 import socket
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -18,6 +19,8 @@ from xosc_lateral.pipeline.manifest import (
     MANIFEST,
     TIMINGS,
     ManifestRow,
+    Timing,
+    is_of_now,
     read_manifest,
     read_timings,
     write_manifest,
@@ -36,12 +39,7 @@ def folder_lock(path: Path) -> Iterator[None]:
     The operating system's lock counts, not the file: it goes with the process, however that ends, so a file that a
     killed run has left is no obstacle. What the file says (process and host) is for the message.
 
-    Raises
-    ------
-    FolderInUseError
-        When another process holds it.
-    OSError
-        When the folder can't be written.
+    Raises `FolderInUseError`: when another process holds it; `OSError`: when the folder can't be written.
     """
     file = _open_locked(path)
     try:
@@ -102,27 +100,33 @@ def _lock(file: IO[str]) -> bool:
     return True
 
 
+CLOCK_TICK = 20_000_000
+"""A file that is written to twice within the resolution of a file system's clock (4 ms on Linux, 16 ms on Windows) may
+look as if it had not been: what was written so shortly before is not known by its state. [ns]"""
+
+
+def _known(timing: Timing, now: int) -> Timing:
+    """With the state if an edit from `now` on [ns] would change it."""
+    changed = max(map(int, timing.state.split()[1:3]), default=now)
+    return timing if now - changed > CLOCK_TICK else Timing(timing.seconds)
+
+
 class Journal:
     """Rows of an output folder, the newest of each output.
 
-    A file of JSON lines; a line that a kill cut short is dropped. Rows stay on disk: in memory is only where each
-    one begins, so that ten thousand of them cost a megabyte.
+    A file of JSON lines; a line that a kill cut short is dropped. Rows stay on disk: in memory is only where each one
+    begins, so that ten thousand of them cost a megabyte.
 
-    Parameters
-    ----------
-    folder : Path
-        Output folder; rows of its manifest count until the journal has newer ones.
-    path : Path
-        The journal.
-    notify : callable
-        Gets a line if manifest or timings can't be read: they are put aside, and the run goes on without.
+    `folder`: output folder; rows of its manifest count until the journal has newer ones; `path`: the journal; `notify`:
+    gets a line if manifest or timings can't be read: they are put aside, and the run goes on without.
     """
 
     def __init__(self, folder: Path, path: Path, notify: Callable[[str], None]) -> None:
         self._folder, self._path, self._notify = folder, path, notify
         self._begin: dict[str, int] = {}
-        self._seconds: dict[str, float] = {}
+        self._timings: dict[str, Timing] = {}
         self._end = self._intact_end()
+        self._changed = bool(self._begin)
         self._file = path.open("r+b" if path.exists() else "w+b")
         self._file.truncate(self._end)
         self._adopt_manifest()
@@ -151,38 +155,41 @@ class Journal:
         self._file.seek(self._begin[output])
         return msgspec.convert(json.loads(self._file.readline())["row"], ManifestRow)  # was checked when it came in
 
-    def seconds(self, output: str) -> float:
-        """What the newest conversion of an output took. [s]"""
-        return self._seconds[output]
+    def timing(self, output: str) -> Timing:
+        """Of the newest conversion of an output."""
+        return self._timings[output]
 
-    def add(self, row: ManifestRow, seconds: float) -> None:
+    def add(self, row: ManifestRow, timing: Timing) -> None:
         """Append a row. From the return on it survives the death of this process.
 
-        Raises
-        ------
-        OSError
-            When the disk is full; rows added before are still there.
+        Raises `OSError`: when the disk is full; rows added before are still there.
         """
-        line = json.dumps({"row": row.to_dict(), "seconds": seconds}).encode() + b"\n"
+        self._changed = True
+        self._append(row, timing)
+
+    def _append(self, row: ManifestRow, timing: Timing) -> None:
+        line = json.dumps({"row": row.to_dict(), **timing._asdict()}).encode() + b"\n"
         self._file.seek(self._end)
         self._file.write(line)
         self._file.flush()
         self._begin[row.output] = self._end
-        self._seconds[row.output] = seconds
+        self._timings[row.output] = timing
         self._end += len(line)
 
     def forget(self, output: str) -> None:
         """Leave an output out of the manifest."""
+        self._changed = True
         del self._begin[output]
 
     def finish(self) -> None:
-        """Write manifest and timings, sorted by output; then the journal is no longer needed and goes.
+        """Write manifest and timings, sorted by output, if they change; then the journal goes.
 
         A kill in between leaves a journal that says the same as the manifest.
         """
-        outputs = sorted(self._begin)
-        write_timings(((output, self._seconds[output]) for output in outputs), self._folder / TIMINGS)
-        write_manifest((self.row(output) for output in outputs), self._folder / MANIFEST)
+        if self._changed:
+            outputs, now = sorted(self._begin), time.time_ns()
+            write_timings(((output, _known(self._timings[output], now)) for output in outputs), self._folder / TIMINGS)
+            write_manifest((self.row(output) for output in outputs), self._folder / MANIFEST)
         self._file.close()
         self._path.unlink()
 
@@ -195,25 +202,27 @@ class Journal:
             for line in file:
                 try:
                     values = json.loads(line)
-                    output, seconds = ManifestRow.from_dict(values["row"]).output, float(values["seconds"])
-                    if not math.isfinite(seconds):
+                    output = ManifestRow.from_dict(values["row"]).output
+                    timing = Timing(float(values["seconds"]), str(values["state"]))
+                    if not math.isfinite(timing.seconds):
                         break
                 except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
                     break
                 if not line.endswith(b"\n"):
                     break
-                self._begin[output], self._seconds[output] = end, seconds
+                self._begin[output], self._timings[output] = end, timing
                 end += len(line)
         return end
 
     def _adopt_manifest(self) -> None:
-        seconds: dict[str, float] = {}
+        timings, timings_path, path = dict[str, Timing](), self._folder / TIMINGS, self._folder / MANIFEST
         with self._put_aside_if_damaged(TIMINGS):
-            seconds = read_timings(self._folder / TIMINGS)
+            timings = read_timings(timings_path)
         with self._put_aside_if_damaged(MANIFEST):
-            for row in read_manifest(self._folder / MANIFEST):
+            for row in read_manifest(path):
                 if row.output not in self._begin:
-                    self.add(row, seconds.get(row.output, 0.0))
+                    self._append(row, timings.get(row.output, Timing()))
+        self._changed |= not (timings_path.exists() and path.exists() and is_of_now(path))
 
     @contextmanager
     def _put_aside_if_damaged(self, name: str) -> Iterator[None]:

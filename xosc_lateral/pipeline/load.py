@@ -11,7 +11,7 @@ from msgspec import structs
 
 from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.formats.openscenario.read import NO_ROADS, RoadSearch, read_scenario
-from xosc_lateral.formats.source import check_regular, guard_input
+from xosc_lateral.formats.source import check_regular, guard_input, state_key
 from xosc_lateral.motion.nominal import NominalMotion
 from xosc_lateral.pipeline.settings import STEP
 from xosc_lateral.playback.player import play
@@ -46,31 +46,41 @@ def play_scenario(
 ) -> Played:
     """Read and play.
 
-    Parameters
-    ----------
-    path : Path
-        The ``.xosc`` file.
-    parameters : mapping of str to str, optional
-        Values that replace those declared.
-    step : float
-    time_limit : float or None
-        [s]
-    allowed : iterable of Path
-        Folders, besides those around the scenario, that its road and catalogs may lie in.
-    roads : RoadSearch
-        Where else its road may lie.
-    strict : bool
-        Refuse a missing vehicle catalog, instead of playing a usual car.
+    - `path`: the ``.xosc`` file
+    - `parameters`: values that replace those declared
+    - `time_limit`: [s]
+    - `allowed`: folders, besides those around the scenario, that its road and catalogs may lie in
+    - `roads`: where else its road may lie
+    - `strict`: refuse a missing vehicle catalog, instead of playing a usual car
 
-    Raises
-    ------
-    FormatError, PlaybackError
-        With file, line and element.
+    Raises `FormatError, PlaybackError`: with file, line and element.
     """
-    scenario = read_scenario(path, parameters or {}, allowed=allowed, roads=roads, strict=strict)
-    network = RoadNetwork(()) if scenario.road_file is None else road_network(scenario.road_file)
     values = tuple(sorted((parameters or {}).items()))
+    scenario = _read(path, values, tuple(allowed), roads, strict)
+    network = RoadNetwork(()) if scenario.road_file is None else road_network(scenario.road_file)
     return _played(_Playable(input_hashes(scenario, network), values, step, time_limit, scenario, network))
+
+
+def _read(
+    path: Path, parameters: tuple[tuple[str, str], ...], allowed: tuple[Path, ...], roads: RoadSearch, strict: bool
+) -> Scenario:
+    """Read a scenario, once for all its variants if that depends on its own file and on the place of its road alone."""
+    state = check_regular(path)
+    guard_input(path)
+    before = _read_before(path, parameters, allowed, roads, strict, state_key(state))
+    for scenario in before:
+        if scenario.road_file is None or scenario.road_file.is_file():
+            return scenario
+    scenario = read_scenario(path, dict(parameters), allowed=allowed, roads=roads, strict=strict)
+    if not scenario.catalog_locations and not scenario.remarks:
+        before[:] = [scenario]
+    return scenario
+
+
+@lru_cache(maxsize=2)
+def _read_before(*_key: object) -> list[Scenario]:
+    """The scenario that was read from a file in this state, if it was kept."""
+    return []
 
 
 @lru_cache(maxsize=2)  # as `_played`, whose result is the same object for all variants
@@ -110,9 +120,9 @@ def road_network(path: Path) -> RoadNetwork:
     """Read a road, once per process for as long as the file stays the same."""
     state = check_regular(path)
     guard_input(path)
-    return _road_network(path, state.st_ino, state.st_ctime_ns, state.st_mtime_ns, state.st_size)
+    return _road_network(path, state_key(state))
 
 
 @lru_cache(maxsize=32)
-def _road_network(path: Path, *_state: int) -> RoadNetwork:
+def _road_network(path: Path, _state: tuple[int, ...]) -> RoadNetwork:
     return read_opendrive(path)

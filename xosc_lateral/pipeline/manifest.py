@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, fields, replace
 from io import BytesIO
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.atomic import write_atomically
@@ -46,71 +46,38 @@ _OLD_NAMES = {
 class ManifestRow:
     """One output, or why there is none.
 
-    Parameters
-    ----------
-    output : str
-        Path of the output below the output folder, with forward slashes; names the row.
-    scenario, scenario_sha256 : str, str
-        Path of the input below the inputs' common folder, and SHA-256 of the file.
-    variant, seed : int, int
-        The variant from 1, as in file names.
-    profile : str
-        As asked for (a name, a path, "auto").
-    parameters : mapping of str to str
-        Scenario parameters that were replaced.
-    settings : str
-        SHA-256 over settings, variant, profile files and context table.
-    package_version : str
-    with_sensor : bool
-        Offsets hold the sensor error of the drives that profiles were fitted on; else the driver alone.
-    output_sha256 : str
-        SHA-256 of the output.
-    road, road_sha256 : str, str
-        As for the scenario; empty if it has none.
-    inputs : mapping of str to str
-        Every file that was read -> SHA-256.
-    profiles : mapping of str to str
-        Enriched entity -> name of its profile.
-    profile_sha256 : mapping of str to str
-        Profile name -> SHA-256.
-    entities : int
-        In the scenario.
-    enriched : tuple of str
-        Names of the entities that got offsets.
-    why_not : mapping of str to str
-        Entity that got none -> why.
-    segment_seconds : float
-        Road-following time of all enriched entities together. [s]
-    offset_spread : float
-        Standard deviation of all sampled offsets. [m]
-    gap_before, gap_after : float or None
-        Smallest gap between any two vehicles, nominal and enriched; None: no two come near each other. [m]
-    warnings : tuple of str
-    player, version : str, str
-        What it was written for; version of the standard.
-    mode : str
-        How offsets are written: "trajectory", "lane-offset", "mixed"; empty: nobody got any.
-    modes : mapping of str to str
-        The same by vehicle.
-    only : tuple of str or None
-        Who alone was to be enriched; None: everybody.
-    ego : tuple of str
-        Vehicles under test: left as they are; empty: there is none.
-    behaviour : int
-        `version.BEHAVIOUR` of the program that wrote it.
-    options : mapping
-        What was asked for: `ConvertSettings.record`, files as seen from the scenario.
-    content_sha256 : str
-        SHA-256 of the output without its provenance.
-    cut_off : bool
-        The run ends at the time limit, though its scenario goes on.
-    error : str
-        One line; empty if the output is what the inputs and settings give.
-    stale : bool
-        The output is that of a former run, which the other columns describe: it could not be made anew, or was
-        to be kept.
-    schema : int
-        Version of these columns. Rows without it are of version 1, whose variants count from 0.
+    - `output`: path of the output below the output folder, with forward slashes; names the row
+    - `scenario`, `scenario_sha256`: path of the input below the inputs' common folder, and SHA-256 of the file
+    - `variant`, `seed`: the variant from 1, as in file names
+    - `profile`: as asked for (a name, a path, "auto")
+    - `parameters`: scenario parameters that were replaced
+    - `settings`: SHA-256 over settings, variant, profile files and context table
+    - `with_sensor`: offsets hold the sensor error of the drives that profiles were fitted on; else the driver alone
+    - `output_sha256`: SHA-256 of the output
+    - `road`, `road_sha256`: as for the scenario; empty if it has none
+    - `inputs`: every file that was read -> SHA-256
+    - `profiles`: enriched entity -> name of its profile
+    - `profile_sha256`: profile name -> SHA-256
+    - `entities`: in the scenario
+    - `enriched`: names of the entities that got offsets
+    - `why_not`: entity that got none -> why
+    - `segment_seconds`: road-following time of all enriched entities together. [s]
+    - `offset_spread`: standard deviation of all sampled offsets. [m]
+    - `gap_before`, `gap_after`: smallest gap between any two vehicles, nominal and enriched; None: no two come near
+      each other. [m]
+    - `player`, `version`: what it was written for; version of the standard
+    - `mode`: how offsets are written: "trajectory", "lane-offset", "mixed"; empty: nobody got any
+    - `modes`: the same by vehicle
+    - `only`: who alone was to be enriched; None: everybody
+    - `ego`: vehicles under test: left as they are; empty: there is none
+    - `behaviour`: `version.BEHAVIOUR` of the program that wrote it
+    - `options`: what was asked for: `ConvertSettings.record`, files as seen from the scenario
+    - `content_sha256`: SHA-256 of the output without its provenance
+    - `cut_off`: the run ends at the time limit, though its scenario goes on
+    - `error`: one line; empty if the output is what the inputs and settings give
+    - `stale`: the output is that of a former run, which the other columns describe: it could not be made anew, or was
+      to be kept
+    - `schema`: version of these columns. Rows without it are of version 1, whose variants count from 0
     """
 
     output: str
@@ -154,19 +121,14 @@ class ManifestRow:
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values."""
         values = {name: getattr(self, name) for name in self.__slots__}
-        return {
-            name: dict(value) if isinstance(value, Mapping) else list(value) if isinstance(value, tuple) else value
-            for name, value in values.items()
-        }
+        values |= {name: dict(values[name]) for name in _MAPPINGS}
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> ManifestRow:
         """Read what `to_dict` gave; names that are unknown are left out.
 
-        Raises
-        ------
-        ValueError
-            When a value is missing or of the wrong kind.
+        Raises `ValueError`: when a value is missing or of the wrong kind.
         """
         import msgspec
 
@@ -213,10 +175,7 @@ def manifest_schema() -> pa.Schema:
 def write_manifest(rows: Iterable[ManifestRow], path: Path) -> None:
     """Write rows in the order given, `ROW_GROUP` at a time; a file that would not change is left alone.
 
-    Raises
-    ------
-    OSError
-        The old manifest is still there.
+    Raises `OSError`: the old manifest is still there.
     """
     schema = manifest_schema()
     _write_table(path, schema, (_packed(row) for row in rows))
@@ -225,10 +184,7 @@ def write_manifest(rows: Iterable[ManifestRow], path: Path) -> None:
 def read_manifest(path: Path) -> Iterator[ManifestRow]:
     """Rows of a manifest; none if there is no file.
 
-    Raises
-    ------
-    FormatError
-        When it is no manifest.
+    Raises `FormatError`: when it is no manifest.
     """
     for values in _read_table(path):
         try:
@@ -241,24 +197,38 @@ def read_manifest(path: Path) -> Iterator[ManifestRow]:
             raise FormatError(f"not a manifest of this package: {error}", path=path) from error
 
 
-def write_timings(seconds: Iterable[tuple[str, float]], path: Path) -> None:
-    """Write what each output took: columns `output`, `seconds`."""
+class Timing(NamedTuple):
+    """What an output took [s], and its `file_state` as it was written; empty: not known."""
+
+    seconds: float = 0.0
+    state: str = ""
+
+
+def is_of_now(path: Path) -> bool:
+    """Whether a manifest has the columns that would be written now."""
+    import pyarrow.parquet as pq
+
+    return bool(pq.read_schema(path).equals(manifest_schema()))
+
+
+def write_timings(timings: Iterable[tuple[str, Timing]], path: Path) -> None:
+    """Write columns `output`, `seconds`, `state`."""
     import pyarrow as pa
 
-    schema = pa.schema([("output", pa.string()), ("seconds", pa.float64())])
-    _write_table(path, schema, ({"output": output, "seconds": took} for output, took in seconds))
+    schema = pa.schema([("output", pa.string()), ("seconds", pa.float64()), ("state", pa.string())])
+    _write_table(path, schema, ({"output": output, **own._asdict()} for output, own in timings))
 
 
-def read_timings(path: Path) -> dict[str, float]:
-    """Seconds per output; empty if there is no file.
+def read_timings(path: Path) -> dict[str, Timing]:
+    """Timing of each output; empty if there is no file.
 
-    Raises
-    ------
-    FormatError
-        When it is no such file.
+    Raises `FormatError`: when it is no such file.
     """
     try:
-        return {str(values["output"]): float(values["seconds"]) for values in _read_table(path)}
+        return {
+            str(values["output"]): Timing(float(values["seconds"]), str(values.get("state", "")))
+            for values in _read_table(path)
+        }
     except (TypeError, ValueError, KeyError) as error:
         raise FormatError(f"not a timings file of this package: {error}", path=path) from error
 

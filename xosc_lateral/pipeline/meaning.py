@@ -138,15 +138,7 @@ MOST_TRIES = 12
 class Meaning:
     """What happens in a source, nominally and under faster and slower egos.
 
-    Parameters
-    ----------
-    played : Played
-        The source and its nominal run.
-    egos : tuple of str
-        Vehicles under test.
-    step : float
-    time_limit : float or None
-        Of playback. [s]
+    `played`: the source and its nominal run; `egos`: vehicles under test; `time_limit`: of playback. [s]
     """
 
     def __init__(self, played: Played, egos: tuple[str, ...], *, step: float, time_limit: float | None) -> None:

@@ -18,10 +18,7 @@ from xosc_lateral.scenario.under_test import vehicles_under_test
 def chosen_egos(scenario: Scenario, settings: ConvertSettings) -> dict[str, str]:
     """Vehicles under test of a conversion, and why each is one.
 
-    Raises
-    ------
-    FormatError
-        If one of them was also to be enriched.
+    Raises `FormatError`: if one of them was also to be enriched.
     """
     if settings.ego is not None and not settings.ego:
         return {}
@@ -43,14 +40,9 @@ def chosen_egos(scenario: Scenario, settings: ConvertSettings) -> dict[str, str]
 class WritingPlan:
     """How the vehicles of a scenario are written.
 
-    Parameters
-    ----------
-    trajectories, lane_offsets : frozenset of str
-        Who follows a trajectory; who keeps its maneuvers and gets lane offsets. All others stay as they are.
-    is_replay : bool
-        Everything happens by the clock of the nominal run, whoever drives.
-    frozen : tuple of str
-        Triggers that depend on a vehicle under test and no longer do in the output, a line each.
+    `trajectories`, `lane_offsets`: who follows a trajectory; who keeps its maneuvers and gets lane offsets. All others
+    stay as they are; `is_replay`: everything happens by the clock of the nominal run, whoever drives; `frozen`:
+    triggers that depend on a vehicle under test and no longer do in the output, a line each.
     """
 
     trajectories: frozenset[str]
@@ -82,18 +74,8 @@ def writing_plan(
 ) -> WritingPlan:
     """Decide by vehicle.
 
-    Parameters
-    ----------
-    scenario : Scenario
-    settings : ConvertSettings
-    depends : Dependence
-        On the vehicles under test.
-    enriched : collection of str
-        Who got offsets.
-    pulled : mapping of str to str
-        Trailer -> its tractor: it goes with it.
-    sampled : collection of str
-        Whose maneuvers the target does not know, so that only a trajectory is left.
+    `depends`: on the vehicles under test; `enriched`: who got offsets; `pulled`: trailer -> its tractor: it goes with
+    it; `sampled`: whose maneuvers the target does not know, so that only a trajectory is left.
     """
     if settings.mode is OutputMode.LANE_OFFSET:
         return WritingPlan(frozenset(), frozenset(enriched), is_replay=False)

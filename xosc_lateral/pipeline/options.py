@@ -30,20 +30,13 @@ Cell = Callable[[str, Path], Any]
 class Option:
     """How users say a setting.
 
-    Parameters
-    ----------
-    read : callable
-        What they say in Python, a word of the command line or a cell of a table -> the field's value, or `ValueError`.
-    flags : tuple of str
-        On the command line; empty: its name.
-    kind : object
-        Type of the command line's value; None: several verbs share the option, and `cli.words` has it.
-    words : mapping
-        What else the command line says of it (help, limits).
-    cell : callable or None
-        Reads the column of its name; None: a table has no such column.
-    prefix, entry : str, callable
-        Of columns that hold one entry each of a mapping.
+    - `read`: what they say in Python, a word of the command line or a cell of a table -> the field's value, or
+      `ValueError`
+    - `flags`: on the command line; empty: its name
+    - `kind`: type of the command line's value; None: several verbs share the option, and `cli.words` has it
+    - `words`: what else the command line says of it (help, limits)
+    - `cell`: reads the column of its name; None: a table has no such column
+    - `prefix`, `entry`: of columns that hold one entry each of a mapping
     """
 
     read: Callable[[Any], Any]

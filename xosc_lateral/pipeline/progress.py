@@ -35,25 +35,15 @@ class Display(StrEnum):
 class Summary:
     """How a batch went.
 
-    Parameters
-    ----------
-    total, written, up_to_date, failed : int
-        Jobs.
-    anew, kept : mapping of str to int
-        Why outputs that were there were made anew, or are no longer what a conversion would write but were to be kept
-        -> how many.
-    stale : int
-        Of the failed ones: those whose output of a former run is kept.
-    seconds : float
-        From start to end. [s]
-    failures : list of (str, str)
-        Output and error.
-    with_warnings : int
-        Outputs with at least one.
-    cut_off : list of str
-        Outputs of runs that the time limit cut off.
-    nobody_enriched : mapping of str to int
-        Why no entity of an output got offsets -> how many outputs.
+    - `total`, `written`, `up_to_date`, `failed`: jobs
+    - `anew`, `kept`: why outputs that were there were made anew, or are no longer what a conversion would write but
+      were to be kept -> how many
+    - `seconds`: from start to end. [s]
+    - `stale`: of the failed ones: those whose output of a former run is kept
+    - `failures`: output and error
+    - `with_warnings`: outputs with at least one
+    - `cut_off`: outputs of runs that the time limit cut off
+    - `nobody_enriched`: why no entity of an output got offsets -> how many outputs
     """
 
     total: int
@@ -146,15 +136,7 @@ def follow(
 ) -> Summary:
     """Run a batch to its end and show how it goes.
 
-    Parameters
-    ----------
-    outcomes : iterable of JobOutcome
-        From `convert_many`.
-    total : int
-        How many there will be.
-    display : Display
-    stream : text stream, optional
-        Default: standard error.
+    `outcomes`: from `convert_many`; `total`: how many there will be; `stream`: default: standard error.
     """
     stream = stream or sys.stderr
     summary = Summary(total)

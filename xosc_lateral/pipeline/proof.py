@@ -39,18 +39,11 @@ LEAST = 0.02
 class Proof:
     """A shift by one effect, measured between two conversions of a scenario with the same seeds.
 
-    Parameters
-    ----------
-    columns : tuple of str
-        What the effect goes by.
-    scenario : str
-        The template.
-    vehicle : str
-        Who shows it most.
-    start, end : float
-        Of the stretch: from its first to its last moment with half of the largest shift or more. [s]
-    shift, error : float
-        Mean over the stretch and over seeds, positive left, and its standard error over seeds. [m]
+    - `columns`: what the effect goes by
+    - `scenario`: the template
+    - `vehicle`: who shows it most
+    - `start`, `end`: of the stretch: from its first to its last moment with half of the largest shift or more. [s]
+    - `shift`, `error`: mean over the stretch and over seeds, positive left, and its standard error over seeds. [m]
     """
 
     columns: tuple[str, ...]

@@ -85,12 +85,8 @@ class Reconstructed:
 def reconstruct_recording(traffic: RecordedTraffic, settings: ReconstructSettings) -> Reconstructed:
     """Choose vehicles, plan their maneuvers, write the scenario in memory and play it.
 
-    Raises
-    ------
-    FormatError
-        A vehicle that is not in the recording, a window without time.
-    NotEnoughDataError
-        If no vehicle is left.
+    Raises `FormatError`: a vehicle that is not in the recording, a window without time; `NotEnoughDataError`: if no
+    vehicle is left.
     """
     tracks, begin, end = chosen(traffic, settings)
     recording = place_tracks(tracks, traffic.network, begin, end)
@@ -180,10 +176,7 @@ def version_named(text: str) -> Version:
 def chosen(traffic: RecordedTraffic, settings: ReconstructSettings) -> tuple[list[Track], float, float]:
     """Tracks and window of time [s] that the settings ask for.
 
-    Raises
-    ------
-    FormatError
-        A vehicle that is not in the recording, a window without time.
+    Raises `FormatError`: a vehicle that is not in the recording, a window without time.
     """
     by_name = {track.name: track for track in traffic.tracks}
     source = traffic.sources[0]

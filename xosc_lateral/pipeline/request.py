@@ -86,22 +86,13 @@ _GLOB_CHARACTERS = frozenset("*?[")
 class Request:
     """One scenario to convert.
 
-    Parameters
-    ----------
-    scenario : Path
-        A scenario, or a parameter value distribution that stands for several.
-    settings : ConvertSettings
-    variants : int
-        Outputs per scenario, each with offsets of its own.
-    base : Path or None
-        Folder whose layout below the output tree mirrors; None: the scenario's own.
-    listed : bool
-        Named one by one. What was merely found in a folder is left out if it is a catalog or was
-        converted already.
-    label : str
-        Tells outputs of this scenario with these settings from its others: part of their names.
-    name : str
-        In place of the scenario's name and the label.
+    - `scenario`: a scenario, or a parameter value distribution that stands for several
+    - `variants`: outputs per scenario, each with offsets of its own
+    - `base`: folder whose layout below the output tree mirrors; None: the scenario's own
+    - `listed`: named one by one. What was merely found in a folder is left out if it is a catalog or was converted
+      already
+    - `label`: tells outputs of this scenario with these settings from its others: part of their names
+    - `name`: in place of the scenario's name and the label
     """
 
     scenario: Path
@@ -154,21 +145,10 @@ def find_requests(
 ) -> Iterator[Request]:
     """Scenarios that files, folders, globs and tables name.
 
-    Parameters
-    ----------
-    inputs : sequence of str or Path
-        A ``.xosc`` file, a folder (searched to the bottom), a glob (``db/**/cut*.xosc``) or a table
-        (CSV, Parquet; see `read_request_table`).
-    settings : ConvertSettings
-        For all of them; a table's columns go before it.
-    variants : int
-    leave_out : Path, optional
-        Folder that is not searched: the output's.
-
-    Raises
-    ------
-    FormatError
-        An input that is not there, a glob that matches nothing, a table that can't be read.
+    `inputs`: a ``.xosc`` file, a folder (searched to the bottom), a glob (``db/**/cut*.xosc``) or a table (CSV,
+    Parquet; see `read_request_table`); `settings`: for all of them; a table's columns go before it; `leave_out`: folder
+    that is not searched: the output's. Raises `FormatError`: an input that is not there, a glob that matches nothing, a
+    table that can't be read.
     """
     for given in inputs:
         path = Path(given)
@@ -196,10 +176,7 @@ def read_request_table(path: Path, settings: ConvertSettings, *, variants: int =
     separated by semicolons (ego ``none``: there is none), ``parameter:NAME``, ``parameters`` as a JSON object, and so
     on; ``user:NAME`` is for the user. An empty cell leaves what `settings` says.
 
-    Raises
-    ------
-    FormatError
-        With the line of the table (the header is line 1).
+    Raises `FormatError`: with the line of the table (the header is line 1).
     """
     yield from _table_requests(read_text_table(path), settings, variants, path.parent, path)
 

@@ -192,14 +192,8 @@ class ConvertSettings:
     def of(cls, **options: Unpack[ConvertOptions]) -> ConvertSettings:
         """Settings from what a user says, else as configured; None: nothing is said.
 
-        Raises
-        ------
-        TypeError
-            There is no such option.
-        ValueError
-            It can't have that value.
-        FormatError
-            It is the configuration that says so; there is no such road, or folder of roads.
+        Raises `TypeError`: there is no such option; `ValueError`: it can't have that value; `FormatError`: it is the
+        configuration that says so; there is no such road, or folder of roads.
         """
         unknown = options.keys() - OPTIONS.keys()
         if unknown:

@@ -15,11 +15,11 @@ from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.hashes import file_hash
 from xosc_lateral.formats.openscenario.provenance import CONTENT, content_hash, facts_in, without_provenance
 from xosc_lateral.formats.output_paths import path_below
-from xosc_lateral.formats.profiles import profile_hash
+from xosc_lateral.formats.profiles import profile_hash, read_profile
 from xosc_lateral.formats.source import check_regular
 from xosc_lateral.pipeline.batch import convert_many
 from xosc_lateral.pipeline.convert import convert_scenario
-from xosc_lateral.pipeline.drivers import AUTO_PROFILE, load_profile
+from xosc_lateral.pipeline.drivers import AUTO_PROFILE
 from xosc_lateral.pipeline.jobs import Batch, Job, fingerprint
 from xosc_lateral.pipeline.manifest import MANIFEST, ManifestRow, read_manifest
 from xosc_lateral.pipeline.settings import AUTO, ConvertSettings
@@ -43,11 +43,7 @@ class Problem(StrEnum):
 class Checked:
     """An output, and what is wrong with it.
 
-    Parameters
-    ----------
-    output : Path
-    problems : tuple of (Problem, str)
-        Empty: nothing.
+    `problems`: empty: nothing.
     """
 
     output: Path
@@ -90,10 +86,7 @@ class _Origin:
 def verify(outputs: Sequence[Path], search: ConvertSettings) -> Iterator[Checked]:
     """Check outputs one by one: files, and folders by their manifests, which may be named as well.
 
-    Raises
-    ------
-    FormatError
-        There is no such file, or no manifest in a folder.
+    Raises `FormatError`: there is no such file, or no manifest in a folder.
     """
     for given in outputs:
         given = given.parent if given.name == MANIFEST else given
@@ -149,7 +142,7 @@ def _other_profile(settings: ConvertSettings, entity: str, recorded: Any) -> str
     """Why an entity would get another profile today."""
     named = settings.entity.get(entity, settings.profile)
     try:
-        found = load_profile(AUTO_PROFILE if named == AUTO else str(named), settings.library)
+        found = read_profile(AUTO_PROFILE if named == AUTO else str(named), settings.library)
     except (XoscLateralError, OSError) as error:
         return f"profile of {entity!r}: {error}"
     same = isinstance(recorded, list) and recorded[1:] == [profile_hash(found)]
@@ -159,20 +152,9 @@ def _other_profile(settings: ConvertSettings, entity: str, recorded: Any) -> str
 def reproduce(output: Path, new: Path, search: ConvertSettings, *, workers: int = 1) -> Iterator[Checked]:
     """Make an output, or all of a folder's manifest, again from the provenance, and compare.
 
-    Parameters
-    ----------
-    output : Path
-    new : Path
-        File or folder to write to.
-    search : ConvertSettings
-        Where profiles, roads and catalogs are looked for.
-    workers : int
-        Processes, for a folder.
-
-    Raises
-    ------
-    XoscLateralError
-        An output has no provenance; what it was made from can't be converted.
+    `new`: file or folder to write to; `search`: where profiles, roads and catalogs are looked for; `workers`:
+    processes, for a folder. Raises `XoscLateralError`: an output has no provenance; what it was made from can't be
+    converted.
     """
     if not output.is_dir():
         origin = _Origin.of(output, output.read_bytes(), search)

@@ -235,12 +235,7 @@ def installed_version() -> str:
 def open_pool(workers: int, cluster: str | None) -> Pool:
     """Pool for so many processes on this machine (-1: one per core; 0: this process), or for a cluster.
 
-    Raises
-    ------
-    ClusterError
-        The cluster can't be reached.
-    ValueError
-        Fewer than none.
+    Raises `ClusterError`: the cluster can't be reached; `ValueError`: fewer than none.
     """
     if cluster is not None:
         return _Cluster(cluster)

@@ -21,11 +21,7 @@ def drive(state: EntityState, distance: float) -> None:
     The way along the reference line follows from the curvature at the START of the step (explicit Euler, as the
     reference player does it). Without a road there is no lane to follow: the entity stops.
 
-    Parameters
-    ----------
-    state : EntityState
-    distance : float
-        Way on the entity's own track; negative: backwards. [m]
+    `distance`: way on the entity's own track; negative: backwards. [m]
     """
     state.follow_lane()
     if state.road == NOWHERE:
@@ -39,12 +35,7 @@ def drive(state: EntityState, distance: float) -> None:
 def halt_at_road_end(state: EntityState, step: float) -> None:
     """Who has not moved at a road's end in the frame before stops, whoever drives it.
 
-    Parameters
-    ----------
-    state : EntityState
-        After it was moved in this frame.
-    step : float
-        [s]
+    `state`: after it was moved in this frame; `step`: [s]
     """
     if state.free_pose is not None:
         state.last_place, state.stuck = None, False

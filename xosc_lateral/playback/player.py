@@ -46,27 +46,12 @@ def play(
 ) -> NominalMotion:
     """Play a scenario to its stop trigger, or to the time limit.
 
-    Parameters
-    ----------
-    scenario : Scenario
-    network : RoadNetwork
-        Its roads; one without roads where the scenario has none.
-    step : float
-        Length of a frame. [s]
-    time_limit : float or None
-        Where runs end that don't stop before; None: `TIME_LIMIT`, or `LONGEST` with a stop trigger that can hold. [s]
+    `network`: its roads; one without roads where the scenario has none; `step`: length of a frame. [s]; `time_limit`:
+    where runs end that don't stop before; None: `TIME_LIMIT`, or `LONGEST` with a stop trigger that can hold. [s]
+    What was not played, or not as written, is in the notes of the motion.
 
-    Returns
-    -------
-    NominalMotion
-        What was not played, or not as written, is in its notes.
-
-    Raises
-    ------
-    PlaybackError
-        If the scenario makes no sense on these roads (a lane or road that is not there).
-    UnsupportedElementError
-        If it needs something that can't be played and that motion depends on.
+    Raises `PlaybackError`: if the scenario makes no sense on these roads (a lane or road that is not there);
+    `UnsupportedElementError`: if it needs something that can't be played and that motion depends on.
     """
     if time_limit is None:
         time_limit = LONGEST if _has_end(scenario) else TIME_LIMIT

@@ -104,13 +104,7 @@ class TrafficSignals:
 
 
 class Simulation:
-    """All that one play-out of a scenario knows.
-
-    Parameters
-    ----------
-    scenario : Scenario
-    network : RoadNetwork
-    """
+    """All that one play-out of a scenario knows."""
 
     def __init__(self, scenario: Scenario, network: RoadNetwork) -> None:
         self.scenario = scenario

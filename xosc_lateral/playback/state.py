@@ -22,19 +22,11 @@ NOWHERE = -1
 class Placement:
     """A place and an orientation, in road coordinates and, where it was not given in them, in world coordinates too.
 
-    Parameters
-    ----------
-    road : int
-        Index of the road; -1 where there is none.
-    lane : int
-    s : float
-        [m]
-    offset_t : float
-        From the lane's centre along the road's t-axis. [m]
-    relative_heading : float
-        Relative to the road's s-direction (slope of the lane included). [rad]
-    pose : Pose or None
-        World pose; None: it follows from the road coordinates. NaN in z, pitch, roll: those of the road.
+    - `road`: index of the road; -1 where there is none
+    - `s`: [m]
+    - `offset_t`: from the lane's centre along the road's t-axis. [m]
+    - `relative_heading`: relative to the road's s-direction (slope of the lane included). [rad]
+    - `pose`: world pose; None: it follows from the road coordinates. NaN in z, pitch, roll: those of the road
     """
 
     road: int
@@ -47,13 +39,7 @@ class Placement:
 
 @dataclass(frozen=True, slots=True)
 class RouteGuide:
-    """A way over roads. It decides at junctions only; between them, the lane is followed.
-
-    Parameters
-    ----------
-    network : RoadNetwork
-    steps : tuple of RouteStep
-    """
+    """A way over roads. It decides at junctions only; between them, the lane is followed."""
 
     network: RoadNetwork
     steps: tuple[RouteStep, ...]

@@ -68,15 +68,8 @@ class Behaviour(Protocol):
 class StoryboardElement:
     """One element of the tree.
 
-    Parameters
-    ----------
-    name : str
-    kind : StoryboardElementType or None
-        None for the storyboard.
-    children : sequence of StoryboardElement
-    start_trigger, stop_trigger : RunningTrigger or None
-    maximum_count : int or None
-        How often it may run; None for elements that run once and cannot be run again by themselves.
+    `kind`: none for the storyboard; `maximum_count`: how often it may run; None for elements that run once and cannot
+    be run again by themselves.
     """
 
     __slots__ = (

@@ -24,13 +24,8 @@ _PEAK_SLOPE = {DynamicsShape.LINEAR: 1.0, DynamicsShape.CUBIC: 1.5, DynamicsShap
 class Transition:
     """A transition under way.
 
-    Parameters
-    ----------
-    shape : DynamicsShape
-    dimension : DynamicsDimension
-        What the parameter is: seconds (`time`, `rate`) or metres (`distance`).
-    value : float
-        Range of the parameter (a step has none), or peak slope for `rate` (its sign does not matter).
+    `dimension`: what the parameter is: seconds (`time`, `rate`) or metres (`distance`); `value`: range of the parameter
+    (a step has none), or peak slope for `rate` (its sign does not matter).
     """
 
     __slots__ = ("dimension", "parameter", "peak_rate", "range", "scale", "shape", "start", "target")

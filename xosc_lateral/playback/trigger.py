@@ -19,15 +19,8 @@ Check = Callable[[], bool]
 class RunningCondition:
     """One condition: its present value, edge-filtered and delayed.
 
-    Parameters
-    ----------
-    check : callable
-        The bare condition, at the present moment.
-    edge : ConditionEdge
-    delay : float
-        [s]
-    forget : callable, optional
-        Makes the bare condition forget what happened before its owner waits again.
+    `check`: the bare condition, at the present moment; `delay`: [s]; `forget`: makes the bare condition forget what
+    happened before its owner waits again.
     """
 
     __slots__ = ("_armed", "_edge", "_forget", "_history", "_last", "_read", "_time", "_value", "check", "delay")
@@ -95,11 +88,7 @@ class RunningCondition:
 class RunningTrigger:
     """A trigger.
 
-    Parameters
-    ----------
-    groups : tuple of tuple of RunningCondition
-    when_empty : bool
-        Value of a trigger without groups: true for start, false for stop triggers.
+    `when_empty`: value of a trigger without groups: true for start, false for stop triggers.
     """
 
     __slots__ = ("groups", "when_empty")

@@ -28,12 +28,7 @@ _ACTIVE = int(Activity.ACTIVE)
 
 
 class Unwatched:
-    """Who moves frame by frame, and who is ahead of the run.
-
-    Parameters
-    ----------
-    entities : iterable of EntityState
-    """
+    """Who moves frame by frame, and who is ahead of the run."""
 
     def __init__(self, entities: Iterable[EntityState]) -> None:
         self.awake = {state: Rows(state) for state in entities}

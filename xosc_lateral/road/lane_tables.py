@@ -52,9 +52,9 @@ class LaneTables:
         ids = [lane.id for lane in self.lanes]
         self._lowest = min(ids, default=0)  # a file may hold no road at all
         self._slots = max(ids, default=0) - self._lowest + 1
-        self._row_of = np.full(len(sections) * self._slots, -1, dtype=np.int32)
+        self._row_of = np.full(len(sections) * self._slots, -1, dtype=np.intp)
         row = 0
-        self.section_first = np.empty(len(sections), dtype=np.int32)
+        self.section_first = np.empty(len(sections), dtype=np.intp)
         self.section_count = np.array([len(section.lanes) for section in sections], dtype=np.int32)
         for i, section in enumerate(sections):
             self.section_first[i] = row
@@ -99,7 +99,7 @@ class LaneTables:
         """Centre, slope and width of rows of the lane table. Shape as `s`; [m], [-], [m]."""
         piece = self._lane_lookup.find(row, s)
         ds = s - self._lane_lookup.starts[piece]
-        a, b, c, d, e, f, g, h = (values[piece] for values in self._lane_table)
+        a, b, c, d, e, f, g, h = (values.take(piece) for values in self._lane_table)
         return LaneProfile(
             row,
             a + ds * (b + ds * (c + ds * d)),
@@ -200,13 +200,12 @@ class LaneTables:
         outputs: int,
         road: ArrayLike,
         s: ArrayLike,
-        *,
+        *across: ArrayLike,
         lane: ArrayLike | None = None,
-        offset: ArrayLike | None = None,
     ) -> tuple[FloatArray, ...]:
         """Broadcast, cut into chunks, evaluate, put together; a road or lane that is one for all stays a plain int."""
         extra = [] if lane is None else [np.asarray(lane)]
-        numbers = [np.asarray(s, dtype=np.float64)] + ([] if offset is None else [np.asarray(offset, dtype=np.float64)])
+        numbers = [np.asarray(a, dtype=np.float64) for a in (s, *across)]
         shape = np.broadcast_shapes(np.shape(road), *(a.shape for a in (*extra, *numbers)))
         flat = [np.broadcast_to(a, shape).ravel() for a in numbers]
         road_ = _one_or_many(road, shape)
@@ -241,4 +240,4 @@ def _one_or_many(index: ArrayLike, shape: tuple[int, ...]) -> IndexLike:
     array = np.asarray(index)
     if array.ndim == 0 or (array.size and (array == array.flat[0]).all()):
         return int(array.flat[0])
-    return np.asarray(np.broadcast_to(array, shape).ravel(), dtype=np.int32)
+    return np.asarray(np.broadcast_to(array, shape).ravel(), dtype=np.intp)

@@ -131,6 +131,12 @@ class RoadNetwork:
         """
         return self._tables.lane_to_world(road, lane, s, offset)
 
+    def lane_points(
+        self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, *offsets: ArrayLike
+    ) -> list[tuple[FloatArray, ...]]:
+        """x, y, z as of `lane_to_world`, for each of several offsets at the same `s`. [m]"""
+        return self._tables.lane_points(road, lane, s, *offsets)
+
     def road_to_world(self, road: ArrayLike, s: ArrayLike, t: ArrayLike = 0.0) -> Poses:
         """World poses; heading along the reference line (+s)."""
         return self._tables.road_to_world(road, s, t)

@@ -12,8 +12,9 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 from msgspec import Struct
+from numpy.typing import NDArray
 
-from xosc_lateral.road.positions import FloatArray, IntArray
+from xosc_lateral.road.positions import FloatArray
 
 Cubic = tuple[float, float, float, float]
 """a, b, c, d of a + b ds + c ds^2 + d ds^3."""
@@ -99,7 +100,8 @@ class PiecewiseCubic(Struct, frozen=True):
         return PiecewiseCubic(starts, tuple(cubics))
 
 
-IndexLike = int | IntArray
+IndexLike = int | NDArray[np.integer]
+"""What arrays are gathered by is best of the platform's own kind (`intp`): others are copied into it each time."""
 
 
 class Lookup:
@@ -119,8 +121,8 @@ class Lookup:
         counts = np.array([len(owner) for owner in starts], dtype=np.int64)
         self.starts: FloatArray = np.array([s for owner in starts for s in owner], dtype=np.float64)
         last = np.cumsum(counts)
-        self.first = (last - counts).astype(np.int32)
-        self._last = (last - 1).astype(np.int32)
+        self.first = last - counts
+        self._last = last - 1
         self._single = bool((counts == 1).all())
         begin, end = self.starts[self.first], self.starts[self._last]
         base = np.concatenate([[0.0], np.cumsum(end - begin + 2.0)[:-1]])
@@ -138,18 +140,18 @@ class Lookup:
             if first == last:
                 return first
             found = np.searchsorted(self.starts[first + 1 : last + 1], s, side="right")
-            return np.asarray(found + first, dtype=np.int32)
+            return np.asarray(found + first)
         return self._of_many(owner, s)
 
-    def _of_many(self, owner: IntArray, s: FloatArray) -> IntArray:
+    def _of_many(self, owner: NDArray[np.integer], s: FloatArray) -> NDArray[np.intp]:
         """The same for an owner per point, shape of both."""
         # s beyond an owner's ends must not reach its neighbours on the axis
         key = np.minimum(np.maximum(s, self._begin[owner]), self._reach[owner]) + self._shift[owner]
-        piece = np.searchsorted(self._keys, key, side="right").astype(np.int32) - 1
+        piece = np.searchsorted(self._keys, key, side="right") - 1
         first_, last_ = self.first[owner], self._last[owner]
         piece = np.minimum(np.maximum(piece, first_), last_)
         while (down := (s < self.starts[piece]) & (piece > first_)).any():
             piece -= down
         while (up := (s >= self.starts[np.minimum(piece + 1, last_)]) & (piece < last_)).any():
             piece += up
-        return np.asarray(piece, dtype=np.int32)
+        return np.asarray(piece)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.road.geometry import SERIES_TERMS, ClothoidPiece, ParamCubic
 from xosc_lateral.road.piecewise import IndexLike, Lookup
-from xosc_lateral.road.positions import FloatArray, IntArray
+from xosc_lateral.road.positions import FloatArray
 from xosc_lateral.road.road import Road
 
 
@@ -64,7 +64,7 @@ class ReferenceLines:
         self._lookup = Lookup(starts)
         self._origin = np.array(origins)
         self._is_cubic = np.array(kinds)
-        self._row = np.array(rows, dtype=np.int32)
+        self._row = np.array(rows, dtype=np.intp)
         self._any_cubic, self._all_cubic = bool(self._is_cubic.any()), bool(self._is_cubic.all())
         self._clothoid = np.array([(p.heading, p.curvature, p.sharpness) for p in clothoids]).reshape(-1, 3).T.copy()
         self._x_series = np.array([p.x_series for p in clothoids]).reshape(-1, SERIES_TERMS + 1).T.copy()
@@ -91,7 +91,7 @@ class ReferenceLines:
             return (self._cubic_frame if count else self._clothoid_frame)(row, ds, derivatives)
         return self._mixed(row, ds, is_cubic, derivatives)
 
-    def _mixed(self, row: IntArray, ds: FloatArray, is_cubic: NDArray[np.bool_], derivatives: bool) -> Frame:
+    def _mixed(self, row: NDArray[np.intp], ds: FloatArray, is_cubic: NDArray[np.bool_], derivatives: bool) -> Frame:
         """Rows of either kind, evaluated apart."""
         frame = Frame(*(np.empty(len(ds)) for _ in Frame._fields))
         for evaluate, where in (
@@ -103,16 +103,16 @@ class ReferenceLines:
                     whole[where] = part
         return frame
 
-    def _clothoid_frame(self, row: IntArray, ds: FloatArray, derivatives: bool) -> Frame:
-        heading, curvature, sharpness = (values[row] for values in self._clothoid)
+    def _clothoid_frame(self, row: NDArray[np.intp], ds: FloatArray, derivatives: bool) -> Frame:
+        heading, curvature, sharpness = (values.take(row) for values in self._clothoid)
         turned = heading + ds * (curvature + (0.5 * ds) * sharpness)
         x, y = (_polynomial(series[: self._powers + 1], row, ds) for series in (self._x_series, self._y_series))
         if not derivatives:
             return Frame(x, y, np.cos(turned), np.sin(turned), turned, _NONE, _NONE)
         return Frame(x, y, np.cos(turned), np.sin(turned), turned, curvature + ds * sharpness, np.ones_like(ds))
 
-    def _cubic_frame(self, row: IntArray, ds: FloatArray, derivatives: bool) -> Frame:
-        p0, p1, p2, p3, x0, x1, x2, x3, y0, y1, y2, y3 = (values[row] for values in self._cubic)
+    def _cubic_frame(self, row: NDArray[np.intp], ds: FloatArray, derivatives: bool) -> Frame:
+        p0, p1, p2, p3, x0, x1, x2, x3, y0, y1, y2, y3 = (values.take(row) for values in self._cubic)
         p = p0 + ds * (p1 + ds * (p2 + ds * p3))
         dx = x1 + p * (2.0 * x2 + (3.0 * p) * x3)
         dy = y1 + p * (2.0 * y2 + (3.0 * p) * y3)
@@ -132,9 +132,10 @@ class ReferenceLines:
 _NONE: NDArray[np.float64] = np.empty(0)
 
 
-def _polynomial(coefficients: FloatArray, row: IntArray, at: FloatArray) -> FloatArray:
+def _polynomial(coefficients: FloatArray, row: NDArray[np.intp], at: FloatArray) -> FloatArray:
     """Horner, lowest power first."""
-    value = coefficients[-1][row]
+    value = coefficients[-1].take(row)
     for series in coefficients[-2::-1]:
-        value = value * at + series[row]
+        value *= at
+        value += series.take(row)
     return np.asarray(np.broadcast_to(value, at.shape))

@@ -38,7 +38,7 @@ class Cubics:
         """Values and derivatives. Shape as `s`. [m]"""
         piece = self._lookup.find(owner, s)
         ds = s - self._lookup.starts[piece]
-        a, b, c, d = (values[piece] for values in self._table)
+        a, b, c, d = (values.take(piece) for values in self._table)
         return a + ds * (b + ds * (c + ds * d)), b + ds * (2.0 * c + (3.0 * ds) * d)
 
 
@@ -58,7 +58,7 @@ class HeightTable:
         """Height `from_centre` (along t) of lanes of this width and id, linear across the lane. Shape as `s`. [m]"""
         piece = self._lookup.find(row, s)
         ds = np.maximum(s - self._lookup.starts[piece], 0.0)
-        inner, inner_slope, outer, outer_slope = (values[piece] for values in self._table)
+        inner, inner_slope, outer, outer_slope = (values.take(piece) for values in self._table)
         low, high = inner + ds * inner_slope, outer + ds * outer_slope
         # a lane of no width has no inside: its inner edge counts
         narrow = width <= 0.0
@@ -74,6 +74,10 @@ def _linear_pieces(records: Sequence[tuple[float, float, float]]) -> list[tuple[
         length = end - s if end > s else np.inf
         pieces.append((inner, (inner_end - inner) / length, outer, (outer_end - outer) / length))
     return pieces
+
+
+_Lie = tuple[FloatArray, FloatArray, FloatArray, FloatArray | None, FloatArray | None, FloatArray | None]
+"""Height, pitch, roll of a surface, and shrinking, drift and lead, which are None where nothing leans."""
 
 
 class NetworkTables(LaneTables):
@@ -100,7 +104,25 @@ class NetworkTables(LaneTables):
             t = profile.centre + profile.direction * offset
             return self._pose(road, s, t, profile)
 
-        return Poses(*self._batch(evaluate, 6, road, s, lane=lane, offset=offset))
+        return Poses(*self._batch(evaluate, 6, road, s, offset, lane=lane))
+
+    def lane_points(
+        self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, *offsets: ArrayLike
+    ) -> list[tuple[FloatArray, ...]]:
+        """Points x, y, z at each of several offsets from lane centres, at the same s. [m] Shape as the arguments."""
+
+        def evaluate(road: IndexLike, s: FloatArray, lane: IndexLike, *offsets: FloatArray) -> tuple[FloatArray, ...]:
+            s = self._clamped(road, s)
+            profile = self.profile_of(self.row_of(road, lane, s), s)
+            frame, rising = self.lines.at(road, s), self._elevation.at(road, s)
+            found: tuple[FloatArray, ...] = ()
+            for offset in offsets:
+                t = profile.centre + profile.direction * offset
+                found += self._point(frame, self._surface(road, s, t, rising, angles=False), s, t, profile)
+            return found
+
+        found = self._batch(evaluate, 3 * len(offsets), road, s, *offsets, lane=lane)
+        return [found[k : k + 3] for k in range(0, len(found), 3)]
 
     def road_to_world(self, road: ArrayLike, s: ArrayLike, t: ArrayLike) -> Poses:
         """Poses along reference lines."""
@@ -108,7 +130,7 @@ class NetworkTables(LaneTables):
         def evaluate(road: IndexLike, s: FloatArray, offset: FloatArray) -> tuple[FloatArray, ...]:
             return self._pose(road, self._clamped(road, s), offset, None)
 
-        return Poses(*self._batch(evaluate, 6, road, s, offset=t))
+        return Poses(*self._batch(evaluate, 6, road, s, t))
 
     def _clamped(self, road: IndexLike, s: FloatArray) -> FloatArray:
         return np.asarray(np.minimum(np.maximum(s, 0.0), self.lengths[road]))
@@ -117,42 +139,61 @@ class NetworkTables(LaneTables):
         self, road: IndexLike, s: FloatArray, t: FloatArray, profile: LaneProfile | None
     ) -> tuple[FloatArray, ...]:
         frame = self.lines.at(road, s)
-        z, pitch, roll, shrink, drift, lead = self._surface(road, s, t)
+        surface = self._surface(road, s, t, self._elevation.at(road, s))
+        _, pitch, roll, _, drift, _ = surface
         heading = frame.heading if drift is None else frame.heading + np.arctan(drift)
+        if profile is not None:
+            heading, pitch, roll = _along_lane(profile, heading, pitch, roll)
+        # into [-pi, pi]
+        heading = heading - (2.0 * np.pi) * np.rint(heading / (2.0 * np.pi))
+        return *self._point(frame, surface, s, t, profile), heading, pitch, roll
+
+    def _point(
+        self, frame: Frame, surface: _Lie, s: FloatArray, t: FloatArray, profile: LaneProfile | None
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """x, y, z of `_pose`."""
+        z, _, _, shrink, _, lead = surface
         sideways = t if shrink is None else t * shrink
         x, y = frame.x - sideways * frame.sin, frame.y + sideways * frame.cos
         if lead is not None:
             x, y = x + lead * frame.cos, y + lead * frame.sin
-        if profile is not None:
-            heading, pitch, roll = _along_lane(profile, heading, pitch, roll)
-            if self._heights.any:
-                z = z + self._heights.at(profile.row, s, t - profile.centre, profile.width, self.ids[profile.row])
-        # into [-pi, pi]
-        heading = heading - (2.0 * np.pi) * np.rint(heading / (2.0 * np.pi))
-        return x, y, z, heading, pitch, roll
+        if profile is not None and self._heights.any:
+            z = z + self._heights.at(profile.row, s, t - profile.centre, profile.width, self.ids[profile.row])
+        return x, y, z
 
     def _surface(
-        self, road: IndexLike, s: FloatArray, t: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray | None, FloatArray | None, FloatArray | None]:
-        """What `Surface.at` answers; no shrinking, drift and lead where nothing leans."""
+        self,
+        road: IndexLike,
+        s: FloatArray,
+        t: FloatArray,
+        rising: tuple[FloatArray, FloatArray],
+        *,
+        angles: bool = True,
+    ) -> _Lie:
+        """What `Surface.at` answers, by the elevation there and its slope.
+
+        Without `angles` no more than height, shrinking and lead.
+        """
         nothing = np.zeros(len(s))
         if self._flat:
             return nothing, nothing, nothing, None, None, None
-        height, grade = self._elevation.at(road, s)
+        height, grade = rising
         if self._level:
-            return height, -np.arctan(grade), nothing, None, None, None
+            return height, -np.arctan(grade) if angles else nothing, nothing, None, None, None
         angle, twist = self._superelevation.at(road, s)
         shrink, rise = np.cos(angle), np.sin(angle)
         level = 1.0 / np.sqrt(1.0 + grade * grade)
         steep = grade * level
+        lead = -t * rise * steep
+        height = height + t * rise * level
+        lift, lift_along, lean = self._shaped(road, s, t)
+        if not angles:
+            return height + lift, nothing, nothing, shrink, None, lead
         ahead, behind = (self._elevation.at(road, s + ds)[1] for ds in (BEND_STEP, -BEND_STEP))
         bend = (ahead - behind) / (2.0 * BEND_STEP) * level * level
-        lead = -t * rise * steep
         onward = 1.0 - t * (shrink * twist * steep + rise * level * bend)
-        height = height + t * rise * level
         climb = grade + t * (shrink * twist * level - rise * steep * bend)
         drift = -t * rise * twist / onward
-        lift, lift_along, lean = self._shaped(road, s, t)
         height, climb, angle = height + lift, (climb + lift_along) / onward, angle + np.arctan(lean)
         pitch = -np.arctan(climb / np.sqrt(1.0 + drift * drift))
         leaning = np.clip(np.sin(angle) * np.cos(np.arctan(grade)) / np.cos(pitch), -1.0, 1.0)
@@ -175,7 +216,7 @@ class NetworkTables(LaneTables):
 
     def height(self, road: IndexLike, s: FloatArray, t: FloatArray) -> FloatArray:
         """Height of the road surface, without kerbs. [m] Shape as `s`."""
-        return self._surface(road, s, t)[0]
+        return self._surface(road, s, t, self._elevation.at(road, s), angles=False)[0]
 
     def _shaped(self, road: IndexLike, s: FloatArray, t: FloatArray) -> FloatArray:
         """Crossfall and shape are rare: place by place."""
@@ -207,7 +248,7 @@ class NetworkTables(LaneTables):
         (t t' dk/ds, under 1e-6 1/m on roads) does not.
         """
 
-        return self._batch(self._curvature_beside, 1, road, s, lane=lane, offset=offset)[0]
+        return self._batch(self._curvature_beside, 1, road, s, offset, lane=lane)[0]
 
     def _curvature_beside(
         self, road: IndexLike, s: FloatArray, lane: IndexLike, offset: FloatArray

@@ -30,13 +30,7 @@ class RunningAction:
     `start` is called when the event starts, `step` in every frame from then on (the first time in the same frame), with
     the time at its start and its length, 0 in the very first frame. An action that has done its work calls `end`.
 
-    Parameters
-    ----------
-    source : Action
-        As read.
-    actor : EntityState or None
-        Who acts; None for global and user-defined actions.
-    simulation : Simulation
+    `source`: as read; `actor`: who acts; None for global and user-defined actions.
     """
 
     domains: Domain = Domain.NONE

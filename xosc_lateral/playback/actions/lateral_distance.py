@@ -29,12 +29,7 @@ class BesideOnRoad:
     The spring is for a limited acceleration. Nothing moves in the first frame. The way of a frame on the entity's own
     track is `speed * step`: what goes sideways is missing ahead, but for an entity that moves at once.
 
-    Parameters
-    ----------
-    state, other : EntityState
-    wanted : float
-        To the left of the other entity. [m]
-    limits : DynamicConstraints or None
+    `wanted`: to the left of the other entity. [m]
     """
 
     def __init__(
@@ -155,12 +150,7 @@ class BesideEntity:
     Without a limit of acceleration it is on the line at once. With one, it heads for the line, and turns into it when
     it is nearer than the radius of its turn.
 
-    Parameters
-    ----------
-    state, other : EntityState
-    wanted : float
-        Of the line, to the left of the other entity. [m]
-    limits : DynamicConstraints or None
+    `wanted`: of the line, to the left of the other entity. [m]
     """
 
     def __init__(

@@ -76,10 +76,7 @@ def follow(targets: Sequence[SpeedTarget], acceleration: float, limits: Limits) 
     """Pieces of the profile through `targets`, beginning with the present acceleration, and why the last of them are
     straight lines (empty: they are not). [m/s2]
 
-    Raises
-    ------
-    NoSolutionError
-        When not even the first target can be met so.
+    Raises `NoSolutionError`: when not even the first target can be met so.
     """
     up, down = min(limits.acceleration_rate, _NO_LIMIT), min(limits.deceleration_rate, _NO_LIMIT)
     if len(targets) < 2:

@@ -39,12 +39,7 @@ class TimedClothoid:
 class ClothoidPath:
     """Clothoid pieces one after another.
 
-    Parameters
-    ----------
-    pieces : sequence of TimedClothoid
-        At least one.
-    end_time : float
-        [s]; NaN without times.
+    `pieces`: at least one; `end_time`: [s]; NaN without times.
     """
 
     def __init__(self, pieces: Sequence[TimedClothoid], end_time: float = nan) -> None:

@@ -44,13 +44,8 @@ class Control(Struct, frozen=True):
 class NurbsPath:
     """A NURBS curve of order `order` (degree + 1).
 
-    Parameters
-    ----------
-    controls : sequence of Control
-        At least `order`.
-    knots : sequence of float
-        As many as control points and order together, none smaller than the one before, spanning a curve.
-    order : int
+    `controls`: at least `order`; `knots`: as many as control points and order together, none smaller than the one
+    before, spanning a curve.
     """
 
     def __init__(self, controls: Sequence[Control], knots: Sequence[float], order: int) -> None:

@@ -55,14 +55,8 @@ class Corner(Struct, frozen=True):
 class PolylinePath:
     """A polyline.
 
-    Parameters
-    ----------
-    corners : sequence of Corner
-        At least one.
-    follow : bool
-        Follow mode, else position mode.
-    initial_speed : float
-        With which the entity comes (follow mode needs it). [m/s]
+    `corners`: at least one; `follow`: follow mode, else position mode; `initial_speed`: with which the entity comes
+    (follow mode needs it). [m/s]
     """
 
     def __init__(self, corners: Sequence[Corner], *, follow: bool = False, initial_speed: float = 0.0) -> None:

@@ -31,6 +31,7 @@ from xosc_lateral.driver.models.autoregressive.parts import (
     CoarsePart,
     CoarseState,
     DriverState,
+    Factors,
     FactorState,
     FinePart,
     FineState,
@@ -207,8 +208,9 @@ class AutoregressiveStream:
 
     def __init__(self, model: AutoregressiveModel, state: AutoregressiveState) -> None:
         self.state = state
-        self._coarse = CoarsePart(model, state.driver, state.coarse, state.factors)
-        self._fine = FinePart(model, state.driver, state.fine, state.factors)
+        factors = Factors(model, state.factors)
+        self._coarse = CoarsePart(model, state.driver, state.coarse, factors)
+        self._fine = FinePart(model, state.driver, state.fine, factors)
 
     @property
     def mean(self) -> FloatArray | float:

@@ -212,13 +212,9 @@ class _Part:
 class CoarsePart(_Part):
     """Coarse movement about the driver's mean; its first block belongs to coarse step `TICKS`."""
 
-    def __init__(
-        self, model: AutoregressiveModel, driver: DriverState, state: CoarseState, factors: FactorState
-    ) -> None:
+    def __init__(self, model: AutoregressiveModel, driver: DriverState, state: CoarseState, factors: Factors) -> None:
         self.state: CoarseState = state
-        self._model, self._driver, self._factors = model, driver, Factors(model, factors)
-        if not len(state.held):
-            state.held = self._steps(2 * TICKS + 1)
+        self._model, self._driver, self._factors = model, driver, factors
 
     def _steps(self, n: int) -> FloatArray:
         state, drivers = self.state, len(self._driver.mean)
@@ -229,7 +225,8 @@ class CoarsePart(_Part):
         return series[len(series) - n :]
 
     def _make(self, blocks: int) -> FloatArray:
-        steps = np.concatenate([self.state.held, self._steps(blocks)])
+        before = 0 if len(self.state.held) else 2 * TICKS + 1
+        steps = np.concatenate([self.state.held, self._steps(before + blocks)])
         self.state.held = steps[blocks:]
         return interpolate(steps) * self._driver.coarse
 
@@ -237,15 +234,14 @@ class CoarsePart(_Part):
 class FinePart(_Part):
     """Fine movement; its first value is centred half a kernel after step 0."""
 
-    def __init__(self, model: AutoregressiveModel, driver: DriverState, state: FineState, factors: FactorState) -> None:
+    def __init__(self, model: AutoregressiveModel, driver: DriverState, state: FineState, factors: Factors) -> None:
         self.state: FineState = state
-        self._kernel, self._driver, self._factors = model.kernel, driver, Factors(model, factors)
-        if not len(state.last_factor):
-            state.last_factor = self._factors.take(FINE, 1)
+        self._kernel, self._driver, self._factors = model.kernel, driver, factors
 
     def _volatile_noise(self, blocks: int) -> FloatArray:
         state, drivers = self.state, len(self._driver.mean)
-        factors = np.concatenate([state.last_factor, self._factors.take(FINE, blocks)])
+        before = 0 if len(state.last_factor) else 1
+        factors = np.concatenate([state.last_factor, self._factors.take(FINE, before + blocks)])
         state.last_factor = factors[-1:]
         share = (np.arange(COARSE_EVERY) / COARSE_EVERY)[:, None]
         between = factors[:-1, None] * (1.0 - share) + factors[1:, None] * share

@@ -106,13 +106,13 @@ def vertex_times(time: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
         way[rows] = driven[1:] + np.arange(rows.start, rows.stop) * 1e-12
     if driven[-1] < LEAST_SPACING:
         return time[:1]
-    step = _step(time, way, x, y)
+    step, head = _step(time, way, x, y)
     tail = _tail(time, way, step)
     if _way_at(tail[0], time, way) < 2.0 * VERTEX_SPACING and len(tail) > 1:
         # Slow from end to end: evenly, so that no gap is left over.
         times = np.interp(np.linspace(0.0, way[-1], int(way[-1] / VERTEX_SPACING) + 1), way, time)
     else:
-        head = _head(time, way, tail[0], step)
+        head = _head(time, way, tail[0], step) if len(tail) > 1 else head
         while len(head) > 1 and _way_at(tail[0], time, way) - _way_at(head[-1], time, way) < LEAST_SPACING:
             head = head[:-1]
         times = np.append(head, tail)
@@ -178,6 +178,8 @@ def _refined(times: FloatArray, time: FloatArray, way: FloatArray, error: _Error
 
     `replace`: only where the error is large, but then vertices too close to that row give way to it, but for the ends.
     """
+    if not (error.there > (LARGE_ERROR if replace else TOLERANCE)).any():
+        return times
     at = _interpolated(times, time, way)
     gap = np.searchsorted(times, time[error.rows], side="right")
     if replace:
@@ -256,15 +258,18 @@ def _reversals(x: FloatArray, y: FloatArray, first: int, last: int) -> list[int]
     return found
 
 
-def _step(time: FloatArray, way: FloatArray, x: FloatArray, y: FloatArray) -> float:
-    """`VERTEX_STEP`, or less where the piece holds a bend that gaps of that length would cut.
+def _step(time: FloatArray, way: FloatArray, x: FloatArray, y: FloatArray) -> tuple[float, FloatArray]:
+    """`VERTEX_STEP`, or less where the piece holds a bend that gaps of that length would cut; and its `_head` then.
 
     The same everywhere: where gaps change, a player that turns the car within half a gap turns it more sharply.
     """
+    end = float(time[-1])
     for step in (VERTEX_STEP, VERTEX_STEP / 2.0):
-        if not _is_cut(np.append(_head(time, way, float(time[-1]), step), time[-1]), time, x, y):
-            return step
-    return float(time[1] - time[0])
+        head = _head(time, way, end, step)
+        if not _is_cut(np.append(head, end), time, x, y):
+            return step, head
+    step = float(time[1] - time[0])
+    return step, _head(time, way, end, step)
 
 
 def _is_cut(times: FloatArray, time: FloatArray, x: FloatArray, y: FloatArray) -> bool:

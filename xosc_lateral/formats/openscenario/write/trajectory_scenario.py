@@ -95,7 +95,6 @@ def write_trajectory_scenario(
     """
     output = Path(output)
     root = parse_xml(scenario.source, scenario.path)
-    untouched = parse_xml(scenario.source, scenario.path)
     check_convertible(root, scenario, motion)
     scope = global_scope(scenario)
     version = target.version_for(scenario)
@@ -115,7 +114,7 @@ def write_trajectory_scenario(
         starts = {name: start_of(item) for name, item in moving.items()}
     rewrite_init(root, scenario, starts)
     vertices = Vertices(scenario.source)
-    _replace_stories(root, scenario, motion, moving, untouched, scope, target, vertices)
+    _replace_stories(root, scenario, motion, moving, scope, target, vertices)
     _replace_stop_trigger(root, scenario, motion, version)
     override_parameters(root, scenario)
     notes = fit(root, scenario, motion, target, scope, tuple(moving))
@@ -141,14 +140,13 @@ def _replace_stories(
     scenario: Scenario,
     motion: NominalMotion,
     moving: Mapping[str, Moving],
-    untouched: etree._Element,
     scope: Scope,
     target: TargetPlayer,
     vertices: Vertices,
 ) -> None:
     storyboard = _child(root, "Storyboard")
     index = _take_away(storyboard)
-    story = _new_story(scenario, motion, moving, untouched, scope, target, vertices)
+    story = _new_story(scenario, motion, moving, scope, target, vertices)
     if len(story):
         build.insert_indented(storyboard, index, story)
 
@@ -171,7 +169,6 @@ def _new_story(
     scenario: Scenario,
     motion: NominalMotion,
     moving: Mapping[str, Moving],
-    untouched: etree._Element,
     scope: Scope,
     target: TargetPlayer,
     vertices: Vertices,
@@ -181,7 +178,7 @@ def _new_story(
     kept = [played for played in motion.actions if _is_non_motion(played, scenario, moving)]
     if kept:
         # Before the trajectories: an entity has to be there before it moves.
-        _add_kept(story, kept, scenario, moving, untouched, scope, version)
+        _add_kept(story, kept, scenario, moving, scope, version)
     with_pieces = [item for item in moving.values() if item.pieces]
     # Up to 1.1 there has to be a story, even if nothing happens in it.
     if with_pieces or (not kept and version < (1, 2)):
@@ -203,7 +200,6 @@ def _add_kept(
     kept: Sequence[PlayedAction],
     scenario: Scenario,
     moving: Mapping[str, Moving],
-    untouched: etree._Element,
     scope: Scope,
     version: tuple[int, int],
 ) -> None:
@@ -214,7 +210,7 @@ def _add_kept(
         for index, played in enumerate(kept)
         if is_placing(played.action) and played.action.content.entity_ref in moving
     }
-    add_non_motion_actions(act, kept, poses, scenario, untouched, scope, version)
+    add_non_motion_actions(act, kept, poses, scenario, parse_xml(scenario.source, scenario.path), scope, version)
     build.time_trigger(act, "StartTrigger", 0.0, version)
 
 
