@@ -15,7 +15,7 @@ from tests.pipeline.test_batch import make_inputs, run, states, tree
 from xosc_lateral.pipeline import workers as dask_cluster
 from xosc_lateral.pipeline.batch import JobState, convert_many
 from xosc_lateral.pipeline.jobs import plan_batch
-from xosc_lateral.pipeline.tasks import ClusterError
+from xosc_lateral.pipeline.workers import ClusterError
 
 dask = pytest.importorskip("dask")
 distributed = pytest.importorskip("distributed")

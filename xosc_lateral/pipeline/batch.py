@@ -19,8 +19,7 @@ from xosc_lateral.pipeline.guard import JobLimitError, JobLimits, within_limits
 from xosc_lateral.pipeline.jobs import Batch, Job
 from xosc_lateral.pipeline.journal import Journal, folder_lock
 from xosc_lateral.pipeline.manifest import ManifestRow, Timing
-from xosc_lateral.pipeline.tasks import WorkerDiedError, run_tasks
-from xosc_lateral.pipeline.workers import open_pool
+from xosc_lateral.pipeline.workers import WorkerDiedError, open_pool, run_tasks
 from xosc_lateral.version import BEHAVIOUR, __version__
 
 Converter = Callable[[Job], ManifestRow]

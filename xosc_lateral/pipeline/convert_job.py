@@ -3,27 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 import numpy as np
 
-from xosc_lateral.enrich.result import ConvertedScenario, Enriched
+from xosc_lateral.enrich.result import ConvertedScenario
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.atomic import write_atomically
 from xosc_lateral.motion.gaps import Gap
 from xosc_lateral.pipeline.convert import convert_scenario
-from xosc_lateral.pipeline.jobs import Job, fingerprint
-from xosc_lateral.pipeline.manifest import ManifestRow
-
-if TYPE_CHECKING:
-    from xosc_lateral.pipeline.jobs import Batch
-    from xosc_lateral.pipeline.manifest import ManifestRow
-    from xosc_lateral.report.batch import BatchEntry
-
+from xosc_lateral.pipeline.jobs import Batch, Job, fingerprint
+from xosc_lateral.pipeline.manifest import MANIFEST, ManifestRow, read_manifest
 
 INDEX = "index.html"
 
@@ -40,37 +32,20 @@ def write_page_and_thumbnail(conversion: ConvertedScenario, page: Path) -> None:
 
 def write_batch_index(batch: Batch, folder: Path) -> Path:
     """Write ``index.html`` over the pages of a finished batch, what needs attention first."""
-    from xosc_lateral.pipeline.manifest import MANIFEST, read_manifest
-    from xosc_lateral.report.batch import batch_page
+    from xosc_lateral.report.batch import BatchEntry, batch_page
 
+    same = [name for name in BatchEntry.__slots__ if name not in ("page", "thumbnail", "enriched")]
     pages = {job.name: job.page for job in batch.jobs}
-    rows = (row for row in read_manifest(batch.folder / MANIFEST) if row.output in pages)
-    entries = [_entry(row, pages[row.output], folder) for row in rows]
+    entries = []
+    for row in read_manifest(batch.folder / MANIFEST):
+        if row.output in pages:
+            page = None if row.error else pages[row.output]
+            link = "" if page is None else quote(Path(os.path.relpath(page, folder)).as_posix())
+            values = {name: getattr(row, name) for name in same}
+            picture = link and f"{link.removesuffix('.html')}.svg"
+            entries.append(BatchEntry(page=link, thumbnail=picture, enriched=len(row.enriched), **values))
     folder.mkdir(parents=True, exist_ok=True)
     return write_atomically(folder / INDEX, batch_page(entries, batch.folder.name))
-
-
-def _entry(row: ManifestRow, page: Path | None, folder: Path) -> BatchEntry:
-    from xosc_lateral.report.batch import BatchEntry
-
-    link = "" if page is None or row.error else quote(Path(os.path.relpath(page, folder)).as_posix())
-    return BatchEntry(
-        output=row.output,
-        scenario=row.scenario,
-        page=link,
-        thumbnail=link and f"{link.removesuffix('.html')}.svg",
-        enriched=len(row.enriched),
-        entities=row.entities,
-        segment_seconds=row.segment_seconds,
-        offset_spread=row.offset_spread,
-        gap_before=row.gap_before,
-        gap_after=row.gap_after,
-        warnings=row.warnings,
-        error=row.error,
-    )
-
-
-ROAD_SUFFIX = ".xodr"
 
 
 def convert_job(job: Job) -> ManifestRow:
@@ -96,8 +71,12 @@ def _refuse_changes(job: Job) -> None:
 def describe(job: Job, conversion: ConvertedScenario) -> ManifestRow:
     """A conversion as a row: numbers and hashes, nothing that keeps its arrays alive."""
     enriched, provenance = conversion.enriched, conversion.provenance
-    inputs = _below(job.base, job.source.parent, provenance.inputs)
-    road = next((name for name in inputs if name.lower().endswith(ROAD_SUFFIX)), "")
+    inputs = {
+        Path(os.path.relpath(os.path.normpath(job.source.parent / name), job.base)).as_posix(): sha256
+        for name, sha256 in sorted(provenance.inputs.items())
+    }
+    road = next((name for name in inputs if name.lower().endswith(".xodr")), "")
+    offsets = [segment.offset for entity in enriched.entities for segment in entity.segments]
     return replace(
         job.row(),
         scenario_sha256=provenance.inputs.get(job.source.name, ""),
@@ -111,7 +90,7 @@ def describe(job: Job, conversion: ConvertedScenario) -> ManifestRow:
         enriched=tuple(entity.name for entity in enriched.entities if entity.is_enriched),
         why_not={entity.name: entity.why for entity in enriched.entities if not entity.is_enriched},
         segment_seconds=_rounded(sum(entity.segment_seconds for entity in enriched.entities)),
-        offset_spread=_rounded(_spread(enriched)),
+        offset_spread=_rounded(np.std(np.concatenate(offsets))) if offsets else 0.0,
         gap_before=_smallest(enriched.gaps_before),
         gap_after=_smallest(enriched.gaps_after),
         warnings=conversion.warnings,
@@ -124,23 +103,10 @@ def describe(job: Job, conversion: ConvertedScenario) -> ManifestRow:
     )
 
 
-def _below(base: Path, folder: Path, inputs: Mapping[str, str]) -> dict[str, str]:
-    """Names from the scenario's folder -> names from the batch's."""
-    return {
-        Path(os.path.relpath(os.path.normpath(folder / name), base)).as_posix(): value
-        for name, value in sorted(inputs.items())
-    }
-
-
-def _spread(enriched: Enriched) -> float:
-    offsets = [segment.offset for entity in enriched.entities for segment in entity.segments]
-    return float(np.std(np.concatenate(offsets))) if offsets else 0.0
-
-
 def _smallest(gaps: tuple[Gap, ...]) -> float | None:
     return _rounded(min(gap.distance for gap in gaps)) if gaps else None
 
 
-def _rounded(value: float) -> float:
+def _rounded(value: float | np.floating) -> float:
     """To a micrometre or microsecond: what a manifest is read for, and no noise of another machine's last bit."""
-    return round(value, 6)
+    return round(float(value), 6)

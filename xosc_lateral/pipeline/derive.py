@@ -9,8 +9,8 @@ they miss, and the result measured again with other seeds: those are the figures
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +21,7 @@ from xosc_lateral.driver.drivability import SELDOM, strain
 from xosc_lateral.driver.effects import Acts, Adapted, ColumnEffect, Population
 from xosc_lateral.driver.effects.base import FACTOR_LIMIT
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
-from xosc_lateral.driver.profile import DriverProfile, Metadata, Provenance
+from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.evaluation.lane_keeping import HIGHWAY_SPEED, LaneKeeping, highway_drives, lane_keeping
 from xosc_lateral.motion.segments import MINIMUM_SPEED
@@ -70,10 +70,10 @@ class Asked:
 
     def check(self) -> None:
         """Refuse what no driver has."""
-        for name, unit in (("sdlp", "m"), ("restlessness", "m/s"), ("memory", "s"), ("near_line", "")):
+        for name, unit in (("sdlp", " m"), ("restlessness", " m/s"), ("memory", " s"), ("near_line", "")):
             value = getattr(self, name)
             if value is not None and not 0.0 < value < np.inf:
-                raise DriverProfileError(f"{name.replace('_', ' ')} of {value:g} {unit}: it is above 0")
+                raise DriverProfileError(f"{name.replace('_', ' ')} of {value:g}{unit}: it is above 0")
         if self.near_line is not None and self.near_line >= 1.0:
             raise DriverProfileError(f"near line {self.near_line:g}: a share of the time is below 1")
         if self.sdlp is not None and self.sdlp_change is not None:
@@ -88,10 +88,15 @@ class Asked:
             raise DriverProfileError(f"mean of {self.mean:g} m")
 
     @property
-    def stated(self) -> dict[str, float | str]:
-        """What was asked, by name."""
-        values = {one.name: getattr(self, one.name) for one in fields(self)}
+    def figures(self) -> dict[str, float]:
+        """Those that are stated, by name."""
+        values = {name: getattr(self, name) for name in ("sdlp", "mean", "restlessness", "memory", "near_line")}
         return {name: value for name, value in values.items() if value is not None}
+
+    @property
+    def size_is_given(self) -> bool:
+        """Whether the size of the movement follows from other figures than the time near a marking."""
+        return self.sdlp is not None or (self.restlessness is not None and self.memory is not None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,8 +155,9 @@ class Derived(NamedTuple):
     reached: LaneKeeping
 
     def __str__(self) -> str:
-        had = [f"{name} {value:g}, reached {getattr(self.reached, name):.4g}" for name, value in _targets(self).items()]
-        if self.asked.near_line is not None and self.asked.mean is None and size_is_given(self.asked):
+        asked = self.asked.figures
+        had = [f"{name} {value:g}, reached {getattr(self.reached, name):.4g}" for name, value in asked.items()]
+        if "near_line" in asked and "mean" not in asked and self.asked.size_is_given:
             side = "left" if self.reached.mean > 0 else "right"
             had.append(f"for which he drives {abs(self.reached.mean):.2f} m {side} of the lane's middle")
         return f"{self.profile.name}: " + ("; ".join(had) or "as its base")
@@ -165,24 +171,25 @@ def derive(base: DriverProfile, asked: Asked, name: str, *, preset: Preset | Non
     """
     asked.check()
     speed = HIGHWAY_SPEED if asked.speed is None else asked.speed
-    half_width = TRUCK_HALF_WIDTH if asked.vehicle == "truck" else None
     plain, adapted = _of_class(_single(base), asked.vehicle)
     plain = structs.replace(plain, name=name)
+    half_width = TRUCK_HALF_WIDTH if asked.vehicle == "truck" else None
+    count = DRIVES if asked.memory is None and asked.near_line is None else 2 * DRIVES
 
     def measured(handles: Adapted, seed: int) -> tuple[LaneKeeping, FloatArray]:
-        count = DRIVES if asked.memory is None and asked.near_line is None else 2 * DRIVES
         drives = highway_drives(plain.with_effects(handles), seed, speed=speed, drives=count)
         return lane_keeping(drives, plain.lane_width, plain.model.step, half_width=half_width), drives
 
     known, drives = measured(adapted, DESIGN)
     if asked.sdlp_change is not None:
-        asked = replace(asked, sdlp=known.sdlp + asked.sdlp_change, sdlp_change=None)
-        if asked.sdlp is not None and asked.sdlp <= 0.0:
+        if known.sdlp + asked.sdlp_change <= 0.0:
             raise DriverProfileError(f"the SDLP of {base.name} is {known.sdlp:.3f} m: it can't be so much smaller")
+        asked = replace(asked, sdlp=known.sdlp + asked.sdlp_change, sdlp_change=None)
+    within = drives - drives.mean(axis=1, keepdims=True)
     parts = _parts(known, measured(structs.replace(adapted, fine=0.5 * adapted.fine), DESIGN)[0])
     handles, reached, want = adapted, known, asked
     for _ in range(CORRECTIONS):
-        handles = _handles(adapted, known, parts, drives, want, plain.lane_width, half_width)
+        handles = _handles(adapted, known, parts, within, want, plain.lane_width)
         reached, _ = measured(handles, DESIGN)
         if not _missed(asked, reached, share=0.25):
             break
@@ -247,16 +254,9 @@ def _parts(known: LaneKeeping, quiet: LaneKeeping) -> _Parts:
 
 
 def _handles(
-    start: Adapted,
-    known: LaneKeeping,
-    parts: _Parts,
-    drives: FloatArray,
-    want: Asked,
-    lane_width: float,
-    half_width: float | None,
+    start: Adapted, known: LaneKeeping, parts: _Parts, within: FloatArray, want: Asked, lane_width: float
 ) -> Adapted:
-    """Closed form: from the base's figures to those wanted."""
-    within = drives - drives.mean(axis=1, keepdims=True)
+    """Closed form: from the base's figures, and its deviations `within` drives [m], to those wanted."""
     limit = known.limit_near_line
     mean = known.mean if want.mean is None else want.mean
     rate = 1.0 if want.memory is None else known.memory / want.memory
@@ -281,29 +281,20 @@ def _handles(
                 f"an SDLP of {want.sdlp:.3g} m with a memory of {want.memory:.3g} s moves at {least:.3g} m/s at least: "
                 f"a restlessness of {want.restlessness:.3g} m/s can't be had with them"
             )
-    if want.near_line is not None and want.mean is None and size_is_given(want):
+    if want.near_line is not None and want.mean is None and want.size_is_given:
         away = 1.0 if known.mean >= 0 else -1.0
         moved = _solved(lambda m: _near(away * m + size * within, limit), want.near_line, 0.0, 0.5 * lane_width)
         mean = away * moved
-    factors = {
-        "spread": start.spread * size,
-        "rate": start.rate * rate,
-        "fine": start.fine * (size * rate if fine is None else fine),
-    }
-    names = {"spread": "large", "rate": "quick", "fine": "restless"}
-    for name, factor in factors.items():
+    fine = start.fine * (size * rate if fine is None else fine)
+    spread, rate = start.spread * size, start.rate * rate
+    for word, factor in (("large", spread), ("quick", rate), ("restless", fine)):
         if not 1.0 / FACTOR_LIMIT <= factor <= FACTOR_LIMIT:
             raise DriverProfileError(
-                f"movement {factor:.2g} times as {names[name]} as the base's (SDLP {known.sdlp:.3f} m, restlessness "
+                f"movement {factor:.2g} times as {word} as the base's (SDLP {known.sdlp:.3f} m, restlessness "
                 f"{known.restlessness:.3f} m/s, memory {known.memory:.2g} s): {1 / FACTOR_LIMIT:g} to "
                 f"{FACTOR_LIMIT:g} times can be had"
             )
-    return Adapted(shift=start.shift + mean - known.mean, **factors)
-
-
-def size_is_given(want: Asked) -> bool:
-    """Whether the size of the movement follows from other figures than the time near a marking."""
-    return want.sdlp is not None or (want.restlessness is not None and want.memory is not None)
+    return Adapted(shift=start.shift + mean - known.mean, spread=spread, rate=rate, fine=fine)
 
 
 def _near(offset: FloatArray, limit: float) -> float:
@@ -323,19 +314,10 @@ def _solved(share: Callable[[float], float], wanted: float, low: float, high: fl
     return 0.5 * (low + high)
 
 
-def _targets(derived: Derived | Asked) -> dict[str, float]:
-    asked = derived.asked if isinstance(derived, Derived) else derived
-    return {
-        name: float(value)
-        for name, value in asked.stated.items()
-        if name in ("sdlp", "mean", "restlessness", "memory", "near_line")
-    }
-
-
 def _missed(asked: Asked, reached: LaneKeeping, *, share: float = 1.0) -> list[str]:
     """Figures that are not reached within so much of the tolerance, in words."""
     found = []
-    for name, value in _targets(asked).items():
+    for name, value in asked.figures.items():
         had = getattr(reached, name)
         scale = reached.sdlp if name == "mean" else value
         known_to = 0.0 if share < 1.0 else 2.0 * reached.errors.get(name, 0.0)  # what runs as many can't tell
@@ -347,7 +329,7 @@ def _missed(asked: Asked, reached: LaneKeeping, *, share: float = 1.0) -> list[s
 def _corrected(want: Asked, asked: Asked, reached: LaneKeeping) -> Asked:
     """What to want instead, by what was missed."""
     now = {}
-    for name, value in _targets(asked).items():
+    for name, value in asked.figures.items():
         had, wanted = getattr(reached, name), getattr(want, name)
         now[name] = wanted + value - had if name == "mean" else wanted * value / max(had, 1e-6)
     return replace(want, **now)
@@ -381,34 +363,28 @@ def _described(
     from xosc_lateral.formats.profiles import profile_hash
     from xosc_lateral.version import __version__
 
-    stated = _targets(asked)
-    figures: Mapping[str, float] = {name: round(getattr(reached, name), 5) for name in stated}
-    words = ", ".join(
-        f"{name.replace('_', ' ')} {value:.4g} (reached {figures[name]:.4g})" for name, value in stated.items()
-    )
-    known = base.provenance
-    notes = f"Derived from {base.name}: {words or 'as its base'}, at {speed:.3g} m/s."
+    stated = asked.figures
+    reach = {name: round(getattr(reached, name), 5) for name in stated}
+    words = [f"{name.replace('_', ' ')} {value:.4g} (reached {reach[name]:.4g})" for name, value in stated.items()]
+    notes = f"Derived from {base.name}: {', '.join(words) or 'as its base'}, at {speed:.3g} m/s."
     fit: dict[str, object] = {
         "derived_from": base.name,
         "sha256": profile_hash(base),
-        "asked": {name: value for name, value in asked.stated.items() if name != "speed"},
-        "reached": figures,
+        "asked": stated if asked.vehicle is None else {**stated, "vehicle": asked.vehicle},
+        "reached": reach,
         "speed": round(speed, 3),
     }
     if preset is not None:
         notes = f"{preset.what[0].upper()}{preset.what[1:]}. {notes}"
         fit["preset"] = {"name": preset.name, "source": preset.source, "doi": preset.doi}
-    provenance = Provenance(
-        source=f"derived from {base.name}, which is of: {known.source}",
-        licence=known.licence,
-        hours=known.hours,
-        drives=known.drives,
-        runs=known.runs,
-        inputs=known.inputs,
+    provenance = structs.replace(
+        base.provenance,
+        source=f"derived from {base.name}, which is of: {base.provenance.source}",
         fit=fit,
+        evaluation={},
         package_version=__version__,
         notes=notes,
     )
-    given = structs.asdict(base.metadata)
-    given |= {"tags": (*base.metadata.tags, "derived"), "vehicle": asked.vehicle or base.metadata.vehicle}
-    return structs.replace(profile, provenance=provenance, metadata=Metadata(**given), sensor=None)
+    known = base.metadata
+    metadata = structs.replace(known, tags=(*known.tags, "derived"), vehicle=asked.vehicle or known.vehicle)
+    return structs.replace(profile, provenance=provenance, metadata=metadata, sensor=None)

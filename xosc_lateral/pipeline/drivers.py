@@ -59,14 +59,6 @@ def _driver(entity: Entity, settings: ConvertSettings) -> DriverProfile | str:
     return named if isinstance(named, DriverProfile) else read_profile(named, settings.library)
 
 
-def auto_profile(libraries: tuple[Path, ...]) -> Path:
-    """File of what "auto" chooses: one in one of the folders comes before the shipped one.
-
-    Raises `FormatError`: if a folder isn't there.
-    """
-    return find_profile(AUTO_PROFILE, libraries)
-
-
 def uses_auto(settings: ConvertSettings) -> bool:
     """Whether "auto" chooses for any entity."""
     return AUTO in (settings.profile, *settings.entity.values())
@@ -74,5 +66,5 @@ def uses_auto(settings: ConvertSettings) -> bool:
 
 def hidden_by_libraries(libraries: tuple[Path, ...]) -> tuple[str, ...]:
     """A line where "auto" takes one of the user's profiles in place of the shipped one."""
-    path = auto_profile(libraries)
+    path = find_profile(AUTO_PROFILE, libraries)
     return () if path.parent == SHIPPED else (f"{path} hides the shipped profile {AUTO_PROFILE!r}: auto takes it",)

@@ -16,11 +16,10 @@ from xosc_lateral.formats.openscenario.catalogs import require_folders
 from xosc_lateral.formats.output_paths import real_path
 from xosc_lateral.formats.profiles import find_profile, profile_hash
 from xosc_lateral.limits import BATCH_JOBS, VARIANTS
-from xosc_lateral.pipeline.concrete import concrete
 from xosc_lateral.pipeline.convert import numbered
-from xosc_lateral.pipeline.drivers import auto_profile, hidden_by_libraries, uses_auto
+from xosc_lateral.pipeline.drivers import AUTO_PROFILE, hidden_by_libraries, uses_auto
 from xosc_lateral.pipeline.manifest import ManifestRow, printable
-from xosc_lateral.pipeline.request import DocumentKind, Request, document_kind, find_requests
+from xosc_lateral.pipeline.request import DocumentKind, Request, concrete, document_kind, find_requests
 from xosc_lateral.pipeline.settings import AUTO, ConvertSettings
 from xosc_lateral.version import BEHAVIOUR, __version__
 
@@ -140,8 +139,7 @@ def plan_batch(
         if request.variants > VARIANTS.value:
             raise FormatError(VARIANTS.refusal(request.variants), path=request.scenario)
         kind = document_kind(request.scenario)
-        ours_or_catalog = kind in (DocumentKind.CATALOG, DocumentKind.CONVERTED, DocumentKind.VARIANTS)
-        if ours_or_catalog and not request.listed:
+        if kind in (DocumentKind.CATALOG, DocumentKind.CONVERTED) and not request.listed:
             left_out.append((request.scenario, kind))
             continue
         before = asked.setdefault(request.scenario, set())
@@ -277,7 +275,7 @@ def _profile_state(name: str, libraries: tuple[Path, ...]) -> str:
     """What a profile's name means now: its file's hash; "auto": that of what it chooses."""
     try:
         if name == AUTO:
-            return file_hash(auto_profile(libraries))
+            return file_hash(find_profile(AUTO_PROFILE, libraries))
         return _hash_or_missing(find_profile(name, libraries))
     except (XoscLateralError, OSError):
         return "missing"  # the conversion says so

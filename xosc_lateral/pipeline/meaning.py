@@ -48,16 +48,10 @@ class Shift:
         return f"{self.what} {self.how} with the offsets"
 
 
-def shifted_events(before: NominalMotion, after: NominalMotion) -> list[str]:
-    """A line for each thing that happens otherwise in the other run; see `shifts`."""
-    return [str(shift) for shift in shifts(before, after)]
-
-
 def shifts(before: NominalMotion, after: NominalMotion, *, ignored: Collection[str] = ()) -> list[Shift]:
     """Events of the source that start earlier, later, not at all or once more in the other run; other ends and lanes.
 
-    A car that drives beside the middle of its lane comes to places, and to others, at other times: what it triggers is
-    triggered then. Entities that are ignored may end in any lane.
+    Entities that are ignored may end in any lane.
     """
     then, now = _spans(before.actions), _spans(after.actions)
     found: dict[str, Shift] = {}
@@ -149,12 +143,11 @@ class Meaning:
 
     def __init__(self, played: Played, egos: tuple[str, ...], *, step: float, time_limit: float | None) -> None:
         self._played, self._egos, self._step = played, egos, step
-        self.limit = inf if time_limit is None else time_limit
         motion = played.motion
-        last = [one.start if one.end is None else one.end for one in motion.actions]
         self._is_cut_off = motion.cut_off is not None
-        until = max(last, default=0.0) if self._is_cut_off else motion.end_time
-        self.limit = min(self.limit, LASTING * max(until, LEAST))
+        last = max((one.start if one.end is None else one.end for one in motion.actions), default=0.0)
+        until = last if self._is_cut_off else motion.end_time
+        self.limit = min(inf if time_limit is None else time_limit, LASTING * max(until, LEAST))
         self._before = list(self._runs(played))
 
     @property

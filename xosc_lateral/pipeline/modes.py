@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from xosc_lateral.errors import FormatError, locate
@@ -80,36 +80,25 @@ def writing_plan(
     if settings.mode is OutputMode.LANE_OFFSET:
         return WritingPlan(frozenset(), frozenset(enriched), is_replay=False)
     if is_replay(settings, depends):
-        return WritingPlan(
-            frozenset(enriched), frozenset(), is_replay=True, frozen=tuple(_frozen(scenario, depends, None))
-        )
+        return WritingPlan(frozenset(enriched), frozenset(), is_replay=True, frozen=_frozen(scenario, depends, None))
     if settings.mode is OutputMode.TRAJECTORY:
         chosen = {*enriched, *sampled}
         chosen |= {trailer for trailer, tractor in pulled.items() if tractor in chosen}
-        frozen = tuple(_frozen(scenario, depends, chosen))
+        frozen = _frozen(scenario, depends, chosen)
         return WritingPlan(frozenset(chosen), frozenset(), is_replay=False, frozen=frozen)
     independent = set(enriched) - depends.entities
     chosen = {*separable(scenario, independent), *sampled}
     return WritingPlan(frozenset(chosen), frozenset(enriched) - chosen, is_replay=False)
 
 
-def _frozen(scenario: Scenario, depends: Dependence, entities: Collection[str] | None) -> Iterator[str]:
-    """Triggers of these entities' maneuvers (None: all) that depend on a vehicle under test."""
+def _frozen(scenario: Scenario, depends: Dependence, entities: Collection[str] | None) -> tuple[str, ...]:
+    """Triggers of these entities' maneuvers (None: all) that depend on a vehicle under test, a line each."""
     names = {entity.name for entity in scenario.entities} if entities is None else entities
-    said = dict[str, None]()
+    conditions: list[Condition] = []
     for one in replaced_groups(scenario, names):
-        of_act = (*conditions_of(one.act.start_trigger), *conditions_of(one.act.stop_trigger))
-        for condition in (*of_act, *one.conditions()):
-            if depends.of_condition(condition):
-                said[_line(condition)] = None
+        conditions += [*conditions_of(one.act.start_trigger), *conditions_of(one.act.stop_trigger), *one.conditions()]
     if entities is None:
-        for condition in conditions_of(scenario.storyboard.stop_trigger):
-            if depends.of_condition(condition):
-                said[_line(condition)] = None
-    yield from said
-
-
-def _line(condition: Condition) -> str:
-    place = condition.place
+        conditions += conditions_of(scenario.storyboard.stop_trigger)
+    places = [condition.place for condition in conditions if depends.of_condition(condition)]
     what = "depends on a vehicle under test, and happens at the time of the nominal run in a trajectory"
-    return locate(what, path=place.path, line=place.line, element=place.element)
+    return tuple(dict.fromkeys(locate(what, path=one.path, line=one.line, element=one.element) for one in places))

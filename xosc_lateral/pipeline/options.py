@@ -48,10 +48,7 @@ class Option:
     entry: Cell | None = None
 
     def value(self, name: str, said: Any) -> Any:
-        """The field's value.
-
-        Raises `ValueError`: with the option's name before it.
-        """
+        """The field's value; `ValueError` with the option's name before it."""
         try:
             return self.read(said)
         except (TypeError, ValueError) as error:

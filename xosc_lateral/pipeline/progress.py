@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -12,23 +13,22 @@ from enum import StrEnum
 from typing import TextIO
 
 from xosc_lateral.pipeline.batch import JobOutcome, JobState
-from xosc_lateral.pipeline.manifest import ManifestRow
 
 LINES_EVERY = 30.0
 """Without a terminal a line of progress comes this often. [s]"""
 
 
 class Display(StrEnum):
-    """How a batch is followed."""
+    """How a batch is followed.
+
+    `AUTO`: a bar on a terminal, a line now and then elsewhere; `JSON`: an object a line for every output, at the start
+    and at the end; `NOTHING`: for callers that look at the outcomes themselves. Failures are a line each but there.
+    """
 
     AUTO = "auto"
-    """A bar on a terminal, a line now and then elsewhere; every failure and warning a line."""
     QUIET = "quiet"
-    """Failures alone."""
     JSON = "json"
-    """One JSON object a line for every output, at the start and at the end."""
     NOTHING = "nothing"
-    """For callers that look at the outcomes themselves."""
 
 
 @dataclass(slots=True)
@@ -62,32 +62,31 @@ class Summary:
 
     def count(self, outcome: JobOutcome) -> None:
         """Take one more outcome into account."""
-        if outcome.state is JobState.WRITTEN:
-            self.written += 1
-            if outcome.why:
-                self.anew[outcome.why] = self.anew.get(outcome.why, 0) + 1
-        elif outcome.state is JobState.KEPT:
-            self.kept[outcome.why] = self.kept.get(outcome.why, 0) + 1
-        elif outcome.state is JobState.UP_TO_DATE:
-            self.up_to_date += 1
-        else:
+        row = outcome.row
+        if outcome.state is JobState.FAILED:
             self.failed += 1
-            self.stale += outcome.row.stale
-            self.failures.append((outcome.row.output, outcome.row.error))
+            self.stale += row.stale
+            self.failures.append((row.output, row.error))
             return
-        self.with_warnings += bool(outcome.row.warnings)
-        if outcome.row.cut_off:
-            self.cut_off.append(outcome.row.output)
-        if not outcome.row.enriched:
-            why = _why_nobody(outcome.row)
+        self.written += outcome.state is JobState.WRITTEN
+        self.up_to_date += outcome.state is JobState.UP_TO_DATE
+        if outcome.why:
+            reasons = self.anew if outcome.state is JobState.WRITTEN else self.kept
+            reasons[outcome.why] = reasons.get(outcome.why, 0) + 1
+        self.with_warnings += bool(row.warnings)
+        if row.cut_off:
+            self.cut_off.append(row.output)
+        if not row.enriched:
+            why = "; ".join(sorted({why for why in row.why_not.values() if why})) or "there are no entities"
             self.nobody_enriched[why] = self.nobody_enriched.get(why, 0) + 1
 
-    def is_new(self, outcome: JobOutcome) -> bool:
-        """Whether a failure was not met yet: one that all variants of a scenario share is one line."""
+    def new_failure(self, outcome: JobOutcome) -> str:
+        """A failure's line, if it was not met yet: one that all variants of a scenario share is one line."""
         key = (outcome.row.scenario, outcome.row.error)
-        before = len(self._said)
+        if outcome.state is not JobState.FAILED or key in self._said:
+            return ""
         self._said.add(key)
-        return len(self._said) > before
+        return f"xosc-lateral: {outcome.row.error}"
 
     @property
     def finished(self) -> int:
@@ -106,9 +105,8 @@ class Summary:
 
     def remarks(self) -> list[str]:
         """What a person has to know besides the counts, a line each."""
-        lines = (
-            [f"  {self.with_warnings} with warnings (column `warnings` of the manifest)"] if self.with_warnings else []
-        )
+        said = f"  {self.with_warnings} with warnings (column `warnings` of the manifest)"
+        lines = [said] if self.with_warnings else []
         if self.nobody_enriched:
             lines.append(f"  {sum(self.nobody_enriched.values())} in which nobody was enriched:")
             reasons = sorted(self.nobody_enriched.items(), key=lambda item: (-item[1], item[0]))
@@ -158,12 +156,6 @@ def _counted(reasons: Mapping[str, int], what: str) -> str:
     return f" ({what}{': ' if what else ''}{listed})" if listed else ""
 
 
-def _why_nobody(row: ManifestRow) -> str:
-    """The reasons of all entities, the same ones once: what an output without offsets is counted under."""
-    reasons = sorted({why for why in row.why_not.values() if why})
-    return "; ".join(reasons) or "there are no entities"
-
-
 Show = Callable[[JobOutcome], None]
 
 
@@ -172,15 +164,13 @@ def _shower(display: Display, summary: Summary, stream: TextIO) -> Iterator[Show
     if display is Display.JSON:
         with _json_lines(summary, stream) as show:
             yield show
-    elif display is Display.QUIET:
-        yield lambda outcome: _say_failure(outcome, summary, stream)
     elif display is Display.NOTHING:
         yield lambda outcome: None
-    elif stream.isatty():
+    elif display is Display.AUTO and stream.isatty():
         with _bar(summary, stream) as show:
             yield show
     else:
-        yield _lines(summary, stream)
+        yield _lines(summary, stream, LINES_EVERY if display is Display.AUTO else math.inf)
 
 
 @contextmanager
@@ -190,11 +180,8 @@ def _json_lines(summary: Summary, stream: TextIO) -> Iterator[Show]:
 
     def show(outcome: JobOutcome) -> None:
         row = outcome.row
-        details = (
-            {"error": row.error, "stale": row.stale}
-            if row.error
-            else {"sha256": row.output_sha256, "warnings": list(row.warnings)}
-        )
+        failed = {"error": row.error, "stale": row.stale}
+        details = failed if row.error else {"sha256": row.output_sha256, "warnings": list(row.warnings)}
         say(outcome.state.value, output=row.output, scenario=row.scenario, seconds=round(outcome.seconds, 4), **details)
 
     say("start", total=summary.total)
@@ -213,33 +200,25 @@ def _bar(summary: Summary, stream: TextIO) -> Iterator[Show]:
         task = progress.add_task("", total=summary.total, pace="")
 
         def show(outcome: JobOutcome) -> None:
-            if outcome.state is JobState.FAILED and summary.is_new(outcome):
-                progress.console.print(_failure(outcome), markup=False, highlight=False, soft_wrap=True)
+            if failure := summary.new_failure(outcome):
+                progress.console.print(failure, markup=False, highlight=False, soft_wrap=True)
             progress.update(task, completed=summary.finished, pace=_pace(summary))
 
         yield show
 
 
-def _lines(summary: Summary, stream: TextIO) -> Show:
-    next_line = LINES_EVERY
+def _lines(summary: Summary, stream: TextIO, every: float) -> Show:
+    next_line = every
 
     def show(outcome: JobOutcome) -> None:
         nonlocal next_line
-        _say_failure(outcome, summary, stream)
+        if failure := summary.new_failure(outcome):
+            print(failure, file=stream, flush=True)
         if summary.seconds >= next_line:
-            next_line = summary.seconds + LINES_EVERY
+            next_line = summary.seconds + every
             print(f"{summary.finished} of {summary.total}, {_pace(summary)}", file=stream, flush=True)
 
     return show
-
-
-def _say_failure(outcome: JobOutcome, summary: Summary, stream: TextIO) -> None:
-    if outcome.state is JobState.FAILED and summary.is_new(outcome):
-        print(_failure(outcome), file=stream, flush=True)
-
-
-def _failure(outcome: JobOutcome) -> str:
-    return f"xosc-lateral: {outcome.row.error}"
 
 
 def _pace(summary: Summary) -> str:

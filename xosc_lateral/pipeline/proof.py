@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, partial
-from pathlib import Path
 
 import numpy as np
 from msgspec.structs import replace
@@ -18,17 +16,20 @@ from xosc_lateral.enrich.enrich import SAMPLE_STEP, enrich
 from xosc_lateral.enrich.result import Neighbours
 from xosc_lateral.motion.context import entity_context
 from xosc_lateral.pipeline.load import Played, play_scenario
-from xosc_lateral.templates import find_template
+from xosc_lateral.shipped import shipped_folder
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-Converted = Callable[[str, int, int], FloatArray]
-"""Template, number of the vehicle, seed -> deviation."""
+Converted = Callable[[str, int], FloatArray]
+"""Template, number of the vehicle -> deviations."""
 
 SCENARIOS = ("overtake-truck", "cut-in", "curves")
 """Shipped templates, of which the one in which an effect moves somebody most is taken."""
 
 SEEDS = range(4)
+
+STEP = 0.1
+"""Of playback: stretches are stated to a second and shifts to a centimetre. [s]"""
 
 LEAST = 0.02
 """A stretch on which an effect moves its driver by less is none. [m]"""
@@ -66,37 +67,27 @@ def proofs_of(profile: DriverProfile, effects: Iterable[Effect] | None = None) -
     """Of those effects of a profile (all by default) that move the mean and act in one of the `SCENARIOS`."""
     chosen = profile.effects if effects is None else tuple(effects)
     moving = [one for one in chosen if isinstance(one, ColumnEffect) and one.acts is Acts.LOCATION]
-    converted: Converted = cache(partial(_deviation, profile))  # the same for every effect
+    converted: Converted = cache(partial(_deviations, profile))  # the same for every effect
     return [found for effect in moving if (found := _proof(profile, effect, converted)) is not None]
 
 
 def _proof(profile: DriverProfile, effect: ColumnEffect, converted: Converted) -> Proof | None:
-    without = replace(profile, effects=tuple(one for one in profile.effects if one != effect))
     stretches = [(name, *one) for name in SCENARIOS for one in _stretches(name, effect)]
     if not stretches:
         return None
     name, vehicle, rows, _ = max(stretches, key=lambda one: one[-1])
-    paths = [(_deviation(without, name, vehicle, seed), converted(name, vehicle, seed)) for seed in SEEDS]
-    shifts = np.array([(after[rows] - before[rows]).mean() for before, after in paths])
+    without = replace(profile, effects=tuple(one for one in profile.effects if one != effect))
+    shifts = (converted(name, vehicle) - _deviations(without, name, vehicle))[:, rows].mean(axis=1)
     driven = _played(name).motion.entities[vehicle]
-    return Proof(
-        effect.columns,
-        name,
-        driven.name,
-        float(driven.time[rows[0]]),
-        float(driven.time[rows[-1]]),
-        float(shifts.mean()),
-        float(shifts.std(ddof=1) / np.sqrt(len(shifts))),
-    )
+    begin, end = driven.time[rows[[0, -1]]].tolist()
+    error = float(shifts.std(ddof=1) / np.sqrt(len(shifts)))
+    return Proof(effect.columns, name, driven.name, begin, end, float(shifts.mean()), error)
 
 
 @cache
 def _played(name: str) -> Played:
     """A template with its own settings, played."""
-    with tempfile.TemporaryDirectory() as folder:
-        for file, text in find_template(name).files({}).items():
-            (Path(folder) / file).write_text(text, encoding="utf-8")
-        return play_scenario(next(Path(folder).glob("*.xosc")))
+    return play_scenario(shipped_folder("templates") / f"{name}.xosc", step=STEP)
 
 
 @cache
@@ -119,9 +110,9 @@ def _stretches(name: str, effect: ColumnEffect) -> Iterator[tuple[int, IntArray,
             yield number, grid[np.abs(strength) >= 0.5 * most], most
 
 
-def _deviation(profile: DriverProfile, name: str, vehicle: int, seed: int) -> FloatArray:
-    """How far from the nominal path one vehicle drives in a conversion, shape (rows,). [m]"""
+def _deviations(profile: DriverProfile, name: str, vehicle: int) -> FloatArray:
+    """How far from the nominal path one vehicle drives in conversions, shape (seeds, rows). [m]"""
     played = _played(name)
     drivers = {played.motion.entities[vehicle].name: profile}
-    found = enrich(played.motion, played.network, drivers, seed=seed, neighbours=Neighbours.PROFILE)
-    return found.entities[vehicle].deviation
+    found = [enrich(played.motion, played.network, drivers, seed=k, neighbours=Neighbours.PROFILE) for k in SEEDS]
+    return np.array([one.entities[vehicle].deviation for one in found])

@@ -35,19 +35,7 @@ AROUND = 100.0
 
 @dataclass(frozen=True, slots=True)
 class ReconstructSettings:
-    """What is reconstructed, and how.
-
-    - `begin`, `end`: of the part of the recording. [s]
-    - `vehicles`: these alone, by their recorded names
-    - `around`: a vehicle, and those within `AROUND`, for `window` seconds in the middle of its passage
-    - `window`: [s]
-    - `host`: recorded name of the vehicle under test
-    - `error`: bound of positions along the road. [m]
-    - `relative`: lane changes and braking begin by distances, where the recording bears it out
-    - `exact`: recorded paths as trajectories, instead of maneuvers
-    - `fit`: a profile of its own for every vehicle that drove long enough
-    - `libraries`: folders with further profiles
-    """
+    """What is reconstructed, and how: `api.reconstruct` says what each is; times and `error` in [s] and [m]."""
 
     begin: float | None = None
     end: float | None = None
@@ -67,8 +55,8 @@ class ReconstructSettings:
 class Reconstructed:
     """A scenario as text, how it was made, and how far it is from the recording.
 
-    `residuals`: in the order of `plans`; `relative`: entity -> triggers that are distances; `drivers`: in the order of
-    `plans`; `fitted`: profiles of single vehicles, by name.
+    Residuals and drivers are in the order of the plans; `relative` holds, by entity, triggers that are distances, and
+    `fitted`, by name, profiles of single vehicles.
     """
 
     traffic: RecordedTraffic
@@ -123,13 +111,14 @@ def reconstruct_recording(traffic: RecordedTraffic, settings: ReconstructSetting
     residuals = tuple(map(residuals_of, plans))
     met = encounters(plans, traffic.network)
     drivers, fitted = _drivers(plans, residuals, settings)
-    parts = traffic, recording, plans, scenario, residuals, met, relative, drivers, fitted
-    return Reconstructed(*parts, settings)
+    return Reconstructed(
+        traffic, recording, plans, scenario, residuals, met, relative, tuple(drivers), fitted, settings
+    )
 
 
 def _drivers(
     plans: Sequence[VehiclePlan], residuals: Sequence[Residuals], settings: ReconstructSettings
-) -> tuple[tuple[ChosenDriver, ...], dict[str, DriverProfile]]:
+) -> tuple[list[ChosenDriver], dict[str, DriverProfile]]:
     """A profile for each vehicle: its own, the likeliest of the library, or the population's."""
     from xosc_lateral.driver.fitting import fit_profile
 
@@ -152,7 +141,7 @@ def _drivers(
             except XoscLateralError as error:
                 one = replace(one, why=f"{one.why}; can't be fitted: {error}")
         chosen.append(one)
-    return tuple(chosen), fitted
+    return chosen, fitted
 
 
 @lru_cache(maxsize=64)
@@ -164,13 +153,10 @@ def drivers_table(made: Reconstructed, path: Path) -> None:
     """Write the table of one row that `convert` takes: the scenario, who is under test, and everybody's profile."""
     import pandas as pd
 
-    cells = {"scenario": f"{made.traffic.name}.xosc"}
-    if made.host is not None:
-        cells["ego"] = made.host
     drivers = {plan.name: driver.profile for plan, driver in zip(made.plans, made.drivers, strict=True)}
     driven = {name: profile for name, profile in drivers.items() if profile and name != made.host}
-    cells |= {f"profile:{name}": profile for name, profile in driven.items()}
-    cells["only"] = ";".join(driven)
+    cells = {"scenario": f"{made.traffic.name}.xosc"} | ({} if made.host is None else {"ego": made.host})
+    cells |= {f"profile:{name}": profile for name, profile in driven.items()} | {"only": ";".join(driven)}
     write_frame(pd.DataFrame([cells]), path, {"inputs": parsed_hashes(made.files)})
 
 
@@ -194,11 +180,8 @@ def chosen(traffic: RecordedTraffic, settings: ReconstructSettings) -> tuple[lis
     """
     by_name = {track.name: track for track in traffic.tracks}
     source = traffic.sources[0]
-    for word, names in (
-        ("vehicles", settings.vehicles or ()),
-        ("around", [settings.around]),
-        ("host", [settings.host]),
-    ):
+    asked = {"vehicles": settings.vehicles or (), "around": [settings.around], "host": [settings.host]}
+    for word, names in asked.items():
         for name in names:
             if name is not None and name not in by_name:
                 some = ", ".join(list(by_name)[:8])
@@ -215,24 +198,21 @@ def chosen(traffic: RecordedTraffic, settings: ReconstructSettings) -> tuple[lis
     if settings.vehicles is not None:
         tracks = [track for track in tracks if track.name in set(settings.vehicles)]
     begin, end = max(begin, first), min(end, last)
+    wrong = ""
     if end - begin < 1.0:
-        raise FormatError(
-            f"from {begin:g} to {end:g} s is no second; it lasts from {first:g} to {last:g} s", path=source
-        )
-    if end - begin > LONGEST_WINDOW:
-        raise FormatError(
-            f"{end - begin:g} s are more than {LONGEST_WINDOW:g} s: take a part with --from and --to", path=source
-        )
+        wrong = f"from {begin:g} to {end:g} s is no second; it lasts from {first:g} to {last:g} s"
+    elif end - begin > LONGEST_WINDOW:
+        wrong = f"{end - begin:g} s are more than {LONGEST_WINDOW:g} s: take a part with --from and --to"
+    if wrong:
+        raise FormatError(wrong, path=source)
     return tracks, begin, end
 
 
 def _comes_near(track: Track, centre: Track, begin: float, end: float) -> bool:
-    time = track.time[(track.time >= begin) & (track.time <= end)]
-    time = time[(time >= centre.time[0]) & (time <= centre.time[-1])]
-    if not len(time):
-        return False
+    first, last = max(begin, centre.time[0]), min(end, centre.time[-1])
+    time = track.time[(track.time >= first) & (track.time <= last)]
     away = [
         np.interp(time, track.time, getattr(track, axis)) - np.interp(time, centre.time, getattr(centre, axis))
         for axis in "xy"
     ]
-    return bool((np.hypot(*away) <= AROUND).any())
+    return bool((np.hypot(*away) <= AROUND).any())  # nobody where they are not there at once

@@ -7,20 +7,21 @@ import json
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
+from itertools import islice
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from lxml import etree
 
-from xosc_lateral.errors import FormatError
+from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.openscenario.element import local_name
 from xosc_lateral.formats.openscenario.provenance import HEADER_MARK
 from xosc_lateral.formats.output_paths import file_name
 from xosc_lateral.formats.source import open_source
 from xosc_lateral.formats.tables import TABLE_SUFFIXES, as_text, read_text_table
-from xosc_lateral.limits import XML_TREE
+from xosc_lateral.limits import PARAMETER_SETS, XML_TREE
 from xosc_lateral.pipeline.manifest import MANIFEST
 from xosc_lateral.pipeline.options import Option, as_it_is, whole
 from xosc_lateral.pipeline.settings import OPTIONS, ConvertSettings
@@ -36,42 +37,36 @@ class DocumentKind(Enum):
     CATALOG = "catalog"
     DISTRIBUTION = "parameter value distribution"
     CONVERTED = "converted scenario"
-    VARIANTS = "set of converted variants"
 
 
-DISTRIBUTIONS = frozenset({DocumentKind.DISTRIBUTION, DocumentKind.VARIANTS})
-"""Files that stand for several scenarios."""
-
-_KINDS = {"Catalog": DocumentKind.CATALOG, "ParameterValueDistribution": DocumentKind.DISTRIBUTION}
-
-_SCENARIO_PARTS = frozenset({"CatalogLocations", "RoadNetwork", "Entities", "Storyboard"})
+_KINDS = dict.fromkeys(("CatalogLocations", "RoadNetwork", "Entities", "Storyboard"), DocumentKind.SCENARIO)
+_KINDS |= {"Catalog": DocumentKind.CATALOG, "ParameterValueDistribution": DocumentKind.DISTRIBUTION}
+"""By the first element that says it."""
 
 
 def document_kind(path: Path) -> DocumentKind:
     """What a file holds, from its first elements; what can't be read counts as a scenario (its reader says why)."""
+    is_ours = False
     try:
         with open_source(path, XML_TREE) as source:
-            return _kind_from(source.file)
+            for _, element in etree.iterparse(
+                source.file,
+                events=("start",),
+                resolve_entities=False,
+                no_network=True,
+                load_dtd=False,
+                remove_comments=True,
+            ):
+                parent = element.getparent()
+                if parent is None or parent.getparent() is not None or not isinstance(element.tag, str):
+                    continue
+                name = local_name(element)
+                if name == "FileHeader" and HEADER_MARK in (element.get("description") or ""):
+                    is_ours = True
+                elif is_ours or name in _KINDS:
+                    return DocumentKind.CONVERTED if is_ours else _KINDS[name]
     except (etree.XMLSyntaxError, FormatError, OSError, ValueError, LookupError):
         return DocumentKind.SCENARIO
-
-
-def _kind_from(file: IO[bytes]) -> DocumentKind:
-    events = etree.iterparse(
-        file, events=("start",), resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True
-    )
-    is_ours = False
-    for _, element in events:
-        parent = element.getparent()
-        if parent is not None and parent.getparent() is None and isinstance(element.tag, str):
-            name = local_name(element)
-            if name == "FileHeader" and HEADER_MARK in (element.get("description") or ""):
-                is_ours = True
-            elif is_ours:
-                is_set = name == "ParameterValueDistribution"
-                return DocumentKind.VARIANTS if is_set else DocumentKind.CONVERTED
-            if name in _KINDS or name in _SCENARIO_PARTS:
-                return _KINDS.get(name, DocumentKind.SCENARIO)
     return DocumentKind.CONVERTED if is_ours else DocumentKind.SCENARIO
 
 
@@ -109,6 +104,42 @@ class Request:
     name: str = ""
 
 
+class Concrete(NamedTuple):
+    """A scenario's file, a suffix of its output's name, its settings, and why it can't be converted, normally empty."""
+
+    source: Path
+    suffix: str
+    settings: ConvertSettings
+    error: str = ""
+
+
+def concrete(request: Request, kind: DocumentKind) -> Iterator[Concrete]:
+    """The scenarios that a file stands for: itself, or those of its distribution."""
+    from xosc_lateral.formats.openscenario.distribution import read_distribution
+
+    scenario, settings = request.scenario, request.settings
+    if kind is not DocumentKind.DISTRIBUTION:
+        yield Concrete(scenario, "", settings)
+        return
+    try:
+        logical = read_distribution(scenario, allowed=settings.allow)
+        sets = list(islice(logical.parameter_sets(settings.seed), int(PARAMETER_SETS.value) + 1))
+        if len(sets) > PARAMETER_SETS.value:
+            raise FormatError(PARAMETER_SETS.refusal(logical.count), path=scenario)
+        if not sets:
+            raise FormatError("no set of parameters satisfies the scenario's constraints", path=scenario)
+    except (XoscLateralError, OSError) as error:
+        why = str(error)
+    except Exception as error:  # a bug of ours in one file must not cost the others; the row says that it is one
+        why = f"{scenario}: internal error: {type(error).__name__}: {error}"
+    else:
+        for index, values in enumerate(sets):
+            own = replace(settings, parameters={**values, **settings.parameters})
+            yield Concrete(logical.scenario_file, f"_p{index:05d}", own)
+        return
+    yield Concrete(scenario, "", settings, " ".join(why.split()))
+
+
 def find_requests(
     inputs: Sequence[str | Path], settings: ConvertSettings, *, variants: int = 1, leave_out: Path | None = None
 ) -> Iterator[Request]:
@@ -131,7 +162,8 @@ def find_requests(
         elif path.exists():
             yield Request(path, settings, variants)  # a device or a fifo: its reader says so
         elif _GLOB_CHARACTERS & set(str(given)):
-            yield from _matches(str(given), settings, variants, leave_out)
+            base, found = _matches(str(given), leave_out)
+            yield from (Request(scenario, settings, variants, base, listed=False) for scenario in found)
         else:
             raise FormatError("no such file or folder", path=given)
 
@@ -142,7 +174,7 @@ def read_request_table(path: Path, settings: ConvertSettings, *, variants: int =
     Columns: ``scenario`` (path, from the table's folder), and if wanted those of `COLUMNS` and `PREFIXES`: ``name`` of
     the output in place of the scenario's, ``variants``, ``profile:ENTITY``, ``only`` and ``ego`` with entities
     separated by semicolons (ego ``none``: there is none), ``parameter:NAME``, ``parameters`` as a JSON object, and so
-    on. An empty cell leaves what `settings` says. Columns ``user:NAME`` are for the user: tags, owners.
+    on; ``user:NAME`` is for the user. An empty cell leaves what `settings` says.
 
     Raises `FormatError`: with the line of the table (the header is line 1).
     """
@@ -160,12 +192,17 @@ def _table_requests(
     if "scenario" not in table.columns:
         known = ", ".join(map(str, table.columns[:12]))
         raise FormatError(f"no column 'scenario'; there are {known}", path=path, line=1)
-    _refuse_unknown_columns(table, path)
+    for name in map(str, table.columns):  # what is not understood is a setting that would be ignored
+        if name not in COLUMNS and not name.startswith(PREFIXES):
+            known = ", ".join((*COLUMNS, *(f"{prefix}NAME" for prefix in PREFIXES)))
+            raise FormatError(f"unknown column {name!r}; there are {known} (user: is for your own)", path=path, line=1)
     folder = base or Path()
     for number, row in enumerate(table.to_dict("records"), start=2):
         cells = {str(name): text for name, value in row.items() if (text := str(value).strip())}
         try:
-            scenario = _scenario(cells)
+            scenario = cells.pop("scenario", "")
+            if not scenario or "\0" in scenario:
+                raise ValueError(f"scenario {scenario!r}: a path holds no zero byte" if scenario else "no scenario")
             rows_variants = _VARIANTS.of_row("variants", variants, cells, folder)
             row_settings = settings.of_row(cells, folder)
             name = file_name(cells["name"], "name") if "name" in cells else ""
@@ -186,30 +223,12 @@ def _label(cells: Mapping[str, str]) -> str:
     return "".join(f"_{part}" for part in (profile, hashlib.sha256(listed).hexdigest()[:8] if said else "") if part)
 
 
-def _refuse_unknown_columns(table: pd.DataFrame, path: Path) -> None:
-    """A column that is not understood is a setting that would be ignored."""
-    for name in map(str, table.columns):
-        if name not in COLUMNS and not name.startswith(PREFIXES):
-            known = ", ".join((*COLUMNS, *(f"{prefix}NAME" for prefix in PREFIXES)))
-            raise FormatError(f"unknown column {name!r}; there are {known} (user: is for your own)", path=path, line=1)
-
-
-def _scenario(cells: dict[str, str]) -> str:
-    """A row's, taken out of its cells."""
-    scenario = cells.pop("scenario", "")
-    if not scenario:
-        raise ValueError("no scenario")
-    if "\0" in scenario:
-        raise ValueError(f"scenario {scenario!r}: a path holds no zero byte")
-    return scenario
-
-
 def is_single(given: str | Path) -> bool:
     """Whether an input is one scenario, or nothing that is there: neither folder, glob, table nor distribution."""
     path = Path(given)
     if path.is_file():
         is_table = path.name.lower().endswith(TABLE_SUFFIXES)
-        return not is_table and document_kind(path) not in DISTRIBUTIONS
+        return not is_table and document_kind(path) is not DocumentKind.DISTRIBUTION
     return not path.is_dir() and not _GLOB_CHARACTERS & set(str(given))
 
 
@@ -218,30 +237,23 @@ def _search(folder: Path, leave_out: Path | None) -> Iterator[Path]:
     avoided = None if leave_out is None else leave_out.resolve()
     for name, folders, files in os.walk(folder):
         here = Path(name)
-        folders[:] = sorted(
-            inner
-            for inner in folders
-            if not inner.startswith(".")
-            and (here / inner).resolve() != avoided
-            and not (here / inner / MANIFEST).exists()
-        )
+        inner = sorted(one for one in folders if not one.startswith("."))
+        folders[:] = [
+            one for one in inner if (here / one).resolve() != avoided and not (here / one / MANIFEST).exists()
+        ]
         for file in sorted(files):
             if file.lower().endswith(SCENARIO_SUFFIX) and not file.startswith("."):
                 yield here / file
 
 
-def _matches(pattern: str, settings: ConvertSettings, variants: int, leave_out: Path | None) -> Iterator[Request]:
+def _matches(pattern: str, leave_out: Path | None) -> tuple[Path, list[Path]]:
+    """Folder before the first wild part, and files that match, sorted; hidden ones and those in `leave_out` aside."""
     parts = Path(pattern).parts
     wild = next(index for index, part in enumerate(parts) if _GLOB_CHARACTERS & set(part))
     base = Path(*parts[:wild]) if wild else Path()
-    found = [path for path in sorted(base.glob(str(Path(*parts[wild:])))) if not _is_hidden(path.relative_to(base))]
+    matching = sorted(base.glob(str(Path(*parts[wild:]))))
+    found = [path for path in matching if not any(part.startswith(".") for part in path.relative_to(base).parts)]
     if not found:
         raise FormatError("nothing matches", path=pattern)
     avoided = None if leave_out is None else leave_out.resolve()
-    for path in found:
-        if path.is_file() and (avoided is None or avoided not in path.resolve().parents):
-            yield Request(path, settings, variants, base, listed=False)
-
-
-def _is_hidden(path: Path) -> bool:
-    return any(part.startswith(".") for part in path.parts)
+    return base, [one for one in found if one.is_file() and (avoided is None or avoided not in one.resolve().parents)]

@@ -118,9 +118,7 @@ class ConvertOptions(TypedDict, total=False):
 class ConvertSettings:
     """Settings of one conversion: `ConvertOptions` as plain values that a batch can send and hash.
 
-    `names_may_lack`: `entity`, `only` and `ego` apply where an entity of that name exists: one of many scenarios;
-    `step`: of playback. [s] Raises `ValueError`: a version of the standard that can't be written, or that the player
-    does not read.
+    `ValueError` for a version of the standard that can't be written, or that the player does not read.
     """
 
     # What is said of one option stays together.
@@ -184,6 +182,7 @@ class ConvertSettings:
     )
     # fmt: on
     names_may_lack: bool = False
+    """`entity`, `only` and `ego` apply where an entity of that name exists: one of many scenarios."""
     step: float = STEP
 
     def __post_init__(self) -> None:
@@ -200,10 +199,7 @@ class ConvertSettings:
         if unknown:
             raise TypeError(f"no option {min(unknown)!r}; there are {', '.join(OPTIONS)}")
         path, configured = configuration()
-        values = {}
-        for name, said in options.items():
-            if said is not None:
-                values[name] = OPTIONS[name].value(name, said)
+        values = {name: OPTIONS[name].value(name, said) for name, said in options.items() if said is not None}
         for name in (SETTINGS - values.keys()) & configured.keys():
             try:
                 values[name] = OPTIONS[name].value(name, configured[name])
@@ -224,16 +220,12 @@ class ConvertSettings:
 
         Where files are looked for is no part of it, for their hashes are known; nor what refuses more or less.
         """
-        return {
-            name: _plain(name, getattr(self, name), folder) for name in (*OPTIONS, "step") if name not in NOT_RECORDED
-        }
+        names = [name for name in (*OPTIONS, "step") if name not in NOT_RECORDED]
+        return {name: _plain(name, getattr(self, name), folder) for name in names}
 
     @classmethod
     def of_record(cls, values: Mapping[str, Any], folder: Path) -> ConvertSettings:
-        """Settings from what `record` gave.
-
-        Raises `ValueError`: a value that can't be.
-        """
+        """Settings from what `record` gave; `ValueError` for a value that can't be."""
         found: dict[str, Any] = {"step": float(values.get("step", STEP)), "names_may_lack": True}
         for name, said in values.items():
             one = OPTIONS.get(name)
@@ -260,7 +252,6 @@ OPTIONS: Mapping[str, Option] = {
     item.name: item.metadata["option"] for item in fields(ConvertSettings) if "option" in item.metadata
 }
 """What users can set, by name."""
-
 
 NOT_RECORDED = frozenset({"library", "allow", "road_path", "strict"})
 
@@ -293,13 +284,9 @@ def spelled_out(verb: Verb) -> Verb:
     signature = inspect.signature(verb)
     own = [one for one in signature.parameters.values() if one.kind is not one.VAR_KEYWORD]
     defaults = ConvertSettings().record(Path())
+    keyword = inspect.Parameter.KEYWORD_ONLY
     named = [
-        inspect.Parameter(
-            name,
-            inspect.Parameter.KEYWORD_ONLY,
-            default=defaults.get(name),
-            annotation=getattr(hint, "__forward_arg__", hint),
-        )
+        inspect.Parameter(name, keyword, default=defaults.get(name), annotation=getattr(hint, "__forward_arg__", hint))
         for name, hint in ConvertOptions.__annotations__.items()
     ]
     verb.__signature__ = signature.replace(parameters=[*own, *named])  # type: ignore[attr-defined]

@@ -61,10 +61,7 @@ class _Origin:
 
     @classmethod
     def of(cls, output: Path, data: bytes, search: ConvertSettings) -> _Origin:
-        """Read it; `search` says where profiles and roads are looked for.
-
-        Raises `FormatError`: there is no provenance, or it is not one of ours.
-        """
+        """Read it, `FormatError` if it is not one of ours; `search` says where profiles and roads are looked for."""
         facts = facts_in(data)
         if facts is None:
             raise FormatError("has no provenance of xosc-lateral", path=output)
@@ -78,16 +75,12 @@ class _Origin:
             if variant < 1:
                 raise ValueError(f"variant {variant}")
         except KeyError as error:
-            raise FormatError(
-                f"its provenance says nothing of {error}: made by an older version", path=output
-            ) from error
+            what = f"its provenance says nothing of {error}: made by an older version"
+            raise FormatError(what, path=output) from error
         except (TypeError, ValueError, AttributeError, OverflowError) as error:
             raise FormatError(f"its provenance can't be read: {error}", path=output) from error
-        return cls(facts, scenario, replace(settings, **_places(search)), variant)
-
-
-def _places(search: ConvertSettings) -> dict[str, Any]:
-    return {"library": search.library, "allow": search.allow, "road_path": search.road_path}
+        places = {name: getattr(search, name) for name in ("library", "allow", "road_path")}
+        return cls(facts, scenario, replace(settings, **places), variant)
 
 
 def verify(outputs: Sequence[Path], search: ConvertSettings) -> Iterator[Checked]:
@@ -97,12 +90,12 @@ def verify(outputs: Sequence[Path], search: ConvertSettings) -> Iterator[Checked
     """
     for given in outputs:
         given = given.parent if given.name == MANIFEST else given
-        if given.is_dir():
-            for row in _rows(given):
-                path = path_below(given, row.output, "output")
-                yield _check(path, search, row) if path.exists() else Checked(path, ((Problem.MISSING, "is gone"),))
-        else:
+        if not given.is_dir():
             yield _check(given, search, None)
+            continue
+        for row in _rows(given):
+            path = path_below(given, row.output, "output")
+            yield _check(path, search, row) if path.exists() else Checked(path, ((Problem.MISSING, "is gone"),))
 
 
 def _rows(folder: Path) -> Iterator[ManifestRow]:
@@ -119,32 +112,30 @@ def _check(output: Path, search: ConvertSettings, row: ManifestRow | None) -> Ch
         origin = _Origin.of(output, data, search)
     except FormatError as error:
         return Checked(output, ((Problem.FOREIGN, error.what),))
-    problems = [*_edited(data, origin.facts), *_aged(origin)]
+    problems = _changes(data, origin)
     if not problems and row is not None and hashlib.sha256(data).hexdigest() != row.output_sha256:
         problems.append((Problem.EDITED, "is not the file that the manifest names"))
     return Checked(output, tuple(problems))
 
 
-def _edited(data: bytes, facts: Mapping[str, Any]) -> Iterator[tuple[Problem, str]]:
+def _changes(data: bytes, origin: _Origin) -> list[tuple[Problem, str]]:
+    """What was edited in an output, and what would come out otherwise today, and why."""
+    facts, found = origin.facts, list[tuple[Problem, str]]()
     if facts.get(CONTENT) != content_hash(data):
-        yield Problem.EDITED, "its content is not what was written"
-
-
-def _aged(origin: _Origin) -> Iterator[tuple[Problem, str]]:
-    """What would come out otherwise today, and why."""
-    facts = origin.facts
+        found.append((Problem.EDITED, "its content is not what was written"))
     if facts.get("behaviour") != BEHAVIOUR:
         made = f"behaviour {facts.get('behaviour')} of version {facts.get('package_version')}"
-        yield Problem.VERSION, f"made by {made}; this program has behaviour {BEHAVIOUR}"
+        found.append((Problem.VERSION, f"made by {made}; this program has behaviour {BEHAVIOUR}"))
     for name, sha256 in facts["inputs"].items():
         try:
             if file_hash(Path(os.path.normpath(origin.scenario.parent / name))) != sha256:
-                yield Problem.INPUT, f"{name} has changed"
+                found.append((Problem.INPUT, f"{name} has changed"))
         except (OSError, FormatError, ValueError):
-            yield Problem.INPUT, f"{name} is gone"
+            found.append((Problem.INPUT, f"{name} is gone"))
     for name, sha256 in sorted({str(entity): profile for entity, profile in facts["profiles"].items()}.items()):
         if (why := _other_profile(origin.settings, name, sha256)) is not None:
-            yield Problem.PROFILE, why
+            found.append((Problem.PROFILE, why))
+    return found
 
 
 def _other_profile(settings: ConvertSettings, entity: str, recorded: Any) -> str | None:
@@ -192,18 +183,18 @@ def reproduce(output: Path, new: Path, search: ConvertSettings, *, workers: int 
 
 
 def _job(row: ManifestRow, origin: _Origin, output: Path) -> Job:
-    depth = len(Path(row.scenario).parts)
-    base = origin.scenario.parents[depth - 1] if origin.scenario.parts[-depth:] == Path(row.scenario).parts else None
-    base = origin.scenario.parent if base is None else base
+    below, variant = Path(row.scenario).parts, origin.variant - 1
+    source, depth = origin.scenario, len(below)
+    base = source.parents[depth - 1] if source.parts[-depth:] == below else source.parent
     return Job(
         name=row.output,
-        scenario=origin.scenario.relative_to(base).as_posix(),
-        source=origin.scenario,
+        scenario=source.relative_to(base).as_posix(),
+        source=source,
         output=output,
         base=base,
         settings=origin.settings,
-        variant=origin.variant - 1,
-        fingerprint=fingerprint(origin.settings, origin.variant - 1),
+        variant=variant,
+        fingerprint=fingerprint(origin.settings, variant),
     )
 
 
@@ -215,7 +206,7 @@ def _compared(old: Path, new: Path, origin: _Origin) -> Checked:
         for number, (one, other) in enumerate(zip(before, after, strict=True))
     ):
         return Checked(old)
-    why = (*_edited(old.read_bytes(), origin.facts), *_aged(origin))
+    why = tuple(_changes(old.read_bytes(), origin))
     return Checked(old, why or ((Problem.DIFFERS, "another content comes out, and nothing says why"),))
 
 

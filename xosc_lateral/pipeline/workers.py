@@ -1,4 +1,9 @@
-"""Where jobs run: in this process, on this machine's cores (joblib's executor), on a dask.distributed cluster."""
+"""Where jobs run: in this process, on this machine's cores (joblib's executor), on a dask.distributed cluster.
+
+Workers may die: what was lost is tried again, what kills its worker is found. All of them are pools around
+`concurrent.futures` executors, so the loop that feeds them is the same. joblib's `Parallel` is not in between because
+it ends, and on dask waits for ever, when one task takes its worker down; here that costs one row.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +13,77 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from itertools import islice
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
+from xosc_lateral.errors import XoscLateralError
 from xosc_lateral.pipeline.guard import let_worker_die
-from xosc_lateral.pipeline.tasks import AHEAD, TRIES_ALONE, ClusterError, Pool, Result, Task
 from xosc_lateral.version import __version__
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+AHEAD = 2
+"""Tasks handed out per worker: one at work, one to begin with at once."""
+
+LONG_TRY = 60.0
+"""A task that was alone and worked for so long before its worker died is not tried again: that was no accident. [s]"""
+
+TRIES_ALONE = 3
+"""Tries of a task that may have killed its worker; more than one, for a worker may be killed from outside as well."""
+
+CHECK_EVERY = 5.0
+"""How often it is looked whether a pool that does not answer still has workers. [s]"""
+
+
+class ClusterError(XoscLateralError):
+    """The cluster can't be reached, or is gone."""
+
+
+class WorkerDiedError(XoscLateralError):
+    """A task took down its worker, time and again."""
+
+
+class Pool:
+    """Workers, used as a context: here none, a task runs in this process when it is handed out.
+
+    Attributes
+    ----------
+    tries_alone : int
+        How often a task that may have killed its worker is tried by itself.
+    """
+
+    tries_alone = TRIES_ALONE
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
+        """End the workers: at once after an error."""
+
+    def capacity(self) -> int:
+        """How many tasks may be handed out at once."""
+        return 1
+
+    def submit(self, work: Callable[[Task], Result], task: Task) -> Future[Result]:
+        """Hand out a task."""
+        future: Future[Result] = Future()
+        future.set_result(work(task))
+        return future
+
+    def recover(self) -> None:
+        """Get fit again after a worker died; raises `ClusterError` if that can't be."""
+
+    def lost(self, error: BaseException) -> bool:
+        """Whether a future's error means that its worker died, rather than that the task raised it."""
+        return False
+
+    def check(self) -> None:
+        """Raise `ClusterError` when no result can come any more; called every few seconds without one."""
+
 
 PARENT_CHECK = 0.5
 """How often a worker looks whether its run is still there. [s]"""
@@ -24,46 +92,29 @@ PR_SET_PDEATHSIG = 1
 """Of Linux's prctl(2), from <linux/prctl.h>: the signal that this process gets when its parent ends."""
 
 
-class LocalProcesses:
-    """Worker processes of joblib's executor (loky).
-
-    `count`: how many.
-    """
-
-    tries_alone = TRIES_ALONE
+class _LocalProcesses(Pool):
+    """So many worker processes of joblib's executor (loky), which sees by itself when one is gone."""
 
     def __init__(self, count: int) -> None:
         self._count = count
         self._executor = self._start()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
         self._executor.shutdown(wait=True, kill_workers=error is not None)
 
     def capacity(self) -> int:
-        """A few per worker."""
         return AHEAD * self._count
 
     def submit(self, work: Callable[[Task], Result], task: Task) -> Future[Result]:
-        """Hand out a task."""
         future: Future[Result] = self._executor.submit(work, task)
         return future
 
     def recover(self) -> None:
-        """Start anew."""
         self._executor.shutdown(wait=True, kill_workers=True)
         self._executor = self._start()
 
     def lost(self, error: BaseException) -> bool:
-        """Whether the pool broke."""
         return isinstance(error, BrokenExecutor)
-
-    def check(self) -> None:
-        """The executor sees by itself when a process is gone."""
 
     def _start(self) -> Any:
         from joblib.externals.loky import ProcessPoolExecutor
@@ -102,18 +153,15 @@ WORKERLESS = 120.0
 """A cluster without workers for so long is given up; restarting one takes seconds. [s]"""
 
 
-class Cluster:
-    """Workers of a running dask.distributed cluster.
+class _Cluster(Pool):
+    """Workers of a dask.distributed cluster that runs at an address such as ``tcp://10.0.0.1:8786``.
 
     They have to see the same files under the same paths, and have the same version of this package. The scheduler
     itself gives a dead worker's tasks to another. Whoever can talk to the scheduler can run code on the workers and
     here: it has to be trusted.
-
-    `address`: of the scheduler, as in ``tcp://10.0.0.1:8786``. Raises `ClusterError`: the extra ``cluster`` is not
-    installed, nobody answers, or a worker has another version of this package.
     """
 
-    tries_alone = 1
+    tries_alone = 1  # the scheduler has had a task on several workers before it gives it up, and a try costs some more
 
     def __init__(self, address: str) -> None:
         try:
@@ -130,37 +178,28 @@ class Cluster:
         # pure=False: the key of a task must not come from its arguments, a repeated task has to run again
         self._executor: Executor = self._client.get_executor(pure=False)
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
         self._executor.shutdown(wait=error is None)
         self._client.close()
 
     def capacity(self) -> int:
-        """A few per thread of the workers that there are now; workers may come and go."""
+        # of the workers that there are now; they may come and go
         return AHEAD * max(1, sum(map(int, self._client.nthreads().values())))
 
     def submit(self, work: Callable[[Task], Result], task: Task) -> Future[Result]:
-        """Hand out a task."""
         self._check()
         return self._executor.submit(work, task)
 
     def recover(self) -> None:
-        """The scheduler sees to it, if it is still there."""
-        self._check()
+        self._check()  # the scheduler sees to it
 
     def lost(self, error: BaseException) -> bool:
-        """Whether the scheduler has given the task up, rather than that it is gone."""
         from distributed import KilledWorker
 
         self._check()
         return isinstance(error, KilledWorker | CancelledError)
 
     def check(self) -> None:
-        """Whether scheduler and workers are there; a worker that is being restarted has its time."""
         self._check()
         if self._client.nthreads():
             self._had_workers = time.monotonic()
@@ -193,53 +232,85 @@ def installed_version() -> str:
     return __version__
 
 
-class ThisProcess:
-    """No workers: a task runs when it is handed out."""
-
-    tries_alone = TRIES_ALONE
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        return None
-
-    def capacity(self) -> int:
-        """One."""
-        return 1
-
-    def submit(self, work: Callable[[Task], Result], task: Task) -> Future[Result]:
-        """Run it."""
-        future: Future[Result] = Future()
-        future.set_result(work(task))
-        return future
-
-    def recover(self) -> None:
-        """Nothing to do: if a task takes this process down, that was it."""
-
-    def lost(self, error: BaseException) -> bool:
-        """Never."""
-        return False
-
-    def check(self) -> None:
-        """It answers at once."""
-
-
 def open_pool(workers: int, cluster: str | None) -> Pool:
     """Pool for so many processes on this machine (-1: one per core; 0: this process), or for a cluster.
 
     Raises `ClusterError`: the cluster can't be reached; `ValueError`: fewer than none.
     """
     if cluster is not None:
-        from xosc_lateral.pipeline.workers import Cluster
-
-        return Cluster(cluster)
+        return _Cluster(cluster)
     if workers == -1:
         import joblib
 
         workers = joblib.cpu_count()
     if workers < 0:
         raise ValueError(f"{workers} workers; at least 0 (this process), or -1 for one per core")
-    return ThisProcess() if workers == 0 else LocalProcesses(workers)
+    return Pool() if workers == 0 else _LocalProcesses(workers)
+
+
+def run_tasks(
+    pool: Pool, work: Callable[[Task], Result], tasks: Iterable[Task]
+) -> Iterator[tuple[Task, Result | WorkerDiedError]]:
+    """Results as they come, in any order.
+
+    When a worker dies, whatever had been handed out is tried again, one by one: what kills its worker then as well is
+    the culprit and gives a `WorkerDiedError`; the rest is fine.
+
+    Raises
+    ------
+    ClusterError
+        When the cluster is gone.
+    Exception
+        What `work` raises.
+    """
+    waiting = iter(tasks)
+    running: dict[Future[Result], Task] = {}
+    suspects: list[Task] = []
+    while True:
+        if not suspects:
+            for task in islice(waiting, max(pool.capacity() - len(running), 0)):
+                try:
+                    running[pool.submit(work, task)] = task
+                except BrokenExecutor:
+                    suspects.append(task)
+                    break
+        if not running:
+            if not suspects:
+                return
+            pool.recover()
+            while suspects:
+                task = suspects.pop(0)
+                yield task, _alone(pool, work, task)
+            continue
+        done = wait(running, CHECK_EVERY, FIRST_COMPLETED).done
+        if not done:
+            pool.check()
+        for future in done:
+            task = running.pop(future)
+            try:
+                result = future.result()
+            except (Exception, CancelledError) as error:
+                if not pool.lost(error):
+                    raise
+                suspects.append(task)
+            else:
+                yield task, result
+
+
+def _alone(pool: Pool, work: Callable[[Task], Result], task: Task) -> Result | WorkerDiedError:
+    deaths = 1
+    for _ in range(pool.tries_alone):
+        begin = time.monotonic()
+        try:
+            future = pool.submit(work, task)
+            while not wait([future], CHECK_EVERY).done:
+                pool.check()
+            return future.result()
+        except (Exception, CancelledError) as error:
+            if not pool.lost(error):
+                raise
+            pool.recover()
+        deaths += 1
+        if time.monotonic() - begin > LONG_TRY:
+            break
+    return WorkerDiedError(f"its worker process died {deaths} times (killed, out of memory, or a crash in a library)")
