@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.effects import Acts, Angular, ColumnEffect, Product
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.cross_validation import hold_out_blocks
+from xosc_lateral.identification.terms.base import latent_path
 from xosc_lateral.identification.terms.between import is_between
-from xosc_lateral.identification.terms.cycle import CycleTerm, latent_path
+from xosc_lateral.identification.terms.cycle import CycleTerm
 from xosc_lateral.identification.terms.regimes import RegimesTerm
 from xosc_lateral.identification.terms.time import StepTerm, TimeMeanTerm
 from xosc_lateral.identification.timeline import LOCAL_S, coarse_mean, coarse_middle, local_mean
