@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from xosc_lateral.api.profiles import read_profile
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
-from xosc_lateral.driver.upsampling import upsample
+from tests.driver.upsampled import upsample
 from xosc_lateral.errors import SimulationError
 from xosc_lateral.live.traffic import TURN, Moment, Moves, Traffic
 from xosc_lateral.segment import Segment

@@ -203,7 +203,7 @@ class Journal:
                 try:
                     values = json.loads(line)
                     output = ManifestRow.from_dict(values["row"]).output
-                    timing = Timing(float(values["seconds"]), str(values["state"]))
+                    timing = Timing(float(values["seconds"]), str(values.get("state", "")))
                     if not math.isfinite(timing.seconds):
                         break
                 except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
