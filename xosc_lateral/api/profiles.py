@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from xosc_lateral.driver.profile import DriverProfile
     from xosc_lateral.formats.profiles import Entry
-    from xosc_lateral.pipeline.derive import Derived
+    from xosc_lateral.identification.derive import Derived
     from xosc_lateral.report.comparison import Compared
     from xosc_lateral.report.figure import Figure
 
@@ -86,11 +86,11 @@ def derive_profile(
     name : str
         Id of the new profile; else the preset's or the base's name with ``-derived``.
     preset : str, optional
-        One of `pipeline.derive.PRESETS`: figures with a source.
+        One of `identification.stated_figures.PRESETS`: figures with a source.
     library : path or paths
         Folders with further profiles.
     **asked
-        Fields of `pipeline.derive.Asked`: ``sdlp=0.25``.
+        Fields of `identification.stated_figures.Asked`: ``sdlp=0.25``.
 
     Raises
     ------
@@ -99,13 +99,20 @@ def derive_profile(
     """
     from dataclasses import replace
 
-    from xosc_lateral.pipeline.derive import Asked, derive, preset_called
+    from msgspec import structs
+
+    from xosc_lateral.formats.profiles import profile_hash
+    from xosc_lateral.identification.derive import derive
+    from xosc_lateral.identification.stated_figures import Asked, preset_called
 
     known = given_profile(base, library)
     chosen = None if preset is None else preset_called(preset)
     stated = {key: value for key, value in asked.items() if value is not None}
     figures = Asked(**stated) if chosen is None else replace(chosen.asked, **stated)  # type: ignore[arg-type]
-    return derive(known, figures, name or preset or f"{known.name}-derived", preset=chosen)
+    made = derive(known, figures, name or preset or f"{known.name}-derived", preset=chosen)
+    origin = made.profile.provenance
+    origin = structs.replace(origin, fit={**origin.fit, "sha256": profile_hash(known)})
+    return made._replace(profile=structs.replace(made.profile, provenance=origin))
 
 
 def list_profiles(
