@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from xosc_lateral.driver.profile import DriverProfile
+    from xosc_lateral.evaluation.profile_comparison import Compared
     from xosc_lateral.formats.profiles import Entry
     from xosc_lateral.identification.derive import Derived
-    from xosc_lateral.report.comparison import Compared
     from xosc_lateral.report.figure import Figure
 
 PROFILE_SUFFIXES = (".json",)
@@ -217,7 +217,7 @@ def compare_profiles(*profiles: ProfileLike, seed: int = 0, library: Paths = ())
     library : path or paths
         Folders with further profiles.
     """
-    from xosc_lateral.report.comparison import compare
+    from xosc_lateral.evaluation.profile_comparison import compare
 
     if len(profiles) < 2:
         raise ValueError(f"{len(profiles)} profile to compare, two are needed")
@@ -276,7 +276,7 @@ class ProfileComparison(Result):
 
     def headline(self) -> str:
         """One line."""
-        return ", ".join(profile.name for profile in self._compared.profiles)
+        return ", ".join(self._compared.names)
 
     def __str__(self) -> str:
         from xosc_lateral.report.comparison import comparison_text
@@ -287,7 +287,7 @@ class ProfileComparison(Result):
         """Mean distance of the ten metrics of each profile (row) from each (column), in standard deviations."""
         import pandas as pd
 
-        names = [profile.name for profile in self._compared.profiles]
+        names = self._compared.names
         return pd.DataFrame(self._compared.distance, index=names, columns=names)
 
     def to_dict(self) -> dict[str, Any]:
