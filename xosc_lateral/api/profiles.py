@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xosc_lateral.api.result import PathLike, Paths, ProfileLike, Result, as_paths, given_profile
+from xosc_lateral.api.result import PathLike, Paths, ProfileLike, Result, as_paths, given_profile, write_page
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.output_paths import claim, output_file, output_folder
 
@@ -61,12 +61,9 @@ def write_profile(profile: DriverProfile, path: PathLike, *, force: bool = False
 
 def write_card(profile: DriverProfile, path: PathLike, *, force: bool = False) -> Path:
     """Write a profile's card as a page: what it does, where it comes from, how true it is."""
-    from xosc_lateral.formats.atomic import write_atomically
     from xosc_lateral.report.cards import card_page
 
-    output = output_file(path, f"{profile.name}.html", (".html", ".htm"))
-    claim([output], force=force)
-    return write_atomically(output, card_page(profile))
+    return write_page(path, f"{profile.name}.html", lambda: card_page(profile), force=force)
 
 
 def derive_profile(
@@ -304,9 +301,6 @@ class ProfileComparison(Result):
 
     def write_report(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the HTML page."""
-        from xosc_lateral.formats.atomic import write_atomically
         from xosc_lateral.report.comparison import comparison_page
 
-        output = output_file(path, "profiles.html", (".html", ".htm"))
-        claim([output], force=force)
-        return write_atomically(output, comparison_page(self._compared))
+        return write_page(path, "profiles.html", lambda: comparison_page(self._compared), force=force)
