@@ -130,7 +130,8 @@ def comparison_page(compared: Compared) -> str:
     page.section("Summary")
     page.table(
         [
-            {name: text.replace("+-", "±") for name, text in _row(one).items()} | {"effects": len(one.profile.effects)}
+            {name: text.replace(" +- ", "\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}") for name, text in _row(one).items()}
+            | {"effects": len(one.profile.effects)}
             for one in compared.profiles
         ]
     )
