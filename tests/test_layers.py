@@ -10,6 +10,7 @@ import pytest
 PACKAGE = Path(__file__).resolve().parents[1] / "xosc_lateral"
 
 LAYERS = {
+    "arrays": 0,
     "errors": 0,
     "version": 0,
     "plugins": 0,

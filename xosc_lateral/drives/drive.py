@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-FloatArray = NDArray[np.float64]
+from xosc_lateral.arrays import FloatArray
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,13 +24,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.drives.cuts import MAX_GAP, lane_steps
 from xosc_lateral.drives.drive import MarkingShares
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.normal import MAD_TO_SD
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 DEGREES = 4.0
 """Of freedom of the views' errors. [-]"""

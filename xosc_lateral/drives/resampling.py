@@ -15,9 +15,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.drives.filters import kaiser_design, low_pass, mirrored
-
-FloatArray = NDArray[np.float64]
 
 STEP = 0.2
 """Step of the model. [s]"""

@@ -9,8 +9,8 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.driver.answers import basis_of
 from xosc_lateral.driver.drivability import drivable
 from xosc_lateral.driver.plausibility import check_offsets
@@ -30,9 +30,6 @@ from xosc_lateral.motion.trajectory import WorldTrajectory, displace, distance_d
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.rows import blocks, columns, give_back, kept
 from xosc_lateral.segment import Segment
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 SAMPLE_STEP = 0.2
 """Step of the driver model. [s]"""

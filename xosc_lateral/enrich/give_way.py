@@ -25,14 +25,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.motion.context import CELLS, STEERING, smooth_step
 from xosc_lateral.motion.nearby import stretches_within
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.rows import empty, give_back, kept, put
 from xosc_lateral.segment import Segment
-
-FloatArray = NDArray[np.float64]
 
 OTHER_SIGN = ("curvature", "crossfall")
 """Positive to the one side, negative to the other."""
@@ -67,8 +66,6 @@ def other_side(name: str) -> str:
     """The name with the words `left` and `right` exchanged."""
     return "_".join(_SIDES.get(word, word) for word in name.split("_"))
 
-
-IntArray = NDArray[np.int64]
 
 GAPS = (
     np.array([-0.68, -0.05, 0.37, 0.76, 1.29, 1.65, 3.0]),

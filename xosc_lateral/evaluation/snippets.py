@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampled_offsets import Snippet, cut_snippets, recorded, segment_of, sensor_error
@@ -20,8 +21,6 @@ from xosc_lateral.driver.sampling import OffsetSampler, sample_offsets
 from xosc_lateral.driver.seeds import child
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.segment import Segment
-
-FloatArray = NDArray[np.float64]
 
 BLOCK = 120.0
 """Where there are too few drives to split between them, blocks of this length are split instead. [s]"""

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.plausibility import first_implausible, implausible
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.tables import plain_cells, read_table
@@ -17,8 +17,6 @@ from xosc_lateral.limits import TIME
 
 if TYPE_CHECKING:
     import pandas as pd
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, slots=True)

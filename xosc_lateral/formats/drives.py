@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.plausibility import first_implausible, implausible, implausible_rows, nobody
 from xosc_lateral.drives.cleaning import MAX_MEDIAN_SPEED, MAX_OUTSIDE, OWN, clean_drive
 from xosc_lateral.drives.cuts import MIN_RUN
@@ -21,8 +22,6 @@ from xosc_lateral.segment import CONTEXT_UNITS
 
 if TYPE_CHECKING:
     import pandas as pd
-
-FloatArray = NDArray[np.float64]
 
 MAX_LEVELS = 12
 """A column of whole numbers with at most so many values holds levels, not a quantity."""

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.importers import dlr_ht, levelx
 from xosc_lateral.formats.importers.track_table import USUAL_LENGTH, Tracks, read_tracks, tracks_of
@@ -18,8 +19,6 @@ from xosc_lateral.formats.opendrive.write import SHOULDER, WIDTH_PIECE, WrittenL
 from xosc_lateral.formats.tables import foreign_errors
 from xosc_lateral.reconstruction.recorded import Track
 from xosc_lateral.road.network import RoadNetwork
-
-FloatArray = NDArray[np.float64]
 
 STEP = 0.1
 """Rows are thinned to this: lane changes and braking last seconds. [s]"""

@@ -13,6 +13,7 @@ from typing import IO, TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.hashes import parsed_hash
 from xosc_lateral.formats.source import Source, open_source
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
 
     from xosc_lateral.formats.mapping import TableMapping
 
-
-FloatArray = NDArray[np.float64]
 
 _COMMA_NUMBER = r"\s*[+-]?(?:\d{1,3}(?:\.\d{3})+|\d*)(?:,\d+)?(?:[eE][+-]?\d+)?\s*"
 

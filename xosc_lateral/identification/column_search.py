@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import ColumnEffect
 from xosc_lateral.identification.autocorrelation import Problem
 from xosc_lateral.identification.dictionary import (
@@ -22,7 +23,6 @@ from xosc_lateral.identification.refinement import Refined, Refinement
 from xosc_lateral.identification.regression import Fitted, fit_model
 from xosc_lateral.identification.significance import LoopSeed, upper_tail
 from xosc_lateral.identification.terms.base import Outcome
-from xosc_lateral.identification.timeline import FloatArray
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.selection import Search

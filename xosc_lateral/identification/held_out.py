@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from msgspec import structs
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.driver.effects import ColumnEffect, Effect, TimeSmooth
 from xosc_lateral.driver.fitting import fit_population, fit_runs
 from xosc_lateral.driver.models.base import ModelKind
@@ -37,7 +38,7 @@ from xosc_lateral.identification.significance import LoopSeed
 from xosc_lateral.identification.terms.base import Removal
 from xosc_lateral.identification.terms.cycle import CycleTerm
 from xosc_lateral.identification.terms.time import StepTerm
-from xosc_lateral.identification.timeline import COARSE, BoolArray, FloatArray, IntArray, Timeline, coarse_middle
+from xosc_lateral.identification.timeline import COARSE, Timeline, coarse_middle
 from xosc_lateral.rows import true_slices
 
 FINE_S = 1.0  # Movement within this time counts as fine when a spread is taken out. [s]
@@ -89,7 +90,7 @@ class Setting:
     root: np.random.SeedSequence
 
     @cached_property
-    def blocks(self) -> IntArray:
+    def blocks(self) -> IndexArray:
         """What is held out."""
         return hold_out_blocks(self.coarse.timeline)
 
@@ -222,7 +223,7 @@ class Scorecard:
 
 
 def score_runs(
-    timeline: Timeline, before: FloatArray, after: FloatArray, blocks: IntArray, rng: np.random.Generator
+    timeline: Timeline, before: FloatArray, after: FloatArray, blocks: IndexArray, rng: np.random.Generator
 ) -> Scorecard:
     """Cut offsets [m], shape (n,), and runs, shape (runs, n), into the same snippets and compare."""
     starts = _starts(timeline)
@@ -242,7 +243,7 @@ def score_runs(
     return Scorecard(own, other, floor, real, snippet_metrics(before[0][rows]), snippet_metrics(after[0][rows]))
 
 
-def _starts(timeline: Timeline) -> IntArray:
+def _starts(timeline: Timeline) -> IndexArray:
     """Snippets side by side, each of valid rows alone, shape (snippets,)."""
     stretches = true_slices(timeline.valid)
     starts = [np.arange(rows.start, rows.stop - SNIPPET_ROWS + 1, SNIPPET_ROWS) for rows in stretches]

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.identification.autocorrelation import (
     Problem,
     Whitener,
@@ -20,15 +21,7 @@ from xosc_lateral.identification.autocorrelation import (
     moving_sum,
     start_factors,
 )
-from xosc_lateral.identification.timeline import (
-    COARSE,
-    BoolArray,
-    FloatArray,
-    IntArray,
-    coarse_all,
-    coarse_mean,
-    means_by_drive,
-)
+from xosc_lateral.identification.timeline import COARSE, coarse_all, coarse_mean, means_by_drive
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.regression import Coarse, Fitted
@@ -51,7 +44,7 @@ SQUARES_S = 12
 SLOW_S = 8  # Whitened seconds that are averaged for the slower movement: below 1/16 Hz. [s]
 
 
-def own_levels(squares: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
+def own_levels(squares: FloatArray, valid: BoolArray, drive: IndexArray) -> FloatArray:
     """Mean square of every drive over that of all, shape (drives,); 1 for a single drive, near 1 for short ones."""
     groups = int(drive.max()) + 1
     if groups == 1 or not valid.any():
@@ -67,13 +60,13 @@ def clipped_squares(rows: FloatArray, valid: BoolArray) -> FloatArray:
     return np.asarray(np.minimum(np.square(rows) / max(float(np.mean(rows[valid] ** 2)), 1e-300), CLIP))
 
 
-def _within_drives(scales: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
+def _within_drives(scales: FloatArray, valid: BoolArray, drive: IndexArray) -> FloatArray:
     """Valid rows of the scale's columns about their drive's mean."""
     means = np.stack([means_by_drive(column, valid, drive) for column in scales.T], axis=1)
     return np.asarray((scales - means[drive])[valid])
 
 
-def scoring_step(scales: FloatArray, rows: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
+def scoring_step(scales: FloatArray, rows: FloatArray, valid: BoolArray, drive: IndexArray) -> FloatArray:
     """One Fisher-scoring step [-], shape (j,), for log sd = scales . sizes (variance of a squared normal is 2)."""
     squares, design = clipped_squares(rows, valid)[valid], _within_drives(scales, valid, drive)
     return np.asarray(np.linalg.pinv(2.0 * design.T @ design) @ (design.T @ (squares / squares.mean() - 1.0)))
@@ -85,7 +78,7 @@ def bounded(log_sizes: FloatArray, scales: FloatArray) -> FloatArray:
     return log_sizes * min(1.0, MOST_LOG_SCALE / max(reach, 1e-300))
 
 
-def covariance_of_log_sizes(scales: FloatArray, rows: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
+def covariance_of_log_sizes(scales: FloatArray, rows: FloatArray, valid: BoolArray, drive: IndexArray) -> FloatArray:
     """Sandwich, clustered [2]_, shape (j, j): squares have heavy tails and come in clusters."""
     if scales.shape[1] == 0:
         return np.zeros((0, 0))
@@ -98,13 +91,13 @@ def covariance_of_log_sizes(scales: FloatArray, rows: FloatArray, valid: BoolArr
     return np.asarray(bread @ (sums.T @ sums) @ bread * len(sums) / max(1, len(sums) - 1))
 
 
-def _whitener(movement: FloatArray, valid: BoolArray, drive: IntArray, scale: FloatArray) -> Whitener:
+def _whitener(movement: FloatArray, valid: BoolArray, drive: IndexArray, scale: FloatArray) -> Whitener:
     """What turns movement over scale, 0 where invalid, into independent rows as it is seen: without a floor."""
     return Whitener(fit_autoregression(movement, valid, ORDER, longest=LONGEST), valid, drive, scale)
 
 
 def innovations(
-    moved: FloatArray, responses: FloatArray, valid: BoolArray, drive: IntArray, scale: FloatArray
+    moved: FloatArray, responses: FloatArray, valid: BoolArray, drive: IndexArray, scale: FloatArray
 ) -> FloatArray:
     """White rows of variance about 1, shape (n,), young runs by their own size; 0 where invalid.
 
@@ -119,7 +112,7 @@ def innovations(
 
 
 def smoothed_as_seen(
-    moved: FloatArray, responses: FloatArray, valid: BoolArray, drive: IntArray, scale: FloatArray
+    moved: FloatArray, responses: FloatArray, valid: BoolArray, drive: IndexArray, scale: FloatArray
 ) -> FloatArray:
     """Responses, shape (n,), through the filter of five seconds and gain one that leaves least of them. [m]
 

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from msgspec import structs
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression, start_factors, unbiased
 from xosc_lateral.identification.innovations import (
@@ -31,16 +32,7 @@ from xosc_lateral.identification.innovations import (
     own_levels,
     scoring_step,
 )
-from xosc_lateral.identification.timeline import (
-    BoolArray,
-    FloatArray,
-    IntArray,
-    Timeline,
-    coarse_all,
-    coarse_mean,
-    coarse_middle,
-    means_by_drive,
-)
+from xosc_lateral.identification.timeline import Timeline, coarse_all, coarse_mean, coarse_middle, means_by_drive
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.terms.base import Term
@@ -63,7 +55,7 @@ class Coarse:
     timeline: Timeline
     offset: FloatArray  # shape (n,): Mean of each second. [m]
     valid: BoolArray  # shape (n,)
-    drive: IntArray  # shape (n,)
+    drive: IndexArray  # shape (n,)
     time: FloatArray  # shape (n,): [s]
     # Columns on the fine grid, lane width included, clipped to what occurs while road-following: a traffic jam that is
     # cut out must not stretch a column's range.
@@ -96,7 +88,7 @@ class Coarse:
         return int(self.drive.max()) + 1
 
     @cached_property
-    def cluster(self) -> IntArray:
+    def cluster(self) -> IndexArray:
         """Clusters: minutes within drives, numbered, shape (n,); they count as independent of each other."""
         _, first = np.unique(self.drive, return_index=True)
         minute = (np.arange(len(self)) - first[self.drive]) // CLUSTER_S
@@ -254,7 +246,7 @@ def joined(blocks: Sequence[FloatArray], n: int) -> FloatArray:
 
 
 def clustered_least_squares(
-    design: FloatArray, observed: FloatArray, cluster: IntArray
+    design: FloatArray, observed: FloatArray, cluster: IndexArray
 ) -> tuple[FloatArray, FloatArray]:
     """Sizes, and a sandwich for their covariance, clustered [1]_.
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.identification import terms
 from xosc_lateral.identification.candidates import candidates_of
 from xosc_lateral.identification.columns import Column
@@ -16,7 +17,6 @@ from xosc_lateral.identification.refinement import Alternatives
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
 from xosc_lateral.identification.significance import Budget
 from xosc_lateral.identification.terms.base import Stage, Term
-from xosc_lateral.identification.timeline import FloatArray
 from xosc_lateral.normal import NORMAL_95
 from xosc_lateral.plugins import defined_in
 

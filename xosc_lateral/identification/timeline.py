@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.driver.effects import ColumnEffect
 from xosc_lateral.driver.effects.response import respond
 from xosc_lateral.drives.cuts import CutRules
@@ -22,10 +23,6 @@ from xosc_lateral.drives.drive import Drive
 from xosc_lateral.drives.gridding import GriddedDrive, grid_drives
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import NotEnoughDataError
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
 
 # Samples of the 0.2 s grid per sample of the coarse one: effects take seconds, so they are tested at 1 Hz. [-]
 COARSE = 5
@@ -42,7 +39,7 @@ class Timeline:
     """All drives on the 0.2 s grid."""
 
     names: tuple[str, ...]  # Drives.
-    drive: IntArray  # shape (n,): Index into `names`.
+    drive: IndexArray  # shape (n,): Index into `names`.
     time: FloatArray  # shape (n,): The drive's own clock. [s]
     offset: FloatArray  # shape (n,): 0 outside `valid`. [m]
     valid: BoolArray  # shape (n,): Road-following, not cut out.
@@ -138,7 +135,7 @@ def coarse_all(mask: BoolArray) -> BoolArray:
     return np.asarray(mask[: n * COARSE].reshape(n, COARSE).all(axis=1))
 
 
-def means_by_drive(values: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
+def means_by_drive(values: FloatArray, valid: BoolArray, drive: IndexArray) -> FloatArray:
     """Mean over the valid rows of each drive, shape (drives,), in the values' unit; 0 where there are none."""
     drives = int(drive.max()) + 1
     count = np.bincount(drive, valid.astype(float), minlength=drives)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.enrich.give_way import FADES, Frame, part_of, widened
 from xosc_lateral.motion.context import (
     IN_SIGHT,
@@ -27,10 +27,6 @@ from xosc_lateral.motion.context import (
 )  # fmt: skip
 from xosc_lateral.motion.nearby import pairs_now
 from xosc_lateral.road.network import RoadNetwork
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 
 class Roads(Protocol):

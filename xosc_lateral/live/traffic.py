@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.driver.group import OffsetGroup
 from xosc_lateral.driver.plausibility import first_implausible, implausible
 from xosc_lateral.driver.profile import Basis, DriverProfile, sampling_hash
@@ -27,9 +28,6 @@ from xosc_lateral.live.surroundings import Places, Roads, give_way_now, look_aro
 from xosc_lateral.motion.context import STEERING
 from xosc_lateral.motion.deviation import SETTLING_TIME, settle
 from xosc_lateral.motion.segments import MINIMUM_SPEED
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 FORMAT = "xosc-lateral live traffic"
 

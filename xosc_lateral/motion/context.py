@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.motion.nearby import stretches_within
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.road.network import RoadNetwork
@@ -27,9 +28,6 @@ from xosc_lateral.scenario.enums import VehicleCategory
 from xosc_lateral.scenario.environment import Environment, Weather
 from xosc_lateral.scenario.global_actions import EnvironmentAction
 from xosc_lateral.segment import FADES
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 REACH = 200.0
 """How far a driver looks for others [m]; beyond it there is none (about what a series radar sees)."""

@@ -14,10 +14,9 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.motion.nearby import stretches_within
 from xosc_lateral.rows import BLOCK, give_back
-
-FloatArray = NDArray[np.float64]
 
 REACH = 30.0
 """Boxes farther apart than this at all times are no pair worth naming. [m]"""

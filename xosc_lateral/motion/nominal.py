@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, Int32Array
 from xosc_lateral.errors import locate
 from xosc_lateral.scenario import Entity
-
-FloatArray = NDArray[np.float64]
 
 
 def axes(yaw: FloatArray, pitch: FloatArray, roll: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -23,9 +22,6 @@ def axes(yaw: FloatArray, pitch: FloatArray, roll: FloatArray) -> tuple[FloatArr
         np.stack([cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr], axis=1),
         np.stack([cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr], axis=1),
     )
-
-
-IntArray = NDArray[np.int32]
 
 
 class Activity(IntFlag):
@@ -83,8 +79,8 @@ class EntityMotion:
     pitch: FloatArray
     roll: FloatArray
     speed: FloatArray
-    road: IntArray
-    lane: IntArray
+    road: Int32Array
+    lane: Int32Array
     s: FloatArray
     offset: FloatArray
     heading_relative: FloatArray

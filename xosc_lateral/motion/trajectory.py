@@ -17,11 +17,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.motion.nominal import Activity, EntityMotion
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.rows import blocks, columns, empty, put, rows_where, scratch
-
-FloatArray = NDArray[np.float64]
 
 _STANDSTILL = 1e-3
 """Displacement per step under which a direction of motion can't be read from it. [m]"""

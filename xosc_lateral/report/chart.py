@@ -10,7 +10,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-FloatArray = NDArray[np.float64]
+from xosc_lateral.arrays import FloatArray
+
 Ticks = list[tuple[float, str]]
 
 # Okabe and Ito, "Color universal design" (2008), and six more. Each of these was chosen as the colour farthest from all

@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.evaluation.distances import wasserstein
 from xosc_lateral.evaluation.lane_keeping import LaneKeeping, keeping_of
@@ -28,8 +28,6 @@ from xosc_lateral.report.cards import keeping_record
 from xosc_lateral.report.chart import color_of
 from xosc_lateral.report.figure import Figure
 from xosc_lateral.report.page import Page
-
-FloatArray = NDArray[np.float64]
 
 SNIPPET = 10.0
 """Length of the snippets that are compared. [s]"""

@@ -7,10 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.motion.nominal import Activity, EntityMotion
 from xosc_lateral.motion.trajectory import WorldTrajectory
-
-FloatArray = NDArray[np.float64]
 
 STEP = 0.1
 """Rows that the derivatives are taken on. [s]"""

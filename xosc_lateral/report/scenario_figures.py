@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.enrich.result import Enriched, EntityResult
 from xosc_lateral.motion.gaps import Gap
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
@@ -17,7 +18,6 @@ from xosc_lateral.report.figure import WIDTH, Figure, text_width
 from xosc_lateral.report.path_dynamics import COMFORTABLE, lateral_dynamics
 from xosc_lateral.road import RoadNetwork
 
-FloatArray = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 ROW_STEP = 0.1

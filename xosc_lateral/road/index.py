@@ -7,8 +7,9 @@ from collections.abc import Collection, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from xosc_lateral.arrays import FloatArray, Int32Array
 from xosc_lateral.road.places import lane_at
-from xosc_lateral.road.positions import FloatArray, IntArray, LaneCoordinates, LanePositions
+from xosc_lateral.road.positions import LaneCoordinates, LanePositions
 from xosc_lateral.road.projection import Feet, project, project_at
 from xosc_lateral.road.samples import BRUTE_FORCE, Candidates, Samples, joined
 from xosc_lateral.road.tables import NetworkTables
@@ -137,7 +138,7 @@ class SurfaceIndex:
         self,
         best: _Best,
         point: NDArray[np.int64],
-        road: IntArray,
+        road: Int32Array,
         guess: FloatArray,
         x: FloatArray,
         y: FloatArray,
@@ -164,8 +165,8 @@ class SurfaceIndex:
         )  # fmt: skip
 
     def _lanes(
-        self, road: IntArray, feet: Feet, types: frozenset[str] | None
-    ) -> tuple[IntArray, FloatArray, FloatArray]:
+        self, road: Int32Array, feet: Feet, types: frozenset[str] | None
+    ) -> tuple[Int32Array, FloatArray, FloatArray]:
         """Row, centre and width of the lane of these types that holds t, else of the nearest; row -1: there is none."""
         tables = self._tables
         if types not in self._wanted:
@@ -207,8 +208,8 @@ class _Best:
         point: NDArray[np.int64],
         score: FloatArray,
         away: FloatArray,
-        road: IntArray,
-        lane: IntArray,
+        road: Int32Array,
+        lane: Int32Array,
         s: FloatArray,
         offset: FloatArray,
         t: FloatArray,

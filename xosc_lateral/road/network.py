@@ -16,6 +16,7 @@ from functools import cached_property
 
 from numpy.typing import ArrayLike
 
+from xosc_lateral.arrays import FloatArray, Int32Array
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.road.index import SurfaceIndex
 from xosc_lateral.road.lanes import DRIVING
@@ -26,8 +27,6 @@ from xosc_lateral.road.piecewise import IndexLike
 from xosc_lateral.road.places import cross_section, find_lane, lane_at, lane_pose, surface_pose
 from xosc_lateral.road.positions import (
     Advance,
-    FloatArray,
-    IntArray,
     LaneCoordinates,
     LaneInfo,
     LaneLink,
@@ -107,7 +106,7 @@ class RoadNetwork:
         """+1: the lane is driven along s, -1: against s. Lane id and ``road/@rule`` (RHT, LHT) decide."""
         return self.roads[road].directions.get(lane, 1)
 
-    def travel_directions(self, road: ArrayLike, lane: ArrayLike) -> IntArray:
+    def travel_directions(self, road: ArrayLike, lane: ArrayLike) -> Int32Array:
         """`travel_direction` for arrays. Shape as the arguments. [-]"""
         return self._tables.travel_directions(road, lane)
 
@@ -195,7 +194,7 @@ class RoadNetwork:
         """
         return self._tables.lane_curvature(road, lane, s, offset)
 
-    def lane_index(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[IntArray, IntArray]:
+    def lane_index(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[Int32Array, Int32Array]:
         """Index among the driving lanes of its direction (0 = rightmost in travel direction), and their count.
 
         Index -1 for a lane that is no driving lane.
@@ -256,7 +255,7 @@ class RoadNetwork:
         """
         return lane_at(self.roads[road], road, s, t, lane_types)
 
-    def section_numbers(self, road: IntArray, s: FloatArray) -> IndexLike:
+    def section_numbers(self, road: Int32Array, s: FloatArray) -> IndexLike:
         """Numbers of lane sections, counted over all roads; road and s [m] of the same shape (n,)."""
         return self._tables.section_of(road, s)
 

@@ -14,7 +14,7 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from xosc_lateral.road.positions import FloatArray
+from xosc_lateral.arrays import FloatArray
 
 Cubic = tuple[float, float, float, float]
 """a, b, c, d of a + b ds + c ds^2 + d ds^3."""

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
+from xosc_lateral.arrays import FloatArray, Int32Array
 
 
 class Pose(NamedTuple):
@@ -55,8 +51,8 @@ class LaneCoordinates(NamedTuple):
 class LanePositions(NamedTuple):
     """Places on the road as arrays of one shape; fields as in `LaneCoordinates`; lane 0 where there is none."""
 
-    road: IntArray
-    lane: IntArray
+    road: Int32Array
+    lane: Int32Array
     s: FloatArray
     offset: FloatArray
     t: FloatArray

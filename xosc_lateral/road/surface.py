@@ -10,6 +10,7 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.road.piecewise import PiecewiseCubic
 
 BEND_STEP = 1e-3
@@ -131,8 +132,6 @@ class Surface(Struct, frozen=True):
             height, along, lean = height + lift, along + lift_along, lean + lift_across
         return height, along, lean
 
-
-FloatArray = NDArray[np.float64]
 
 Place = TypeVar("Place", float, NDArray[np.float64])
 

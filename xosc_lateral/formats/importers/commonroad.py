@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings
 from xosc_lateral.formats.importers.lane_shapes import LaneShape, curvature_along, place_in_shapes
@@ -30,9 +31,6 @@ from xosc_lateral.formats.importers.placed import (
 from xosc_lateral.formats.importers.table import Imported, guarded
 from xosc_lateral.formats.importers.track_table import Tracks
 from xosc_lateral.formats.xml import read_xml
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 LICENCE = "that of the CommonRoad scenario and of the recording that it was made from"
 

@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.drives.cleaning import RUN
 from xosc_lateral.drives.filters import filtered, low_pass_between
 from xosc_lateral.errors import FormatError, NotEnoughDataError
@@ -45,9 +46,6 @@ from xosc_lateral.formats.source import Source, open_source
 
 if TYPE_CHECKING:
     import pandas as pd
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 LANES = 2  # through lanes per direction of the A39 there; ramps and their merging lanes are left out
 STEP = 0.05  # [s]

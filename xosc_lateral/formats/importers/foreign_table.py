@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.drives import drives_of_table, translated
 from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping, factor, spelled
@@ -18,8 +18,6 @@ from xosc_lateral.formats.tables import comma_numbers, read_table, text_encoding
 
 if TYPE_CHECKING:
     import pandas as pd
-
-FloatArray = NDArray[np.float64]
 
 HEADERS = {
     "time": r"time|timestamp|t|zeit|zeitstempel|sec|seconds",

@@ -9,11 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.formats.importers.placed import PlacedTracks
 from xosc_lateral.formats.importers.track_table import Tracks
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 LEAST_AGREEMENT = 0.7
 """Cosine between a vehicle's heading and the lane's that is taken to be driven along. [-]"""

@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.drives.cleaning import RUN
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings, lane_changes, name_states, number_runs
@@ -35,9 +36,6 @@ from xosc_lateral.formats.tables import read_table
 
 if TYPE_CHECKING:
     import pandas as pd
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 LICENCE = (
     "highD/exiD: leveLXData, under the licence that you signed (free for non-commercial research); whether fitted "

@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.importers.cuts import KEPT
 from xosc_lateral.formats.importers.table import Imported, finished, guarded
@@ -36,8 +37,6 @@ from xosc_lateral.segment import CONTEXT_UNITS
 
 if TYPE_CHECKING:
     import pandas as pd
-
-FloatArray = NDArray[np.float64]
 
 POSITIONS = (("offset", "lane_width"), ("distance_left", "distance_right"))
 LICENCE = "your own recording"

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.drives.cleaning import RUN
 from xosc_lateral.formats.importers.cuts import CutSettings, lane_changes, name_states, number_runs
 from xosc_lateral.formats.importers.neighbours import find_neighbours
@@ -18,11 +19,6 @@ from xosc_lateral.formats.importers.table import Imported, finished, hash_files,
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-FloatArray = NDArray[np.float64]
-
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)

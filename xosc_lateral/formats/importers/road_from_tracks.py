@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import NotEnoughDataError
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
-
-FloatArray = NDArray[np.float64]
 
 BIN_LENGTH = 20.0  # [m] along the road; short beside any motorway curve, long enough for tens of vehicles
 KNOT_SPACING = 300.0  # [m]; camera calibration bends the tracks at 100-300 m, the road itself only more slowly

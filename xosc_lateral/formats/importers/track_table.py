@@ -11,6 +11,7 @@ from typing import IO, TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.importers.placed import PlacedTracks, ground_speed, travel_heading
 from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping, parse_map
@@ -23,10 +24,6 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-
-FloatArray = NDArray[np.float64]
-
-IntArray = NDArray[np.int64]
 
 HEADERS: Mapping[str, tuple[str, ...]] = {
     "vehicle": ("vehicle", "id", "track_id", "trackid", "vehicle_id", "object_id", "track", "drive"),

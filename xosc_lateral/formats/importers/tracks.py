@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings
@@ -20,9 +19,6 @@ from xosc_lateral.formats.importers.track_table import Tracks, read_tracks
 from xosc_lateral.formats.mapping import MappingLike
 from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.road.network import DRIVING, RoadNetwork
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 LICENCE = "your own recording"
 

@@ -14,11 +14,11 @@ from math import cos, sin
 import numpy as np
 from msgspec import Struct
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.opendrive.document import RoadFile, XmlElement
 from xosc_lateral.road.geometry import MAX_TURN, Arc, Line, ParamCubic, ReferenceElement, Spiral
 from xosc_lateral.road.piecewise import Cubic
-from xosc_lateral.road.positions import FloatArray
 
 PIECES = 32
 """Pieces of p(ds) per element. Field junctions: ds is then true to 1e-6 m, and p(ds) has no corner."""

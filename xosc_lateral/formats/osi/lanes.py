@@ -7,15 +7,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.formats.osi.extra import osi
 from xosc_lateral.road.geometry import simplify
 from xosc_lateral.road.lanes import DRIVING, Lane, LaneSection
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.road.positions import RoadMark
-
-FloatArray = NDArray[np.float64]
 
 STEP = 1.0
 """Between two points of a line before it is simplified. [m]"""

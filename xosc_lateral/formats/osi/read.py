@@ -11,15 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.importers.placed import ground_speed, travel_heading
 from xosc_lateral.formats.importers.track_table import USUAL_LENGTH, Tracks
 from xosc_lateral.formats.osi.extra import osi
 from xosc_lateral.formats.osi.trace import Trace
 from xosc_lateral.motion.nominal import axes
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 KINDS = {
     **dict.fromkeys(("SMALL_CAR", "COMPACT_CAR", "CAR", "MEDIUM_CAR", "LUXURY_CAR"), "car"),

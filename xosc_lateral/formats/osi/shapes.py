@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.formats.importers.lane_shapes import Strip, middle
 from xosc_lateral.formats.importers.placed import LaneGraph
 from xosc_lateral.formats.osi.extra import osi
 from xosc_lateral.formats.osi.read import Recorded
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.atomic import replace_atomically
 from xosc_lateral.formats.osi.extra import SUFFIXES, osi
@@ -24,8 +24,6 @@ from xosc_lateral.scenario.entity import Entity
 from xosc_lateral.scenario.enums import EntityCategory, VehicleCategory
 from xosc_lateral.scenario.private_actions import LightStateAction
 from xosc_lateral.version import __version__
-
-FloatArray = NDArray[np.float64]
 
 TOPIC = "ground_truth"
 VERSION = (3, 8, 0)

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import Effect
 from xosc_lateral.identification.regression import Coarse, Fitted
-from xosc_lateral.identification.timeline import FloatArray, on_fine_grid
+from xosc_lateral.identification.timeline import on_fine_grid
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.selection import Search

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 import numpy as np
 from msgspec import structs
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.identification.autocorrelation import Problem
 from xosc_lateral.identification.column_search import find_column, likely_response, probability_of
@@ -30,7 +31,7 @@ from xosc_lateral.identification.innovations import (
 from xosc_lateral.identification.refinement import Alternatives
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term
-from xosc_lateral.identification.timeline import FloatArray, coarse_mean
+from xosc_lateral.identification.timeline import coarse_mean
 from xosc_lateral.identification.timing import span, widening
 
 if TYPE_CHECKING:

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import Cycle, Effect
 from xosc_lateral.identification.regression import MIN_DRIFT_S, Coarse, Fitted
 from xosc_lateral.identification.residual import OSCILLATION
 from xosc_lateral.identification.significance import LEAST
 from xosc_lateral.identification.terms.base import Description, Outcome, Stage, Term
-from xosc_lateral.identification.timeline import FloatArray
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.selection import Search

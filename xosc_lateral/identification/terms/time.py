@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import Effect, Step, TimeSmooth
 from xosc_lateral.identification.innovations import SLOW_S, fine_squares, log_sizes, quick_squares, slow_squares
 from xosc_lateral.identification.low_frequencies import (
@@ -38,7 +39,6 @@ from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
 from xosc_lateral.identification.significance import LoopSeed
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term
 from xosc_lateral.identification.terms.column import what_a_column_may_do, what_columns_do
-from xosc_lateral.identification.timeline import FloatArray
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.selection import Search

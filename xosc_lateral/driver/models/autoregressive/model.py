@@ -24,8 +24,8 @@ from typing import ClassVar
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.models.autoregressive.coarse import COARSE_EVERY, TICKS, Autoregression, building_low_pass
 from xosc_lateral.driver.models.autoregressive.parts import (
     CoarsePart,
@@ -45,8 +45,6 @@ from xosc_lateral.driver.models.noise import NOISE_VARIANCE, ShapedNoise
 from xosc_lateral.driver.seeds import AutoregressiveSeed, generator
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import DriverProfileError
-
-FloatArray = NDArray[np.float64]
 
 KNEE = 0.8
 """Coarse movement is bent from this share of the way between the mean and a limit on. [-]"""

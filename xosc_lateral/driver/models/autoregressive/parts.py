@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Self
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.driver.linear_filters import convolve, recur
 from xosc_lateral.driver.models.autoregressive.coarse import COARSE_EVERY, TICKS, interpolate
 from xosc_lateral.driver.models.autoregressive.volatility import SLOW_CORRELATION_TIME
@@ -22,9 +22,6 @@ from xosc_lateral.driver.seeds import AutoregressiveSeed, generator
 
 if TYPE_CHECKING:
     from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 COARSE, FINE = 0, 1

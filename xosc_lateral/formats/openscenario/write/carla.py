@@ -27,8 +27,8 @@ from math import cos, sin
 
 import numpy as np
 from lxml import etree
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.formats.openscenario.element import local_name
 from xosc_lateral.formats.openscenario.write import build
 from xosc_lateral.formats.openscenario.write.losses import Losses, remove
@@ -39,8 +39,6 @@ from xosc_lateral.formats.openscenario.write.vertices import Vertices
 from xosc_lateral.motion.nominal import Activity, NominalMotion
 from xosc_lateral.scenario import Entity, Scenario
 from xosc_lateral.scenario.enums import EntityCategory, Priority
-
-FloatArray = NDArray[np.float64]
 
 CONTROL = "vehicle_velocity_control"
 """Its only control that keeps to the times of waypoints and does not move them to the lane (since 0.9.16)."""

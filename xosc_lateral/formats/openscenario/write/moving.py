@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from lxml import etree
 from msgspec import structs
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.formats.openscenario.write import build
 from xosc_lateral.formats.openscenario.write.non_motion_actions import Pose
 from xosc_lateral.formats.openscenario.write.path_pieces import (
@@ -25,8 +25,6 @@ from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.rows import blocks, columns, give_back, kept
 from xosc_lateral.scenario.enums import Priority
-
-FloatArray = NDArray[np.float64]
 
 MOTION_SINCE = (1, 4)
 """Version from which a vertex may say how fast the entity is there."""

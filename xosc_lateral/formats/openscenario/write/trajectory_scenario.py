@@ -7,9 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from lxml import etree
-from numpy.typing import NDArray
 
 from xosc_lateral.formats.openscenario.element import local_name
 from xosc_lateral.formats.openscenario.provenance import mark, write_sealed
@@ -42,8 +40,6 @@ from xosc_lateral.scenario.conditions import SimulationTimeCondition
 from xosc_lateral.scenario.parameters import Scope
 from xosc_lateral.scenario.place import Unsupported
 from xosc_lateral.scenario.private_actions import ConnectTrailerAction
-
-FloatArray = NDArray[np.float64]
 
 STORY = "xosc-lateral"
 TRAILERS_SINCE = (1, 3)

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from lxml import etree
 from msgspec import Struct
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.formats.openscenario.element import local_name
 from xosc_lateral.formats.openscenario.read import is_town
 from xosc_lateral.formats.openscenario.write import build
@@ -19,8 +19,6 @@ from xosc_lateral.rows import give_back
 from xosc_lateral.scenario import Scenario
 from xosc_lateral.scenario.expressions import ExpressionError
 from xosc_lateral.scenario.parameters import Scope
-
-FloatArray = NDArray[np.float64]
 
 BLOCK = 1000
 """Vertices that are text at a time."""
