@@ -6,7 +6,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +16,7 @@ from xosc_lateral.drives.cleaning import RUN
 from xosc_lateral.formats.importers.cuts import CutSettings, lane_changes, name_states, number_runs
 from xosc_lateral.formats.importers.neighbours import find_neighbours
 from xosc_lateral.formats.importers.table import Imported, finished, hash_files, without_cut
-
-if TYPE_CHECKING:
-    import pandas as pd
+from xosc_lateral.lazy import pd
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,8 +121,6 @@ def import_each(sources: Path | Sequence[Path], read: Callable[[Path], Imported]
 
     Raises `NotEnoughDataError` if nothing is left.
     """
-    import pandas as pd
-
     files = [sources] if isinstance(sources, Path) else list(sources)
     parts = [read(file) for file in files]
     record = parts[0].provenance
@@ -147,8 +143,6 @@ def import_each(sources: Path | Sequence[Path], read: Callable[[Path], Imported]
 
 def placed_table(tracks: PlacedTracks, graph: LaneGraph, settings: CutSettings) -> pd.DataFrame:
     """The drive table with its column `state`."""
-    import pandas as pd
-
     part, station, rank = graph.layout()
     piece, inside = np.maximum(tracks.piece, 0), tracks.piece >= 0
     s = station[piece] + tracks.along

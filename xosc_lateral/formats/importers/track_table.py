@@ -18,11 +18,10 @@ from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping, 
 from xosc_lateral.formats.source import open_source
 from xosc_lateral.formats.states import COLUMNS
 from xosc_lateral.formats.tables import foreign_errors, numbers_of, read_table, unpacked_text
+from xosc_lateral.lazy import pd
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-    import pandas as pd
 
 
 HEADERS: Mapping[str, tuple[str, ...]] = {
@@ -136,8 +135,6 @@ def _given(table: pd.DataFrame, name: str, otherwise: FloatArray) -> FloatArray:
 
 def _columns(table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequence[str]) -> pd.DataFrame:
     """The columns that are needed, under their own names, in our units."""
-    import pandas as pd
-
     mapping = {**saved.columns, **parse_map(words)}
     if unknown := mapping.keys() - HEADERS.keys():
         raise FormatError(f"--map {min(unknown)}: tracks have {', '.join(HEADERS)}", path=path)
@@ -199,8 +196,6 @@ def read_esmini_log(path: Path) -> pd.DataFrame:
 
     Raises `FormatError`: a column is missing, or the table is damaged.
     """
-    import pandas as pd
-
     with open_source(path) as source, foreign_errors(path, "can't be read as a log of esmini"):
         text = unpacked_text(source)
         names = _head(text, path)
