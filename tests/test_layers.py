@@ -14,6 +14,7 @@ LAYERS = {
     "errors": 0,
     "version": 0,
     "plugins": 0,
+    "lazy": 0,
     "shipped": 0,
     "segment": 0,
     "limits": 0,

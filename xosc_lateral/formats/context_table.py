@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,10 +12,8 @@ from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.plausibility import first_implausible, implausible
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.tables import plain_cells, read_table
+from xosc_lateral.lazy import pd
 from xosc_lateral.limits import TIME
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -88,8 +85,6 @@ def _time_of(table: pd.DataFrame, path: Path) -> FloatArray:
 
 
 def _no_number(column: pd.Series, time: FloatArray) -> str:
-    import pandas as pd
-
     column = plain_cells(column)
     wrong = np.flatnonzero((pd.to_numeric(column.astype("string"), errors="coerce").isna() & column.notna()).to_numpy())
     row = int(wrong[0]) if len(wrong) else 0

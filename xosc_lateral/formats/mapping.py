@@ -11,16 +11,13 @@ from dataclasses import dataclass, field, replace
 from math import pi
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from xosc_lateral.errors import FormatError
+from xosc_lateral.lazy import pd
 from xosc_lateral.segment import CONTEXT_UNITS
-
-if TYPE_CHECKING:
-    import pandas as pd
-
 
 # Factors to SI. Degrees stay apart from radians only by their factor.
 _BY_QUANTITY = {
@@ -145,8 +142,6 @@ class TableMapping:
 
         Raises `FormatError`: for a text that stands for none.
         """
-        import pandas as pd
-
         if name not in self.values:
             return column
         known = {text.strip().lower(): number for text, number in self.values[name].items()}

@@ -14,7 +14,7 @@ from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.importers import dlr_ht, levelx
 from xosc_lateral.formats.importers.track_table import USUAL_LENGTH, Tracks, read_tracks, tracks_of
 from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping
-from xosc_lateral.formats.opendrive import read_opendrive
+from xosc_lateral.formats.opendrive import read_opendrive, read_road
 from xosc_lateral.formats.opendrive.write import SHOULDER, WIDTH_PIECE, WrittenLane, WrittenRoad, curved_plan
 from xosc_lateral.formats.tables import foreign_errors
 from xosc_lateral.reconstruction.recorded import Track
@@ -149,15 +149,9 @@ def _thinned(time: FloatArray) -> NDArray[np.bool_]:
 
 # ---- recordings whose road is made -----------------------------------------------------------------------------------
 def _made(road: WrittenRoad, tracks: Sequence[Track], sources: Sequence[Path], notes: Sequence[str]) -> RecordedTraffic:
-    import tempfile
-
-    text = road.to_xml()
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / f"{road.name}.xodr"
-        path.write_text(text, encoding="utf-8")
-        network = read_opendrive(path)
-    road_file = text.encode(), f"{road.name}.xodr"
-    return RecordedTraffic(road.name, tuple(tracks), network, *road_file, tuple(sources), tuple(notes))
+    data = road.to_xml().encode()
+    about = data, f"{road.name}.xodr", tuple(sources), tuple(notes)
+    return RecordedTraffic(road.name, tuple(tracks), read_road(data, road.name), *about)
 
 
 def _dlr(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:

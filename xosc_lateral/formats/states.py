@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.formats.output_tables import harmless
+from xosc_lateral.lazy import pd
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.road import RoadNetwork
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 COLUMNS = ("time", "name", "x", "y", "z", "h", "speed", "road", "lane", "offset_t", "s")
 """[s], -, [m], [m], [m], [rad], [m/s], road id, lane id, [m] from the lane centre along +t, [m]."""
@@ -35,8 +33,6 @@ def states_csv(motion: NominalMotion, network: RoadNetwork) -> str:
 
 def states_frame(motion: NominalMotion, network: RoadNetwork) -> pd.DataFrame:
     """The same rows as a frame, every digit kept."""
-    import pandas as pd
-
     frames = [_frame(entity, network, number) for number, entity in enumerate(motion.entities)]
     if not frames:
         return pd.DataFrame(columns=list(COLUMNS))
@@ -45,8 +41,6 @@ def states_frame(motion: NominalMotion, network: RoadNetwork) -> pd.DataFrame:
 
 
 def _frame(motion: EntityMotion, network: RoadNetwork, number: int) -> pd.DataFrame:
-    import pandas as pd
-
     frame = pd.DataFrame(_columns(motion, network) | {"entity": number})
     there: pd.DataFrame = frame.loc[(motion.activity & Activity.ACTIVE) != 0]
     return there

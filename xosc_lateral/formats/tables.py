@@ -17,11 +17,10 @@ from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.hashes import parsed_hash
 from xosc_lateral.formats.source import Source, open_source
+from xosc_lateral.lazy import pd
 from xosc_lateral.limits import TABLE_CELLS, TABLE_COLUMNS
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from xosc_lateral.formats.mapping import TableMapping
 
 
@@ -42,8 +41,6 @@ def plain_cells(column: pd.Series) -> pd.Series:
 
 def comma_numbers(column: pd.Series) -> pd.Series | None:
     """Numbers such as ``3,75`` or ``1.234,5``; None if a value is no such number or none has a comma."""
-    import pandas as pd
-
     known = column.dropna().astype(str)
     if known.empty or not known.str.contains(",", regex=False).any() or not known.str.fullmatch(_COMMA_NUMBER).all():
         return None
@@ -57,8 +54,6 @@ def seconds_of_text(column: pd.Series) -> FloatArray | None:
     Counted from the earliest, or from midnight for clock times, which may run past it; NaN where there is none.
     None if a value is neither.
     """
-    import pandas as pd
-
     known = column.dropna().astype(str).str.strip()
     if known.empty:
         return None
@@ -86,8 +81,6 @@ def _clock_seconds(clock: pd.Series) -> FloatArray:
 
 def _stamps(text: pd.Series) -> pd.Series | None:
     """Times in UTC. Days come first where dots part them; slashes are read the American way where that can be."""
-    import pandas as pd
-
     dotted = bool(text.str.match(r"\d{1,2}\.\d{1,2}\.\d{4}").all())
     for form, day_first in (("ISO8601", False), ("mixed", dotted), ("mixed", not dotted)):
         try:
@@ -102,15 +95,13 @@ def numbers_of(column: pd.Series, path: Path, name: str) -> FloatArray:
 
     Raises `FormatError` for a cell that is no number.
     """
-    import pandas as pd
-    from pandas.api import types
-
-    if types.is_datetime64_any_dtype(column):
+    if pd.api.types.is_datetime64_any_dtype(column):
         return np.array((column - column.min()).dt.total_seconds(), dtype=np.float64)
-    if not types.is_numeric_dtype(column) and name == "time" and (seconds := seconds_of_text(column)) is not None:
+    is_text = not pd.api.types.is_numeric_dtype(column)
+    if is_text and name == "time" and (seconds := seconds_of_text(column)) is not None:
         return seconds
     numbers = pd.to_numeric(column, errors="coerce")
-    if numbers.isna().any() and not types.is_numeric_dtype(column):
+    if is_text and numbers.isna().any():
         commas = comma_numbers(column)
         numbers = numbers if commas is None else commas
     strange = numbers.isna() & column.notna()
@@ -132,8 +123,6 @@ def indicators(name: str, column: pd.Series, drives: pd.Series | None, most: int
 
 
 def _changes(codes: NDArray[np.intp], drives: pd.Series | None) -> bool:
-    import pandas as pd
-
     if drives is None:
         return True
     by_drive = pd.Series(codes).groupby(drives.to_numpy())
@@ -157,8 +146,6 @@ def read_table(path: Path, mapping: TableMapping | None = None) -> tuple[pd.Data
 
     Returns DataFrame, str: the table, and the SHA-256 of the bytes that it was parsed from.
     """
-    import pandas as pd
-
     name = path.name.lower()
     if not name.endswith(TABLE_SUFFIXES):
         raise FormatError(f"not a drive table: expected a name ending in {', '.join(TABLE_SUFFIXES)}", path=path)
@@ -182,8 +169,6 @@ def read_text_table(path: Path) -> pd.DataFrame:
 
     Raises `FormatError`: see `read_table`.
     """
-    import pandas as pd
-
     with open_source(path) as source, foreign_errors(path, "can't be read as a table"):
         if path.name.lower().endswith(".parquet"):
             return as_text(_read_parquet(source))
@@ -194,8 +179,6 @@ def read_text_table(path: Path) -> pd.DataFrame:
 
 def as_text(table: pd.DataFrame) -> pd.DataFrame:
     """The table with all cells as text, missing ones empty."""
-    import pandas as pd
-
     return pd.DataFrame({str(name): [_as_text(value) for value in table[name]] for name in table.columns})
 
 

@@ -28,6 +28,11 @@ NARROW = 0.1
 """A lane narrower than this at some s does not count as one there (it opens or closes). [m]"""
 
 
+def beside(lane: int, step: int) -> int:
+    """Id of the lane on the left (+1) or right (-1), looking along s; lane 0 is none."""
+    return lane + step if lane + step else lane + 2 * step
+
+
 class LaneRecord(Struct, frozen=True):
     """A lane as written in the file; starts are s of the road, not of the section. [m], [m/s]"""
 

@@ -11,11 +11,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 from xosc_lateral.errors import FormatError
+from xosc_lateral.lazy import pd
 from xosc_lateral.plugins import plugins
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from xosc_lateral.formats.importers.table import Imported
 
 Importer: TypeAlias = "Callable[..., Imported | pd.DataFrame]"

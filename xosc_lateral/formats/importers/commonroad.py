@@ -21,15 +21,9 @@ from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings
 from xosc_lateral.formats.importers.lane_shapes import LaneShape, curvature_along, place_in_shapes
-from xosc_lateral.formats.importers.placed import (
-    LaneGraph,
-    ground_speed,
-    import_each,
-    import_placed,
-    travel_heading,
-)
+from xosc_lateral.formats.importers.placed import LaneGraph, import_each, import_placed
 from xosc_lateral.formats.importers.table import Imported, guarded
-from xosc_lateral.formats.importers.track_table import Tracks
+from xosc_lateral.formats.importers.track_table import Tracks, ground_speed, travel_heading
 from xosc_lateral.formats.xml import read_xml
 
 LICENCE = "that of the CommonRoad scenario and of the recording that it was made from"

@@ -21,7 +21,6 @@ import io
 import zipfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,9 +42,7 @@ from xosc_lateral.formats.importers.neighbours import find_neighbours
 from xosc_lateral.formats.importers.road_from_tracks import ReferenceLine, fit_reference_line
 from xosc_lateral.formats.importers.table import Imported, finished, guarded
 from xosc_lateral.formats.source import Source, open_source
-
-if TYPE_CHECKING:
-    import pandas as pd
+from xosc_lateral.lazy import pd
 
 LANES = 2  # through lanes per direction of the A39 there; ramps and their merging lanes are left out
 STEP = 0.05  # [s]
@@ -103,8 +100,6 @@ def import_dlr_ht(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cu
 
 def read_tracks(source: Path) -> pd.DataFrame:
     """All rows, sorted by vehicle and time, with `time` [s] from the first instant and `vehicle` counted from 0."""
-    import pandas as pd
-
     frame = pd.concat([_read_csv(stream, source) for stream in _trajectory_files(source)], ignore_index=True)
     try:
         stamps = pd.to_datetime(frame["timestamp"], utc=True)
@@ -147,8 +142,6 @@ def _packed_files(opened: Source) -> list[io.BufferedIOBase]:
 
 
 def _read_csv(stream: io.BufferedIOBase, source: Path) -> pd.DataFrame:
-    import pandas as pd
-
     with stream:
         head = stream.readline().decode("utf-8", "replace").strip().split(",")
         missing = [name for name in COLUMNS if name not in head]
@@ -166,8 +159,6 @@ def _read_csv(stream: io.BufferedIOBase, source: Path) -> pd.DataFrame:
 
 def _check_numbers(column: pd.Series, source: Path) -> None:
     """Refuse text and missing values, with the line of the first."""
-    import pandas as pd
-
     numbers = pd.to_numeric(column, errors="coerce").to_numpy(dtype=np.float64)
     if not np.isfinite(numbers).all():
         row = int(np.argmin(np.isfinite(numbers)))
@@ -310,8 +301,6 @@ def _each(passage: IntArray, every: int) -> NDArray[np.bool_]:
 
 def _context(tracks: pd.DataFrame, placed: _Placed, s: FloatArray, forward: NDArray[np.bool_]) -> pd.DataFrame:
     """The drive table's columns, for every row of the tracks."""
-    import pandas as pd
-
     kind = vehicle_classes(tracks)
     frame = np.round(tracks["time"].to_numpy() / STEP).astype(np.int64) * 2 + forward
     near = find_neighbours(

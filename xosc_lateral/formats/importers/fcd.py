@@ -14,9 +14,9 @@ import numpy as np
 
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.importers.neighbours import find_neighbours
+from xosc_lateral.lazy import pd
 
 if TYPE_CHECKING:
-    import pandas as pd
     from lxml import etree
 
 WIDTH = 3.2
@@ -43,8 +43,6 @@ def import_fcd(source: Path, *, net: str | Path | None = None, lane_width: float
     lane_width : float
         Where there is no net. [m]
     """
-    import pandas as pd
-
     widths = {} if net is None else _lanes(Path(net))
     rows = list(_rows(source))
     if not rows:

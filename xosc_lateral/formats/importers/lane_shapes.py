@@ -64,7 +64,7 @@ def place_in_shapes(tracks: Tracks, shapes: Sequence[LaneShape], left: IntArray)
         "lane_index": np.where(inside, index[piece], np.nan),
         "lane_count": np.where(inside, count[piece], np.nan),
     }
-    return tracks.placed(piece, along, offset, width, road)
+    return PlacedTracks(tracks, piece, along, offset, width, road)
 
 
 def find_lanes(

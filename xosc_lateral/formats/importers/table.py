@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -18,11 +18,9 @@ from xosc_lateral.formats.hashes import parsed_hash
 from xosc_lateral.formats.importers.cuts import KEPT
 from xosc_lateral.formats.output_tables import harmless_frame, write_table
 from xosc_lateral.formats.tables import foreign_errors
+from xosc_lateral.lazy import pd
 from xosc_lateral.limits import TIME, Range, context_range
 from xosc_lateral.version import __version__
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 @dataclass(frozen=True)

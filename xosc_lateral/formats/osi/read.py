@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.errors import FormatError, NotEnoughDataError
-from xosc_lateral.formats.importers.placed import ground_speed, travel_heading
-from xosc_lateral.formats.importers.track_table import USUAL_LENGTH, Tracks
+from xosc_lateral.formats.importers.track_table import USUAL_LENGTH, Tracks, ground_speed, travel_heading
 from xosc_lateral.formats.osi.extra import osi
 from xosc_lateral.formats.osi.trace import Trace
 from xosc_lateral.motion.nominal import axes
