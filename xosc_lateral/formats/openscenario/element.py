@@ -188,6 +188,28 @@ def local_name(xml: etree._Element) -> str:
     return str(xml.tag).rpartition("}")[2]
 
 
+def elements(xml: etree._Element, *tags: str) -> list[etree._Element]:
+    """An element and all below it, of these tags or all; no comments. A list, for what changes the tree."""
+    return list(xml.iter(*(f"{{*}}{tag}" for tag in tags or ("*",))))
+
+
+def children_of(xml: etree._Element) -> list[etree._Element]:
+    """Child elements; no comments."""
+    return [child for child in xml if isinstance(child.tag, str)]
+
+
+def child_of(xml: etree._Element, tag: str) -> etree._Element | None:
+    """First child of a tag."""
+    return xml.find(f"{{*}}{tag}")
+
+
+def parent_of(xml: etree._Element) -> etree._Element:
+    """Parent of an element that is not the root."""
+    parent = xml.getparent()
+    assert parent is not None
+    return parent
+
+
 def line_of(xml: etree._Element) -> int | None:
     """Line in the file, from 1; None for an element that was made, not read."""
     return cast("int | None", xml.sourceline)  # the stubs have an ellipsis there

@@ -13,6 +13,7 @@ import numpy as np
 from lxml import etree
 from numpy.typing import NDArray
 
+from xosc_lateral.formats.openscenario.element import parent_of
 from xosc_lateral.scenario.enums import Priority
 
 Version = tuple[int, int]
@@ -53,8 +54,11 @@ def decimals(values: NDArray[np.float64], digits: Sequence[int]) -> tuple[str, .
     return tuple(found)
 
 
-def sub(parent: etree._Element, tag: str, **attributes: str) -> etree._Element:
-    """Append a child."""
+def sub(parent: etree._Element, path: str, **attributes: str) -> etree._Element:
+    """Append a child, or one below the other (``PrivateAction/TeleportAction``), the last with the attributes."""
+    *above, tag = path.split("/")
+    for outer in above:
+        parent = etree.SubElement(parent, outer)
     return etree.SubElement(parent, tag, attributes)
 
 
@@ -172,6 +176,12 @@ def insert_indented(parent: etree._Element, index: int, element: etree._Element)
         parent[-1].tail = own
     element.tail = closing if index >= len(parent) else own
     parent.insert(index, element)
+
+
+def insert_after(neighbour: etree._Element, element: etree._Element) -> None:
+    """Insert a new element right after another one."""
+    parent = parent_of(neighbour)
+    insert_indented(parent, parent.index(neighbour) + 1, element)
 
 
 def document(root: etree._Element) -> bytes:

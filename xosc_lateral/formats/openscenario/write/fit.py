@@ -11,7 +11,6 @@ from xosc_lateral.formats.openscenario.write.carla import fit_carla
 from xosc_lateral.formats.openscenario.write.esmini import fit_esmini
 from xosc_lateral.formats.openscenario.write.literal import fill_in, inline_catalogs
 from xosc_lateral.formats.openscenario.write.losses import Losses
-from xosc_lateral.formats.openscenario.write.sampled_splines import SINCE, sample_splines
 from xosc_lateral.formats.openscenario.write.target import Player, TargetPlayer
 from xosc_lateral.formats.openscenario.write.versions import fit_version
 from xosc_lateral.motion.nominal import NominalMotion
@@ -57,8 +56,6 @@ def fit(
         inline_catalogs(losses, scenario, scope)
         if version == (1, 0):
             fill_in(losses, scope, parameters=target.player is Player.CARLA)
-        if version < SINCE <= source:
-            sample_splines(losses, scope)
         fit_version(losses, source, version)
     if target.player is Player.ESMINI:
         losses.target = "esmini"
