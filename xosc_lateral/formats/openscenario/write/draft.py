@@ -58,12 +58,8 @@ class Draft:
         if self.motion.end_time <= 0.0:
             trigger = self.scenario.storyboard.stop_trigger
             place = self.scenario.storyboard.place if trigger is None else trigger.place
-            raise PlaybackError(
-                f"the scenario is over at 0 s ({self.motion.ended_by}): there is nothing to convert",
-                path=self.scenario.path,
-                line=place.line,
-                element=place.element,
-            )
+            what = f"the scenario is over at 0 s ({self.motion.ended_by}): there is nothing to convert"
+            raise place.error(what, PlaybackError)
 
     @property
     def storyboard(self) -> etree._Element:
