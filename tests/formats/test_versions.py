@@ -29,9 +29,9 @@ from tests.formats.made_scenario import (
 from tests.formats.test_openscenario_write import CUSTOM, LIGHT, STOP_AND_GO, VISIBLE, nominal, played
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.openscenario.read import read_scenario
+from xosc_lateral.formats.openscenario.write.draft import WrittenScenario
 from xosc_lateral.formats.openscenario.write.lane_offset_scenario import write_lane_offset_scenario
 from xosc_lateral.formats.openscenario.write.literal import name_literally
-from xosc_lateral.formats.openscenario.write.result import WrittenScenario
 from xosc_lateral.formats.openscenario.write.target import target
 from xosc_lateral.formats.openscenario.write.trajectory_scenario import write_trajectory_scenario
 from xosc_lateral.formats.openscenario.write.versions import additions as table_of_additions

@@ -10,7 +10,6 @@ from typing import NoReturn, TypeVar, cast
 
 from lxml import etree
 
-from xosc_lateral.errors import FormatError
 from xosc_lateral.scenario.enums import SYNONYMS
 from xosc_lateral.scenario.expressions import ExpressionError
 from xosc_lateral.scenario.parameters import Scope
@@ -180,7 +179,7 @@ class XmlElement:
 
     def fail(self, what: str) -> NoReturn:
         """Raise a `FormatError` that names this element."""
-        raise FormatError(what, path=self.path, line=line_of(self.xml), element=self.label())
+        raise self.place().error(what)
 
 
 def local_name(xml: etree._Element) -> str:
