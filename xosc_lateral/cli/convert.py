@@ -131,7 +131,8 @@ def _convert_one(
     strict: bool,
     said: Written,
 ) -> None:
-    from xosc_lateral.api.convert import REPORT_SUFFIXES, convert, lifelike, osi_files, output_scenario
+    from xosc_lateral.api.convert import convert, lifelike, osi_files, output_scenario
+    from xosc_lateral.api.result import PAGE_SUFFIXES
     from xosc_lateral.formats.osi.extra import osi_wanted
     from xosc_lateral.formats.output_paths import STDOUT, claim, output_file
     from xosc_lateral.pipeline.convert import numbered
@@ -146,7 +147,7 @@ def _convert_one(
         unclean = bool(result.warnings) or not result.enriched
     else:
         written = lifelike(source) if output is None else output_scenario(output, source)
-        page = None if report is None else output_file(report, f"{written.stem}.html", REPORT_SUFFIXES)
+        page = None if report is None else output_file(report, f"{written.stem}.html", PAGE_SUFFIXES)
         outputs = [numbered(written, variant, variants) for variant in range(variants)]
         pages = [None if page is None else numbered(page, variant, variants) for variant in range(variants)]
         trace = None if osi is None else osi_files(osi, source)[0]

@@ -72,7 +72,7 @@ class HiddenEffect(Effect, frozen=True, kw_only=True):
 
 
 class Adapted(HiddenEffect, frozen=True, kw_only=True):
-    """What makes another driver of a profile's (`pipeline.derive`).
+    """What makes another driver of a profile's (`identification.derive`).
 
     `shift` of the mean offset, positive left [m]; factors of `EffectTerms`, 1/5 to 5 [-].
     """
