@@ -41,10 +41,7 @@ def configuration() -> tuple[Path | None, Mapping[str, list[str]]]:
 
 
 def configured_libraries() -> list[Path]:
-    """Folders of profiles that the configuration names.
-
-    Raises `FormatError`: see `configuration`.
-    """
+    """Folders of profiles that the configuration names. Raises `FormatError`: see `configuration`."""
     path, found = configuration()
     library = found.get("library", [])
     try:

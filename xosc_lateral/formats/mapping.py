@@ -109,26 +109,14 @@ class ColumnSource:
 
 @dataclass(frozen=True, slots=True)
 class TableMapping:
-    """How to read foreign tables.
+    """How to read foreign tables."""
 
-    Parameters
-    ----------
-    columns : mapping of str to ColumnSource
-        By standard name.
-    values : mapping of str to mapping of str to float
-        By standard name, the number that a text stands for, in the standard unit.
-    roles : mapping of str to str
-        By standard name, where a column comes from ("road", say), for who asks what may be a cause.
-    encoding, separator : str, optional
-        Of text files; None: found out.
-    decimal : str
-        Decimal mark, "." or ",".
-    """
-
-    columns: Mapping[str, ColumnSource] = field(default_factory=dict)
+    columns: Mapping[str, ColumnSource] = field(default_factory=dict)  # by standard name
+    # values: by standard name, the number that a text stands for, in the standard unit
     values: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    # roles: by standard name, where a column comes from ("road", say), for who asks what may be a cause
     roles: Mapping[str, str] = field(default_factory=dict)
-    encoding: str | None = None
+    encoding: str | None = None  # encoding, separator: of text files; None: found out
     separator: str | None = None
     decimal: str = "."
 
@@ -202,10 +190,7 @@ def _source(name: str, words: str) -> ColumnSource:
 
 
 def read_mapping(path: Path) -> TableMapping:
-    """Read a mapping's file.
-
-    Raises `FormatError`: it is no TOML, or holds what no mapping has; names the entry.
-    """
+    """Read a mapping's file. Raises `FormatError`: it is no TOML, or holds what no mapping has; names the entry."""
     import tomllib
 
     from xosc_lateral.formats.source import open_source

@@ -52,10 +52,7 @@ class Source:
     size: int  # [byte]
 
     def unpacked(self, size: int) -> None:
-        """Refuse what unpacks to more than its size can hold.
-
-        Raises `FormatError`: see `check_unpacked`.
-        """
+        """Refuse what unpacks to more than its size can hold. Raises `FormatError`: see `check_unpacked`."""
         check_unpacked(size, self.size, self.path)
 
 
@@ -68,10 +65,7 @@ class Content:
 
 
 def read_source(path: Path | str, limit: Limit = FILE_SIZE) -> Content:
-    """Bytes of an input file.
-
-    Raises `FormatError`: see `open_source`.
-    """
+    """Bytes of an input file. Raises `FormatError`: see `open_source`."""
     with open_source(path, limit) as source:
         data = source.file.read(limit.bytes + 1)
     if len(data) > limit.bytes:
@@ -113,10 +107,7 @@ def last_read(path: Path) -> str:
 
 
 def check_regular(path: Path) -> os.stat_result:
-    """State of a regular file.
-
-    Raises `FormatError`: It is not there, or something else.
-    """
+    """State of a regular file. Raises `FormatError`: It is not there, or something else."""
     try:
         state = path.stat()
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the name

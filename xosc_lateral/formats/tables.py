@@ -165,10 +165,7 @@ def read_table(path: Path, mapping: TableMapping | None = None) -> tuple[pd.Data
 
 
 def read_text_table(path: Path) -> pd.DataFrame:
-    """A table with all cells as text, missing ones empty.
-
-    Raises `FormatError`: see `read_table`.
-    """
+    """A table with all cells as text, missing ones empty. Raises `FormatError`: see `read_table`."""
     with open_source(path) as source, foreign_errors(path, "can't be read as a table"):
         if path.name.lower().endswith(".parquet"):
             return as_text(_read_parquet(source))
@@ -240,10 +237,7 @@ def _encoding(text: IO[bytes]) -> str:
 
 
 def _in_utf8(text: IO[bytes], path: Path, encoding: str | None = None) -> IO[bytes]:
-    """The text in UTF-8.
-
-    Raises `FormatError`: it is not in the encoding that is given or found.
-    """
+    """The text in UTF-8. Raises `FormatError`: it is not in the encoding that is given or found."""
     given = encoding or _encoding(text)
     if given.lower().replace("_", "-") in ("utf-8", "utf8", "utf-8-sig"):
         return text

@@ -49,33 +49,17 @@ class LaneRecord(Struct, frozen=True):
 
 
 class Lane(Struct, frozen=True):
-    """A lane of one section, evaluated.
+    """A lane of one section, evaluated."""
 
-    Attributes
-    ----------
-    id : int
-        Positive to the left of the reference line, negative to the right.
-    direction : int
-        Travel along (+1) or against (-1) s.
-    starts : tuple of float
-        s where new cubics begin. [m]
-    centre, width : tuple of Cubic
-        t of the lane centre and width, about each start. [m]
-    heights : tuple of (s, inner, outer)
-        Height over the road surface at its edges. [m]
-    speeds : tuple of (s, limit)
-        [m/s], inf: none.
-    """
-
-    id: int
+    id: int  # positive to the left of the reference line, negative to the right
     type: str
-    direction: int
+    direction: int  # of travel: along (+1) or against (-1) s
     level: bool
-    starts: tuple[float, ...]
-    centre: tuple[Cubic, ...]
-    width: tuple[Cubic, ...]
-    heights: tuple[tuple[float, float, float], ...]
-    speeds: tuple[tuple[float, float], ...]
+    starts: tuple[float, ...]  # s where new cubics begin [m]
+    centre: tuple[Cubic, ...]  # t of the lane centre, about each start [m]
+    width: tuple[Cubic, ...]  # [m]
+    heights: tuple[tuple[float, float, float], ...]  # s, and height over the road at the inner and outer edge [m]
+    speeds: tuple[tuple[float, float], ...]  # s [m], and limit from there on [m/s]; inf: none
     marks: tuple[RoadMark, ...]
     predecessors: tuple[int, ...]
     successors: tuple[int, ...]
@@ -110,25 +94,13 @@ class Lane(Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class LaneSection:
-    """The cross-section of a road over [start, end).
-
-    Attributes
-    ----------
-    lanes : tuple of Lane
-        From left to right looking along s, without the centre lane 0.
-    centre : Lane
-        Lane 0: no width, its t is the lane offset.
-    by_id : mapping
-        All of them by id.
-    centre_marks : tuple of RoadMark
-        Markings of lane 0.
-    """
+    """The cross-section of a road over [start, end)."""
 
     start: float
     end: float
-    lanes: tuple[Lane, ...]
-    centre: Lane
-    by_id: Mapping[int, Lane] = field(init=False)
+    lanes: tuple[Lane, ...]  # from left to right looking along s, without the centre lane 0
+    centre: Lane  # lane 0: no width, its t is the lane offset
+    by_id: Mapping[int, Lane] = field(init=False)  # lane 0 included
 
     def __post_init__(self) -> None:
         """Index the lanes by id."""

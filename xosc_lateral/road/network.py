@@ -46,34 +46,17 @@ from xosc_lateral.road.tables import NetworkTables
 
 @dataclass(frozen=True, eq=False)
 class RoadNetwork:
-    """Roads, their lanes and their links, as read from one OpenDRIVE file.
-
-    Attributes
-    ----------
-    roads : tuple of Road
-    junctions : tuple of Junction
-    path : str
-        The file.
-    sha256 : str
-        Of the bytes that were parsed; empty for a network that was not read from a file.
-    notes : tuple of str
-        What was repaired, ignored or degenerate on reading: never silent.
-    geo_reference : str or None
-        Projection of inertial x, y (PROJ string).
-    header_offset : HeaderOffset
-        From the coordinates of the file, which all answers are in, to inertial ones.
-    road_ids : tuple of str
-        ``road/@id`` in file order.
-    """
+    """Roads, their lanes and their links, as read from one OpenDRIVE file."""
 
     roads: tuple[Road, ...]
     junctions: tuple[Junction, ...] = ()
-    path: str = ""
-    notes: tuple[str, ...] = ()
-    geo_reference: str | None = None
-    sha256: str = ""
+    path: str = ""  # the file
+    notes: tuple[str, ...] = ()  # what was repaired, ignored or degenerate on reading: never silent
+    geo_reference: str | None = None  # projection of inertial x, y (PROJ string)
+    sha256: str = ""  # of the bytes that were parsed; empty: not read from a file
+    # from the coordinates of the file, which all answers are in, to inertial ones
     header_offset: HeaderOffset = field(default_factory=HeaderOffset)
-    road_ids: tuple[str, ...] = field(init=False)
+    road_ids: tuple[str, ...] = field(init=False)  # ``road/@id`` in file order
     _indices: dict[str, int] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

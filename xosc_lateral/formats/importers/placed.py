@@ -87,10 +87,7 @@ class PlacedTracks:
 
 
 def require_lanes(placed: PlacedTracks, where: str, path: Path) -> None:
-    """Refuse tracks that lie beside all lanes.
-
-    Raises `FormatError`.
-    """
+    """Refuse tracks that lie beside all lanes. Raises `FormatError`."""
     if not (placed.piece >= 0).any():
         x, y = placed.tracks.x, placed.tracks.y
         raise FormatError(
