@@ -16,6 +16,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.source import read_toml
 from xosc_lateral.lazy import pd
 from xosc_lateral.segment import CONTEXT_UNITS
 
@@ -191,15 +192,7 @@ def _source(name: str, words: str) -> ColumnSource:
 
 def read_mapping(path: Path) -> TableMapping:
     """Read a mapping's file. Raises `FormatError`: it is no TOML, or holds what no mapping has; names the entry."""
-    import tomllib
-
-    from xosc_lateral.formats.source import open_source
-
-    with open_source(path) as source:
-        try:
-            values = tomllib.loads(source.file.read().decode("utf-8-sig"))
-        except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-            raise FormatError(f"no mapping in TOML and UTF-8: {error}", path=path) from error
+    values = read_toml(path, "no mapping in TOML and UTF-8")
     if unknown := values.keys() - set(KEYS):
         raise FormatError(f"unknown entry {min(unknown)!r}; there are {', '.join(KEYS)}", path=path)
     for key in ("columns", "values", "roles"):

@@ -20,7 +20,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.limits import FILE_SIZE, PACKING_RATIO, UNPACKED_SIZE, UNPACKED_UNASKED, Limit
@@ -71,6 +71,16 @@ def read_source(path: Path | str, limit: Limit = FILE_SIZE) -> Content:
     if len(data) > limit.bytes:
         raise FormatError(limit.refusal(len(data) / 1e6), path=path)
     return Content(data, last_read(Path(path)))
+
+
+def read_toml(path: Path, otherwise: str) -> dict[str, Any]:
+    """What a file in TOML says. Raises `FormatError`, beginning with `otherwise`, if it is none; see `open_source`."""
+    import tomllib
+
+    try:
+        return tomllib.loads(read_source(path).data.decode("utf-8-sig"))
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise FormatError(f"{otherwise}: {error}", path=path) from error
 
 
 @contextmanager

@@ -142,13 +142,7 @@ class RoadNetwork:
         return self._index.world_to_lane(x, y, z, heading, near=near, lane_types=lane_types)
 
     def path_to_lane(
-        self,
-        x: ArrayLike,
-        y: ArrayLike,
-        road: ArrayLike,
-        s: ArrayLike,
-        *,
-        lane_types: Collection[str] | None = DRIVING,
+        self, x: ArrayLike, y: ArrayLike, road: ArrayLike, s: ArrayLike, *, lane_types: Collection[str] | None = DRIVING
     ) -> LanePositions:
         """Like `world_to_lane`, on known roads and from a guess of `s` per point (a written path, say): cheap."""
         return self._index.path_to_lane(x, y, road, s, lane_types=lane_types)
@@ -296,12 +290,7 @@ class RoadNetwork:
         return straightest(self.roads, options)
 
     def path_between(
-        self,
-        start: tuple[int, float],
-        end: tuple[int, float],
-        *,
-        direction: int = 1,
-        limit: float = float("inf"),
+        self, start: tuple[int, float], end: tuple[int, float], *, direction: int = 1, limit: float = float("inf")
     ) -> RoadPath | None:
         """Shortest way along the reference lines of linked roads between two (road, s).
 

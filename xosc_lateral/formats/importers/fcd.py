@@ -76,7 +76,7 @@ def _rows(source: Path) -> Iterator[tuple[float, str, str, float, float, float, 
             if element.get("posLat") is None:
                 raise FormatError(
                     "no posLat: it is written with the sublane model and --fcd-output.attributes all",
-                    path=source, line=_line(element), element="vehicle",
+                    path=source, line=_line(element), element="vehicle"
                 )  # fmt: skip
             if element.get("lane") is None or element.get("id") is None:
                 raise FormatError("no id or lane", path=source, line=_line(element), element="vehicle")

@@ -98,12 +98,7 @@ def require_lanes(placed: PlacedTracks, where: str, path: Path) -> None:
 
 
 def import_placed(
-    placed: PlacedTracks,
-    graph: LaneGraph,
-    settings: CutSettings,
-    *,
-    only: Collection[str] | None = None,
-    **about: Any,
+    placed: PlacedTracks, graph: LaneGraph, settings: CutSettings, *, only: Collection[str] | None = None, **about: Any
 ) -> Imported:
     """Neighbours, cuts and the record of the import; of the vehicles in `only` alone, if it is given.
 
