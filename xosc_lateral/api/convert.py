@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Any
 
 from xosc_lateral.api.result import PathLike, Result
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.output_paths import claim, output_file
 from xosc_lateral.pipeline.convert import convert_scenario
-from xosc_lateral.pipeline.settings import ConvertOptions, ConvertSettings, spelled_out
+from xosc_lateral.pipeline.options import spelled_out
+from xosc_lateral.pipeline.settings import ConvertSettings
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,7 +22,7 @@ SCENARIO_SUFFIXES = (".xosc",)
 REPORT_SUFFIXES = (".html", ".htm")
 
 
-@spelled_out
+@spelled_out(ConvertSettings)
 def convert(
     scenario: PathLike,
     output: PathLike | None = None,
@@ -29,7 +30,7 @@ def convert(
     variant: int = 1,
     report: PathLike | None = None,
     force: bool = False,
-    **options: Unpack[ConvertOptions],
+    **options: Any,
 ) -> Conversion:
     """Give every car in a scenario the lateral movement of a real driver.
 
@@ -47,7 +48,7 @@ def convert(
     force : bool
         Replace an output that this package did not write.
     options
-        `ConvertOptions`.
+        `ConvertSettings`.
 
     Raises
     ------

@@ -14,13 +14,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from xosc_lateral.arrays import BoolArray, FloatArray, IndexArray
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.identification.autocorrelation import Whitener
 from xosc_lateral.identification.innovations import CLIP, own_levels
-from xosc_lateral.identification.regression import Coarse, Fitted, design_of, fit_model
-from xosc_lateral.identification.selection import Gain, Search, Selection, select
-from xosc_lateral.identification.terms.base import Term
-from xosc_lateral.identification.timeline import Timeline, coarse_middle
+from xosc_lateral.identification.model import Fitted, Term
+from xosc_lateral.identification.regression import design_of, fit_model
+from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.selection import Gain, Selection, select
+from xosc_lateral.identification.timeline import Coarse, Timeline, coarse_middle
 
 Progress = Callable[[float, str], None]  # Gets the share that is done and what is being done.
 FOLDS = 4  # Every part of the drives is held out once, and predicted from the other three.
@@ -28,7 +29,7 @@ FOLDS = 4  # Every part of the drives is held out once, and predicted from the o
 BLOCK_S = 150.0
 
 
-def hold_out_blocks(timeline: Timeline) -> IndexArray:
+def hold_out_blocks(timeline: Timeline) -> IntArray:
     """Number of the block that every row is in, shape (n,) [-]; block b belongs to fold b modulo `FOLDS`."""
     blocks = np.zeros(len(timeline), dtype=np.intp)
     length = round(BLOCK_S / timeline.step)
@@ -41,12 +42,12 @@ def hold_out_blocks(timeline: Timeline) -> IndexArray:
     return blocks
 
 
-def folds_of(blocks: IndexArray) -> int:
+def folds_of(blocks: IntArray) -> int:
     """Number of folds, at most `FOLDS`: fewer when there are fewer blocks. `blocks` of shape (n,). [-]"""
     return min(FOLDS, int(blocks.max()) + 1)
 
 
-def held_out_words(timeline: Timeline, blocks: IndexArray) -> str:
+def held_out_words(timeline: Timeline, blocks: IntArray) -> str:
     """What is held out, for the record."""
     number, folds = int(blocks.max()) + 1, folds_of(blocks)
     if folds == 1:
@@ -98,7 +99,7 @@ class Nested:
 
     selections: tuple[Selection, ...]
     coarse: Coarse
-    blocks: IndexArray  # shape (n,): On the 1 Hz grid.
+    blocks: IntArray  # shape (n,): On the 1 Hz grid.
 
     def only(self, terms: Sequence[Term]) -> Nested:
         """The same without what a fold chose that is none of these terms."""
@@ -137,7 +138,7 @@ class Nested:
 
 def nest(
     search: Search,
-    blocks: IndexArray,
+    blocks: IntArray,
     initial: Sequence[Term],
     wanted: Mapping[str, int],
     progress: Callable[[float], None] = lambda _: None,
@@ -178,7 +179,7 @@ def _any_matches(term: Term, others: Sequence[Term]) -> bool:
     return any(type(term) is type(other) and term.matches(other) for other in others)
 
 
-def _over_blocks(rows: FloatArray, blocks: IndexArray, valid: BoolArray, folds: int) -> Gain:
+def _over_blocks(rows: FloatArray, blocks: IntArray, valid: BoolArray, folds: int) -> Gain:
     sums = np.bincount(blocks, rows)[np.unique(blocks[valid])]
     error = float(np.std(sums, ddof=1) / np.sqrt(len(sums))) if len(sums) > 1 else 0.0
     return Gain(float(sums.mean()), error, folds)

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from msgspec import structs
 
-from xosc_lateral.arrays import BoolArray, FloatArray, IndexArray
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.driver.effects import ColumnEffect, Effect, TimeSmooth
 from xosc_lateral.driver.fitting import fit_population, fit_runs
 from xosc_lateral.driver.models.base import ModelKind
@@ -23,7 +23,8 @@ from xosc_lateral.evaluation.distances import Distances, mean_distances, metric_
 from xosc_lateral.evaluation.metrics import METRICS, snippet_metrics
 from xosc_lateral.identification.columns import Column
 from xosc_lateral.identification.cross_validation import Nested, Progress, folds_of, hold_out_blocks
-from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
+from xosc_lateral.identification.model import Fitted, Removal
+from xosc_lateral.identification.regression import fit_model
 from xosc_lateral.identification.residual import (
     SummaryStatistics,
     error_between,
@@ -35,10 +36,9 @@ from xosc_lateral.identification.residual import (
 )
 from xosc_lateral.identification.selection import Selection
 from xosc_lateral.identification.significance import LoopSeed
-from xosc_lateral.identification.terms.base import Removal
 from xosc_lateral.identification.terms.cycle import CycleTerm
 from xosc_lateral.identification.terms.time import StepTerm
-from xosc_lateral.identification.timeline import COARSE, Timeline, coarse_middle
+from xosc_lateral.identification.timeline import COARSE, Coarse, Timeline, coarse_middle
 from xosc_lateral.rows import true_slices
 
 FINE_S = 1.0  # Movement within this time counts as fine when a spread is taken out. [s]
@@ -90,7 +90,7 @@ class Setting:
     root: np.random.SeedSequence
 
     @cached_property
-    def blocks(self) -> IndexArray:
+    def blocks(self) -> IntArray:
         """What is held out."""
         return hold_out_blocks(self.coarse.timeline)
 
@@ -223,7 +223,7 @@ class Scorecard:
 
 
 def score_runs(
-    timeline: Timeline, before: FloatArray, after: FloatArray, blocks: IndexArray, rng: np.random.Generator
+    timeline: Timeline, before: FloatArray, after: FloatArray, blocks: IntArray, rng: np.random.Generator
 ) -> Scorecard:
     """Cut offsets [m], shape (n,), and runs, shape (runs, n), into the same snippets and compare."""
     starts = _starts(timeline)
@@ -243,7 +243,7 @@ def score_runs(
     return Scorecard(own, other, floor, real, snippet_metrics(before[0][rows]), snippet_metrics(after[0][rows]))
 
 
-def _starts(timeline: Timeline) -> IndexArray:
+def _starts(timeline: Timeline) -> IntArray:
     """Snippets side by side, each of valid rows alone, shape (snippets,)."""
     stretches = true_slices(timeline.valid)
     starts = [np.arange(rows.start, rows.stop - SNIPPET_ROWS + 1, SNIPPET_ROWS) for rows in stretches]

@@ -13,15 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 from msgspec import structs
 
-from xosc_lateral.arrays import FloatArray, IndexArray
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.driver.effects import ColumnEffect, Product
 from xosc_lateral.driver.effects.product import Form
 from xosc_lateral.identification.autocorrelation import Problem
 from xosc_lateral.identification.candidates import FINE_SCALES, Family, shapes_of
 from xosc_lateral.identification.columns import Column
 from xosc_lateral.identification.dictionary import beside, orthonormal
-from xosc_lateral.identification.regression import Coarse
-from xosc_lateral.identification.timeline import COARSE
+from xosc_lateral.identification.timeline import COARSE, Coarse
 
 Alternatives = tuple[tuple[str, ...], ...]  # Columns of each effect that explains as much.
 Priced = tuple[ColumnEffect, float]  # An effect, and what its family and a finer choice within it take from its score.
@@ -36,7 +35,7 @@ LAG_STEPS = (1.0, 0.4, 0.2)  # Lags are searched in steps that get finer. [s]
 LAG_LIMIT = 5.0  # Longest lag either way. [s]
 
 
-def explains_as_much(chosen: FloatArray, other: FloatArray, observed: FloatArray, cluster: IndexArray) -> bool:
+def explains_as_much(chosen: FloatArray, other: FloatArray, observed: FloatArray, cluster: IntArray) -> bool:
     """Whether squared residuals of two regressions differ by no more than they scatter from cluster to cluster.
 
     Neither has to be true, nor one a part of the other. `chosen` and `other`, shape (n, k) and (n, j): white columns;

@@ -15,7 +15,7 @@ from xosc_lateral.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.driver.effects import Acts, Angular, ColumnEffect, Product
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.cross_validation import hold_out_blocks
-from xosc_lateral.identification.terms.base import latent_path
+from xosc_lateral.identification.model import latent_path
 from xosc_lateral.identification.terms.between import is_between
 from xosc_lateral.identification.terms.cycle import CycleTerm
 from xosc_lateral.identification.terms.regimes import RegimesTerm

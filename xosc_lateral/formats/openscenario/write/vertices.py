@@ -29,6 +29,9 @@ _DIGITS = (6, 5, 5, 5, 6, 6, 6, 4, 4)
 """Decimals of the time and of these."""
 
 
+ColumnsOf = Callable[[slice], Sequence[FloatArray]]
+
+
 class TimedVertices(Struct, frozen=True, eq=False):
     """Vertices of one trajectory.
 
@@ -42,7 +45,7 @@ class TimedVertices(Struct, frozen=True, eq=False):
     """
 
     count: int
-    columns_of: Callable[[slice], Sequence[FloatArray]]
+    columns_of: ColumnsOf
 
     def text(self, indent: str, unit: str) -> Iterator[str]:
         """XML of the vertices, set out at `indent`, each level below by `unit` more; the first without its indent."""
