@@ -55,11 +55,7 @@ class RecordedTraffic:
 
 
 def read_recording(
-    source: Path,
-    *,
-    kind: str | None = None,
-    road: Path | None = None,
-    columns: MappingLike | None = None,
+    source: Path, *, kind: str | None = None, road: Path | None = None, columns: MappingLike | None = None
 ) -> RecordedTraffic:
     """Read a recording.
 

@@ -8,7 +8,7 @@ import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +16,10 @@ from numpy.typing import NDArray
 from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.hashes import parsed_hash
+from xosc_lateral.formats.mapping import TableMapping
 from xosc_lateral.formats.source import Source, open_source
 from xosc_lateral.lazy import pd
 from xosc_lateral.limits import TABLE_CELLS, TABLE_COLUMNS
-
-if TYPE_CHECKING:
-    from xosc_lateral.formats.mapping import TableMapping
-
 
 _COMMA_NUMBER = r"\s*[+-]?(?:\d{1,3}(?:\.\d{3})+|\d*)(?:,\d+)?(?:[eE][+-]?\d+)?\s*"
 
@@ -129,7 +126,11 @@ def _changes(codes: NDArray[np.intp], drives: pd.Series | None) -> bool:
     return bool((by_drive.max() > by_drive.min()).any())
 
 
-TABLE_SUFFIXES = (".csv", ".csv.gz", ".parquet")
+PARQUET = ".parquet"
+TABLE_SUFFIXES = (".csv", ".csv.gz", PARQUET)
+
+AS_IT_IS = TableMapping()
+"""Nothing is known of how a table is written."""
 
 LONGEST_MESSAGE = 300
 """Of what a library says about a file; some quote half of it."""
@@ -139,7 +140,7 @@ _CHUNK = 1 << 20
 _DOUBLE = 8
 
 
-def read_table(path: Path, mapping: TableMapping | None = None) -> tuple[pd.DataFrame, str]:
+def read_table(path: Path, mapping: TableMapping = AS_IT_IS) -> tuple[pd.DataFrame, str]:
     """Read a CSV, CSV.gz or Parquet file as it is; a mapping may say how text is written.
 
     Raises `FormatError` when it isn't one, or is beyond the limits.
@@ -149,32 +150,24 @@ def read_table(path: Path, mapping: TableMapping | None = None) -> tuple[pd.Data
     name = path.name.lower()
     if not name.endswith(TABLE_SUFFIXES):
         raise FormatError(f"not a drive table: expected a name ending in {', '.join(TABLE_SUFFIXES)}", path=path)
-    with open_source(path) as source, foreign_errors(path, "can't be read as a table"):
-        if name.endswith(".parquet"):
-            table = _read_parquet(source)
-        else:
-            encoding, separator, decimal = None, None, "."
-            if mapping is not None:
-                encoding, separator, decimal = mapping.encoding, mapping.separator, mapping.decimal
-            text = _in_utf8(unpacked_text(source), path, encoding)
-            separator = separator or _separator(text, path)
-            table = pd.read_csv(
-                text, sep=separator, decimal=decimal, encoding="utf-8-sig", low_memory=False, index_col=False
-            )
+    table = _read(path, mapping.encoding, mapping.separator, decimal=mapping.decimal, low_memory=False)
     return table, parsed_hash(path)
 
 
 def read_text_table(path: Path) -> pd.DataFrame:
-    """A table with all cells as text, missing ones empty.
+    """A table with all cells as text, missing ones empty. Raises `FormatError`: see `read_table`."""
+    table = _read(path, dtype=str, keep_default_na=False)
+    return as_text(table) if path.name.lower().endswith(PARQUET) else table
 
-    Raises `FormatError`: see `read_table`.
-    """
+
+def _read(path: Path, encoding: str | None = None, separator: str | None = None, **csv: Any) -> pd.DataFrame:
     with open_source(path) as source, foreign_errors(path, "can't be read as a table"):
-        if path.name.lower().endswith(".parquet"):
-            return as_text(_read_parquet(source))
-        text = _in_utf8(unpacked_text(source), path)
-        separator = _separator(text, path)
-        return pd.read_csv(text, dtype=str, keep_default_na=False, encoding="utf-8-sig", sep=separator, index_col=False)
+        if path.name.lower().endswith(PARQUET):
+            return _read_parquet(source)
+        text = _in_utf8(unpacked_text(source), path, encoding)
+        separator = separator or _separator(text, path)
+        table: pd.DataFrame = pd.read_csv(text, sep=separator, encoding="utf-8-sig", index_col=False, **csv)
+        return table
 
 
 def as_text(table: pd.DataFrame) -> pd.DataFrame:
@@ -240,10 +233,7 @@ def _encoding(text: IO[bytes]) -> str:
 
 
 def _in_utf8(text: IO[bytes], path: Path, encoding: str | None = None) -> IO[bytes]:
-    """The text in UTF-8.
-
-    Raises `FormatError`: it is not in the encoding that is given or found.
-    """
+    """The text in UTF-8. Raises `FormatError`: it is not in the encoding that is given or found."""
     given = encoding or _encoding(text)
     if given.lower().replace("_", "-") in ("utf-8", "utf8", "utf-8-sig"):
         return text

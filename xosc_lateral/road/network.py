@@ -46,34 +46,17 @@ from xosc_lateral.road.tables import NetworkTables
 
 @dataclass(frozen=True, eq=False)
 class RoadNetwork:
-    """Roads, their lanes and their links, as read from one OpenDRIVE file.
-
-    Attributes
-    ----------
-    roads : tuple of Road
-    junctions : tuple of Junction
-    path : str
-        The file.
-    sha256 : str
-        Of the bytes that were parsed; empty for a network that was not read from a file.
-    notes : tuple of str
-        What was repaired, ignored or degenerate on reading: never silent.
-    geo_reference : str or None
-        Projection of inertial x, y (PROJ string).
-    header_offset : HeaderOffset
-        From the coordinates of the file, which all answers are in, to inertial ones.
-    road_ids : tuple of str
-        ``road/@id`` in file order.
-    """
+    """Roads, their lanes and their links, as read from one OpenDRIVE file."""
 
     roads: tuple[Road, ...]
     junctions: tuple[Junction, ...] = ()
-    path: str = ""
-    notes: tuple[str, ...] = ()
-    geo_reference: str | None = None
-    sha256: str = ""
+    path: str = ""  # the file
+    notes: tuple[str, ...] = ()  # what was repaired, ignored or degenerate on reading: never silent
+    geo_reference: str | None = None  # projection of inertial x, y (PROJ string)
+    sha256: str = ""  # of the bytes that were parsed; empty: not read from a file
+    # from the coordinates of the file, which all answers are in, to inertial ones
     header_offset: HeaderOffset = field(default_factory=HeaderOffset)
-    road_ids: tuple[str, ...] = field(init=False)
+    road_ids: tuple[str, ...] = field(init=False)  # ``road/@id`` in file order
     _indices: dict[str, int] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -159,13 +142,7 @@ class RoadNetwork:
         return self._index.world_to_lane(x, y, z, heading, near=near, lane_types=lane_types)
 
     def path_to_lane(
-        self,
-        x: ArrayLike,
-        y: ArrayLike,
-        road: ArrayLike,
-        s: ArrayLike,
-        *,
-        lane_types: Collection[str] | None = DRIVING,
+        self, x: ArrayLike, y: ArrayLike, road: ArrayLike, s: ArrayLike, *, lane_types: Collection[str] | None = DRIVING
     ) -> LanePositions:
         """Like `world_to_lane`, on known roads and from a guess of `s` per point (a written path, say): cheap."""
         return self._index.path_to_lane(x, y, road, s, lane_types=lane_types)
@@ -313,12 +290,7 @@ class RoadNetwork:
         return straightest(self.roads, options)
 
     def path_between(
-        self,
-        start: tuple[int, float],
-        end: tuple[int, float],
-        *,
-        direction: int = 1,
-        limit: float = float("inf"),
+        self, start: tuple[int, float], end: tuple[int, float], *, direction: int = 1, limit: float = float("inf")
     ) -> RoadPath | None:
         """Shortest way along the reference lines of linked roads between two (road, s).
 

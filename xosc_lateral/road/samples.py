@@ -40,14 +40,7 @@ class Candidates(NamedTuple):
 
 
 class Samples:
-    """Samples of all lanes of some types, in a grid.
-
-    Parameters
-    ----------
-    tables : NetworkTables
-    lane_types : collection of str or None
-        None: all but lane 0.
-    """
+    """Samples of all lanes of some types (None: all but lane 0), in a grid."""
 
     def __init__(self, tables: NetworkTables, lane_types: Collection[str] | None) -> None:
         """Lay samples over the lanes, and list for each cell those in it and around it."""

@@ -37,10 +37,7 @@ GROUP = "xosc_lateral.importers"
 
 
 def find_importer(name: str) -> Importer:
-    """The reader of a format.
-
-    Raises `FormatError` if there is none.
-    """
+    """The reader of a format. Raises `FormatError` if there is none."""
     if name in IMPORTERS:
         module, _, function = IMPORTERS[name].partition(":")
         return cast("Importer", getattr(import_module(module), function))

@@ -91,10 +91,7 @@ def _opened(path: Path) -> Any:
 
 
 def read_obstacles(path: Path) -> Tracks:
-    """All obstacles that move along a recorded trajectory.
-
-    Raises `FormatError`, `NotEnoughDataError`.
-    """
+    """All obstacles that move along a recorded trajectory. Raises `FormatError`, `NotEnoughDataError`."""
     return _tracks(_opened(path), path)
 
 

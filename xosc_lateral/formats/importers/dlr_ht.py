@@ -229,12 +229,7 @@ def _slow(d: FloatArray, tracks: pd.DataFrame) -> FloatArray:
 
 
 def _place_in_lanes(
-    s: FloatArray,
-    d: FloatArray,
-    height: FloatArray,
-    vehicle: IntArray,
-    gap: NDArray[np.bool_],
-    settings: CutSettings,
+    s: FloatArray, d: FloatArray, height: FloatArray, vehicle: IntArray, gap: NDArray[np.bool_], settings: CutSettings
 ) -> tuple[_Placed, list[LaneCentreLine]]:
     """Lane centres of one carriageway, and every row's lane and offset. Rounds, since each needs the other."""
     levels = _levels(d)

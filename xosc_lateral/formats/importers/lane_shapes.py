@@ -23,14 +23,8 @@ SMOOTHED = 20.0
 class LaneShape(ABC):
     """A lane between two boundaries, in coordinates along and across its centre line.
 
-    Parameters
-    ----------
-    centre : array, shape (n, 2) or (n, 3)
-        In the direction of travel. [m]
-    boundaries : sequence of array
-        Lines about it. [m]
-    beyond : float
-        So far out of their box a point may lie in the lane. [m]
+    `centre`: in the direction of travel, shape (n, 2) or (n, 3). [m] `boundaries`: lines about it. [m] `beyond`: so far
+    out of their box a point may lie in the lane. [m]
     """
 
     def __init__(self, centre: FloatArray, boundaries: Sequence[FloatArray], beyond: float = 0.0) -> None:
@@ -105,16 +99,9 @@ def lanes_beside(left: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def curvature_along(start: FloatArray, direction: FloatArray, way: FloatArray) -> FloatArray:
-    """Curvature of a polyline, smoothed, shape as `way`. [1/m]
+    """Curvature of a polyline, smoothed, at some ways along it, shape as `way`. [1/m]
 
-    Parameters
-    ----------
-    start : array, shape (n + 1,)
-        Way along it to each of its points. [m]
-    direction : array, shape (n,)
-        Of its pieces, unwrapped. [rad]
-    way : array
-        Where. [m]
+    `start`: way to each of its points, shape (n + 1,). [m] `direction`: of its pieces, unwrapped, shape (n,). [rad]
     """
     middles = 0.5 * (start[1:] + start[:-1])
     bend = np.interp(way + 0.5 * SMOOTHED, middles, direction) - np.interp(way - 0.5 * SMOOTHED, middles, direction)
@@ -131,13 +118,7 @@ BEYOND = 1e-3
 
 
 class Strip(LaneShape):
-    """A lane in coordinates along and across its centre line.
-
-    Parameters
-    ----------
-    centre, left, right : array, shape (n, 3)
-        Lines in the direction of travel; the centre line may lie anywhere between the other two. [m]
-    """
+    """A lane between lines in the direction of travel, shape (n, 3); the centre may lie anywhere between. [m]"""
 
     def __init__(self, centre: FloatArray, left: FloatArray, right: FloatArray) -> None:
         from scipy.spatial import cKDTree

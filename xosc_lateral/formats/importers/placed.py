@@ -87,10 +87,7 @@ class PlacedTracks:
 
 
 def require_lanes(placed: PlacedTracks, where: str, path: Path) -> None:
-    """Refuse tracks that lie beside all lanes.
-
-    Raises `FormatError`.
-    """
+    """Refuse tracks that lie beside all lanes. Raises `FormatError`."""
     if not (placed.piece >= 0).any():
         x, y = placed.tracks.x, placed.tracks.y
         raise FormatError(
@@ -101,12 +98,7 @@ def require_lanes(placed: PlacedTracks, where: str, path: Path) -> None:
 
 
 def import_placed(
-    placed: PlacedTracks,
-    graph: LaneGraph,
-    settings: CutSettings,
-    *,
-    only: Collection[str] | None = None,
-    **about: Any,
+    placed: PlacedTracks, graph: LaneGraph, settings: CutSettings, *, only: Collection[str] | None = None, **about: Any
 ) -> Imported:
     """Neighbours, cuts and the record of the import; of the vehicles in `only` alone, if it is given.
 

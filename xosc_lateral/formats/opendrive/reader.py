@@ -27,20 +27,9 @@ LONGEST = 1e6
 
 
 def read_opendrive(path: str | PathLike[str]) -> RoadNetwork:
-    """Read one ``.xodr``.
+    """Read one ``.xodr``; the network's `notes` name what was repaired, ignored or degenerate.
 
-    Raises `FormatError` if it is no OpenDRIVE, or can't be understood: file, line, element and value; `OSError` if it
-    can't be opened.
-
-    Parameters
-    ----------
-    path : path-like
-        The file.
-
-    Returns
-    -------
-    RoadNetwork
-        Its `notes` name what was repaired, ignored or degenerate.
+    Raises `FormatError` if it is no OpenDRIVE, or can't be understood: file, line, element and value.
     """
     root, source = open_document(path)
     elements = list(root.iterfind("road"))

@@ -73,24 +73,13 @@ def write_osi(
     host: str | None = None,
     description: str = "",
 ) -> Path:
-    """Write a trace; same motion, same bytes.
+    """Write a trace, ``.mcap``, or ``.osi`` (messages alone); same motion, same bytes.
 
-    Raises `FormatError`: Another suffix; `XoscLateralError`: The extra `osi` is not installed; `OSError`: The file
+    Raises `FormatError`: another suffix; `XoscLateralError`: the extra `osi` is not installed; `OSError`: the file
     can't be written; it is as it was then.
 
-    Parameters
-    ----------
-    path : path
-        ``.mcap``, or ``.osi`` (messages alone).
-    motion : NominalMotion
-    network : RoadNetwork
-        That it was played on.
-    trajectories : sequence of WorldTrajectory, optional
-        One per entity, in its order, where they are not the nominal ones.
-    host : str, optional
-        Entity that is the host vehicle; without it the trace has none.
-    description : str
-        For the metadata of the file.
+    `trajectories`: one per entity, in its order, where they are not the nominal ones. `host`: entity that is the host
+    vehicle; without it the trace has none. `description`: for the metadata of the file.
     """
     if path.suffix.lower() not in SUFFIXES:
         raise FormatError(f"an OSI trace ends in {' or '.join(SUFFIXES)}", path=path)
