@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.group import OffsetGroup
 from xosc_lateral.driver.plausibility import first_implausible, implausible
 from xosc_lateral.driver.profile import Basis, DriverProfile, sampling_hash
-from xosc_lateral.enrich.enrich import sides_known
-from xosc_lateral.enrich.give_way import mirrored_context
 from xosc_lateral.enrich.result import Neighbours
+from xosc_lateral.enrich.seen import mirrored_context, sides_known
 from xosc_lateral.errors import SimulationError
 from xosc_lateral.live.surroundings import Places, Roads, give_way_now, look_around
 from xosc_lateral.motion.context import STEERING
