@@ -21,7 +21,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.motion.context import CELLS, STEERING, smooth_step
+from xosc_lateral.motion.around import smooth_step
+from xosc_lateral.motion.context import CELLS, STEERING
 from xosc_lateral.motion.nearby import stretches_within
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.road.network import RoadNetwork

@@ -22,7 +22,8 @@ from xosc_lateral.errors import SimulationError
 from xosc_lateral.live.scene import KINDS
 from xosc_lateral.live.surroundings import Places
 from xosc_lateral.live.traffic import Moment, Moves, Traffic
-from xosc_lateral.motion.context import REACH, TRUCKS, Reach
+from xosc_lateral.motion.around import REACH, Reach
+from xosc_lateral.motion.context import TRUCKS
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -9,7 +9,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
-REACH = 200.0  # [m]; who is farther away is none, as in `motion.context`
+REACH = 200.0  # [m]; who is farther away is none, as in `motion.around`
 LONGEST = 30.0  # [m]; no vehicle is longer (German road traffic regulations: 25.25 m)
 
 
