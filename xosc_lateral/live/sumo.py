@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.enrich.result import Neighbours
 from xosc_lateral.errors import SimulationError
+from xosc_lateral.live.paths import Moves
 from xosc_lateral.live.scene import KINDS
 from xosc_lateral.live.surroundings import Places
-from xosc_lateral.live.traffic import Moment, Moves, Traffic
+from xosc_lateral.live.traffic import Moment, Traffic
 from xosc_lateral.motion.around import REACH, Reach
 from xosc_lateral.motion.context import TRUCKS
 
