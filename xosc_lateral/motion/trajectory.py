@@ -34,28 +34,20 @@ _ASIDE = 10.0
 
 @dataclass(frozen=True, eq=False, slots=True)
 class WorldTrajectory:
-    """A path in the world over time, on the rows of the nominal motion.
-
-    Parameters
-    ----------
-    time : array, shape (n,)
-        [s]
-    x, y, z : array, shape (n,)
-        [m]
-    heading, pitch, roll : array, shape (n,)
-        [rad]
-    speed : array, shape (n,)
-        Along the path, negative when driving backwards. [m/s]
-    """
+    """A path in the world over time, on the rows of the nominal motion; arrays of shape (n,)."""
 
     time: FloatArray
+    """[s]"""
     x: FloatArray
     y: FloatArray
     z: FloatArray
+    """[m]"""
     heading: FloatArray
     pitch: FloatArray
     roll: FloatArray
+    """[rad]"""
     speed: FloatArray
+    """Along the path, negative when driving backwards. [m/s]"""
 
 
 def distance_driven(motion: EntityMotion) -> FloatArray:

@@ -96,7 +96,7 @@ def comparison_record(compared: Compared) -> dict[str, Any]:
     }
 
 
-def _rounded_rows(values: NDArray[np.float64]) -> list[list[float]]:
+def _rounded_rows(values: FloatArray) -> list[list[float]]:
     return [[round(value, 4) for value in row] for row in values.tolist()]
 
 
