@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.motion.around import smooth_step
-from xosc_lateral.motion.context import CELLS, STEERING, smooth_step
+from xosc_lateral.motion.context import CELLS, STEERING
 from xosc_lateral.motion.nearby import stretches_within
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.road.network import RoadNetwork
