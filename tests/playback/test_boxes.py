@@ -115,10 +115,10 @@ def test_a_box_holds_what_lies_within_it_in_its_own_frame(x: float, y: float, he
 # ---- limits ----------------------------------------------------------------------------------------------------------
 def test_limits_are_the_tighter_of_action_and_vehicle() -> None:
     performance = Performance(50.0, 4.0, 9.0, 10.0, 20.0)
-    assert limits_of(None, performance).speed == 50.0
-    assert limits_of(None, performance).acceleration == inf  # an action without constraints has none at all
+    assert limits_of(None, performance).max_speed == 50.0
+    assert limits_of(None, performance).max_acceleration == inf  # an action without constraints has none at all
     own = limits_of(DynamicConstraints(max_acceleration=2.0, max_deceleration=12.0), performance)
-    assert (own.speed, own.acceleration, own.deceleration, own.acceleration_rate) == (50.0, 2.0, 9.0, 10.0)
+    assert own == Performance(50.0, 2.0, 9.0, 10.0, 20.0)
 
 
 # ---- comparisons and values ------------------------------------------------------------------------------------------

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 from msgspec import UNSET, Struct
+
+from xosc_lateral.errors import FormatError
+
+Error = TypeVar("Error", bound=FormatError)
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +32,10 @@ class Place:
     line: int | None
     element: str
     node: tuple[int, ...] = field(default=(), repr=False, compare=False)
+
+    def error(self, kind: type[Error], what: str) -> Error:
+        """An error that names this place."""
+        return kind(what, path=self.path, line=self.line, element=self.element)
 
 
 class Content(Struct, frozen=True, kw_only=True):
