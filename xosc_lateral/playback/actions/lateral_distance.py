@@ -91,7 +91,7 @@ class BesideOnRoad:
     def _rest(self) -> float:
         """How far to go along +t of the own road. [m]"""
         state, other = self._state, self._other
-        gap = road_gap(state.network, other, spot_of(state))
+        gap = road_gap(other, spot_of(state))
         if gap is None:
             return 0.0
         return (self._wanted if other.is_forward is not gap.is_turned else -self._wanted) - gap.dt

@@ -6,7 +6,7 @@ from math import inf, sqrt
 
 from xosc_lateral.playback.actions.base import Domain, RunningAction, RunningPrivateAction
 from xosc_lateral.playback.actions.speed_profile import limits_of
-from xosc_lateral.playback.distances import ahead_and_left, entity_distance
+from xosc_lateral.playback.distances import Measure, ahead_and_left
 from xosc_lateral.playback.drive import drive
 from xosc_lateral.scenario.enums import CoordinateSystem, LongitudinalDisplacement, RelativeDistanceType
 from xosc_lateral.scenario.private_actions import LongitudinalDistanceAction
@@ -25,6 +25,12 @@ class RunningLongitudinalDistance(RunningPrivateAction):
     content: LongitudinalDistanceAction
 
     def _prepare(self) -> None:
+        self._measure = Measure(
+            # with free space, the reference player measures in the own frame, whatever is asked for
+            (not self.content.freespace and self.content.coordinate_system) or CoordinateSystem.ENTITY,
+            RelativeDistanceType.LONGITUDINAL,
+            self.content.freespace,
+        )
         self._other = self.simulation.entity(self.content.entity_ref, self.content.place)
         self._limits = limits_of(self.content.constraints, self.actor.entity.performance)
         self._ahead: bool | None = None
@@ -68,17 +74,7 @@ class RunningLongitudinalDistance(RunningPrivateAction):
         return ahead_and_left(self.actor, self._other.pose.x, self._other.pose.y)[0] >= 0.0
 
     def _distance(self) -> float | None:
-        system = self.content.coordinate_system or CoordinateSystem.ENTITY
-        if self.content.freespace:  # as the reference player measures it, whatever is asked for
-            system = CoordinateSystem.ENTITY
-        return entity_distance(
-            self.simulation.network,
-            self.actor,
-            self._other,
-            system,
-            RelativeDistanceType.LONGITUDINAL,
-            freespace=self.content.freespace,
-        )
+        return self._measure.to_entity(self.actor, self._other)
 
     def _wanted(self) -> float:
         if self._kept is not None:

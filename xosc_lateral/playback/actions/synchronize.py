@@ -100,7 +100,7 @@ class RunningSynchronize(RunningPrivateAction):
             way = self._target_s(entity.path, spot, position) - entity.path.s
             tangent = entity.path.path.at(entity.path.s).tangent
             return way if is_forward(entity.plane.heading - tangent) else -way
-        gap = road_gap(self.simulation.network, entity, spot)
+        gap = road_gap(entity, spot)
         if gap is not None:
             return gap.ds
         ahead, _ = ahead_and_left(entity, spot.x, spot.y)
