@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.evaluation.metrics import (
     METRICS,
 )
