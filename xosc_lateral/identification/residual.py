@@ -34,9 +34,7 @@ RESPONSE_S = 2.0  # Columns are smoothed as a driver responds before they are bi
 BANDS_S = (1.0, 3.0, 8.0, 20.0, 60.0, 200.0)  # Averaging times between which the bands of the movement lie. [s]
 # Name of that group, and frequencies to each side that belong to it. [-]
 OSCILLATION, LINE_WIDTH = "movement at the weave's period", 2
-
 LOCAL_QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
-
 N_RUNS = 24  # Runs of the profile that its expectation is taken over ...
 FEW_RUNS, MANY_DRIVES = 6, 50  # ... and how many with so many drives, each of which is another sample already.
 DRAWS = 64  # Half samples of the blocks.
