@@ -26,7 +26,6 @@ from xosc_lateral.drives.gridding import GriddedDrive, grid_drives
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import NotEnoughDataError
 
-
 # Samples of the 0.2 s grid per sample of the coarse one: effects take seconds, so they are tested at 1 Hz. [-]
 COARSE = 5
 PAD = 75  # Samples before and after each drive in which the context holds its outermost value: 15 s. [-]
