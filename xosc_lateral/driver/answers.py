@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Linear, Proximity
 from xosc_lateral.driver.profile import COLUMNS, SIDES, Basis, Beside
 from xosc_lateral.drives.drive import Run
@@ -23,8 +24,6 @@ from xosc_lateral.drives.resampling import STEP
 
 if TYPE_CHECKING:
     from xosc_lateral.driver.profile import DriverProfile
-
-FloatArray = NDArray[np.float64]
 
 NEIGHBOURS = ("left_distance", "right_distance")
 """Free space lengthwise to the nearest vehicle in the lane to the left and to the right [m]; NaN or infinite: none."""

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from msgspec.structs import replace
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.answers import answer_effects, measure_beside
 from xosc_lateral.driver.effects import ColumnEffect
 from xosc_lateral.driver.models.base import CoreModel, ModelKind
@@ -20,8 +20,6 @@ from xosc_lateral.drives.cuts import PAPER_RULES, CutRules, all_runs
 from xosc_lateral.drives.drive import Drive, Run
 from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.version import __version__
-
-FloatArray = NDArray[np.float64]
 
 
 def fit_profile(

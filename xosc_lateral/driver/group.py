@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import Acts, EffectTerms
 from xosc_lateral.driver.effects.base import terms_of
 from xosc_lateral.driver.effects.response import Response, ResponseState
@@ -20,8 +21,6 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.records import plain, read_as
 from xosc_lateral.driver.upsampling import extrapolate, piece
 from xosc_lateral.segment import FADES
-
-FloatArray = NDArray[np.float64]
 
 BLOCK = 64
 """Model steps drawn at once for a driver. [-]"""

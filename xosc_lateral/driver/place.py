@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.digits import all_significant
 from xosc_lateral.driver.answers import NEIGHBOURS, SCALE, most_beside, neighbour_shapes
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Levels, Linear, Piecewise, Proximity
@@ -20,8 +21,6 @@ from xosc_lateral.driver.models.autoregressive.coarse import split_bands
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import NotEnoughDataError
-
-FloatArray = NDArray[np.float64]
 
 COLUMNS = ("is_truck", "lane_index", "speed")
 """What a population's drivers are distinguished by: class, lane and speed."""

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.limits import DISTANCES, OFFSET_LANES, Range, context_range
 from xosc_lateral.segment import Segment
 
 if TYPE_CHECKING:
     from xosc_lateral.driver.profile import DriverProfile
-
-FloatArray = NDArray[np.float64]
 
 NARROW = 2.5
 """Where a lane is narrower than this (it opens or closes), an offset is held against a lane of this width. [m]"""

@@ -13,13 +13,12 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import ColumnEffect, EffectTerms, HiddenEffect
 from xosc_lateral.driver.models.base import CoreStream, Start
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.records import read_as
 from xosc_lateral.driver.seeds import DriveSeed, child, generator
-
-FloatArray = NDArray[np.float64]
 
 
 class DriveState(msgspec.Struct, kw_only=True):

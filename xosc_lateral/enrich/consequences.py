@@ -7,14 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.enrich.result import EntityResult, LaneDeparture
 from xosc_lateral.motion.gaps import BoxPath, Gap, smallest_gaps
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.rows import blocks, give_back, kept, slices_where
-
-FloatArray = NDArray[np.float64]
 
 GAP_STEP = 0.1
 """Rows that gaps are looked for on. [s]"""

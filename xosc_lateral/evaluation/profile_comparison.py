@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.evaluation.distances import wasserstein
 from xosc_lateral.evaluation.lane_keeping import LaneKeeping, keeping_of
@@ -23,8 +23,6 @@ from xosc_lateral.evaluation.metrics import (
 )
 from xosc_lateral.evaluation.scores import SNIPPET
 from xosc_lateral.evaluation.spectra import Spectrum, spectrum
-
-FloatArray = NDArray[np.float64]
 
 HALVINGS, SURE = 40, 0.95
 """Random halves of a profile's drivers, and how many of them are no further apart than what counts as alike. [-]"""

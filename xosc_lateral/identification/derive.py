@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 from msgspec import structs
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.drivability import SELDOM, strain
 from xosc_lateral.driver.effects import Acts, Adapted, ColumnEffect, Population
 from xosc_lateral.driver.effects.base import FACTOR_LIMIT
@@ -26,8 +26,6 @@ from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.evaluation.lane_keeping import HIGHWAY_SPEED, LaneKeeping, highway_drives, lane_keeping
 from xosc_lateral.identification.stated_figures import Asked, Preset
 from xosc_lateral.version import __version__
-
-FloatArray = NDArray[np.float64]
 
 TOLERANCE = 0.02
 """Figures are reached within this share of what was asked; a mean within it of the standard deviation. [-]"""

@@ -1,6 +1,6 @@
 """What every driver sees at one moment: the road, the vehicles around from where they are, and whom to give way to.
 
-Gaps, sides and the law of giving way are those of a conversion (`motion.context`, `enrich.give_way`), there for one
+Gaps, sides and the law of giving way are those of a conversion (`motion.around`, `enrich.give_way`), there for one
 vehicle at many moments, here for many vehicles at one.
 """
 
@@ -11,26 +11,13 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.enrich.give_way import FADES, Frame, part_of, widened
-from xosc_lateral.motion.context import (
-    IN_SIGHT,
-    Around,
-    Extent,
-    Reach,
-    free_space,
-    lane_path,
-    lanes_beside,
-    road_columns,
-    see_along,
-)  # fmt: skip
+from xosc_lateral.motion.around import IN_SIGHT, Around, Extent, Reach, free_space, lane_path, see_along
+from xosc_lateral.motion.context import lanes_beside, road_columns
 from xosc_lateral.motion.nearby import pairs_now
 from xosc_lateral.road.network import RoadNetwork
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 
 class Roads(Protocol):
@@ -94,29 +81,21 @@ class OpenDriveRoads:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Places:
-    """Where vehicles are at one moment, shape (n,) each.
-
-    Parameters
-    ----------
-    x, y, heading : array
-        Reference point [m] and the lane's direction of travel there. [rad]
-    road, lane : array of int
-        Index of the road, -1 for none; lane id.
-    s : array
-        Along the road. [m]
-    length, width, center_x : array
-        Of the bounding box, and how far its middle is ahead of the reference point. [m]
-    """
+    """Where vehicles are at one moment, shape (n,) each."""
 
     x: FloatArray
     y: FloatArray
     heading: FloatArray
+    """Reference point [m] and the lane's direction of travel there. [rad]"""
     road: IntArray
     lane: IntArray
+    """Index of the road, -1 for none; lane id."""
     s: FloatArray
+    """Along the road. [m]"""
     length: FloatArray
     width: FloatArray
     center_x: FloatArray
+    """Of the bounding box, and how far its middle is ahead of the reference point. [m]"""
 
 
 def look_around(roads: Roads, places: Places, offset: FloatArray, is_truck: BoolArray) -> dict[str, FloatArray]:

@@ -14,10 +14,9 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.motion.nearby import stretches_within
 from xosc_lateral.rows import BLOCK, give_back
-
-FloatArray = NDArray[np.float64]
 
 REACH = 30.0
 """Boxes farther apart than this at all times are no pair worth naming. [m]"""
@@ -31,43 +30,28 @@ TOGETHER = 256
 
 
 class BoxPath(Struct, frozen=True, eq=False):
-    """A vehicle's bounding box along its path.
-
-    Parameters
-    ----------
-    name : str
-    x, y, heading : array, shape (n,)
-        Pose of the reference point; NaN where the vehicle is absent. [m], [rad]
-    length, width : float
-        Of the box. [m]
-    centre : float
-        Box centre ahead of the reference point. [m]
-    """
+    """A vehicle's bounding box along its path."""
 
     name: str
     x: FloatArray
     y: FloatArray
     heading: FloatArray
+    """Shape (n,). Pose of the reference point; NaN where the vehicle is absent. [m], [rad]"""
     length: float
     width: float
+    """Of the box. [m]"""
     centre: float
+    """Box centre ahead of the reference point. [m]"""
 
 
 class Gap(Struct, frozen=True):
-    """Smallest free space between two vehicles over a run; 0: they touch.
-
-    Parameters
-    ----------
-    names : tuple of str
-    distance : float
-        [m]
-    time : float
-        When it is reached first. [s]
-    """
+    """Smallest free space between two vehicles over a run; 0: they touch."""
 
     names: tuple[str, str]
     distance: float
+    """[m]"""
     time: float
+    """When it is reached first. [s]"""
 
     @property
     def touches(self) -> bool:

@@ -42,22 +42,15 @@ _KINDS = tuple(SegmentKind)
 
 
 class SegmentSpan(Struct, frozen=True):
-    """A segment as the rows ``first`` to ``last`` (both included) of one entity, of one kind throughout.
-
-    Parameters
-    ----------
-    kind : SegmentKind
-    first, last : int
-        Rows of the entity's motion.
-    start, end : float
-        Time of those rows. [s]
-    """
+    """A segment as the rows ``first`` to ``last`` (both included) of one entity, of one kind throughout."""
 
     kind: SegmentKind
     first: int
     last: int
+    """Rows of the entity's motion."""
     start: float
     end: float
+    """Time of those rows. [s]"""
 
     @property
     def is_road_following(self) -> bool:
@@ -66,27 +59,18 @@ class SegmentSpan(Struct, frozen=True):
 
 
 class SegmentRow(Struct, frozen=True):
-    """One segment of one entity.
-
-    Parameters
-    ----------
-    entity : str
-    start, end : float
-        [s]
-    road_following : bool
-    why : str
-        Why it is no road-following segment; empty if it is one.
-    road, lane : str, int
-        Where it begins; empty and 0 off the road.
-    """
+    """One segment of one entity."""
 
     entity: str
     start: float
     end: float
+    """[s]"""
     road_following: bool
     why: str
+    """Why it is no road-following segment; empty if it is one."""
     road: str
     lane: int
+    """Where it begins; empty and 0 off the road."""
 
 
 def cut_segments(motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool = False) -> tuple[SegmentSpan, ...]:

@@ -17,11 +17,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.motion.nominal import Activity, EntityMotion
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.rows import blocks, columns, empty, put, rows_where, scratch
-
-FloatArray = NDArray[np.float64]
 
 _STANDSTILL = 1e-3
 """Displacement per step under which a direction of motion can't be read from it. [m]"""
@@ -35,28 +34,20 @@ _ASIDE = 10.0
 
 @dataclass(frozen=True, eq=False, slots=True)
 class WorldTrajectory:
-    """A path in the world over time, on the rows of the nominal motion.
-
-    Parameters
-    ----------
-    time : array, shape (n,)
-        [s]
-    x, y, z : array, shape (n,)
-        [m]
-    heading, pitch, roll : array, shape (n,)
-        [rad]
-    speed : array, shape (n,)
-        Along the path, negative when driving backwards. [m/s]
-    """
+    """A path in the world over time, on the rows of the nominal motion; arrays of shape (n,)."""
 
     time: FloatArray
+    """[s]"""
     x: FloatArray
     y: FloatArray
     z: FloatArray
+    """[m]"""
     heading: FloatArray
     pitch: FloatArray
     roll: FloatArray
+    """[rad]"""
     speed: FloatArray
+    """Along the path, negative when driving backwards. [m/s]"""
 
 
 def distance_driven(motion: EntityMotion) -> FloatArray:

@@ -8,12 +8,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.reconstruction.recorded import RecordedVehicle
 from xosc_lateral.reconstruction.transitions import SHAPES, Rough, Transition, fit_transition
 from xosc_lateral.rows import true_slices
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 SETTLED = 0.7
 """Nobody has settled in a lane who is farther from its centre, see `formats.importers.cuts`. [m]"""

@@ -8,8 +8,8 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.answers import basis_of, beside_line
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.driver.profile import SIDES, DriverProfile, Provenance
@@ -21,8 +21,6 @@ from xosc_lateral.normal import NORMAL_95
 from xosc_lateral.report.chart import SAMPLED
 from xosc_lateral.report.figure import Figure
 from xosc_lateral.report.page import KeyFigure, Page, format_value
-
-FloatArray = NDArray[np.float64]
 
 CHANGED: Mapping[Acts, str] = {
     Acts.LOCATION: "mean offset",

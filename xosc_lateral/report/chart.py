@@ -8,11 +8,11 @@ from html import escape
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.rows import true_slices
 
-FloatArray = NDArray[np.float64]
 Ticks = list[tuple[float, str]]
 
 # Okabe and Ito, "Color universal design" (2008), and six more. Each of these was chosen as the colour farthest from all

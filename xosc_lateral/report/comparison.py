@@ -6,9 +6,11 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from xosc_lateral.evaluation.metrics import METRICS
+from xosc_lateral.arrays import FloatArray
+from xosc_lateral.evaluation.metrics import (
+    METRICS,
+)
 from xosc_lateral.evaluation.profile_comparison import Compared, ComparedProfile
 from xosc_lateral.evaluation.scores import SNIPPET
 from xosc_lateral.formats.profiles import profile_hash
@@ -95,7 +97,7 @@ def comparison_record(compared: Compared) -> dict[str, Any]:
     }
 
 
-def _rounded_rows(values: NDArray[np.float64]) -> list[list[float]]:
+def _rounded_rows(values: FloatArray) -> list[list[float]]:
     return [[round(value, 4) for value in row] for row in values.tolist()]
 
 

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.report.chart import (
     GRID,
     INK,
@@ -32,8 +32,6 @@ from xosc_lateral.report.chart import (
     stroke_of,
     ticks_of,
 )
-
-FloatArray = NDArray[np.float64]
 
 CSS_VARIABLES: Mapping[str, str] = {
     INK: "--ink",

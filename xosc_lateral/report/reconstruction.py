@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.enrich.result import EntityResult, SampledSegment
 from xosc_lateral.formats.hashes import parsed_hashes
 from xosc_lateral.motion.nominal import EntityMotion, NominalMotion
@@ -24,8 +24,6 @@ from xosc_lateral.version import __version__
 
 if TYPE_CHECKING:
     from xosc_lateral.pipeline.reconstruct import Reconstructed
-
-FloatArray = NDArray[np.float64]
 
 FRAME = 0.1
 """Rows of the page's player. [s]"""

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.road import RoadNetwork
 from xosc_lateral.road.positions import RoadMark
-
-FloatArray = NDArray[np.float64]
 
 STEP = 2.0
 """Between two points of a line. [m]"""

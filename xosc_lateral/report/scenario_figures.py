@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.enrich.result import Enriched, EntityResult
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.report.chart import DASHED, ENRICHED, GRID, INK, MUTED, NOMINAL, SHADE, Panel, color_of, label_of
@@ -14,7 +15,6 @@ from xosc_lateral.report.figure import Figure
 from xosc_lateral.report.road_lines import lane_surfaces, markings
 from xosc_lateral.road.network import DRIVING
 
-FloatArray = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 ROW_STEP = 0.1

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.enrich.result import EntityResult
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.motion.trajectory import WorldTrajectory
@@ -19,7 +20,6 @@ from xosc_lateral.road.geometry import simplify
 from xosc_lateral.road.network import DRIVING
 from xosc_lateral.rows import true_slices
 
-FloatArray = NDArray[np.float64]
 RowArray = NDArray[np.int64]
 
 FRAME = 0.1

@@ -17,13 +17,11 @@ from typing import Any, ClassVar
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects.base import FACTOR_LIMIT, Effect, EffectTerms, step_of
 from xosc_lateral.driver.records import set_once
 from xosc_lateral.errors import DriverProfileError
-
-FloatArray = NDArray[np.float64]
 
 
 class NoState(msgspec.Struct):

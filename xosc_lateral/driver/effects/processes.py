@@ -17,11 +17,10 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects.base import EffectTerms
 from xosc_lateral.driver.effects.hidden import HiddenEffect
 from xosc_lateral.driver.linear_filters import recur
-
-FloatArray = NDArray[np.float64]
 
 
 class DriftState(msgspec.Struct):

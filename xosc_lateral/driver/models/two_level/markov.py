@@ -18,10 +18,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.errors import DriverProfileError
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 def open_traps(counts: IntArray) -> IntArray:
