@@ -137,19 +137,13 @@ def bin_of(rel_offset: FloatArray, n_bins: int = N_BINS) -> IntArray:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class AliasTable:
-    """A chain made ready for sampling: one uniform number and two look-ups per step [1]_.
-
-    Parameters
-    ----------
-    keep : array, shape (n_bins * n_bins,)
-        Column k of row i stands for bin k below this fraction of its width ...
-    other : array of int, shape (n_bins * n_bins,)
-        ... and for this bin above it.
-    """
+    """A chain made ready for sampling: one uniform number and two look-ups per step [1]_."""
 
     n_bins: int
     keep: FloatArray
+    """Shape (n_bins * n_bins,). Column k of row i stands for bin k below this fraction of its width ..."""
     other: IntArray
+    """Shape (n_bins * n_bins,). ... and for this bin above it."""
 
     @classmethod
     def of(cls, transition: FloatArray) -> AliasTable:
