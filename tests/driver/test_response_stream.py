@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.driver.effects.made_effects import STEP, made
+from tests.profiles import whole_terms
 from xosc_lateral.driver.effects import ColumnEffect, Linear, Product
 from xosc_lateral.driver.effects.product import Factor
 from xosc_lateral.driver.process import ResponseStream, ResponseStreamState
@@ -53,7 +54,7 @@ def by_rows(effect: ColumnEffect, values: dict[str, np.ndarray], stop: int = N) 
 @pytest.mark.parametrize("name", EFFECTS)
 def test_rows_one_by_one_are_the_drive_as_a_whole(name: str) -> None:
     effect, values = EFFECTS[name], context()
-    whole = effect.terms(STEP * np.arange(N), values, np.random.default_rng(0)).location
+    whole = whole_terms(effect, STEP * np.arange(N), values, np.random.default_rng(0)).location
     np.testing.assert_array_equal(by_rows(effect, values)[0], whole)
 
 

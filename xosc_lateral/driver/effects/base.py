@@ -11,7 +11,6 @@ References
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, ClassVar
@@ -64,14 +63,6 @@ class Effect(Record, frozen=True, kw_only=True, tag_field="kind", tag=kebab):
     @abstractmethod
     def columns(self) -> tuple[str, ...]:
         """Context columns that it reads; empty for a hidden effect."""
-        raise NotImplementedError
-
-    @abstractmethod
-    def terms(self, time: FloatArray, context: Mapping[str, FloatArray], rng: np.random.Generator) -> EffectTerms:
-        """Evaluate on a whole drive: even grid [s] and context columns, each in its own unit (NaN: none), shape (n,).
-
-        `rng` is for hidden effects only.
-        """
         raise NotImplementedError
 
     def to_dict(self) -> dict[str, Any]:

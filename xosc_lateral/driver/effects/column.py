@@ -22,7 +22,7 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects.base import Acts, Effect, EffectTerms, step_of, terms_of
+from xosc_lateral.driver.effects.base import Acts, Effect, EffectTerms, terms_of
 from xosc_lateral.driver.effects.response import Response, ResponseState, respond
 from xosc_lateral.driver.records import plain, set_once
 from xosc_lateral.errors import DriverProfileError
@@ -200,11 +200,6 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
     def acting(self, response: FloatArray) -> EffectTerms:
         """Terms [m], [-] of responses, shape (n, k), in the unit of the quantity."""
         return terms_of(self.acts, self.weighed(response))
-
-    def terms(self, time: FloatArray, context: Mapping[str, FloatArray], rng: np.random.Generator) -> EffectTerms:
-        """Evaluate on an even time grid [s], shape (n,); `rng` is left untouched. See `Effect.terms`."""
-        strength = self.strength(step_of(time), context)
-        return EffectTerms() if strength is None else terms_of(self.acts, strength)
 
     def of_one_driver(self, rng: np.random.Generator) -> ColumnEffect:
         """The effect with one driver's coefficients, drawn from the population."""
