@@ -293,7 +293,7 @@ class Traffic:
             "knots": self._knots,
             "columns": self._columns,
             "drivers": {
-                name: [_plain(value) for value in own]
+                name: [np.asarray(value).tolist() for value in own]
                 for name, own in zip(self._names, self._state.tolist(), strict=True)
             },
             "groups": {key: {"members": members, **group.to_dict()} for key, (group, members) in self._groups.items()},
@@ -315,7 +315,8 @@ class Traffic:
         self._columns = None if state["columns"] is None else tuple(state["columns"])
         self._names = list(state["drivers"])
         self._index = {name: k for k, name in enumerate(self._names)}
-        self._state = np.array([tuple(map(_tupled, own)) for own in state["drivers"].values()], dtype=DRIVER)
+        rows = [tuple(tuple(one) if isinstance(one, list) else one for one in own) for own in state["drivers"].values()]
+        self._state = np.array(rows, dtype=DRIVER)
         self._groups = {}
         for key, saved in state["groups"].items():
             group = OffsetGroup(self._profiles[key], self._columns or ())
@@ -340,11 +341,3 @@ def _check(time: float, before: float | None, moment: Moment) -> None:
         if bad.any():
             row = int(np.flatnonzero(bad)[0])
             raise SimulationError(f"vehicle {moment.names[row]!r} at {time:g} s: {what} is {values[row]}")
-
-
-def _plain(value: Any) -> Any:
-    return value.tolist() if hasattr(value, "tolist") else value
-
-
-def _tupled(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value

@@ -95,16 +95,9 @@ def see_along(
 ) -> Others:
     """Where others are along one's lane path, row by row: other moments, or other vehicles. Shape (n,) each.
 
-    Parameters
-    ----------
-    path : sequence of Reach
-        What `lane_path` gives; others elsewhere are not seen (NaN).
-    own_u, own_offset : array
-        Where one is on it, and from its lane's centre, positive left. [m]
-    road, s, t, direction : array
-        Where the other is, and which way it drives along s, +1 or -1; 0: it is on no lane. [-], [m], [m], [-]
-    centre_t : callable
-        t of a lane's centre, by road, lane and s. [m]
+    From where one is on the path (`lane_path`) and from its lane's centre, positive left [m]; where the other is, road,
+    s and t [m], and which way it drives along s, +1 or -1, 0 on no lane; and t of a lane's centre, by road, lane and s.
+    Others elsewhere are not seen (NaN).
     """
     n = len(own_u)
     seen = Others(np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool))

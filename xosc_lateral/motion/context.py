@@ -40,22 +40,10 @@ TRUCKS = frozenset({VehicleCategory.TRUCK, VehicleCategory.SEMITRAILER, VehicleC
 
 
 def entity_context(motion: NominalMotion, network: RoadNetwork, index: int, grid: IntArray) -> dict[str, FloatArray]:
-    """Context of one vehicle on chosen rows.
+    """Context of the `index`-th vehicle of a motion on some of its rows, shape (n,) each, under DESIGN's names.
 
-    Parameters
-    ----------
-    motion : NominalMotion
-    network : RoadNetwork
-    index : int
-        Of the vehicle in ``motion.entities``.
-    grid : array of int, shape (n,)
-        Rows of the motion.
-
-    Returns
-    -------
-    dict of str to array, shape (n,)
-        Under DESIGN's names; NaN where there is none (no lane to that side; off the road), infinite where a lane has
-        nobody within reach. Weather that the scenario does not state is absent.
+    NaN where there is none (no lane to that side; off the road), infinite where a lane has nobody within reach. Weather
+    that the scenario does not state is absent.
     """
     entity = motion.entities[index]
     road = _road(entity, network, grid)
@@ -84,11 +72,14 @@ def _road(entity: EntityMotion, network: RoadNetwork, grid: IntArray) -> dict[st
     # Against the lane's traffic all is seen the other way round.
     along = np.where(np.cos(entity.heading_relative[rows]) < 0.0, -1.0, 1.0)
     values = road_columns(network, entity.road[rows], entity.lane[rows], entity.s[rows], entity.offset[rows], along)
-    context = {}
-    for name, part in values.items():
-        context[name] = np.full(len(grid), np.nan)
-        context[name][on] = part
-    return context
+    return {name: spread_out(part, on) for name, part in values.items()}
+
+
+def spread_out(values: FloatArray, where: NDArray[np.bool_]) -> FloatArray:
+    """As many values as there are rows `where` they belong, NaN in the others; shape of `where`."""
+    found = np.full(len(where), np.nan)
+    found[where] = values
+    return found
 
 
 def road_columns(

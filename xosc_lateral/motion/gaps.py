@@ -61,17 +61,7 @@ class Gap(Struct, frozen=True):
 
 
 def smallest_gaps(time: FloatArray, paths: Sequence[BoxPath], *, reach: float = REACH) -> tuple[Gap, ...]:
-    """Smallest gap of each pair of vehicles that come within `reach` of each other.
-
-    Parameters
-    ----------
-    time : array, shape (n,)
-        [s]
-    paths : sequence of BoxPath
-        On that time grid.
-    reach : float
-        [m]
-    """
+    """Smallest gap of each pair of vehicles that come within `reach` [m] of each other, on one time grid [s]."""
     smallest: dict[tuple[int, int], Gap] = {}
     for part in _together(_near_pairs(paths, reach)):
         a, b = ([(paths[pair[side]], near) for pair, near in part] for side in (0, 1))
@@ -135,17 +125,9 @@ _POSE, _SIZE = ("x", "y", "heading"), ("length", "width", "centre")
 
 
 def box_distance(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Distance between rectangles, row by row; 0 where they overlap.
+    """Distance between rectangles, row by row, shape (n,); 0 where they overlap. [m]
 
-    Parameters
-    ----------
-    a, b : array, shape (n, 4, 2)
-        Corners in order. [m]
-
-    Returns
-    -------
-    array, shape (n,)
-        [m]
+    From their corners in order, shape (n, 4, 2). [m]
     """
     from_a, apart_of_a = _beyond(a, b)
     from_b, apart_of_b = _beyond(b, a)

@@ -74,20 +74,9 @@ class SegmentRow(Struct, frozen=True):
 
 
 def cut_segments(motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool = False) -> tuple[SegmentSpan, ...]:
-    """Cut an entity's whole motion into segments; teleports always cut.
+    """Cut an entity's whole motion into segments, each row into exactly one; teleports always cut.
 
-    Parameters
-    ----------
-    motion : EntityMotion
-    network : RoadNetwork
-        The one that it was played on.
-    is_trailer : bool
-        The entity is pulled by another: it has no driver.
-
-    Returns
-    -------
-    tuple of SegmentSpan
-        In order of time, without gaps: each row belongs to exactly one.
+    `is_trailer`: the entity is pulled by another, and has no driver.
     """
     firsts: list[tuple[int, int]] = []  # rows at which segments begin, and their kinds
     before = -1

@@ -88,12 +88,8 @@ def leaps(motion: EntityMotion) -> list[tuple[float, float]]:
 def displace(motion: EntityMotion, network: RoadNetwork, deviation: FloatArray) -> WorldTrajectory:
     """Shift a motion sideways in lane coordinates; headings and speeds follow from the shifted path.
 
-    Parameters
-    ----------
-    motion : EntityMotion
-    network : RoadNetwork
-    deviation : array, shape (n,)
-        Added to the nominal offset, positive to the left of the vehicle's travel; ignored where it is on no road. [m]
+    The deviation [m], shape (n,), is added to the nominal offset, positive to the left of the vehicle's travel; it is
+    ignored where the vehicle is on no road.
     """
     n = len(motion.time)
     x, y, z = columns(n, _shifted(motion, network, deviation)) if n else (motion.x, motion.y, motion.z)
