@@ -18,7 +18,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.records import Record, kebab, plain
+from xosc_lateral.driver.records import Record, kebab
 
 FloatArray = NDArray[np.float64]
 
@@ -64,11 +64,6 @@ class Effect(Record, frozen=True, kw_only=True, tag_field="kind", tag=kebab):
     def columns(self) -> tuple[str, ...]:
         """Context columns that it reads; empty for a hidden effect."""
         raise NotImplementedError
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain JSON values."""
-        values: dict[str, Any] = plain(self)
-        return values
 
 
 def step_of(time: FloatArray) -> float:

@@ -15,7 +15,7 @@ from abc import abstractmethod
 from collections.abc import Iterable, Mapping
 from functools import reduce
 from operator import add
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import msgspec
 import numpy as np
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects.base import Acts, Effect, EffectTerms, terms_of
 from xosc_lateral.driver.effects.response import Response, ResponseState, respond
-from xosc_lateral.driver.records import plain, set_once
+from xosc_lateral.driver.records import set_once
 from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.segment import FADES
 
@@ -62,6 +62,8 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         Lowest and highest response, per component, that the effect was fitted on; responses beyond are taken as these.
         Empty: no bounds. [unit of the quantity]
     """
+
+    later = ("between_drivers", "response_range", "response_order")
 
     words: ClassVar[str] = ""
     """For the report, fields of the effect in braces: "linear", "proximity (fades over {0.scale:.3g})" ..."""
@@ -208,17 +210,6 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         normal = rng.standard_normal(len(self.coefficients))
         drawn = np.asarray(self.coefficients) + np.asarray(self.between_drivers) * normal
         return replace(self, coefficients=tuple(drawn.tolist()), between_drivers=())
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain JSON values."""
-        values: dict[str, Any] = plain(self)
-        if not self.between_drivers:
-            del values["between_drivers"]
-        if not self.response_range:
-            del values["answer_range"]
-        if self.response_order == 1:
-            del values["response_order"]
-        return values
 
 
 def _finite(context: Mapping[str, FloatArray], columns: Iterable[str]) -> dict[str, FloatArray]:
