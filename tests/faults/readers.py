@@ -238,7 +238,7 @@ def _use_state(path: Path) -> None:
     said: list[str] = []
     with Journal(path.parent, path.with_name("journal.jsonl"), said.append) as journal:
         for output in journal:
-            if not math.isfinite(journal.seconds(output)) or not isinstance(journal.row(output), ManifestRow):
+            if not math.isfinite(journal.timing(output).seconds) or not isinstance(journal.row(output), ManifestRow):
                 raise NonsenseError(output)
         journal.finish()
     for row in read_manifest(path.with_name(MANIFEST)):

@@ -12,10 +12,13 @@ from xosc_lateral.driver.effects import Acts, Linear
 from xosc_lateral.driver.effects.response import respond
 from xosc_lateral.identification.column_search import find_column, likely_response
 from xosc_lateral.identification.columns import Column, Values
-from xosc_lateral.identification.regression import Coarse, fit_model
-from xosc_lateral.identification.selection import ERROR_BUDGET, Search, select
-from xosc_lateral.identification.terms.base import Outcome
-from xosc_lateral.identification.terms.column import MeanTerm, SpreadTerm
+from xosc_lateral.identification.model import Outcome
+from xosc_lateral.identification.regression import fit_model
+from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.selection import ERROR_BUDGET, select
+from xosc_lateral.identification.terms.mean import MeanTerm
+from xosc_lateral.identification.terms.spread import SpreadTerm
+from xosc_lateral.identification.timeline import Coarse
 
 SECONDS = 700.0
 COLUMNS = [Column(name, Values.NUMBER, False) for name in ("idle", "x")]

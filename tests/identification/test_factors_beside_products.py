@@ -9,8 +9,9 @@ from xosc_lateral.driver.effects.product import Factor, Form
 from xosc_lateral.identification.column_search import likely_response, probability_of
 from xosc_lateral.identification.identify import usable_columns
 from xosc_lateral.identification.regression import fit_model
-from xosc_lateral.identification.selection import ERROR_BUDGET, Search
-from xosc_lateral.identification.terms.column import MeanTerm
+from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.selection import ERROR_BUDGET
+from xosc_lateral.identification.terms.mean import MeanTerm
 
 PRODUCT = MeanTerm.of(
     Product(

@@ -19,10 +19,11 @@ from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.formats.profiles import read_profile, write_profile
 from xosc_lateral.identification import selection, terms
 from xosc_lateral.identification.held_out import removal_of
-from xosc_lateral.identification.regression import Coarse
-from xosc_lateral.identification.selection import STAGES, TERMS, Search, in_stages, shared_among
+from xosc_lateral.identification.model import Stage, Term
+from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.selection import STAGES, TERMS, in_stages, shared_among
 from xosc_lateral.identification.significance import BUDGET, MANY_DRIVES
-from xosc_lateral.identification.terms.base import Stage, Term
+from xosc_lateral.identification.timeline import Coarse
 from xosc_lateral.plugins import defined_in
 from xosc_lateral.segment import Segment
 
@@ -51,8 +52,8 @@ from typing import ClassVar
 import numpy as np
 from scipy.stats import norm
 from xosc_lateral.driver.effects.ramp import Ramp
+from xosc_lateral.identification.model import Description, Outcome, Stage, Term
 from xosc_lateral.identification.regression import fit_model
-from xosc_lateral.identification.terms.base import Description, Outcome, Stage, Term
 
 
 class RampTerm(Term):

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from xosc_lateral.identification.selection import ERROR_BUDGET, STAGES, TERMS
-from xosc_lateral.identification.terms.column import MeanTerm, SpreadTerm
 from xosc_lateral.identification.terms.cycle import CycleTerm
+from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.regimes import RegimesTerm
+from xosc_lateral.identification.terms.spread import SpreadTerm
 from xosc_lateral.identification.terms.time import TimeMeanTerm
 
 LISTED = [kind for stage in STAGES for kind in stage]

@@ -15,8 +15,13 @@ from xosc_lateral.enrich.result import Enriched
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.report.scenario import scenario_page
-from xosc_lateral.report.scene import pack, scene_of, unpack
+from xosc_lateral.report.scene import packed, scene_of
 from xosc_lateral.road.geometry import simplify
+
+
+def unpack(column: dict) -> np.ndarray:
+    """The values of a column: what the page's script does."""
+    return column["r"] * np.cumsum(column["d"])
 
 
 @pytest.fixture(scope="module")
@@ -37,9 +42,7 @@ def scene(enriched):
 @pytest.mark.parametrize("spread", [1e-4, 0.5, 1e5])
 def test_packed_columns_come_back_to_half_the_resolution(size, spread):
     values = np.random.default_rng(1).normal(scale=spread, size=size)
-    back = unpack(pack(values, 1e-3))
-    np.testing.assert_allclose(back[:size], values, atol=0.5001e-3)
-    assert len(back) == max(size, 1)
+    np.testing.assert_allclose(unpack(packed(values, 1e-3)), values, atol=0.5001e-3)
 
 
 def test_a_simplified_line_stays_within_the_tolerance():

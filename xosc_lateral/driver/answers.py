@@ -14,14 +14,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Linear, Proximity
 from xosc_lateral.driver.profile import COLUMNS, SIDES, Basis, Beside, DriverProfile
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
-
-FloatArray = NDArray[np.float64]
 
 NEIGHBOURS = ("left_distance", "right_distance")
 """Free space lengthwise to the nearest vehicle in the lane to the left and to the right [m]; NaN or infinite: none."""
@@ -183,7 +181,7 @@ def _within_drives(runs: Sequence[Run], near: Mapping[str, Sequence[FloatArray]]
 
 
 def clustered_least_squares(
-    design: FloatArray, observed: FloatArray, cluster: NDArray[np.int64]
+    design: FloatArray, observed: FloatArray, cluster: IntArray
 ) -> tuple[FloatArray, FloatArray]:
     """Slopes, shape (k,), of observations, shape (n,), by a design, shape (n, k), and their covariance, shape (k, k).
 
@@ -196,7 +194,7 @@ def clustered_least_squares(
     return slopes, inverse @ (by_cluster.T @ by_cluster) @ inverse
 
 
-def _centred(table: FloatArray, groups: NDArray[np.int64]) -> FloatArray:
+def _centred(table: FloatArray, groups: IntArray) -> FloatArray:
     """Columns without their mean within each group."""
     counts = np.maximum(np.bincount(groups), 1)
     return np.stack([column - (np.bincount(groups, column) / counts)[groups] for column in table.T], axis=1)

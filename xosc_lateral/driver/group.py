@@ -10,8 +10,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.driver.effects import Acts, EffectTerms
 from xosc_lateral.driver.effects.base import terms_of
 from xosc_lateral.driver.effects.response import Response, ResponseState
@@ -20,8 +20,6 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.records import plain, read_as
 from xosc_lateral.driver.upsampling import extrapolate, piece
 from xosc_lateral.segment import FADES
-
-FloatArray = NDArray[np.float64]
 
 BLOCK = 64
 """Model steps drawn at once for a driver. [-]"""
@@ -93,7 +91,7 @@ class OffsetGroup:
         self._state = np.concatenate([self._state, np.zeros(len(new), dtype=_DRIVER)])
         return new
 
-    def keep(self, there: NDArray[np.bool_]) -> None:
+    def keep(self, there: BoolArray) -> None:
         """Drop the drivers that are not there, shape (n,)."""
         if there.all():
             return
@@ -156,7 +154,7 @@ class OffsetGroup:
             found.append(terms_of(effect.acts, effect.weighed(due, slopes.T)))
         return combine(found)
 
-    def _next(self, who: NDArray[np.int64], effects: EffectTerms, width: FloatArray) -> FloatArray:
+    def _next(self, who: IntArray, effects: EffectTerms, width: FloatArray) -> FloatArray:
         """The next sample of some drivers, shape (m,). [m]"""
         if self._rated:
             return self._next_rated(who, effects, width)
@@ -171,7 +169,7 @@ class OffsetGroup:
         terms = combine([hidden, effects])
         return offsets_of(movement, EffectTerms(terms.location, terms.spread, None, terms.fine), width)
 
-    def _next_rated(self, who: NDArray[np.int64], effects: EffectTerms, width: FloatArray) -> FloatArray:
+    def _next_rated(self, who: IntArray, effects: EffectTerms, width: FloatArray) -> FloatArray:
         """The same where effects act on the rate of mean reversion: nothing can be drawn ahead."""
         found, row = np.empty(len(who)), self._state["row"]
         for k, index in enumerate(who):
@@ -181,7 +179,7 @@ class OffsetGroup:
         row[who] += 1
         return found
 
-    def _draw(self, who: NDArray[np.int64]) -> None:
+    def _draw(self, who: IntArray) -> None:
         """Have at least one row drawn of each; a few of those with few left, so that not all are due at once."""
         remaining = self._state["left"]
         due = set(who[remaining[who] == 0].tolist())

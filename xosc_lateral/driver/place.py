@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from msgspec.structs import replace as with_fields
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.digits import all_significant
 from xosc_lateral.driver.answers import NEIGHBOURS, SCALE, clustered_least_squares, most_beside, neighbour_shapes
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Levels, Linear, Piecewise, Proximity
@@ -21,8 +21,6 @@ from xosc_lateral.driver.models.autoregressive.coarse import split_bands
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import NotEnoughDataError
-
-FloatArray = NDArray[np.float64]
 
 COLUMNS = ("is_truck", "lane_index", "speed")
 """What a population's drivers are distinguished by: class, lane and speed."""
@@ -56,7 +54,7 @@ class _Pieces:
     fine: FloatArray
     quantities: FloatArray
     """Mean of each quantity, shape (n, k)."""
-    drive: NDArray[np.int64]
+    drive: IntArray
 
 
 def fit_place(runs: Sequence[Run], *, neighbours: bool | None = None) -> tuple[ColumnEffect, ...]:
@@ -182,7 +180,7 @@ def _shrunk(slopes: FloatArray, covariance: FloatArray) -> FloatArray:
     return np.asarray(slopes * max(0.0, 1.0 - len(slopes) / max(size, 1e-30)))
 
 
-def _regressed(observed: FloatArray, quantities: FloatArray, drive: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+def _regressed(observed: FloatArray, quantities: FloatArray, drive: IntArray) -> tuple[FloatArray, FloatArray]:
     """Slopes, shape (k,), and their covariance, shape (k, k)."""
     design = np.column_stack([np.ones(len(observed)), quantities])
     counts = np.bincount(drive).astype(np.float64)

@@ -11,16 +11,14 @@ from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.driver.effects import ColumnEffect, EffectTerms, HiddenEffect
 from xosc_lateral.driver.effects.response import ResponseState
 from xosc_lateral.driver.models.base import CoreStream, Start
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.records import read_as
 from xosc_lateral.driver.seeds import DriveSeed, child, generator
-
-FloatArray = NDArray[np.float64]
 
 
 class DriveState(msgspec.Struct, kw_only=True):
@@ -109,7 +107,7 @@ class DriveProcess:
         rows = np.round((time - (self.state.begun_at or 0.0)) / self._model.step).astype(np.int64)
         return self.hidden_terms_at(rows)
 
-    def hidden_terms_at(self, rows: NDArray[np.int64]) -> EffectTerms:
+    def hidden_terms_at(self, rows: IntArray) -> EffectTerms:
         """The same at rows, counted in model steps from the drive's start; shape (n,), n >= 1."""
         if not self.hidden:
             return EffectTerms()

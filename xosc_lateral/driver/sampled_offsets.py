@@ -11,8 +11,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.plausibility import check_offsets
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
@@ -23,8 +23,6 @@ from xosc_lateral.drives.drive import Drive, Run
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import DriverProfileError, NotEnoughDataError
 from xosc_lateral.segment import Segment
-
-FloatArray = NDArray[np.float64]
 
 MEAN_SPEED = 30.0
 """Of a free run whose speed nobody named: about 108 km/h. [m/s]"""

@@ -13,7 +13,6 @@ from typing import Any, Self
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts
 from xosc_lateral.driver.plausibility import check_context
@@ -22,8 +21,6 @@ from xosc_lateral.driver.profile import DriverProfile, sampling_hash
 from xosc_lateral.driver.records import plain, read_as
 from xosc_lateral.driver.upsampling import extrapolate, piece
 from xosc_lateral.errors import DriverProfileError
-
-FloatArray = NDArray[np.float64]
 
 BLOCK = 64
 """Model steps drawn at once. [-]"""

@@ -7,14 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.drives.markings import both_markings
 from xosc_lateral.errors import FormatError
 from xosc_lateral.limits import DRIVE_SPAN, TIME
-
-FloatArray = NDArray[np.float64]
 
 MAX_STEP = 0.25
 """Median step of a table that can give 5 Hz. [s]"""

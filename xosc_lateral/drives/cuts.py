@@ -6,14 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.drives.drive import Drive, Run
 from xosc_lateral.drives.resampling import STEP, average, nearest, resample
 from xosc_lateral.errors import NotEnoughDataError
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 MIN_SPEED = 40.0 / 3.6
 """Slower driving is cut out (arXiv:2405.17080, section III). [m/s]"""

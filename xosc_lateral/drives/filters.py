@@ -14,9 +14,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from xosc_lateral.arrays import FloatArray
 
 LEAST_ATTENUATION = 21.0
 """Of a rectangular window, shape 0: Kaiser's formulas begin there, and change at `GREAT_ATTENUATION`. [dB]"""

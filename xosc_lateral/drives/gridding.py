@@ -6,14 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.drives.cuts import CutRules, cut_runs, grid_of
 from xosc_lateral.drives.drive import Drive, Run
 from xosc_lateral.drives.resampling import STEP, average, in_digits, nearest
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 FEW = 8
 """A column with no more different values than this holds levels. [-]"""

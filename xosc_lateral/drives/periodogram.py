@@ -14,9 +14,8 @@ from __future__ import annotations
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from xosc_lateral.arrays import FloatArray
 
 
 class Detrend(Enum):

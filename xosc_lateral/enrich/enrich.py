@@ -9,8 +9,8 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.driver.drivability import drivable
 from xosc_lateral.driver.plausibility import check_offsets
 from xosc_lateral.driver.profile import DriverProfile
@@ -27,9 +27,6 @@ from xosc_lateral.motion.segments import SegmentSpan, cut_segments
 from xosc_lateral.motion.trajectory import WorldTrajectory, displace, distance_driven
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.rows import blocks, columns, give_back, kept
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 Drivers = Mapping[str, DriverProfile | str]
 """Per entity the profile that drives it, or the reason why it gets none."""

@@ -12,8 +12,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.driver.answers import basis_of
 from xosc_lateral.driver.profile import COLUMNS, SIDES, Basis, DriverProfile
 from xosc_lateral.driver.sampled_offsets import FUTURE, PAST
@@ -26,9 +26,6 @@ from xosc_lateral.motion.segments import SegmentSpan
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.rows import blocks, kept
 from xosc_lateral.segment import Segment
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 SAMPLE_STEP = 0.2
 """Step of the driver model. [s]"""

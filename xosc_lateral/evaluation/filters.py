@@ -11,23 +11,16 @@ References
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.drives.filters import filtered, low_pass_between
 
-FloatArray = NDArray[np.float64]
-
-HIGHEST = 0.5
-"""Where the stop band begins. Drivers steer against what they see below it; beyond it cameras show. [Hz]"""
-
-PASSED = 0.4
-"""Where the pass band ends: the filter sees 11 s to each side, a quarter of most runs. [Hz]"""
-
+HIGHEST = 0.5  # Where the stop band begins. Drivers steer against what they see below it; beyond it cameras show. [Hz]
+PASSED = 0.4  # Where the pass band ends: the filter sees 11 s to each side, a quarter of most runs. [Hz]
+# Of the stop band: noise of 1 cm becomes 0.1 mm, far less than a difference between two models. [dB]
 ATTENUATION = 40.0
-"""Of the stop band: noise of 1 cm becomes 0.1 mm, far less than a difference between two models. [dB]"""
-
+# Seconds between values that say all about what is left: half that rate is the beginning of the stop band. [s]
 THINNED = 0.5 / HIGHEST
-"""Seconds between values that say all about what is left: half that rate is the beginning of the stop band. [s]"""
 
 
 def below_half_hertz(path: FloatArray, step: float) -> FloatArray:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampled_offsets import Snippet, cut_snippets, recorded_offsets, segment_of, sensor_error
@@ -21,38 +22,21 @@ from xosc_lateral.driver.seeds import child
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.segment import Segment
 
-FloatArray = NDArray[np.float64]
-
-BLOCK = 120.0
-"""Where there are too few drives to split between them, blocks of this length are split instead. [s]"""
-
+BLOCK = 120.0  # Where there are too few drives to split between them, blocks of this length are split instead. [s]
 FEW_DRIVES = 6
 
 
 @dataclass(frozen=True, eq=False)
 class Snippets:
-    """Snippets of measured driving.
+    """Snippets of measured driving."""
 
-    Parameters
-    ----------
-    seconds : float
-        Their length. [s]
-    items : tuple of Snippet
-        Where each comes from.
-    offset, lane_width : array, shape (n, m)
-        [m]
-    group : array of str, shape (n,)
-        Drive, or block of a drive: what is split between halves, and resampled, as a whole.
-    place : tuple of (int, slice)
-        Number of the run, and rows in it.
-    """
-
-    seconds: float
-    items: tuple[Snippet, ...]
-    offset: FloatArray
-    lane_width: FloatArray
+    seconds: float  # Their length. [s]
+    items: tuple[Snippet, ...]  # Where each comes from.
+    offset: FloatArray  # shape (n, m). [m]
+    lane_width: FloatArray  # shape (n, m). [m]
+    # shape (n,): Drive, or block of a drive: what is split between halves, and resampled, as a whole.
     group: NDArray[np.str_]
-    place: tuple[tuple[int, slice], ...]
+    place: tuple[tuple[int, slice], ...]  # Number of the run, and rows in it.
 
     def __len__(self) -> int:
         return len(self.items)

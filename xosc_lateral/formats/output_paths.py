@@ -67,10 +67,7 @@ def is_folder(output: str | Path) -> bool:
 
 
 def output_folder(output: str | Path) -> Path:
-    """Path of an output folder, which need not be there yet.
-
-    Raises `FormatError` if a file is there.
-    """
+    """Path of an output folder, which need not be there yet. Raises `FormatError` if a file is there."""
     path = Path(output)
     if path.is_file():
         raise FormatError("is a file, expected a folder", path=path)

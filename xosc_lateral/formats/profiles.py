@@ -293,10 +293,7 @@ def described(
 
 
 def own_path(name: str, folders: Iterable[Path]) -> Path:
-    """Path of a profile that may be changed.
-
-    Raises `FormatError` if it comes with the package.
-    """
+    """Path of a profile that may be changed. Raises `FormatError` if it comes with the package."""
     path = find_profile(name, folders)
     if path.parent == SHIPPED:
         what = f"comes with the package: profiles add {path.stem} --library FOLDER copies it to where it can be changed"

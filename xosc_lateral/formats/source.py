@@ -20,7 +20,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.limits import FILE_SIZE, PACKING_RATIO, UNPACKED_SIZE, UNPACKED_UNASKED, Limit
@@ -52,10 +52,7 @@ class Source:
     size: int  # [byte]
 
     def unpacked(self, size: int) -> None:
-        """Refuse what unpacks to more than its size can hold.
-
-        Raises `FormatError`: see `check_unpacked`.
-        """
+        """Refuse what unpacks to more than its size can hold. Raises `FormatError`: see `check_unpacked`."""
         check_unpacked(size, self.size, self.path)
 
 
@@ -68,15 +65,22 @@ class Content:
 
 
 def read_source(path: Path | str, limit: Limit = FILE_SIZE) -> Content:
-    """Bytes of an input file.
-
-    Raises `FormatError`: see `open_source`.
-    """
+    """Bytes of an input file. Raises `FormatError`: see `open_source`."""
     with open_source(path, limit) as source:
         data = source.file.read(limit.bytes + 1)
     if len(data) > limit.bytes:
         raise FormatError(limit.refusal(len(data) / 1e6), path=path)
     return Content(data, last_read(Path(path)))
+
+
+def read_toml(path: Path, otherwise: str) -> dict[str, Any]:
+    """What a file in TOML says. Raises `FormatError`, beginning with `otherwise`, if it is none; see `open_source`."""
+    import tomllib
+
+    try:
+        return tomllib.loads(read_source(path).data.decode("utf-8-sig"))
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise FormatError(f"{otherwise}: {error}", path=path) from error
 
 
 @contextmanager
@@ -113,10 +117,7 @@ def last_read(path: Path) -> str:
 
 
 def check_regular(path: Path) -> os.stat_result:
-    """State of a regular file.
-
-    Raises `FormatError`: It is not there, or something else.
-    """
+    """State of a regular file. Raises `FormatError`: It is not there, or something else."""
     try:
         state = path.stat()
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the name

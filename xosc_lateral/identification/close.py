@@ -29,14 +29,14 @@ from xosc_lateral.identification.held_out import (
     score_runs,
 )
 from xosc_lateral.identification.identify import Identified, identify, initial_terms
+from xosc_lateral.identification.model import Description, Fitted, Term
 from xosc_lateral.identification.refinement import Alternatives
-from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
+from xosc_lateral.identification.regression import fit_model
 from xosc_lateral.identification.residual import LackOfFit, lack_of_fit_of, size_of
 from xosc_lateral.identification.selection import Accepted, Gain, Selection
 from xosc_lateral.identification.significance import LoopSeed
-from xosc_lateral.identification.terms.base import Description, Term
 from xosc_lateral.identification.terms.between import between_shift
-from xosc_lateral.identification.timeline import join_drives
+from xosc_lateral.identification.timeline import Coarse, join_drives
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import ColumnEffect
 from xosc_lateral.identification.autocorrelation import Problem
 from xosc_lateral.identification.dictionary import (
@@ -18,15 +19,12 @@ from xosc_lateral.identification.dictionary import (
     orthonormal,
     score_entries,
 )
+from xosc_lateral.identification.model import Fitted, Outcome
 from xosc_lateral.identification.refinement import Refined, Refinement
-from xosc_lateral.identification.regression import Fitted, fit_model
+from xosc_lateral.identification.regression import fit_model
+from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.significance import LoopSeed, upper_tail
-from xosc_lateral.identification.terms.base import Outcome
-from xosc_lateral.identification.timeline import FloatArray
-
-if TYPE_CHECKING:
-    from xosc_lateral.identification.selection import Search
-    from xosc_lateral.identification.terms.column import SearchedTerm
+from xosc_lateral.identification.terms.column import ColumnTerm
 
 CONTENDERS = 4  # Sets of columns that are refined, at most.
 WITHIN = 12.0  # Sets of columns that score lower than the best by more than this are not. [squared score]
@@ -40,6 +38,34 @@ CLUSTER_S = 120
 # the right size leaves it the same: a true one is lost in at most 2 % of the tables, however weak it is. [-]
 GROWN = 2.0
 ROUNDS = 2  # Times that the candidates are scored beside what was found before; the first changes most.
+
+
+class SearchedTerm(ColumnTerm):
+    """An effect that the dictionary is searched for, in a regression of its own."""
+
+    @classmethod
+    @abstractmethod
+    def problem(cls, fitted: Fitted) -> Problem:
+        """Regression in which a column of this kind is tested, with the terms fitted already."""
+
+    @classmethod
+    def reweighted(cls, fitted: Fitted, after: Fitted) -> Problem | None:
+        """The same regression beside `fitted`, weighted by the noise that is left in `after`; None: no other."""
+        return None
+
+    @classmethod
+    def barred(cls, fitted: Fitted) -> frozenset[str]:
+        """Columns that this kind may not take up beside the terms fitted."""
+        return frozenset()
+
+    @classmethod
+    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
+        """The best candidate of the whole dictionary against rotations."""
+        return find_column(search, cls, fitted)
+
+    def probability_beside(self, search: Search, fitted: Fitted) -> float:
+        """p-value of its columns in whatever shape suits them beside the terms fitted."""
+        return probability_of(search, type(self), fitted, self.columns)
 
 
 def find_column(search: Search, kind: type[SearchedTerm], fitted: Fitted) -> Outcome | None:
@@ -56,7 +82,7 @@ def find_column(search: Search, kind: type[SearchedTerm], fitted: Fitted) -> Out
     scored, refused = _scored(search, kind, fitted), set[tuple[str, ...]]()
     while scored is not None:
         found, p_value = scored.likeliest()
-        if not search.passes(kind.component, p_value, fitted.terms):  # refined, it would not be accepted either
+        if not kind.passes(search, p_value, fitted):  # refined, it would not be accepted either
             return Outcome(None, found.columns, p_value)
         term, after = _best(search, kind, fitted, scored, refused)
         if not _grows(fitted, after) and after.log_likelihood >= fitted.log_likelihood - ROUNDING:

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from msgspec import structs
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.driver.effects import ColumnEffect, Effect, TimeSmooth
 from xosc_lateral.driver.fitting import fit_population, fit_runs
 from xosc_lateral.driver.models.base import ModelKind
@@ -22,7 +23,8 @@ from xosc_lateral.evaluation.distances import Distances, mean_distances, metric_
 from xosc_lateral.evaluation.metrics import METRICS, snippet_metrics
 from xosc_lateral.identification.columns import Column
 from xosc_lateral.identification.cross_validation import Nested, Progress, folds_of, hold_out_blocks
-from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
+from xosc_lateral.identification.model import Fitted, Removal
+from xosc_lateral.identification.regression import fit_model
 from xosc_lateral.identification.residual import (
     SummaryStatistics,
     error_between,
@@ -34,10 +36,9 @@ from xosc_lateral.identification.residual import (
 )
 from xosc_lateral.identification.selection import Selection
 from xosc_lateral.identification.significance import LoopSeed
-from xosc_lateral.identification.terms.base import Removal
 from xosc_lateral.identification.terms.cycle import CycleTerm
 from xosc_lateral.identification.terms.time import StepTerm
-from xosc_lateral.identification.timeline import COARSE, BoolArray, FloatArray, IntArray, Timeline, coarse_middle
+from xosc_lateral.identification.timeline import COARSE, Coarse, Timeline, coarse_middle
 from xosc_lateral.rows import true_slices
 
 FINE_S = 1.0  # Movement within this time counts as fine when a spread is taken out. [s]

@@ -21,11 +21,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import OffsetSampler
 from xosc_lateral.driver.seeds import child
 from xosc_lateral.drives.resampling import in_digits
-from xosc_lateral.identification.timeline import LOCAL_S, PAD, BoolArray, FloatArray, IntArray, Timeline, local_mean
+from xosc_lateral.identification.timeline import LOCAL_S, PAD, Timeline, local_mean
 from xosc_lateral.segment import Segment
 
 N_BINS = 5  # Bins of a column, equally filled.
@@ -33,9 +34,7 @@ RESPONSE_S = 2.0  # Columns are smoothed as a driver responds before they are bi
 BANDS_S = (1.0, 3.0, 8.0, 20.0, 60.0, 200.0)  # Averaging times between which the bands of the movement lie. [s]
 # Name of that group, and frequencies to each side that belong to it. [-]
 OSCILLATION, LINE_WIDTH = "movement at the weave's period", 2
-
 LOCAL_QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
-
 N_RUNS = 24  # Runs of the profile that its expectation is taken over ...
 FEW_RUNS, MANY_DRIVES = 6, 50  # ... and how many with so many drives, each of which is another sample already.
 DRAWS = 64  # Half samples of the blocks.
@@ -50,7 +49,7 @@ class SummaryStatistics:
     """What is compared, once for measured and sampled offsets alike."""
 
     timeline: Timeline
-    labels: Mapping[str, IntArray]  # shape (n,): Bin of every row by group (a column's name, "time", ...), -1: none.
+    labels: Mapping[str, IndexArray]  # shape (n,): Bin of every row by group (a column's name, "time", ...), -1: none.
     middles: Mapping[str, FloatArray]  # Mean of the quantity per bin, for curves.
     oscillation: float | None = None  # Frequency of a weave that was found. [1/s]
 
@@ -149,7 +148,7 @@ def error_between(first: Mapping[str, FloatArray], second: Mapping[str, FloatArr
 
 
 def half_samples(
-    statistics: SummaryStatistics, offset: FloatArray, blocks: IntArray, rng: np.random.Generator, draws: int = DRAWS
+    statistics: SummaryStatistics, offset: FloatArray, blocks: IndexArray, rng: np.random.Generator, draws: int = DRAWS
 ) -> list[dict[str, FloatArray]]:
     """Random halves of the blocks less all of them: their variance is that of all of them about the truth [2]_.
 
@@ -251,7 +250,7 @@ def _mean_of_finite(values: FloatArray) -> FloatArray:
     return np.where(count > 0, np.nansum(values, axis=0) / np.maximum(count, 1), np.nan)
 
 
-def _by_bin(values: FloatArray, label: IntArray, used: BoolArray) -> FloatArray:
+def _by_bin(values: FloatArray, label: IndexArray, used: BoolArray) -> FloatArray:
     inside = used & (label >= 0)
     size = int(label.max()) + 1
     count = np.bincount(label[inside], minlength=size)
@@ -283,7 +282,7 @@ def _amplitude(offset: FloatArray, used: BoolArray, timeline: Timeline, frequenc
     return float(np.sqrt(squares / max(rows, 1)))
 
 
-def _binned(values: FloatArray, valid: BoolArray, none: BoolArray) -> tuple[IntArray, FloatArray]:
+def _binned(values: FloatArray, valid: BoolArray, none: BoolArray) -> tuple[IndexArray, FloatArray]:
     """Fifths of what there is, then a bin of its own where there is none; with the mean of each, NaN for that one."""
     seen = values[valid & ~none]
     edges = np.unique(np.quantile(seen, np.linspace(0.0, 1.0, N_BINS + 1)[1:-1])) if len(seen) else np.zeros(0)
@@ -297,7 +296,7 @@ def _binned(values: FloatArray, valid: BoolArray, none: BoolArray) -> tuple[IntA
     return label.astype(np.intp), middle
 
 
-def _time_bins(timeline: Timeline, parts: int = 6) -> tuple[IntArray, FloatArray]:
+def _time_bins(timeline: Timeline, parts: int = 6) -> tuple[IndexArray, FloatArray]:
     label = np.full(len(timeline), -1, dtype=np.intp)
     for span in timeline.spans:
         rows = np.arange(span.start, span.stop)

@@ -11,12 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.motion.context import STEERING
 from xosc_lateral.motion.deviation import SETTLING_TIME, settle
 from xosc_lateral.motion.segments import MINIMUM_SPEED
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 TURN = 0.03
 """Change of heading per time that nobody takes for a kink: 0.3 mrad in a step of 0.01 s. [rad/s]"""

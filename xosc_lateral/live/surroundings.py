@@ -11,17 +11,13 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.enrich.give_way import FADES, Frame, part_of, widened
 from xosc_lateral.motion.around import IN_SIGHT, Around, Extent, Reach, free_space, lane_path, see_along
 from xosc_lateral.motion.context import lanes_beside, road_columns, spread_out
 from xosc_lateral.motion.nearby import pairs_now
 from xosc_lateral.road.network import RoadNetwork
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 
 class Roads(Protocol):

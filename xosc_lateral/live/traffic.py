@@ -14,8 +14,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.driver.group import OffsetGroup
 from xosc_lateral.driver.plausibility import first_implausible, implausible
 from xosc_lateral.driver.profile import Basis, DriverProfile, sampling_hash
@@ -25,9 +25,6 @@ from xosc_lateral.errors import SimulationError
 from xosc_lateral.live.paths import DRIVER, SPEEDS, Moves, drive_on
 from xosc_lateral.live.surroundings import Places, Roads, give_way_now, look_around
 from xosc_lateral.motion.context import STEERING
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 FORMAT = "xosc-lateral live traffic"
 
@@ -163,7 +160,7 @@ class Traffic:
         return moves
 
     # ---- who is there ------------------------------------------------------------------------------------------------
-    def _present(self, names: list[str]) -> NDArray[np.int64]:
+    def _present(self, names: list[str]) -> IntArray:
         """Drivers of these vehicles, shape (n,): those of others have gone, new ones have come."""
         if names != self._names:
             gone = self._index.keys() - set(names)
@@ -220,8 +217,8 @@ class Traffic:
         time: float,
         moment: Moment,
         context: dict[str, FloatArray],
-        there: NDArray[np.int64],
-        who: NDArray[np.int64],
+        there: IntArray,
+        who: IntArray,
     ) -> None:
         """On to the model step that is now, or to the last one of those that have passed."""
         if self._columns is None:
@@ -262,7 +259,7 @@ class Traffic:
         self._state["width"][drivers] = width + (before - width) * np.exp(-self._step / STEERING)
         return np.asarray(self._state["width"][drivers])
 
-    def _aside(self, moment: Moment, there: NDArray[np.int64], who: NDArray[np.int64]) -> FloatArray:
+    def _aside(self, moment: Moment, there: IntArray, who: IntArray) -> FloatArray:
         """How far everybody wants to move aside, shape (n,). [m]"""
         if moment.places is None or self._neighbours is not Neighbours.BORROW:
             return np.zeros(len(moment.names))

@@ -13,12 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import BoundingBox
 from xosc_lateral.segment import FADES
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 REACH = 200.0
 """How far a driver looks for others [m]; beyond it there is none (about what a series radar sees)."""
@@ -76,7 +74,7 @@ class Others(NamedTuple):
 
     ahead: FloatArray
     left: FloatArray
-    oncoming: NDArray[np.bool_]
+    oncoming: BoolArray
 
 
 ZONES = {"lead": 0.0, "left": 1.0, "right": -1.0}
@@ -153,7 +151,7 @@ class Around:
         gap: FloatArray,
         width: FloatArray,
         other_width: float | FloatArray,
-        is_truck: NDArray[np.bool_],
+        is_truck: BoolArray,
     ) -> None:
         """Others, seen from the rows, which may come again; free space to them, own lane and their bodies wide. [m]
 
@@ -204,7 +202,7 @@ class _Side:
     def nobody(cls, n: int) -> _Side:
         return cls(np.full(n, np.nan), *np.zeros((4, n)))
 
-    def add(self, rows: IntArray, gap: FloatArray, share: FloatArray, is_truck: NDArray[np.bool_]) -> None:
+    def add(self, rows: IntArray, gap: FloatArray, share: FloatArray, is_truck: BoolArray) -> None:
         """More vehicles, each seen from a row, with free space `gap` [m], of which so much lies in the lane [-]."""
         np.fmin.at(self.distance, rows, gap - NEAR * np.log(share))
         influence = share * np.exp(-gap / NEAR)

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.motion.around import IN_SIGHT, REACH, Around, Extent, Others, Reach, free_space, lane_path, see_along
 from xosc_lateral.motion.nearby import stretches_within
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
@@ -25,9 +26,6 @@ from xosc_lateral.rows import empty, give_back, put
 from xosc_lateral.scenario.enums import VehicleCategory
 from xosc_lateral.scenario.environment import Environment, Weather
 from xosc_lateral.scenario.global_actions import EnvironmentAction
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 STEERING = 1.0
 """Standard deviation of the kernel over which roads are seen and by which drivers respond: steering takes a second or
@@ -75,7 +73,7 @@ def _road(entity: EntityMotion, network: RoadNetwork, grid: IntArray) -> dict[st
     return {name: spread_out(part, on) for name, part in values.items()}
 
 
-def spread_out(values: FloatArray, where: NDArray[np.bool_]) -> FloatArray:
+def spread_out(values: FloatArray, where: BoolArray) -> FloatArray:
     """As many values as there are rows `where` they belong, NaN in the others; shape of `where`."""
     found = np.full(len(where), np.nan)
     found[where] = values
@@ -158,7 +156,7 @@ class _Traffic(NamedTuple):
     extent: Extent
     width: FloatArray
     """Of each, shape (entities,). [m]"""
-    is_truck: NDArray[np.bool_]
+    is_truck: BoolArray
 
     def of(self, others: IntArray, columns: IntArray) -> Iterator[NDArray[Any]]:
         """What `see_along` asks of some of them on some of the rows, one entity after the other."""
@@ -209,7 +207,7 @@ def _lanes_there(road: Mapping[str, FloatArray], step: float) -> dict[str, Float
     return {side: np.clip((share - _NONE) / (1.0 - 2.0 * _NONE), 0.0, 1.0) for side, share in shares.items()}
 
 
-def lanes_beside(road: Mapping[str, FloatArray]) -> dict[str, NDArray[np.bool_]]:
+def lanes_beside(road: Mapping[str, FloatArray]) -> dict[str, BoolArray]:
     """Whether there is a lane on each side, shape (n,) each."""
     index, count = road["lane_index"], road["lane_count"]
     return {"lead": index >= 0, "right": index > 0, "left": index < count - 1}

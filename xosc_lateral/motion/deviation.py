@@ -11,9 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from msgspec import Struct
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from xosc_lateral.arrays import FloatArray
 
 
 class NaturalSpline(Struct, frozen=True, eq=False):

@@ -14,10 +14,9 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.motion.nearby import stretches_within
 from xosc_lateral.rows import BLOCK, give_back
-
-FloatArray = NDArray[np.float64]
 
 REACH = 30.0
 """Boxes farther apart than this at all times are no pair worth naming. [m]"""
@@ -134,7 +133,7 @@ def box_distance(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.where(apart_of_a | apart_of_b, np.minimum(from_a, from_b), 0.0)
 
 
-def _beyond(box: FloatArray, corners: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+def _beyond(box: FloatArray, corners: FloatArray) -> tuple[FloatArray, BoolArray]:
     """Distance of the nearest corner from a box that they are not in [m], and whether a side of it parts them from it.
 
     Convex shapes are nearest to each other at a corner of one of them, and apart if a side of one parts them.

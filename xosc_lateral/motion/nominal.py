@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, Int32Array
 from xosc_lateral.errors import locate
 from xosc_lateral.scenario import Entity
-
-FloatArray = NDArray[np.float64]
 
 
 def axes(yaw: FloatArray, pitch: FloatArray, roll: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -23,9 +22,6 @@ def axes(yaw: FloatArray, pitch: FloatArray, roll: FloatArray) -> tuple[FloatArr
         np.stack([cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr], axis=1),
         np.stack([cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr], axis=1),
     )
-
-
-IntArray = NDArray[np.int32]
 
 
 class Activity(IntFlag):
@@ -63,9 +59,9 @@ class EntityMotion:
     """Pose of the reference point (rear axle). [m], [rad]"""
     speed: FloatArray
     """Signed scalar speed. [m/s]"""
-    road: IntArray
+    road: Int32Array
     """Index into `RoadNetwork.road_ids`; -1 where the entity is on no road."""
-    lane: IntArray
+    lane: Int32Array
     """OpenDRIVE lane id; 0 where on no road."""
     s: FloatArray
     """Along the road's reference line. [m]"""

@@ -6,8 +6,8 @@ from enum import Enum
 
 import numpy as np
 from msgspec import Struct
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, IntArray
 from xosc_lateral.motion.nominal import Activity, EntityMotion
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.rows import blocks
@@ -93,7 +93,7 @@ def cut_segments(motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool
     )
 
 
-def _row_kinds(motion: EntityMotion, network: RoadNetwork, rows: slice, is_trailer: bool) -> NDArray[np.int64]:
+def _row_kinds(motion: EntityMotion, network: RoadNetwork, rows: slice, is_trailer: bool) -> IntArray:
     """Kind of each of these rows, as its index in `SegmentKind`; the first reason that applies, in the enum's order."""
     kinds = np.zeros(rows.stop - rows.start, dtype=np.int64)
     for kind, applies in reversed(_reasons(motion, network, rows, is_trailer).items()):
@@ -103,7 +103,7 @@ def _row_kinds(motion: EntityMotion, network: RoadNetwork, rows: slice, is_trail
 
 def _reasons(
     motion: EntityMotion, network: RoadNetwork, rows: slice, is_trailer: bool
-) -> dict[SegmentKind, NDArray[np.bool_] | bool]:
+) -> dict[SegmentKind, BoolArray | bool]:
     """Where in these rows each kind applies, by the enum's order."""
     activity, road, lane, s = motion.activity[rows], motion.road[rows], motion.lane[rows], motion.s[rows]
     on_road = (road >= 0) & ((activity & Activity.OFF_ROAD) == 0)

@@ -15,13 +15,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.motion.nominal import Activity, EntityMotion
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.rows import blocks, columns, empty, put, rows_where, scratch
-
-FloatArray = NDArray[np.float64]
 
 _STANDSTILL = 1e-3
 """Displacement per step under which a direction of motion can't be read from it. [m]"""
@@ -73,7 +71,7 @@ def leaps(motion: EntityMotion) -> list[tuple[float, float]]:
     def moved(around: slice) -> FloatArray:
         return np.hypot(np.diff(motion.x[around]), np.diff(motion.y[around]))
 
-    def leaps_there(rows: slice) -> NDArray[np.bool_]:
+    def leaps_there(rows: slice) -> BoolArray:
         around = slice(rows.start - 1, rows.stop)
         step, speed, activity = np.diff(motion.time[around]), np.abs(motion.speed[around]), motion.activity[around]
         active = (activity & Activity.ACTIVE) != 0
@@ -99,7 +97,7 @@ def displace(motion: EntityMotion, network: RoadNetwork, deviation: FloatArray) 
     return WorldTrajectory(motion.time, x, y, z, heading, motion.pitch, motion.roll, speed)
 
 
-def _moves(motion: EntityMotion, deviation: FloatArray, rows: slice) -> NDArray[np.bool_]:
+def _moves(motion: EntityMotion, deviation: FloatArray, rows: slice) -> BoolArray:
     return np.asarray((motion.road[rows] >= 0) & (deviation[rows] != 0.0))
 
 

@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.reconstruction.plan import VehiclePlan
 from xosc_lateral.road.network import RoadNetwork
-
-FloatArray = NDArray[np.float64]
 
 REACH = 150.0
 """Who is farther away has nothing to do with it: 5 s at 30 m/s. [m]"""

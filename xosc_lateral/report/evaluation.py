@@ -7,7 +7,6 @@ from math import isfinite
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.evaluation.lane_keeping import NEAR_MARKING, Margins
@@ -30,8 +29,6 @@ from xosc_lateral.report.realism import (
 )
 from xosc_lateral.report.violins import LABELS, violin_figure
 from xosc_lateral.version import __version__
-
-FloatArray = NDArray[np.float64]
 
 
 def trace_figure(scores: ProfileScores) -> Figure:

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.report.chart import (
     GRID,
     INK,
@@ -32,8 +32,6 @@ from xosc_lateral.report.chart import (
     stroke_of,
     ticks_of,
 )
-
-FloatArray = NDArray[np.float64]
 
 CSS_VARIABLES: Mapping[str, str] = {
     INK: "--ink",
@@ -83,8 +81,6 @@ class Figure:
     """Whether labels are explained above the panels."""
     axes: bool = True
     """Whether there are ticks, labels and a frame."""
-    equal: bool = False
-    """Whether a unit is as long along y as along x; y limits are widened for it."""
     panels: list[Panel] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -152,11 +148,6 @@ def svg_of(figure: Figure, alt: str = "", *, themed: bool = False) -> str:
     figure.settle()
     left, right = _margins(figure)
     inner = (figure.width - sum(left) - right - (figure.columns - 1) * BETWEEN) / figure.columns
-    if figure.equal:
-        for panel in figure.panels:
-            low, high = panel.x.ends
-            half, middle = 0.5 * figure.height / inner * (high - low), 0.5 * sum(panel.y.ends)
-            panel.y.limits = middle - half, middle + half
     body, height = _body(figure, left, inner)
     head = f'viewBox="0 0 {figure.width:g} {height:g}" role="img" aria-label="{escape(alt)}" font-size="{TEXT:g}"'
     title = f"<title>{escape(alt)}</title>" if alt else ""

@@ -10,49 +10,31 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.driver.effects import Acts, Angular, ColumnEffect, Product
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.cross_validation import hold_out_blocks
-from xosc_lateral.identification.terms.base import latent_path
+from xosc_lateral.identification.model import latent_path
 from xosc_lateral.identification.terms.between import is_between
 from xosc_lateral.identification.terms.cycle import CycleTerm
 from xosc_lateral.identification.terms.regimes import RegimesTerm
 from xosc_lateral.identification.terms.time import StepTerm, TimeMeanTerm
 from xosc_lateral.identification.timeline import LOCAL_S, coarse_mean, coarse_middle, local_mean
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
-
-POINTS = 9
-"""Equally wide bins between the 1 % and 99 % quantile of what drives an effect."""
-
-LEAST_S = 30
-"""A bin with less driving is left out. [s]"""
-
-SHOWN_DRIVES, SHOWN_S = 3, 120.0
-"""Drives of which a stretch is drawn, and the longest stretch of each. [-], [s]"""
+POINTS = 9  # Equally wide bins between the 1 % and 99 % quantile of what drives an effect.
+LEAST_S = 30  # A bin with less driving is left out. [s]
+SHOWN_DRIVES, SHOWN_S = 3, 120.0  # Drives of which a stretch is drawn, and the longest stretch of each. [-], [s]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Curve:
-    """A fitted effect over what drives it, and what was measured there.
+    """A fitted effect over what drives it, and what was measured there."""
 
-    Parameters
-    ----------
-    over : array, shape (n,)
-        The column, or the product, in its own unit.
-    strength, error : array, shape (n,)
-        Fitted, with its standard error: [m], or a natural logarithm.
-    seen, measured, measured_error : array, shape (k,)
-        Means of bins: where, how much, standard error from blocks. Empty where it can't be measured alone.
-    """
-
-    over: FloatArray
-    strength: FloatArray
-    error: FloatArray
+    over: FloatArray  # shape (n,): The column, or the product, in its own unit.
+    strength: FloatArray  # shape (n,): Fitted, with its standard error: [m], or a natural logarithm.
+    error: FloatArray  # shape (n,)
+    # shape (k,): Means of bins: where, how much, standard error from blocks. Empty where it can't be measured alone.
     seen: FloatArray
     measured: FloatArray
     measured_error: FloatArray
@@ -136,7 +118,7 @@ def _squares(result: LoopResult, acts: Acts) -> FloatArray:
 
 
 def _binned(
-    where: FloatArray, values: FloatArray, own: FloatArray, blocks: IntArray, inside: BoolArray
+    where: FloatArray, values: FloatArray, own: FloatArray, blocks: IndexArray, inside: BoolArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Mean place, mean value, its standard error with blocks as the independent pieces, mean of the fit, per bin."""
     low, high = _ends(where[inside])
@@ -157,18 +139,10 @@ def _binned(
 # ---- over time ----
 @dataclass(frozen=True, eq=False, slots=True)
 class MovingStatistic:
-    """A quantity of the longest drive over time, at 1 Hz, shape (n,) each; road-following seconds only.
+    """A quantity of the longest drive over time, at 1 Hz, shape (n,) each; road-following seconds only."""
 
-    Parameters
-    ----------
-    time : array
-        The drive's own clock. [s]
-    measured, before, after : array
-        Of the measured drive, and the mean over the profiles' runs. [m]
-    """
-
-    time: FloatArray
-    measured: FloatArray
+    time: FloatArray  # The drive's own clock. [s]
+    measured: FloatArray  # Of the measured drive, and the mean over the profiles' runs. [m]
     before: FloatArray
     after: FloatArray
 

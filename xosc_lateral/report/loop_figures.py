@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Cycle, Product, Regimes, Step, TimeSmooth
 from xosc_lateral.evaluation.spectra import gapped_spectrum
 from xosc_lateral.identification.close import Finding, LoopResult
@@ -26,37 +26,19 @@ from xosc_lateral.report.loop_curves import (
 from xosc_lateral.report.loop_words import SPREAD, column_label, product_label
 from xosc_lateral.rows import true_slices
 
-FloatArray = NDArray[np.float64]
-
+# Measured drives, the profile before and the profile after, in every figure of the loop.
 DRIVES, BEFORE, AFTER = BLUE, MUTED, VERMILLION
-"""Measured drives, the profile before and the profile after, in every figure of the loop."""
-
+# Samples per segment of a spectrum: 102 s; of that about a cycle, at most: 14 min, or a line would be smeared.
 SPECTRUM_ROWS, CYCLE_ROWS = 512, 4096
-"""Samples per segment of a spectrum: 102 s; of that about a cycle, at most: 14 min, or a line would be smeared."""
-
-SURROUNDINGS_HZ = 0.07
-"""To either side of a cycle's line. [Hz]"""
-
-TWO_ERRORS = 2.0
-"""Half width of bands, in standard errors: chance leaves them 1 time in 20. [-]"""
-
-FLAT_AXIS_CM = 1.0
-"""A residual's axis reaches at least so far to both sides, lest noise look large. [cm]"""
-
-NEGLIGIBLE = 1e-2
-"""Share of a column's range that is written as 0. [-]"""
-
-PANELS = 4
-"""Residual panels side by side."""
-
+SURROUNDINGS_HZ = 0.07  # To either side of a cycle's line. [Hz]
+TWO_ERRORS = 2.0  # Half width of bands, in standard errors: chance leaves them 1 time in 20. [-]
+FLAT_AXIS_CM = 1.0  # A residual's axis reaches at least so far to both sides, lest noise look large. [cm]
+NEGLIGIBLE = 1e-2  # Share of a column's range that is written as 0. [-]
+PANELS = 4  # Residual panels side by side.
+# Averaging times of the paths of the mean, of the spread, and of the spread with regimes. [s]
 MEAN_S, SPREAD_S, REGIME_S = 120.0, 240.0, 20.0
-"""Averaging times of the paths of the mean, of the spread, and of the spread with regimes. [s]"""
-
-GAP_S = 5.0
-"""Longer gaps in a drive interrupt a line. [s]"""
-
-QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
-"""As `identification.residual.LOCAL_QUANTILES`."""
+GAP_S = 5.0  # Longer gaps in a drive interrupt a line. [s]
+QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)  # As `identification.residual.LOCAL_QUANTILES`.
 
 
 def _three(result: LoopResult) -> tuple[tuple[Mapping[str, FloatArray], str, str], ...]:
@@ -301,6 +283,7 @@ def _gapped(moving: MovingStatistic, values: FloatArray) -> FloatArray:
     return np.where(np.diff(moving.time, prepend=moving.time[:1]) > GAP_S, np.nan, values)
 
 
+# By kind of effect, or of finding: what draws it, and the caption.
 DRAWINGS: Mapping[str, tuple[Callable[[LoopResult, Finding], Figure], str]] = MappingProxyType(
     {
         Cycle.kind: (
@@ -318,4 +301,3 @@ DRAWINGS: Mapping[str, tuple[Callable[[LoopResult, Finding], Figure], str]] = Ma
         "population": (_population, "Distribution of the local spread of the movement on held-out blocks."),
     }
 )
-"""By kind of effect, or of finding: what draws it, and the caption."""

@@ -16,7 +16,7 @@ from xosc_lateral.motion.gaps import REACH, Gap
 from xosc_lateral.motion.nominal import Note
 from xosc_lateral.report import scenario_figures as figures
 from xosc_lateral.report.page import KeyFigure, Page, Tone
-from xosc_lateral.report.path_dynamics import COMFORTABLE
+from xosc_lateral.report.scenario_figures import COMFORTABLE
 from xosc_lateral.report.scene import scene_of
 
 WRITTEN_AS = {"trajectory": "a trajectory", "lane-offset": "lane offsets"}
@@ -119,9 +119,6 @@ MOST_PANELS, MOST_DYNAMICS = 12, 6
 
 SELDOM = 0.01
 """Share of the time beyond which lateral acceleration is rougher than people's. [-]"""
-
-MOST_PAIRS = 20
-"""Pairs of vehicles that the gap figure shows, the closest first."""
 
 GAP_TIMES = ("at [s]", "at [s] ")
 """Headings of the times of the nominal and the enriched gap: a table's headings differ, if only by a blank."""
@@ -236,18 +233,17 @@ def add_notes(page: Page, notes: Sequence[Note]) -> None:
 
 
 def _add_paths(page: Page, enriched: Enriched) -> None:
-    stretched, above = figures.paths_stretched(enriched), figures.paths_from_above(enriched)
     page.section("Paths")
-    if stretched is None or above is None:
+    paths = figures.paths_stretched(enriched)
+    if paths is None:
         page.text("No entity is on a road.")
         return
     page.figure(
-        stretched,
+        paths,
         "Position across the road (t) over position along it (s), with the scale across the road exaggerated. "
         "Coloured: enriched. Dashed: nominal. Dots: where each entity starts. Bends of the road are drawn straight.",
         "Lateral position of every vehicle along the road, nominal and enriched, with lane markings",
     )
-    page.figure(above, "The same, true to scale.", "Plan view of the road with nominal and enriched paths")
 
 
 def _add_offsets(page: Page, enriched: Enriched, done: Sequence[EntityResult]) -> None:
@@ -281,11 +277,11 @@ def _add_dynamics(page: Page, enriched: Enriched, done: Sequence[EntityResult]) 
     )
     if done:
         page.figure(
-            figures.dynamics_over_time(_largest(done, MOST_DYNAMICS)),
-            "Blue: enriched. Dashed: nominal, that is, what curves and lane changes require. The band reaches "
-            f"{COMFORTABLE} m/s² to either side of nominal; real drivers rarely leave it while they keep their lane."
+            figures.accelerations_over_time(_largest(done, MOST_DYNAMICS)),
+            "Lateral acceleration beyond what curves and lane changes require. The band reaches "
+            f"{COMFORTABLE} m/s² to either side; real drivers rarely leave it while they keep their lane."
             f"{_left_out(done, MOST_DYNAMICS)}",
-            "Lateral acceleration and jerk over time, nominal and enriched",
+            "Added lateral acceleration over time",
             over_time=True,
         )
 
@@ -303,17 +299,9 @@ def _add_gaps(page: Page, enriched: Enriched) -> None:
     if not pairs:
         page.text("No two vehicles come that close to each other.")
         return
-    closest = (
-        f"the {MOST_PAIRS} closest of {len(pairs)} pairs" if len(pairs) > MOST_PAIRS else "the closest pairs first"
-    )
-    page.figure(
-        figures.gaps_before_and_after(pairs[:MOST_PAIRS]),
-        f"Nominal and enriched, {closest}.",
-        "Smallest gap of each pair of vehicles, nominal and enriched",
-    )
     page.table(
         [_gap_row(*pair) for pair in pairs],
-        "Pairs of vehicles. Marked: pairs that touch in the enriched scenario only.",
+        "Pairs of vehicles, the closest first. Marked: pairs that touch in the enriched scenario only.",
         formats=dict.fromkeys(("nominal [m]", "enriched [m]", "change [m]"), ".2f") | dict.fromkeys(GAP_TIMES, ".1f"),
         tones=_tones(enriched, pairs),
     )

@@ -24,17 +24,8 @@ def gone_on(
     At the entry of a junction its roads lie on each other, and a point that is between two vertices of a path has no
     other sign of where it goes. Without such a road it stays where it was found. So the reference player has it.
 
-    Parameters
-    ----------
-    links : Links
-    found : LaneCoordinates
-        Where it is without regard to where it came from.
-    near : int and float
-        Road and s where it was a moment ago. [m]
-    point : two floats
-        [m]
-    lane_types : collection of str, optional
-        That count as lanes.
+    `found`: where it is without regard to where it came from. `near`: road and s [m] where it was a moment ago.
+    `lane_types`: those that count.
     """
     before, s = near
     if found.road == before or found.distance > TOUCHING:

@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.road.geometry import SERIES_TERMS, ClothoidPiece, ParamCubic
 from xosc_lateral.road.piecewise import IndexLike, Lookup
-from xosc_lateral.road.positions import FloatArray
 from xosc_lateral.road.road import Road
 
 

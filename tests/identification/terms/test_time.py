@@ -19,10 +19,12 @@ from xosc_lateral.identification.low_frequencies import (
     mean_probability,
     smooth_probabilities,
 )
-from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
-from xosc_lateral.identification.selection import ERROR_BUDGET, Search
-from xosc_lateral.identification.terms.base import Removal
+from xosc_lateral.identification.model import Fitted, Removal
+from xosc_lateral.identification.regression import fit_model
+from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.selection import ERROR_BUDGET
 from xosc_lateral.identification.terms.time import StepTerm, TimeMeanTerm, TimeSpreadTerm, penalised
+from xosc_lateral.identification.timeline import Coarse
 
 SECONDS = 2400.0
 N = round(SECONDS / 0.2)

@@ -16,11 +16,9 @@ from enum import StrEnum
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.driver.records import Record, kebab
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -39,7 +37,7 @@ class EffectTerms:
     rate: FloatArray | None = None
     fine: FloatArray | None = None
 
-    def rows(self, rows: slice | NDArray[np.int64]) -> EffectTerms:
+    def rows(self, rows: slice | IntArray) -> EffectTerms:
         """The same at some rows. Shape of `rows` each. [m], [-]"""
         return EffectTerms(*(None if value is None else value[rows] for value in self.parts))
 

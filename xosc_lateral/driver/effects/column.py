@@ -20,15 +20,13 @@ from typing import ClassVar, Self
 import msgspec
 import numpy as np
 from msgspec.structs import replace
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects.base import Acts, Effect, EffectTerms, terms_of
 from xosc_lateral.driver.effects.response import Response, ResponseState, respond
 from xosc_lateral.driver.records import set_once
 from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.segment import FADES
-
-FloatArray = NDArray[np.float64]
 
 MAX_ORDER = 9
 """More lags in a row are a delay. [-]"""

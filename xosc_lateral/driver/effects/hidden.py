@@ -16,13 +16,11 @@ from typing import Any, ClassVar
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects.base import FACTOR_LIMIT, Effect, EffectTerms
 from xosc_lateral.driver.records import set_once
 from xosc_lateral.errors import DriverProfileError
-
-FloatArray = NDArray[np.float64]
 
 
 class NoState(msgspec.Struct):
@@ -66,7 +64,7 @@ class HiddenEffect(Effect, frozen=True, kw_only=True):
 
 
 class Adapted(HiddenEffect, frozen=True, kw_only=True):
-    """What makes another driver of a profile's (`pipeline.derive`).
+    """What makes another driver of a profile's (`identification.derive`).
 
     `shift` of the mean offset, positive left [m]; factors of `EffectTerms`, 1/5 to 5 [-].
     """

@@ -11,13 +11,11 @@ from collections.abc import Mapping
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects.column import ColumnEffect
 from xosc_lateral.driver.effects.shapes import level_share, nearness, presence, proximity
 from xosc_lateral.driver.records import Record
-
-FloatArray = NDArray[np.float64]
 
 
 class Form(StrEnum):

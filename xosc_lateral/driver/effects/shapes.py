@@ -13,13 +13,11 @@ from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects.column import ColumnEffect
 from xosc_lateral.driver.records import set_once
 from xosc_lateral.errors import DriverProfileError
-
-FloatArray = NDArray[np.float64]
 
 
 class SingleColumnEffect(ColumnEffect, frozen=True, kw_only=True):

@@ -11,14 +11,12 @@ from __future__ import annotations
 from math import isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.records import Record
 from xosc_lateral.driver.sensor.likelihood import Colour
 from xosc_lateral.drives.filters import scale_frequencies
 from xosc_lateral.errors import DriverProfileError
-
-FloatArray = NDArray[np.float64]
 
 HIGHEST = 1.5
 """Runs are low-passed here on being resampled to 5 Hz, and so is what is sampled. [Hz]"""

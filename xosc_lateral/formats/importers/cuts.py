@@ -7,9 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 
 RATE_WINDOW = 0.5  # [s]; the lateral speed is a central difference over this
 KEPT = "kept"

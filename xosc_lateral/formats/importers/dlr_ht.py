@@ -21,11 +21,11 @@ import io
 import zipfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.drives.cleaning import RUN
 from xosc_lateral.drives.filters import filtered, low_pass_between
 from xosc_lateral.errors import FormatError, NotEnoughDataError
@@ -42,12 +42,7 @@ from xosc_lateral.formats.importers.neighbours import find_neighbours
 from xosc_lateral.formats.importers.road_from_tracks import ReferenceLine, fit_reference_line
 from xosc_lateral.formats.importers.table import Imported, finished, guarded
 from xosc_lateral.formats.source import Source, open_source
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from xosc_lateral.lazy import pd
 
 LANES = 2  # through lanes per direction of the A39 there; ramps and their merging lanes are left out
 STEP = 0.05  # [s]
@@ -105,8 +100,6 @@ def import_dlr_ht(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cu
 
 def read_tracks(source: Path) -> pd.DataFrame:
     """All rows, sorted by vehicle and time, with `time` [s] from the first instant and `vehicle` counted from 0."""
-    import pandas as pd
-
     frame = pd.concat([_read_csv(stream, source) for stream in _trajectory_files(source)], ignore_index=True)
     try:
         stamps = pd.to_datetime(frame["timestamp"], utc=True)
@@ -149,8 +142,6 @@ def _packed_files(opened: Source) -> list[io.BufferedIOBase]:
 
 
 def _read_csv(stream: io.BufferedIOBase, source: Path) -> pd.DataFrame:
-    import pandas as pd
-
     with stream:
         head = stream.readline().decode("utf-8", "replace").strip().split(",")
         missing = [name for name in COLUMNS if name not in head]
@@ -168,8 +159,6 @@ def _read_csv(stream: io.BufferedIOBase, source: Path) -> pd.DataFrame:
 
 def _check_numbers(column: pd.Series, source: Path) -> None:
     """Refuse text and missing values, with the line of the first."""
-    import pandas as pd
-
     numbers = pd.to_numeric(column, errors="coerce").to_numpy(dtype=np.float64)
     if not np.isfinite(numbers).all():
         row = int(np.argmin(np.isfinite(numbers)))
@@ -240,12 +229,7 @@ def _slow(d: FloatArray, tracks: pd.DataFrame) -> FloatArray:
 
 
 def _place_in_lanes(
-    s: FloatArray,
-    d: FloatArray,
-    height: FloatArray,
-    vehicle: IntArray,
-    gap: NDArray[np.bool_],
-    settings: CutSettings,
+    s: FloatArray, d: FloatArray, height: FloatArray, vehicle: IntArray, gap: NDArray[np.bool_], settings: CutSettings
 ) -> tuple[_Placed, list[LaneCentreLine]]:
     """Lane centres of one carriageway, and every row's lane and offset. Rounds, since each needs the other."""
     levels = _levels(d)
@@ -312,8 +296,6 @@ def _each(passage: IntArray, every: int) -> NDArray[np.bool_]:
 
 def _context(tracks: pd.DataFrame, placed: _Placed, s: FloatArray, forward: NDArray[np.bool_]) -> pd.DataFrame:
     """The drive table's columns, for every row of the tracks."""
-    import pandas as pd
-
     kind = vehicle_classes(tracks)
     frame = np.round(tracks["time"].to_numpy() / STEP).astype(np.int64) * 2 + forward
     near = find_neighbours(

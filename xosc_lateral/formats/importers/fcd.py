@@ -14,9 +14,9 @@ import numpy as np
 
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.importers.neighbours import find_neighbours
+from xosc_lateral.lazy import pd
 
 if TYPE_CHECKING:
-    import pandas as pd
     from lxml import etree
 
 WIDTH = 3.2
@@ -29,22 +29,12 @@ _TRUCKS = ("truck", "trailer", "bus", "coach", "lkw")
 
 
 def import_fcd(source: Path, *, net: str | Path | None = None, lane_width: float = WIDTH) -> pd.DataFrame:
-    """A drive for every vehicle.
+    """A drive for every vehicle of what ``--fcd-output`` wrote; it is a truck when its type's name says so.
 
-    A vehicle is a truck when its type's name says so. Raises `FormatError`, `NotEnoughDataError`: not such a file; one
-    without `posLat`; one without vehicles.
+    Raises `FormatError`, `NotEnoughDataError`: not such a file; one without `posLat`; one without vehicles.
 
-    Parameters
-    ----------
-    source : Path
-        What ``--fcd-output`` wrote, ``.xml``.
-    net : path, optional
-        The road network, ``.net.xml``, for widths and counts of lanes.
-    lane_width : float
-        Where there is no net. [m]
+    `net`: the road network, ``.net.xml``, for widths and counts of lanes. `lane_width`: without it. [m]
     """
-    import pandas as pd
-
     widths = {} if net is None else _lanes(Path(net))
     rows = list(_rows(source))
     if not rows:
@@ -86,7 +76,7 @@ def _rows(source: Path) -> Iterator[tuple[float, str, str, float, float, float, 
             if element.get("posLat") is None:
                 raise FormatError(
                     "no posLat: it is written with the sublane model and --fcd-output.attributes all",
-                    path=source, line=_line(element), element="vehicle",
+                    path=source, line=_line(element), element="vehicle"
                 )  # fmt: skip
             if element.get("lane") is None or element.get("id") is None:
                 raise FormatError("no id or lane", path=source, line=_line(element), element="vehicle")

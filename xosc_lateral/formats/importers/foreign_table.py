@@ -6,20 +6,15 @@ import json
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.drives import drives_of_table, translated
 from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping, factor, spelled
 from xosc_lateral.formats.tables import comma_numbers, read_table, text_encoding
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-FloatArray = NDArray[np.float64]
+from xosc_lateral.lazy import pd
 
 HEADERS = {
     "time": r"time|timestamp|t|zeit|zeitstempel|sec|seconds",
@@ -62,8 +57,6 @@ def import_table(sources: Path | Sequence[Path], *, mapping: MappingLike | None 
     `mapping`: without it, headers are taken to be standard names. Raises `FormatError`, `NotEnoughDataError`: as
     `formats.drives.read_drives`: what is written here can be read.
     """
-    import pandas as pd
-
     known = as_mapping(mapping)
     made = []
     for path in [sources] if isinstance(sources, Path) else sources:
@@ -111,8 +104,6 @@ def propose_mapping(files: Sequence[Path]) -> str:
 
 
 def _joined(columns: Sequence[pd.Series]) -> pd.Series:
-    import pandas as pd
-
     return pd.concat(columns, ignore_index=True)
 
 
@@ -159,8 +150,6 @@ def _line(name: str, header: str, column: pd.Series) -> str:
 
 
 def _numbers(column: pd.Series) -> FloatArray:
-    import pandas as pd
-
     commas = None if pd.api.types.is_numeric_dtype(column) else comma_numbers(column)
     values = pd.to_numeric(column if commas is None else commas, errors="coerce").to_numpy(dtype=np.float64)
     return np.asarray(values[np.isfinite(values)])

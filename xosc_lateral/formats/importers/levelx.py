@@ -21,23 +21,18 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.drives.cleaning import RUN
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings, lane_changes, name_states, number_runs
 from xosc_lateral.formats.importers.neighbours import REACH, find_neighbours
 from xosc_lateral.formats.importers.table import Imported, finished, guarded
 from xosc_lateral.formats.tables import read_table
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from xosc_lateral.lazy import pd
 
 LICENCE = (
     "highD/exiD: leveLXData, under the licence that you signed (free for non-commercial research); whether fitted "
@@ -59,8 +54,6 @@ def import_levelx(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cu
 
     Raises `FormatError` if a file or a column is missing, or the exiD sign is undecided.
     """
-    import pandas as pd
-
     tracks_files = sorted(source.glob("*_tracks.csv")) if source.is_dir() else [source]
     if not tracks_files:
         raise FormatError("no XX_tracks.csv in this folder", path=source)
@@ -136,8 +129,6 @@ def _from_highd(
     path: Path,
     settings: CutSettings,
 ) -> pd.DataFrame:
-    import pandas as pd
-
     require(tracks, HIGHD_COLUMNS, path)
     tracks = tracks.sort_values(["id", "frame"], ignore_index=True)
     meta = tracks_meta.set_index("id").reindex(tracks["id"])
@@ -194,8 +185,6 @@ def _from_highd(
 def _from_exid(
     tracks: pd.DataFrame, tracks_meta: pd.DataFrame, number: str, step: float, path: Path, settings: CutSettings
 ) -> pd.DataFrame:
-    import pandas as pd
-
     require(tracks, EXID_COLUMNS, path)
     tracks = tracks.sort_values(["trackId", "frame"], ignore_index=True)
     kind = tracks_meta.set_index("trackId").reindex(tracks["trackId"])["class"].astype(str).str.lower().to_numpy()
@@ -235,8 +224,6 @@ def _from_exid(
 
 def _first(column: pd.Series) -> FloatArray:
     """First of the values parted by ``;``; NaN where there is none."""
-    import pandas as pd
-
     if column.dtype.kind == "f":
         return column.to_numpy(dtype=np.float64)
     first = column.astype(str).str.split(";").str[0]

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.atomic import replace_atomically
 from xosc_lateral.formats.osi.extra import SUFFIXES, osi
@@ -24,8 +24,6 @@ from xosc_lateral.scenario.entity import Entity
 from xosc_lateral.scenario.enums import EntityCategory, VehicleCategory
 from xosc_lateral.scenario.private_actions import LightStateAction
 from xosc_lateral.version import __version__
-
-FloatArray = NDArray[np.float64]
 
 TOPIC = "ground_truth"
 VERSION = (3, 8, 0)
@@ -75,24 +73,13 @@ def write_osi(
     host: str | None = None,
     description: str = "",
 ) -> Path:
-    """Write a trace; same motion, same bytes.
+    """Write a trace, ``.mcap``, or ``.osi`` (messages alone); same motion, same bytes.
 
-    Raises `FormatError`: Another suffix; `XoscLateralError`: The extra `osi` is not installed; `OSError`: The file
+    Raises `FormatError`: another suffix; `XoscLateralError`: the extra `osi` is not installed; `OSError`: the file
     can't be written; it is as it was then.
 
-    Parameters
-    ----------
-    path : path
-        ``.mcap``, or ``.osi`` (messages alone).
-    motion : NominalMotion
-    network : RoadNetwork
-        That it was played on.
-    trajectories : sequence of WorldTrajectory, optional
-        One per entity, in its order, where they are not the nominal ones.
-    host : str, optional
-        Entity that is the host vehicle; without it the trace has none.
-    description : str
-        For the metadata of the file.
+    `trajectories`: one per entity, in its order, where they are not the nominal ones. `host`: entity that is the host
+    vehicle; without it the trace has none. `description`: for the metadata of the file.
     """
     if path.suffix.lower() not in SUFFIXES:
         raise FormatError(f"an OSI trace ends in {' or '.join(SUFFIXES)}", path=path)

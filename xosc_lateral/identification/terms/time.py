@@ -12,12 +12,12 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import Effect, Step, TimeSmooth
-from xosc_lateral.identification.innovations import SLOW_S, fine_squares, log_sizes, quick_squares, slow_squares
 from xosc_lateral.identification.low_frequencies import (
     MEAN_SHORTEST_S,
     ORDERS,
@@ -34,14 +34,13 @@ from xosc_lateral.identification.low_frequencies import (
     step_moments,
     without_known,
 )
-from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
+from xosc_lateral.identification.model import Description, Fitted, Outcome, Removal, Stage, Term
+from xosc_lateral.identification.regression import fit_model
+from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.significance import LoopSeed
-from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term
-from xosc_lateral.identification.terms.column import what_a_column_may_do, what_columns_do
-from xosc_lateral.identification.timeline import FloatArray
-
-if TYPE_CHECKING:
-    from xosc_lateral.identification.selection import Search
+from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, quick_squares, slow_squares
+from xosc_lateral.identification.terms.spread import what_a_column_may_do, what_columns_do
+from xosc_lateral.identification.timeline import Coarse
 
 STEP_PARAMETERS = 2  # Of a step: its height and its moment.
 SURER = 0.01  # Where it is surer than the best column by this factor, what that column may do is left to time. [-]

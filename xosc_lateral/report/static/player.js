@@ -15,16 +15,10 @@
     },
   });
 
-  function unpack(column) {
-    const bytes = Uint8Array.from(atob(column.d), (each) => each.charCodeAt(0)), view = new DataView(bytes.buffer);
-    const values = new Float64Array(bytes.length / column.w + 1);
-    let whole = column.b;
-    values[0] = whole * column.r;
-    for (let i = 1; i < values.length; i++) {
-      whole += column.w === 2 ? view.getInt16(2 * (i - 1), true) : view.getInt32(4 * (i - 1), true);
-      values[i] = whole * column.r;
-    }
-    return values;
+  /* Columns hold differences between successive values, in units of their resolution. */
+  function unpack({ r, d }) {
+    let whole = 0;
+    return Float64Array.from(d, (step) => (whole += step) * r);
   }
 
   function make(tag, attributes = {}, ...children) {
@@ -447,7 +441,6 @@
         ["speed", `${speed.toFixed(1)} m/s (${(3.6 * speed).toFixed(0)} km/h)`],
         ...(vehicle.added ? [["from nominal", sided(vehicle.value(vehicle.added, frame))]] : []),
         ...(road ? [["nominal offset", sided(vehicle.value(vehicle.offset, frame))], ["lane", `${lane} of road ${road}`]] : []),
-        ["lateral acceleration", `${vehicle.value(vehicle.drawn.a, frame).toFixed(2)} m/s²`],
       ];
       const list = make("dl", {}, ...rows.flatMap(([name, value]) => [make("dt", {}, name), make("dd", {}, value)]));
       this.tip.replaceChildren(make("strong", {}, vehicle.name), list);

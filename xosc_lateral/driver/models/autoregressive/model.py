@@ -23,8 +23,8 @@ from typing import ClassVar
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.models.autoregressive.coarse import COARSE_EVERY, TICKS
 from xosc_lateral.driver.models.autoregressive.parameters import (
     AutoregressiveParameters,
@@ -43,8 +43,6 @@ from xosc_lateral.driver.models.autoregressive.parts import (
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.models.mean_reversion import ClockState, take_at_rate
 from xosc_lateral.driver.seeds import AutoregressiveSeed, generator
-
-FloatArray = NDArray[np.float64]
 
 KNEE = 0.8
 """Coarse movement is bent from this share of the way between the mean and a limit on. [-]"""

@@ -11,16 +11,14 @@ from functools import cached_property
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.models.autoregressive.coarse import COARSE_EVERY, Autoregression, building_low_pass
 from xosc_lateral.driver.models.autoregressive.volatility import Volatility
 from xosc_lateral.driver.models.base import CoreModel, Start
 from xosc_lateral.driver.models.noise import NOISE_VARIANCE, ShapedNoise
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import DriverProfileError
-
-FloatArray = NDArray[np.float64]
 
 START_LAGS = 300
 """Steps after which a drive has forgotten the offset that it was made to start at: 60 s. [-]"""

@@ -6,17 +6,13 @@ from typing import Self
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.driver.linear_filters import convolve, recur
 from xosc_lateral.driver.models.autoregressive.coarse import COARSE_EVERY, TICKS, interpolate
 from xosc_lateral.driver.models.autoregressive.parameters import AutoregressiveParameters, DriverState
 from xosc_lateral.driver.models.autoregressive.volatility import SLOW_CORRELATION_TIME
 from xosc_lateral.driver.seeds import AutoregressiveSeed, generator
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-
 
 COARSE, FINE = 0, 1
 """Index of a part wherever both stand side by side."""
