@@ -51,7 +51,7 @@ def run(case: dict[str, Any], protocol: dict[str, Any], seconds: float) -> dict[
         [one.column, round(one.coherence, 3), round(one.predicted_share, 3), one.doubtful] for one in found.feedback
     ]
     outcome["p_mean"] = found.least("mean")
-    outcome["p"] = {name: p for name in ERROR_BUDGET.weights if (p := found.least(name)) is not None}
+    outcome["p"] = {name: p for name in ERROR_BUDGET if (p := found.least(name)) is not None}
     if case["name"].startswith("slow vehicles"):
         outcome |= oracle_between(case, table)
     elif "size" in case:

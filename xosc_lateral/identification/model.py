@@ -85,7 +85,6 @@ class Term(ABC):
     # Among those of a stage: smaller ones are asked first, and first where two are equally sure; then by name. [-]
     place: ClassVar[int] = 0
     weight: ClassVar[float]  # Of its component in the error budget; one for each kind of hidden effect. [-]
-    least_drives: ClassVar[int] = 1  # In a table in which it is tested.
     # Whether the mean or the innovations' scale follow terms of this class on held-out rows: not the latent path of a
     # cycle, nor what changes the slow movement alone.
     seen_held_out: ClassVar[bool] = True
@@ -132,7 +131,7 @@ class Term(ABC):
     @classmethod
     def passes(cls, search: Search, p_value: float, fitted: Fitted) -> bool:
         """Whether the best that was found of its component is good enough to be added to the terms fitted."""
-        if p_value <= search.level_of(cls.component):
+        if p_value <= search.levels[cls.component]:
             return True
         there = sum(term.component == cls.component for term in fitted.terms)
         return search.wanted is not None and there < search.wanted.get(cls.component, 0)

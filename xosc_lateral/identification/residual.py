@@ -151,12 +151,8 @@ def half_samples(
 ) -> list[dict[str, FloatArray]]:
     """Random halves of the blocks less all of them: their variance is that of all of them about the truth [2]_.
 
-    Parameters
-    ----------
-    offset : array, shape (n,)
-        Measured, less the effects on the mean that are known: where the car should be is no chance. [m]
-    blocks : int array, shape (n,)
-        What is drawn: whole ones.
+    `offset`, shape (n,) [m]: measured, less the effects on the mean that are known: where the car should be is no
+    chance. `blocks`, shape (n,): what is drawn, as a whole.
     """
     valid = statistics.timeline.valid
     numbers, whole = np.unique(blocks[valid]), statistics.describe(offset, valid)

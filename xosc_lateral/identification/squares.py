@@ -95,10 +95,7 @@ def of_squares(coarse: Coarse, squares: Squares, columns: FloatArray) -> Problem
 def log_sizes(squares: Squares, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Log-linear regression [1]_ of a standard deviation on columns, shape (n, k), from mean squares per second.
 
-    Returns
-    -------
-    sizes, errors : array, shape (k,)
-        Natural logarithm per unit.
+    Returns shape (k,): natural logarithm per unit.
     """
     design = columns[squares.valid] - columns[squares.valid].mean(axis=0)
     inverse = np.linalg.pinv(2.0 * design.T @ design)

@@ -96,10 +96,7 @@ class Timeline:
 def join_drives(drives: Sequence[Drive], rules: CutRules = TRACE_RULES) -> Timeline:
     """Put drives on one grid.
 
-    Raises
-    ------
-    NotEnoughDataError
-        When less than two minutes of road-following are left.
+    Raises `NotEnoughDataError` when less than two minutes of road-following are left.
     """
     kept, periods = grid_drives(drives, rules, pad=PAD, multiple=COARSE)
     valid_s = STEP * sum(float(part.valid.sum()) for part in kept)
@@ -160,14 +157,8 @@ def start_anew(
     What is constant within drives must stay so: a threshold or a cell's edge would tell what is left of the drive
     before.
 
-    Parameters
-    ----------
-    response : array, shape (n,) or (n, k)
-        Of the lag, to `values` of the same shape.
-    keep : float
-        What the lag keeps of itself from row to row.
-    drive : int array, shape (n,)
-        Increasing.
+    `response`, shape (n,) or (n, k): of the lag, to `values` of the same shape; `keep`: what the lag keeps of itself
+    from row to row; `drive`, shape (n,): increasing.
     """
     _, starts, own = np.unique(drive, return_index=True, return_inverse=True)
     first = starts[own]
