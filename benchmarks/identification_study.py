@@ -38,7 +38,7 @@ def run(case: dict[str, Any], protocol: dict[str, Any], seconds: float) -> dict[
     outcome = dict(case)
     outcome["cpu_s"] = round(time.process_time() - started, 1)
     outcome["named"] = [
-        [one.term.kind, sorted(one.term.columns), one.p_value, one.term.component, [sorted(x) for x in one.alike]]
+        [one.term.kind, sorted(one.term.columns), one.p_value, one.term.component, [sorted(x) for x in one.term.alike]]
         for one in found.selection.accepted
     ]
     kinds = {term.component: term.kind for term in TERMS}

@@ -63,7 +63,7 @@ def _finding(size: Description, scored: HeldOut, **about: Any) -> Finding:
 def describe_finding(one: Accepted, key: str, effects: tuple[Effect, ...], fitted: Fitted, scored: HeldOut) -> Finding:
     """Put sizes and errors to what was accepted."""
     term = one.term
-    about = {"kind": term.kind, "columns": term.columns, "alike": one.alike, "p_value": one.p_value, "gain": one.gain}
+    about = {"kind": term.kind, "columns": term.columns, "alike": term.alike, "p_value": one.p_value, "gain": one.gain}
     return _finding(term.describe(fitted, effects, key), scored, effects=effects, **about)
 
 

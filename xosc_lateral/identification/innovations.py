@@ -10,17 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from xosc_lateral.identification.autocorrelation import (
-    Whitener,
-    fit_autoregression,
-    start_factors,
-)
-from xosc_lateral.identification.timeline import (
-    BoolArray,
-    FloatArray,
-    IntArray,
-    means_by_drive,
-)
+from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression, start_factors
+from xosc_lateral.identification.timeline import CLUSTER_S, BoolArray, FloatArray, IntArray, means_by_drive
 
 ORDER = 12  # Past seconds that have a coefficient each in the movement's autoregression. [s]
 LONGEST = 96  # Past seconds that it sees as means over doubling times: drifts of a minute and a half. [s]
@@ -31,7 +22,6 @@ CLIP = 9.0  # Squared innovations (variance 1) beyond this count as this: three 
 # Scale terms together change the movement by at most this factor's logarithm, 20 either way: scoring steps of a factor
 # that the movement contradicts grow without end. [-]
 MOST_LOG_SCALE = 3.0
-CLUSTER_S = 60  # Length of one cluster of squares in errors of the log scale. [s]
 OWN_LEVEL_S = 30.0  # A drive's level of the scale is its own as far as it lasts longer than this. [s]
 
 

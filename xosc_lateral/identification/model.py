@@ -18,6 +18,7 @@ import numpy as np
 from xosc_lateral.driver.effects import Effect
 from xosc_lateral.identification.autocorrelation import Whitener
 from xosc_lateral.identification.innovations import innovations
+from xosc_lateral.identification.refinement import Alternatives
 from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.timeline import Coarse, FloatArray, on_fine_grid
 
@@ -95,6 +96,11 @@ class Term(ABC):
         return ()
 
     @property
+    def alike(self) -> Alternatives:
+        """Columns of each other effect that explains as much."""
+        return ()
+
+    @property
     def predictable(self) -> bool:
         """Whether the model's likelihood of rows that it was not fitted on can tell this term from nothing."""
         return self.seen_held_out
@@ -154,6 +160,10 @@ class Term(ABC):
         """Add what the term did to the measured offsets; hidden ones as they most likely were."""
         coarse, path = fitted.coarse, latent_path(self, fitted)
         removal.location += on_fine_grid(path - path[coarse.valid].mean(), coarse.timeline)
+
+    def quantity(self, coarse: Coarse, effects: tuple[Effect, ...]) -> FloatArray | None:
+        """What the residual is compared by, on the 0.2 s grid, shape (fine n,); None: nothing of its own."""
+        return None
 
     @abstractmethod
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:

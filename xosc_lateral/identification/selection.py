@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from xosc_lateral.identification import terms
 from xosc_lateral.identification.model import Fitted, Stage, Term
-from xosc_lateral.identification.refinement import Alternatives
 from xosc_lateral.identification.regression import fit_model
 from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.significance import BUDGET
@@ -73,12 +72,6 @@ class Accepted:
     term: Term
     p_value: float
     gain: Gain | None = None
-
-    @property
-    def alike(self) -> Alternatives:
-        """Columns of each other effect that explains as much."""
-        alike: Alternatives = getattr(self.term, "alike", ())
-        return alike
 
 
 @dataclass(frozen=True, slots=True)

@@ -73,10 +73,6 @@ class Timeline:
         edges = np.searchsorted(self.drive, np.arange(len(self.names) + 1))
         return [slice(int(first), int(last)) for first, last in pairwise(edges)]
 
-    def response(self, effect: ColumnEffect, context: Mapping[str, FloatArray]) -> FloatArray:
-        """An effect's quantity of columns on this grid as each drive responds to it, shape (n, k). [own unit]"""
-        return self.respond(effect.known(context), effect.lag_s, effect.response_s)
-
     def respond(self, values: FloatArray, lag_s: float, response_s: float) -> FloatArray:
         """`driver.effects.response.respond` drive by drive: shape of `values`, (n,) or (n, k), in their unit.
 
@@ -91,6 +87,11 @@ class Timeline:
         anew = start_anew(response, values, float(np.exp(-self.step / response_s)), amid)
         starts = np.searchsorted(self.drive, np.arange(len(self.names)))
         return anew[np.maximum(rows, np.minimum(starts + PAD // 2, len(rows) - 1)[self.drive])]
+
+
+def unsized(effect: ColumnEffect) -> ColumnEffect:
+    """The same effect before it was fitted."""
+    return structs.replace(effect, coefficients=(), errors=(), reference=(), between_drivers=(), response_range=())
 
 
 def join_drives(drives: Sequence[Drive], rules: CutRules = TRACE_RULES) -> Timeline:
@@ -240,9 +241,7 @@ class Coarse:
 
     def response(self, effect: ColumnEffect, *, keep: bool = False) -> FloatArray:
         """The effect's quantity [own unit] as the driver responds to it, less its mean where valid; shape (n, k)."""
-        key = structs.replace(
-            effect, acts=Acts.LOCATION, coefficients=(), errors=(), reference=(), between_drivers=(), response_range=()
-        )
+        key = structs.replace(unsized(effect), acts=Acts.LOCATION)
         if key in self._responses:
             return self._responses[key]
         response = coarse_mean(self.fine_response(key))
@@ -253,7 +252,7 @@ class Coarse:
 
     def fine_response(self, effect: ColumnEffect) -> FloatArray:
         """The same on the 0.2 s grid, as it is, shape (fine n, k). [own unit]"""
-        return self.timeline.response(effect, self.context)
+        return self.timeline.respond(effect.known(self.context), effect.lag_s, effect.response_s)
 
     def strength(self, effect: ColumnEffect) -> FloatArray:
         """What an effect of columns that the table has does on the 0.2 s grid, shape (fine n,). [m], or log factor"""
