@@ -20,14 +20,7 @@ from xosc_lateral.identification.core_model import (
     test_population,
 )
 from xosc_lateral.identification.cross_validation import Progress, held_out_words, hold_out_blocks
-from xosc_lateral.identification.held_out import (
-    HeldOut,
-    Scorecard,
-    Setting,
-    fit_without,
-    score_held_out,
-    score_runs,
-)
+from xosc_lateral.identification.held_out import HeldOut, Scorecard, Setting, fit_without, score_held_out, score_runs
 from xosc_lateral.identification.identify import Identified, identify, initial_terms
 from xosc_lateral.identification.model import Description, Fitted, Term
 from xosc_lateral.identification.refinement import Alternatives

@@ -25,11 +25,7 @@ from xosc_lateral.identification.innovations import (
     scoring_step,
 )
 from xosc_lateral.identification.model import Fitted, Term, joined
-from xosc_lateral.identification.timeline import (
-    Coarse,
-    FloatArray,
-    IntArray,
-)
+from xosc_lateral.identification.timeline import Coarse, FloatArray, IntArray
 
 # White noise that the model of a drive has beside what it shows: no table knows the lane better (in the motorway
 # recording the standard error of a lane's centre is 0.03 m; docs/real_data.md). Providers smooth their tracks,
