@@ -50,7 +50,7 @@ class SummaryStatistics:
     timeline: Timeline
     labels: Mapping[str, IntArray]  # shape (n,): Bin of every row by group (a column's name, "time", ...), -1: none.
     middles: Mapping[str, FloatArray]  # Mean of the quantity per bin, for curves.
-    oscillation: float | None = None  # Frequency of a weave that was found. [1/s]
+    oscillation: float | None = None  # Frequency of a cycle that was found. [1/s]
 
     def describe(self, offset: FloatArray, used: BoolArray) -> dict[str, FloatArray]:
         """Statistics of one series of offsets on the grid, shape (n,), by group. [m]"""
