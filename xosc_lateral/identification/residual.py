@@ -25,7 +25,16 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import OffsetSampler
 from xosc_lateral.driver.seeds import child
 from xosc_lateral.drives.resampling import in_digits
-from xosc_lateral.identification.timeline import LOCAL_S, PAD, BoolArray, FloatArray, IntArray, Timeline, local_mean
+from xosc_lateral.identification.timeline import (
+    LOCAL_S,
+    PAD,
+    BoolArray,
+    FloatArray,
+    IntArray,
+    Timeline,
+    local_mean,
+    smoothed,
+)
 from xosc_lateral.segment import Segment
 
 N_BINS = 5  # Bins of a column, equally filled.
@@ -256,8 +265,7 @@ def _by_bin(values: FloatArray, label: IntArray, used: BoolArray) -> FloatArray:
 def _bands(offset: FloatArray, used: BoolArray, timeline: Timeline) -> FloatArray:
     if not used.any():
         return np.full(len(BANDS_S) + 1, np.nan)
-    levels = [offset, *(local_mean(offset, timeline.valid, seconds, timeline.step) for seconds in BANDS_S)]
-    inside = [level[used] for level in levels]
+    inside = [level[used] for level in (offset, *smoothed(offset, timeline, BANDS_S))]
     bands = [np.std(finer - coarser) for finer, coarser in pairwise(inside)]
     return np.array([*bands, np.std(inside[-1])])
 

@@ -89,6 +89,11 @@ class Timeline:
         return anew[np.maximum(rows, np.minimum(starts + PAD // 2, len(rows) - 1)[self.drive])]
 
 
+def smoothed(offset: FloatArray, timeline: Timeline, times_s: Sequence[float]) -> list[FloatArray]:
+    """Moving averages of a series over each of several times, shape (n,) each, in its unit."""
+    return [local_mean(offset, timeline.valid, seconds, timeline.step) for seconds in times_s]
+
+
 def unsized(effect: ColumnEffect) -> ColumnEffect:
     """The same effect before it was fitted."""
     return structs.replace(effect, coefficients=(), errors=(), reference=(), between_drivers=(), response_range=())
