@@ -32,6 +32,10 @@ class Condition(Struct, frozen=True):
     triggering_entities: TriggeringEntities | None
     place: Place
 
+    def __post_init__(self) -> None:
+        if self.delay < 0:
+            raise ValueError(f"delay of {self.delay} s is negative")
+
 
 class ConditionGroup(Struct, frozen=True):
     """True when all of its conditions are."""

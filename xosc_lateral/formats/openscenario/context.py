@@ -104,12 +104,16 @@ def read_struct(kind: type[S], e: XmlElement, context: Context, /, **given: Any)
     Raises
     ------
     FormatError
-        An attribute or a child element that is missing and has no default, or is not of its type.
+        An attribute or a child element that is missing and has no default, or is not of its type; what the struct
+        itself refuses.
     """
     for name, reader in _readers(kind):
         if name not in given:
             given[name] = reader(e, context)
-    return kind(**given)
+    try:
+        return kind(**given)
+    except ValueError as error:
+        e.fail(str(error))
 
 
 def declared(*kinds: type[Struct]) -> dict[str, Reader]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 from typing import Any
 
 from xosc_lateral.formats.openscenario.context import Context, Reader, declared, read_struct
@@ -53,11 +52,7 @@ def _choice(owner: XmlElement, what: str, readers: dict[str, Reader], context: C
 
 def read_route(owner: XmlElement, context: Context) -> Route:
     """Route, given inline or from a catalog, inside `owner`."""
-    element = _inline_or_entry(owner, "Route", context)
-    route = read_struct(Route, element, context)
-    if len(route.waypoints) < 2:
-        element.fail(f"a route needs at least 2 waypoints, this one has {len(route.waypoints)}")
-    return route
+    return read_struct(Route, _inline_or_entry(owner, "Route", context), context)
 
 
 def read_trajectory(owner: XmlElement, context: Context) -> Trajectory:
@@ -143,40 +138,10 @@ _POSITIONS: dict[str, Reader] = {
 }
 
 
-def _polyline(e: XmlElement, context: Context) -> Polyline:
-    polyline = read_struct(Polyline, e, context)
-    if len(polyline.vertices) < 2:
-        e.fail(f"a polyline needs at least 2 vertices, this one has {len(polyline.vertices)}")
-    return polyline
-
-
-def _clothoid_spline(e: XmlElement, context: Context) -> ClothoidSpline:
-    if e.child("ClothoidSplineSegment") is None:
-        e.fail("a clothoid spline needs a segment")
-    return read_struct(ClothoidSpline, e, context)
-
-
 def _nurbs(e: XmlElement, context: Context) -> Nurbs:
-    nurbs = read_struct(Nurbs, e, context, knots=tuple(knot.number("value") for knot in e.children("Knot")))
-    order, points, knots = nurbs.order, nurbs.control_points, nurbs.knots
-    if order < 2 or len(points) < order:
-        e.fail(f"order {order} with {len(points)} control points")
-    if len(knots) != len(points) + order:
-        e.fail(f"{len(knots)} knots, {len(points)} control points and order {order} need {len(points) + order}")
-    if any(after < before for before, after in pairwise(knots)):
-        e.fail("knots decrease")
-    if knots[order - 1] >= knots[len(points)]:
-        e.fail("the knots span no curve")
-    if any(point.weight <= 0 for point in points):
-        e.fail("a weight is not positive")
-    return nurbs
+    return read_struct(Nurbs, e, context, knots=tuple(knot.number("value") for knot in e.children("Knot")))
 
 
-_SHAPES: dict[str, Reader] = {
-    **declared(Clothoid),
-    "Polyline": _polyline,
-    "ClothoidSpline": _clothoid_spline,
-    "Nurbs": _nurbs,
-}
+_SHAPES: dict[str, Reader] = {**declared(Clothoid, Polyline, ClothoidSpline), "Nurbs": _nurbs}
 
 READERS: dict[object, Reader] = {Position: read_position, Shape: _shape, Route: read_route, Trajectory: read_trajectory}
