@@ -6,7 +6,6 @@ import math
 from typing import Any
 
 from xosc_lateral.formats.openscenario.context import Context, Reader, declared, read_struct
-from xosc_lateral.formats.openscenario.declarations import local_scope
 from xosc_lateral.formats.openscenario.element import XmlElement
 from xosc_lateral.formats.openscenario.left_handed import mirrored, mirrored_shape
 from xosc_lateral.scenario.place import Unsupported
@@ -52,30 +51,18 @@ def _choice(owner: XmlElement, what: str, readers: dict[str, Reader], context: C
 
 def read_route(owner: XmlElement, context: Context) -> Route:
     """Route, given inline or from a catalog, inside `owner`."""
-    return read_struct(Route, _inline_or_entry(owner, "Route", context), context)
+    return read_struct(Route, context.inline_or_entry(owner, "Route"), context)
 
 
 def read_trajectory(owner: XmlElement, context: Context) -> Trajectory:
     """Trajectory, given inline, in a TrajectoryRef (1.1) or from a catalog, inside `owner`."""
-    return read_struct(
-        Trajectory, _inline_or_entry(owner.child("TrajectoryRef") or owner, "Trajectory", context), context
-    )
+    inside = context.inline_or_entry(owner.child("TrajectoryRef") or owner, "Trajectory")
+    return read_struct(Trajectory, inside, context)
 
 
 def _shape(owner: XmlElement, context: Context) -> Shape:
     shape: Shape = _choice(owner, "shape", _SHAPES, context)
     return mirrored_shape(shape) if context.left_handed else shape
-
-
-def _inline_or_entry(owner: XmlElement, tag: str, context: Context) -> XmlElement:
-    """In the scope of its own parameters; in a catalog, what the reference assigns comes before what is declared."""
-    inline = owner.child(tag)
-    if inline is not None:
-        return inline.within(local_scope(inline))
-    entry = context.catalogs.entry(owner.required("CatalogReference"))
-    if entry.tag != tag:
-        owner.fail(f"catalog entry '{entry.raw('name')}' is a {entry.tag}, not a {tag}")
-    return entry
 
 
 def _road(e: XmlElement, context: Context) -> RoadPosition:
