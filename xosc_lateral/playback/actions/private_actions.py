@@ -5,7 +5,7 @@ from __future__ import annotations
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.playback.actions.base import Domain, RunningAction, RunningPrivateAction
 from xosc_lateral.playback.positions.resolve import resolve, route_guide
-from xosc_lateral.playback.state import Placement, guide
+from xosc_lateral.playback.state import guide
 from xosc_lateral.playback.trailers import align_trailers, connect, disconnect
 from xosc_lateral.scenario.enums import RouteStrategy
 from xosc_lateral.scenario.global_actions import SetMonitorAction, UserDefinedAction
@@ -68,8 +68,7 @@ class RunningAcquirePosition(RunningPrivateAction):
     def _begin(self) -> None:
         state = self.actor
         state.locate()
-        here = Placement(state.road, state.lane, state.s, state.offset_t, state.relative_heading)
-        route = guide(self.simulation.network, [here, resolve(self.content.position, self.simulation)])
+        route = guide(self.simulation.network, [state.place, resolve(self.content.position, self.simulation)])
         if route is None:
             self._note("no way leads to the position: it is not acquired")
         state.route = route
