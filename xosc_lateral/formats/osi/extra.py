@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,8 @@ def osi(module: str) -> Any:
 
     Raises `XoscLateralError`: They are not installed.
     """
+    import logging
+
     try:
         found = import_module(module)
     except ImportError as error:
