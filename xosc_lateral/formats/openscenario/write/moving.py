@@ -120,8 +120,8 @@ def _check(entity: EntityMotion, path: WorldTrajectory) -> None:
     if any(len(values) != len(entity.time) for values in arrays):
         raise ValueError(f"trajectory of '{entity.name}' does not have the {len(entity.time)} rows of its motion")
     for rows in blocks(len(entity.time)):
-        active = (entity.activity[rows] & Activity.ACTIVE) != 0
-        if any(not np.isfinite(values[rows][active]).all() for values in arrays):
+        away = (entity.activity[rows] & Activity.ACTIVE) == 0
+        if any(not (np.isfinite(values[rows]) | away).all() for values in arrays):
             raise ValueError(f"trajectory of '{entity.name}' is not finite")
 
 

@@ -119,7 +119,7 @@ def rewrite_paths(root: etree._Element, scenario: Scenario, output: Path, scope:
     elsewhere than written: their references are repaired.
     """
     old, new = _absolute(scenario.path).parent, _absolute(output).parent
-    found_elsewhere = _catalogs_found_elsewhere(scenario)
+    moves, found_elsewhere = old != new, _catalogs_found_elsewhere(scenario)
     for element in root.iter("{*}*"):  # no comments
         tag = local_name(element)
         if tag == "LogicFile" and scenario.road_file is not None and _names_a_town(element, scope):
@@ -128,9 +128,9 @@ def rewrite_paths(root: etree._Element, scenario: Scenario, output: Path, scope:
             _redirect(element, "filepath", _absolute(scenario.road_file), old, new, scope)
         elif tag == "Directory" and len(found_elsewhere) == 1 and not _leads_somewhere(element, old, scope):
             _redirect(element, "path", found_elsewhere.pop(), old, new, scope)
-        elif tag in REFERENCES and old != new:
+        elif moves and tag in REFERENCES:
             _redirect(element, REFERENCES[tag], None, old, new, scope)
-        elif old != new and element.get("model3d"):
+        elif moves and element.get("model3d"):
             _redirect(element, "model3d", None, old, new, scope, only_existing=True)
 
 
