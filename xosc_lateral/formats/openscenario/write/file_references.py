@@ -27,8 +27,10 @@ def rewrite_paths(draft: Draft, output: Path) -> None:
     for element in elements(draft.root):
         tag = local_name(element)
         attribute = _REFERENCES.get(tag, "model3d")
+        if not (written := element.get(attribute)):
+            continue
         try:
-            text = draft.scope.fill(element.get(attribute) or "").replace("\\", "/")
+            text = draft.scope.fill(written).replace("\\", "/")
         except ExpressionError:
             continue
         leads_to = target = Path(os.path.normpath(old / text))
