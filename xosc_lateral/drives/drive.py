@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from xosc_lateral.arrays import FloatArray
+from xosc_lateral.arrays import FloatArray, IntArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ class Drive:
     context: Mapping[str, FloatArray] = field(default_factory=dict)
     levels: frozenset[str] = frozenset()
     source: str = ""
-    run: NDArray[np.int64] | None = None
+    run: IntArray | None = None
     mended: MarkingShares | None = None
     empty: frozenset[str] = frozenset()
     half_width: FloatArray | None = None

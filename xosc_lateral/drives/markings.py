@@ -22,9 +22,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from xosc_lateral.arrays import BoolArray, FloatArray
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.drives.cuts import MAX_GAP, lane_steps
 from xosc_lateral.drives.drive import MarkingShares
 from xosc_lateral.drives.resampling import STEP
@@ -122,7 +121,7 @@ class BothMarkings:
     """Distances of blocks to both markings. [m]"""
     seen: BoolArray
     """Blocks that have rows."""
-    breaks: NDArray[np.int64]
+    breaks: IntArray
     """Blocks after which the next is not joined."""
     gaps: FloatArray
     """Times between the rows on both sides of these. [s]"""
@@ -206,7 +205,7 @@ def _weights(scaled: FloatArray) -> FloatArray:
     return DEGREES / (DEGREES + scaled**2)
 
 
-def _blocks(time: FloatArray, breaks: BoolArray) -> tuple[NDArray[np.int64], FloatArray]:
+def _blocks(time: FloatArray, breaks: BoolArray) -> tuple[IntArray, FloatArray]:
     """Number of each row's block, and its moment on a clock on which every break takes as long as a block. [s]"""
     steps = np.where(breaks, STEP, np.diff(time))
     moment = np.concatenate([[0.0], np.cumsum(steps)])

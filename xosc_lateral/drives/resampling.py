@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.arrays import FloatArray
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.drives.filters import low_pass_between, mirrored
 
 STEP = 0.2
@@ -67,7 +67,7 @@ def average(time: FloatArray, values: FloatArray, grid: FloatArray) -> FloatArra
     return np.where(np.isfinite(closest), result, closest)
 
 
-def _hann_average(time: FloatArray, values: FloatArray, missing: NDArray[np.bool_], grid: FloatArray) -> FloatArray:
+def _hann_average(time: FloatArray, values: FloatArray, missing: BoolArray, grid: FloatArray) -> FloatArray:
     """Over one step to each side, shape of `grid`, of what is there; 0 where nothing is."""
     kernel, fine_grid = np.hanning(2 * OVERSAMPLING + 1), _fine_grid(grid)
     weight = (nearest(time, missing.astype(np.float64), fine_grid) == 0).astype(np.float64)

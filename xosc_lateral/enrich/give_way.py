@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.arrays import FloatArray, IntArray
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.motion.around import smooth_step
 from xosc_lateral.motion.context import CELLS, STEERING
 from xosc_lateral.motion.nearby import stretches_within
@@ -61,7 +61,7 @@ class SampledVehicle:
 
     motion: EntityMotion  # nominal
     deviation: FloatArray  # from it on the rows that are looked at, positive left, shape (n,) [m]
-    can_move: NDArray[np.bool_]  # on which of them its path is sampled and may be moved, shape (n,)
+    can_move: BoolArray  # on which of them its path is sampled and may be moved, shape (n,)
     # responds: sides, "left" and "right", on which its profile responds to neighbours by itself: there, gaps are
     # widened by what that leaves to be widened
     responds: frozenset[str] = frozenset()
@@ -140,7 +140,7 @@ def _together(meeting: Sequence[tuple[int, int]], n: int) -> Iterator[tuple[IntA
         yield pairs[begin : begin + step, 0], pairs[begin : begin + step, 1]
 
 
-def _near(tables: Sequence[NDArray[Any]], length: FloatArray, own: IntArray, other: IntArray) -> NDArray[np.bool_]:
+def _near(tables: Sequence[NDArray[Any]], length: FloatArray, own: IntArray, other: IntArray) -> BoolArray:
     """Where pairs of vehicles are near enough for `widened`, shape (pairs, n); `tables`: x, y ... of all vehicles."""
     x, y, present = tables[0], tables[1], tables[-1]
     reach = (FADES + 0.5 * (length[own] + length[other]) + MARGIN)[:, None]
@@ -162,8 +162,8 @@ class Frame(NamedTuple):
     y: FloatArray
     heading: FloatArray
     deviation: FloatArray
-    can_move: NDArray[np.bool_]
-    present: NDArray[np.bool_]
+    can_move: BoolArray
+    present: BoolArray
     length: float | FloatArray
     width: float | FloatArray
 
@@ -187,8 +187,8 @@ class Frame(NamedTuple):
 
 
 def widened(
-    own: Frame, other: Frame, responds_left: bool | NDArray[np.bool_], responds_right: bool | NDArray[np.bool_]
-) -> tuple[FloatArray, NDArray[np.bool_], NDArray[np.bool_]] | None:
+    own: Frame, other: Frame, responds_left: bool | BoolArray, responds_right: bool | BoolArray
+) -> tuple[FloatArray, BoolArray, BoolArray] | None:
     """By how much the gap to the other is widened, whether it is to the left, and whether the profile responds to it.
 
     None if the other never is near.
@@ -212,7 +212,7 @@ def widened(
     return weight * np.where(responding, wider(gap, responding=True), wider(gap, responding=False)), is_left, responding
 
 
-def part_of(overtakes: NDArray[np.bool_], responding: NDArray[np.bool_]) -> FloatArray:
+def part_of(overtakes: BoolArray, responding: BoolArray) -> FloatArray:
     """Share of a widening, by whether the vehicle is the overtaking one and responds to the other, shape (n,). [-]
 
     By itself `motorway` moves 0.209 m from whom it overtakes and 0.083 m from who overtakes it, where real vehicles

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import IntArray
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.enrich.result import Neighbours
 from xosc_lateral.errors import FormatError, SimulationError
@@ -262,7 +262,7 @@ class EsminiTraffic:
                           column["width"], column["center_x"]),
         )  # fmt: skip
 
-    def _lanes(self, seen: list[tuple[str, ObjectState]], road: NDArray[np.int64], anew: bool) -> list[_Lane]:
+    def _lanes(self, seen: list[tuple[str, ObjectState]], road: IntArray, anew: bool) -> list[_Lane]:
         """The lanes that vehicles are on; between steps of the model as they were, if they are the same."""
         network, found = self.network, []
         for (name, state), index in zip(seen, road.tolist(), strict=True):

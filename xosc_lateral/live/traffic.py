@@ -14,9 +14,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from xosc_lateral.arrays import BoolArray, FloatArray
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.driver.group import OffsetGroup
 from xosc_lateral.driver.plausibility import first_implausible, implausible
 from xosc_lateral.driver.profile import Basis, DriverProfile, sampling_hash
@@ -161,7 +160,7 @@ class Traffic:
         return moves
 
     # ---- who is there ------------------------------------------------------------------------------------------------
-    def _present(self, names: list[str]) -> NDArray[np.int64]:
+    def _present(self, names: list[str]) -> IntArray:
         """Drivers of these vehicles, shape (n,): those of others have gone, new ones have come."""
         if names != self._names:
             gone = self._index.keys() - set(names)
@@ -218,8 +217,8 @@ class Traffic:
         time: float,
         moment: Moment,
         context: dict[str, FloatArray],
-        there: NDArray[np.int64],
-        who: NDArray[np.int64],
+        there: IntArray,
+        who: IntArray,
     ) -> None:
         """On to the model step that is now, or to the last one of those that have passed."""
         if self._columns is None:
@@ -260,7 +259,7 @@ class Traffic:
         self._state["width"][drivers] = width + (before - width) * np.exp(-self._step / STEERING)
         return np.asarray(self._state["width"][drivers])
 
-    def _aside(self, moment: Moment, there: NDArray[np.int64], who: NDArray[np.int64]) -> FloatArray:
+    def _aside(self, moment: Moment, there: IntArray, who: IntArray) -> FloatArray:
         """How far everybody wants to move aside, shape (n,). [m]"""
         if moment.places is None or self._neighbours is not Neighbours.BORROW:
             return np.zeros(len(moment.names))
@@ -291,7 +290,7 @@ class Traffic:
             "knots": self._knots,
             "columns": self._columns,
             "drivers": {
-                name: [_plain(value) for value in own]
+                name: [np.asarray(value).tolist() for value in own]
                 for name, own in zip(self._names, self._state.tolist(), strict=True)
             },
             "groups": {key: {"members": members, **group.to_dict()} for key, (group, members) in self._groups.items()},
@@ -313,7 +312,8 @@ class Traffic:
         self._columns = None if state["columns"] is None else tuple(state["columns"])
         self._names = list(state["drivers"])
         self._index = {name: k for k, name in enumerate(self._names)}
-        self._state = np.array([tuple(map(_tupled, own)) for own in state["drivers"].values()], dtype=DRIVER)
+        rows = [tuple(tuple(one) if isinstance(one, list) else one for one in own) for own in state["drivers"].values()]
+        self._state = np.array(rows, dtype=DRIVER)
         self._groups = {}
         for key, saved in state["groups"].items():
             group = OffsetGroup(self._profiles[key], self._columns or ())
@@ -338,11 +338,3 @@ def _check(time: float, before: float | None, moment: Moment) -> None:
         if bad.any():
             row = int(np.flatnonzero(bad)[0])
             raise SimulationError(f"vehicle {moment.names[row]!r} at {time:g} s: {what} is {values[row]}")
-
-
-def _plain(value: Any) -> Any:
-    return value.tolist() if hasattr(value, "tolist") else value
-
-
-def _tupled(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value

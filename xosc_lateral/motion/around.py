@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.arrays import FloatArray, IntArray
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import BoundingBox
 from xosc_lateral.segment import FADES
@@ -74,7 +74,7 @@ class Others(NamedTuple):
 
     ahead: FloatArray
     left: FloatArray
-    oncoming: NDArray[np.bool_]
+    oncoming: BoolArray
 
 
 ZONES = {"lead": 0.0, "left": 1.0, "right": -1.0}
@@ -93,16 +93,9 @@ def see_along(
 ) -> Others:
     """Where others are along one's lane path, row by row: other moments, or other vehicles. Shape (n,) each.
 
-    Parameters
-    ----------
-    path : sequence of Reach
-        What `lane_path` gives; others elsewhere are not seen (NaN).
-    own_u, own_offset : array
-        Where one is on it, and from its lane's centre, positive left. [m]
-    road, s, t, direction : array
-        Where the other is, and which way it drives along s, +1 or -1; 0: it is on no lane. [-], [m], [m], [-]
-    centre_t : callable
-        t of a lane's centre, by road, lane and s. [m]
+    From where one is on the path (`lane_path`) and from its lane's centre, positive left [m]; where the other is, road,
+    s and t [m], and which way it drives along s, +1 or -1, 0 on no lane; and t of a lane's centre, by road, lane and s.
+    Others elsewhere are not seen (NaN).
     """
     n = len(own_u)
     seen = Others(np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool))
@@ -158,7 +151,7 @@ class Around:
         gap: FloatArray,
         width: FloatArray,
         other_width: float | FloatArray,
-        is_truck: NDArray[np.bool_],
+        is_truck: BoolArray,
     ) -> None:
         """Others, seen from the rows, which may come again; free space to them, own lane and their bodies wide. [m]
 
@@ -209,7 +202,7 @@ class _Side:
     def nobody(cls, n: int) -> _Side:
         return cls(np.full(n, np.nan), *np.zeros((4, n)))
 
-    def add(self, rows: IntArray, gap: FloatArray, share: FloatArray, is_truck: NDArray[np.bool_]) -> None:
+    def add(self, rows: IntArray, gap: FloatArray, share: FloatArray, is_truck: BoolArray) -> None:
         """More vehicles, each seen from a row, with free space `gap` [m], of which so much lies in the lane [-]."""
         np.fmin.at(self.distance, rows, gap - NEAR * np.log(share))
         influence = share * np.exp(-gap / NEAR)

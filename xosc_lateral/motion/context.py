@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from xosc_lateral.arrays import FloatArray, IntArray
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.motion.around import IN_SIGHT, REACH, Around, Extent, Others, Reach, free_space, lane_path, see_along
 from xosc_lateral.motion.nearby import stretches_within
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
@@ -38,22 +38,10 @@ TRUCKS = frozenset({VehicleCategory.TRUCK, VehicleCategory.SEMITRAILER, VehicleC
 
 
 def entity_context(motion: NominalMotion, network: RoadNetwork, index: int, grid: IntArray) -> dict[str, FloatArray]:
-    """Context of one vehicle on chosen rows.
+    """Context of the `index`-th vehicle of a motion on some of its rows, shape (n,) each, under DESIGN's names.
 
-    Parameters
-    ----------
-    motion : NominalMotion
-    network : RoadNetwork
-    index : int
-        Of the vehicle in ``motion.entities``.
-    grid : array of int, shape (n,)
-        Rows of the motion.
-
-    Returns
-    -------
-    dict of str to array, shape (n,)
-        Under DESIGN's names; NaN where there is none (no lane to that side; off the road), infinite where a lane has
-        nobody within reach. Weather that the scenario does not state is absent.
+    NaN where there is none (no lane to that side; off the road), infinite where a lane has nobody within reach. Weather
+    that the scenario does not state is absent.
     """
     entity = motion.entities[index]
     road = _road(entity, network, grid)
@@ -82,11 +70,14 @@ def _road(entity: EntityMotion, network: RoadNetwork, grid: IntArray) -> dict[st
     # Against the lane's traffic all is seen the other way round.
     along = np.where(np.cos(entity.heading_relative[rows]) < 0.0, -1.0, 1.0)
     values = road_columns(network, entity.road[rows], entity.lane[rows], entity.s[rows], entity.offset[rows], along)
-    context = {}
-    for name, part in values.items():
-        context[name] = np.full(len(grid), np.nan)
-        context[name][on] = part
-    return context
+    return {name: spread_out(part, on) for name, part in values.items()}
+
+
+def spread_out(values: FloatArray, where: BoolArray) -> FloatArray:
+    """As many values as there are rows `where` they belong, NaN in the others; shape of `where`."""
+    found = np.full(len(where), np.nan)
+    found[where] = values
+    return found
 
 
 def road_columns(
@@ -165,7 +156,7 @@ class _Traffic(NamedTuple):
     extent: Extent
     width: FloatArray
     """Of each, shape (entities,). [m]"""
-    is_truck: NDArray[np.bool_]
+    is_truck: BoolArray
 
     def of(self, others: IntArray, columns: IntArray) -> Iterator[NDArray[Any]]:
         """What `see_along` asks of some of them on some of the rows, one entity after the other."""
@@ -216,7 +207,7 @@ def _lanes_there(road: Mapping[str, FloatArray], step: float) -> dict[str, Float
     return {side: np.clip((share - _NONE) / (1.0 - 2.0 * _NONE), 0.0, 1.0) for side, share in shares.items()}
 
 
-def lanes_beside(road: Mapping[str, FloatArray]) -> dict[str, NDArray[np.bool_]]:
+def lanes_beside(road: Mapping[str, FloatArray]) -> dict[str, BoolArray]:
     """Whether there is a lane on each side, shape (n,) each."""
     index, count = road["lane_index"], road["lane_count"]
     return {"lead": index >= 0, "right": index > 0, "left": index < count - 1}
