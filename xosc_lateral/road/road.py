@@ -9,7 +9,6 @@ from math import inf, nan
 
 from xosc_lateral.road.geometry import Line, ReferenceElement
 from xosc_lateral.road.lanes import LaneSection
-from xosc_lateral.road.positions import RoadMark
 from xosc_lateral.road.surface import Surface
 
 
@@ -110,14 +109,3 @@ class Road:
         low = max(low, found.starts[j] if j else -inf)
         high = min(high, (*found.starts[j + 1 :], inf)[0])
         return low, high, element, self.starts[i], nan if any(found.centre[j][1:]) else found.centre[j][0]
-
-
-def road_marks(road: Road) -> tuple[RoadMark, ...]:
-    """Markings at the outer edges of all lanes, lane 0 included, section by section from left to right."""
-    marks: list[RoadMark] = []
-    for section in road.sections:
-        left = [lane for lane in section.lanes if lane.id > 0]
-        right = [lane for lane in section.lanes if lane.id < 0]
-        for lane in (*left, section.centre, *right):
-            marks += [mark for mark in lane.marks if mark.type != "none"]
-    return tuple(marks)

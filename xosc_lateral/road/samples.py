@@ -89,7 +89,8 @@ class Samples:
         if found.all():
             return hits
         far = self._nearest(np.flatnonzero(~found), x, y)
-        return joined(hits, far)
+        point, road = np.concatenate([hits.point, far.point]), np.concatenate([hits.road, far.road])
+        return Candidates(point, road, np.concatenate([hits.s, far.s]))
 
     def _in_cells(
         self, points: NDArray[np.int64], cells: NDArray[np.int64], x: FloatArray, y: FloatArray
@@ -134,11 +135,6 @@ class Samples:
         point_number = np.cumsum(new_point) - 1
         keep = chosen[distance[chosen] <= nearest[point_number[chosen]] + REACH]
         return Candidates(point[keep], self.road[sample[keep]], self.s[sample[keep]])
-
-
-def joined(*parts: Candidates) -> Candidates:
-    """All of them, one behind the other."""
-    return Candidates(*(np.concatenate(field) for field in zip(*parts, strict=True)))
 
 
 def _road_samples(

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -208,7 +208,10 @@ def read_esmini_log(path: Path) -> pd.DataFrame:
     """
     with open_source(path) as source, foreign_errors(path, "can't be read as a log of esmini"):
         text = unpacked_text(source)
-        names = _head(text, path)
+        head = (text.readline().decode("utf-8", "replace") for _ in range(MOST_LINES))
+        names = next((line.rstrip().rstrip(",").split(",") for line in head if line.startswith(HEAD)), None)
+        if names is None:
+            raise FormatError(f"a log of esmini without a line that begins with '{HEAD}'", path=path)
         table = pd.read_csv(text, header=None, names=range(len(names)), skipinitialspace=True, index_col=False)
     places: dict[str, dict[str, int]] = {}
     for column, name in enumerate(names):
@@ -225,11 +228,3 @@ def read_esmini_log(path: Path) -> pd.DataFrame:
     rows = pd.concat(frames, ignore_index=True)
     rows["vehicle"] = rows["vehicle"].astype(str).str.strip()
     return rows
-
-
-def _head(text: IO[bytes], path: Path) -> list[str]:
-    for _ in range(MOST_LINES):
-        line = text.readline().decode("utf-8", "replace")
-        if line.startswith(HEAD):
-            return line.rstrip().rstrip(",").split(",")
-    raise FormatError(f"a log of esmini without a line that begins with '{HEAD}'", path=path)
