@@ -56,16 +56,9 @@ class Samples:
         self._x0, self._y0 = float(self.x.min()) - CELL, float(self.y.min()) - CELL
         column, line = self._cell(self.x, self.y)
         self._lines = int(line.max()) + 2
-        self._file(column, line)
-
-    def _file(self, column: NDArray[np.int64], line: NDArray[np.int64]) -> None:
-        """Which samples lie in each cell and in those around it."""
-        keys, samples = [], []
-        for across in (-1, 0, 1):
-            for along in (-1, 0, 1):
-                keys.append((column + across) * self._lines + line + along)
-                samples.append(np.arange(len(self.x)))
-        key, sample = np.concatenate(keys), np.concatenate(samples)
+        around = [(across, along) for across in (-1, 0, 1) for along in (-1, 0, 1)]
+        key = np.concatenate([(column + across) * self._lines + line + along for across, along in around])
+        sample = np.tile(np.arange(len(self.x)), len(around))
         order = np.lexsort((self.piece[sample], key))
         self._sample = sample[order]
         self._cells, first = np.unique(key[order], return_index=True)
