@@ -187,10 +187,6 @@ class Written(Said):
     force: Force = False
 
 
-TOGETHER = (Mapped, Said, Written)
-"""Options that go together; a verb has them as one parameter."""
-
-
 def flags_of(settings: type, name: str) -> tuple[str, ...]:
     """How a setting is called on the command line."""
     from xosc_lateral.pipeline.options import options_of
@@ -224,25 +220,25 @@ def _read(settings: type, /, **said: Any) -> dict[str, Any]:
     return given
 
 
-def spelled_out(verb: Callable[..., Any], more: Sequence[Parameter] = ()) -> Callable[..., None]:
-    """The verb with each option that it has in a parameter of `TOGETHER` or, as a mapping, annotated with settings.
+def _is_settings(kind: Any) -> bool:
+    return isinstance(kind, type) and is_dataclass(kind)
 
-    Parameters
-    ----------
-    more : sequence of Parameter
-        What the verb takes as ``**others``.
+
+def spelled_out(verb: Callable[..., Any]) -> Callable[..., None]:
+    """The verb with options of its own for those that it has together in one parameter.
+
+    Such a parameter is a dataclass as `Said`, or a mapping that is annotated with a class of settings.
     """
     own = list[Parameter]()
     groups = dict[str, tuple[Callable[..., Any], list[Parameter]]]()
     for one in signature(verb, eval_str=True).parameters.values():
-        said = getattr(one.annotation, "__metadata__", ())
-        settings = next((kind for kind in said if isinstance(kind, type) and is_dataclass(kind)), None)
-        if one.annotation in TOGETHER:
+        settings = next(filter(_is_settings, getattr(one.annotation, "__metadata__", ())), None)
+        if settings is not None:
+            groups[one.name] = partial(_read, settings), _parameters(settings)
+        elif _is_settings(one.annotation):
             options = list(signature(one.annotation, eval_str=True).parameters.values())
             groups[one.name] = one.annotation, sorted(options, key=lambda option: option.name != "force")
-        elif settings is not None:
-            groups[one.name] = partial(_read, settings), _parameters(settings)
-        own += groups[one.name][1] if one.name in groups else [one] if one.kind is not one.VAR_KEYWORD else []
+        own += groups[one.name][1] if one.name in groups else [one]
 
     @wraps(verb)
     def run(**given: Any) -> None:
@@ -250,19 +246,17 @@ def spelled_out(verb: Callable[..., Any], more: Sequence[Parameter] = ()) -> Cal
             given[name] = made_of(**{option.name: given.pop(option.name) for option in options})
         verb(**given)
 
-    parameters = [one.replace(kind=one.KEYWORD_ONLY) for one in (*own, *more)]
+    parameters = [one.replace(kind=one.KEYWORD_ONLY) for one in own]
     run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
     return run
 
 
-def command(
-    group: typer.Typer, name: str, short: str, *examples: str, cls: Any = None, more: Sequence[Parameter] = ()
-) -> Callable[[Verb], Verb]:
-    """Add a verb to a group, with examples at the end of its help; `more`: see `spelled_out`."""
+def command(group: typer.Typer, name: str, short: str, *examples: str, cls: Any = None) -> Callable[[Verb], Verb]:
+    """Add a verb to a group, with examples at the end of its help."""
     epilog = "\b\nExamples:\n" + "\n".join(f"  xosc-lateral {line}" for line in examples)
 
     def add(verb: Verb) -> Verb:
-        group.command(name, cls=cls, short_help=short, epilog=epilog)(spelled_out(verb, more))
+        group.command(name, cls=cls, short_help=short, epilog=epilog)(spelled_out(verb))
         return verb
 
     return add

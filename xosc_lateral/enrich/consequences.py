@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from xosc_lateral.arrays import FloatArray
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.enrich.result import EntityResult, LaneDeparture
 from xosc_lateral.motion.gaps import BoxPath, Gap, smallest_gaps
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
@@ -57,7 +56,7 @@ def _lateral_within_a_lane(motion: EntityMotion) -> list[tuple[int, int]]:
     Lane changes cross markings anyway.
     """
 
-    def lateral(rows: slice) -> NDArray[np.bool_]:
+    def lateral(rows: slice) -> BoolArray:
         activity = motion.activity[rows]
         at_work = ((activity & Activity.LATERAL) != 0) & ((activity & Activity.ACTIVE) != 0)
         return np.asarray(at_work & (motion.road[rows] >= 0))

@@ -189,7 +189,7 @@ def accelerations_over_time(entities: Sequence[EntityResult]) -> Figure:
         panel.band(time[[0, -1]], -COMFORTABLE, COMFORTABLE, GRID, opacity=0.5)
         panel.line(time, added, ENRICHED, label="added")
         panel.title, panel.x.label = label_of(entity.name), "time [s]"
-    figure.panels[len(entities) // 2].y.label = "acceleration [m/s²]"
+    figure.panels[len(entities) // 2].y.label = "[m/s²]"
     return figure
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 
-REACH = 200.0  # [m]; who is farther away is none, as in `motion.context`
+REACH = 200.0  # [m]; who is farther away is none, as in `motion.around`
 LONGEST = 30.0  # [m]; no vehicle is longer (German road traffic regulations: 25.25 m)
 
 
