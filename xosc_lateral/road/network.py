@@ -14,6 +14,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from xosc_lateral.arrays import FloatArray, Int32Array
@@ -62,7 +63,6 @@ class RoadNetwork:
     _indices: dict[str, int] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Index the roads by id."""
         object.__setattr__(self, "road_ids", tuple(road.id for road in self.roads))
         object.__setattr__(self, "_indices", {road.id: i for i, road in enumerate(self.roads)})
 
@@ -97,11 +97,13 @@ class RoadNetwork:
 
     def offset_to_t(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, offset: ArrayLike) -> FloatArray:
         """Offset to the left of travel -> t from the reference line. [m]"""
-        return self._tables.offset_to_t(road, lane, s, offset)
+        profile = self._tables.lane_profile(road, lane, s)
+        return np.asarray(profile.centre + profile.direction * np.asarray(offset, dtype=np.float64))
 
     def t_to_offset(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, t: ArrayLike) -> FloatArray:
         """Inverse of `offset_to_t`. [m]"""
-        return self._tables.t_to_offset(road, lane, s, t)
+        profile = self._tables.lane_profile(road, lane, s)
+        return np.asarray(profile.direction * (np.asarray(t, dtype=np.float64) - profile.centre))
 
     def offset_from_offset_t(self, road: int, lane: int, offset_t: float) -> float:
         """OpenSCENARIO's LanePosition offset (along +t) -> offset (left of travel); its own inverse. [m]"""
@@ -317,8 +319,13 @@ class RoadNetwork:
         return tuple(mark for lane in every for mark in lane.marks if mark.type != "none")
 
     def mark_line(self, road: int, mark: RoadMark, *, step: float = 2.0) -> tuple[FloatArray, FloatArray]:
-        """Polyline x, y of a marking, for plots. [m]"""
-        return self._tables.mark_line(road, mark, step)
+        """Polyline x, y of a marking, the lane's outer edge (of lane 0 itself), for plots. Shape (n,) each. [m]"""
+        s = np.linspace(mark.s_start, mark.s_end, max(2, int(np.ceil((mark.s_end - mark.s_start) / step)) + 1))
+        # the end of a section belongs to the next one, which may not have the lane
+        inside = np.minimum(s, np.nextafter(mark.s_end, -np.inf))
+        profile = self._tables.lane_profile(road, mark.lane, inside)
+        poses = self.road_to_world(road, s, profile.centre + 0.5 * np.sign(mark.lane) * profile.width)
+        return poses.x, poses.y
 
 
 __all__ = ["DRIVING", "Chooser", "RoadNetwork"]

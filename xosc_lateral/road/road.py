@@ -64,7 +64,6 @@ class Road:
     is_flat: bool = field(init=False)
 
     def __post_init__(self) -> None:
-        """Keep what every look-up needs."""
         object.__setattr__(self, "section_starts", tuple(section.start for section in self.sections))
         heights = any(lane.heights for section in self.sections for lane in section.lanes)
         object.__setattr__(self, "is_flat", self.surface.is_flat and not heights)

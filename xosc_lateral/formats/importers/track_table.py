@@ -16,7 +16,7 @@ from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping, parse_map
 from xosc_lateral.formats.source import open_source
 from xosc_lateral.formats.states import COLUMNS
-from xosc_lateral.formats.tables import foreign_errors, numbers_of, read_table, unpacked_text
+from xosc_lateral.formats.tables import foreign_errors, listed, numbers_of, read_table, unpacked_text
 from xosc_lateral.lazy import pd
 
 if TYPE_CHECKING:
@@ -155,12 +155,8 @@ def _columns(table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequen
         header = next((by_lower[one] for one in headers if one in by_lower), None) if source is None else source.column
         if header is None or header not in table.columns:
             if source is not None or name in ("vehicle", "time", "x", "y"):
-                raise FormatError(
-                    f"no column {header or name!r}; there are {', '.join(map(str, table.columns[:20]))} "
-                    f"(translate with --map {name}=COLUMN)",
-                    path=path,
-                    line=1,
-                )
+                there = f"there are {listed(table.columns)} (translate with --map {name}=COLUMN)"
+                raise FormatError(f"no column {header or name!r}; {there}", path=path, line=1)
             continue
         column = table[header]
         if name in ("vehicle", "vehicle_class"):
