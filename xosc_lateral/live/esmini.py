@@ -216,7 +216,7 @@ class EsminiTraffic:
                 yield (self.player.SE_GetObjectName(number) or b"").decode(), state
 
     def _is_sound(self, name: str, state: ObjectState) -> bool:
-        """Whether it is a vehicle that says where it is; one that doesn't is left alone, and the user told once."""
+        """Whether it is a vehicle that says where it is; one that doesn't is left alone, which is a warning."""
         if state.type != _VEHICLE:
             return False
         numbers = {what: getattr(state, what) for what in ("x", "y", "h", "t", "s", "speed", "offset_t")}

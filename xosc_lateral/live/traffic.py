@@ -1,4 +1,4 @@
-"""Drivers of the vehicles of a running simulation: told once per step what it knows, they say where they are.
+"""Drivers of the vehicles of a running simulation: once per step they get what it knows, and say where they are.
 
 A driver goes on at the model's step (5 Hz), on what he sees at that moment; in between he follows the curve of
 `driver.upsampling`. What he sees he responds to a little later than in a conversion, which knows what comes
