@@ -154,10 +154,8 @@ class EsminiTraffic:
     def steer(self, dt: float) -> Moves:
         """Say where everybody is sideways after the next step of `dt` seconds; before ``SE_StepDT(dt)``.
 
-        Raises
-        ------
-        SimulationError
-            If what the simulation says can't be used; nothing was reported then, and the simulation can go on.
+        Raises `SimulationError` if what the simulation says can't be used; nothing was reported then, and the
+        simulation can go on.
         """
         seen = [(name, state) for name, state in self._objects() if self._is_sound(name, state)]
         moment = self._moment(seen, dt)
@@ -167,8 +165,7 @@ class EsminiTraffic:
                 direction = self.network.travel_direction(self._road(state), state.lane)
                 t = state.t + direction * float(moves.offset[row] - moment.offset[row])
                 self.player.SE_ReportObjectLateralPosition(state.id, t)
-        steered = zip(moment.names, moves.offset.tolist(), moves.steered.tolist(), strict=True)
-        self.moves = {name: (offset, own) for name, offset, own in steered}
+        self.moves = moves.by_name(moment.names)
         self._rates = dict(zip(moment.names, moves.rate.tolist(), strict=True))
         return moves
 

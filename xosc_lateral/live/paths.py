@@ -6,6 +6,7 @@ below 40 km/h there is less of the driver's movement.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -59,6 +60,10 @@ class Moves(NamedTuple):
     rate: FloatArray
     heading: FloatArray
     steered: BoolArray
+
+    def by_name(self, names: Sequence[str]) -> dict[str, tuple[float, bool]]:
+        """Offset [m], and whether it is the driver's, of each."""
+        return dict(zip(names, zip(self.offset.tolist(), self.steered.tolist(), strict=True), strict=True))
 
 
 def drive_on(
