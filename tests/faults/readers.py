@@ -38,7 +38,7 @@ from xosc_lateral.pipeline.manifest import MANIFEST, ManifestRow, read_manifest,
 from xosc_lateral.pipeline.settings import ConvertSettings, OutputMode
 from xosc_lateral.pipeline.verify import reproduce, verify
 from xosc_lateral.report.cards import card_text
-from xosc_lateral.report.scenario import facts
+from xosc_lateral.report.conversion import facts
 
 
 # ---- tables ----------------------------------------------------------------------------------------------------------

@@ -10,16 +10,14 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from tests.report.made_enriched import made_enriched
+from tests.report.made_enriched import converted, made_enriched
 from tests.road.places import hand_written
-from xosc_lateral.enrich.result import ConversionProvenance, ConvertedScenario
 from xosc_lateral.motion.nominal import Activity
-from xosc_lateral.pipeline.settings import ConvertSettings
 from xosc_lateral.report.chart import BLUE
+from xosc_lateral.report.conversion import as_text, facts
 from xosc_lateral.report.figure import Figure
 from xosc_lateral.report.frames import conversion_frame
 from xosc_lateral.report.road_lines import lane_surfaces, markings
-from xosc_lateral.report.scenario import as_text, facts
 from xosc_lateral.report.scenario_figures import thumbnail
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -188,16 +186,8 @@ def test_rows_of_one_moment_come_in_the_order_of_the_scenario(enriched):
     assert frame[frame["time"] == 0.0]["name"].tolist() == [one.name for one in enriched.entities]
 
 
-def _converted(enriched, **more) -> ConvertedScenario:
-    options = ConvertSettings(seed=7, parameters={"speed": "30"}).record(Path())
-    made = ConversionProvenance(
-        "0.1", 1, "in.xosc", {"in.xosc": "a" * 64}, {"Ego": ("calm", "b" * 64)}, options, 2, "1.2", (), {}, "d" * 64
-    )
-    return ConvertedScenario(Path("in.xosc"), Path("out.xosc"), "c" * 64, enriched, made, ("mind this",), **more)
-
-
 def test_facts_are_json_and_add_up_to_the_scenario(enriched):
-    found = json.loads(json.dumps(facts(_converted(enriched)), allow_nan=False))
+    found = json.loads(json.dumps(facts(converted(enriched, "mind this")), allow_nan=False))
     assert [one["name"] for one in found["entities"]] == ["Ego", "Van", "Slow"]
     assert found["entities"][2]["why_not"] == "below 40 km/h throughout" and found["entities"][2]["segments"] == []
     (ego,) = found["entities"][0]["segments"]
@@ -208,7 +198,7 @@ def test_facts_are_json_and_add_up_to_the_scenario(enriched):
 
 
 def test_a_conversion_says_of_every_entity_what_was_done_or_why_not(enriched):
-    lines = as_text(_converted(enriched), Path("page.html")).splitlines()
+    lines = as_text(converted(enriched, "mind this"), Path("page.html")).splitlines()
     assert lines[0] == "out.xosc" and lines[-1] == "report: page.html"
     assert "  Slow: as in the scenario (below 40 km/h throughout)" in lines
     assert "  warning: mind this" in lines

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.report.made_enriched import made_enriched
-from xosc_lateral.enrich.result import ConversionProvenance, ConvertedScenario
+from tests.report.made_enriched import converted, made_enriched
 from xosc_lateral.motion.gaps import Gap
 from xosc_lateral.motion.nominal import Note
-from xosc_lateral.pipeline.settings import ConvertSettings
 from xosc_lateral.report import scenario_figures as figures
-from xosc_lateral.report.scenario import conversion_page, scenario_page
+from xosc_lateral.report.scenario import conversion_page
 
 
 @pytest.fixture(scope="module")
@@ -28,8 +25,8 @@ def plain(enriched) -> str:
     return page(enriched)
 
 
-def page(enriched, **more) -> str:
-    return scenario_page(enriched, source="cut-in.xosc", output="out.xosc", provenance={"seed": 1}, **more)
+def page(enriched, *warnings: str) -> str:
+    return conversion_page(converted(enriched, *warnings))
 
 
 def text(html: str) -> str:
@@ -66,7 +63,7 @@ def test_what_was_not_played_is_named_with_file_and_line(tmp_path):
 def test_a_contact_that_enriching_caused_is_marked(enriched, plain):
     pair = ("Ego", "Slow")
     before = (Gap(pair, 0.4, 3.0),)
-    html = page(replace(enriched, gaps_before=before, gaps_after=(Gap(pair, 0.0, 3.1),)), warnings=["they touch"])
+    html = page(replace(enriched, gaps_before=before, gaps_after=(Gap(pair, 0.0, 3.1),)), "they touch")
     assert '<tr class="bad"><td>Ego and Slow</td>' in html
     assert "they touch" in html
     assert '<tr class="bad">' not in plain
@@ -83,26 +80,9 @@ def test_a_scenario_in_which_nothing_was_enriched_gets_a_page_that_says_so(enric
     assert "No two vehicles come that close to each other." in said
 
 
-def test_provenance_is_in_the_footer(enriched):
-    options = ConvertSettings(seed=7, parameters={"speed": "30"}).record(Path())
-    made = ConversionProvenance(
-        "0.1",
-        1,
-        "cut-in.xosc",
-        {"cut-in.xosc": "a" * 64},
-        {"Ego": ("calm", "b" * 64)},
-        options,
-        2,
-        "1.2",
-        (),
-        {},
-        "d" * 64,
-    )
-    conversion = ConvertedScenario(
-        Path("in/cut-in.xosc"), Path("out/lively.xosc"), "c" * 64, enriched, made, ("mind this",)
-    )
-    footer = text(conversion_page(conversion).split("<footer>")[1].join(["<body>", ""]))
-    for fact in ("seed 7", "variant 2", "speed = 30", f"Ego: calm ({'b' * 12})", f"cut-in.xosc ({'a' * 12})", "c" * 64):
+def test_provenance_is_in_the_footer(plain):
+    footer = text(plain.split("<footer>")[1].join(["<body>", ""]))
+    for fact in ("seed 7", "variant 2", "speed = 30", f"Ego: calm ({'b' * 12})", f"in.xosc ({'a' * 12})", "c" * 64):
         assert fact in footer
 
 

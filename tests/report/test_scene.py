@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from tests.motion.made_motion import drive, entity, together, two_roads
-from tests.report.made_enriched import made_enriched
+from tests.report.made_enriched import converted, made_enriched
 from xosc_lateral.enrich.result import Enriched
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.motion.trajectory import WorldTrajectory
-from xosc_lateral.report.scenario import scenario_page
+from xosc_lateral.report.scenario import conversion_page
 from xosc_lateral.report.scene import packed, scene_of
 from xosc_lateral.road.geometry import simplify
 
@@ -146,4 +146,4 @@ def test_a_page_with_no_present_entity_has_an_empty_player(enriched):
     gone = replace(alone, motion=replace(alone.motion, activity=np.zeros_like(alone.motion.activity)))
     nobody = replace(enriched, motion=together(gone.motion), entities=(gone,), gaps_before=(), gaps_after=())
     assert json.loads(enriched_scene(nobody))["entities"] == []
-    assert "Player" in scenario_page(nobody, source="a.xosc", output="b.xosc", provenance={})
+    assert "Player" in conversion_page(converted(nobody))

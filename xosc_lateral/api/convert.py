@@ -175,7 +175,7 @@ class Conversion(Result):
         return f"{where}: {len(self.enriched)} of {len(self.entities)} entities enriched{warned}"
 
     def __str__(self) -> str:
-        from xosc_lateral.report.scenario import as_text
+        from xosc_lateral.report.conversion import as_text
 
         return as_text(self._made, self.report)
 
@@ -192,7 +192,7 @@ class Conversion(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them."""
-        from xosc_lateral.report.scenario import facts
+        from xosc_lateral.report.conversion import facts
 
         return facts(self._made, self.report)
 

@@ -230,9 +230,12 @@ class Segments(Result):
         return f"{len(following)} road-following segments of {entities} entities, {seconds:.1f} s"
 
     def __str__(self) -> str:
-        from xosc_lateral.report.played import as_text
-
-        return as_text(self._rows)
+        width = max((len(row.entity) for row in self._rows), default=0)
+        return "\n".join(
+            f"{row.entity:<{width}}  {row.start:8.2f} - {row.end:8.2f} s  "
+            + (f"road {row.road} lane {row.lane}: road-following" if row.road_following else f"no: {row.why}")
+            for row in self._rows
+        )
 
     def to_frame(self) -> pd.DataFrame:
         """One row per segment: `entity`, `start`, `end` [s], `road_following`, `why`, `road`, `lane`."""

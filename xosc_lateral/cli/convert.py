@@ -89,9 +89,9 @@ def convert(
     from xosc_lateral.pipeline.request import is_single
 
     _refuse_together(settings)
-    options, strict = {**settings, "force": said.force}, settings["strict"]
+    options = {**settings, "force": said.force}
     if len(scenario) == 1 and is_single(scenario[0]):
-        _convert_one(Path(scenario[0]), output, options, variants, report, osi, strict, said)
+        _convert_one(Path(scenario[0]), output, options, variants, report, osi, said)
         return
     if osi is not None:
         raise typer.BadParameter("traces are written for a single scenario", param_hint="--osi")
@@ -102,7 +102,7 @@ def convert(
     options |= {"variants": variants, "report": report, "workers": jobs, "cluster": cluster, "keep_old": keep_old}
     options |= {"job_timeout": job_timeout, "job_memory": job_memory}
     options["show"] = "json" if log_json else "quiet" if said.quiet else "auto"
-    _convert_batch(scenario, output, options, strict, said)
+    _convert_batch(scenario, output, options, said)
 
 
 def _warn_if_cut_off(result: Conversion, unsaid: bool) -> None:
@@ -128,7 +128,6 @@ def _convert_one(
     variants: int,
     report: str | None,
     osi: str | None,
-    strict: bool,
     said: Written,
 ) -> None:
     from xosc_lateral.api.convert import convert, lifelike, osi_files, output_scenario
@@ -148,29 +147,29 @@ def _convert_one(
     else:
         written = lifelike(source) if output is None else output_scenario(output, source)
         page = None if report is None else output_file(report, f"{written.stem}.html", PAGE_SUFFIXES)
-        outputs = [numbered(written, variant, variants) for variant in range(variants)]
-        pages = [None if page is None else numbered(page, variant, variants) for variant in range(variants)]
         trace = None if osi is None else osi_files(osi, source)[0]
-        traces = [None if trace is None else numbered(trace, variant, variants) for variant in range(variants)]
-        both = [path for one in traces if one is not None for path in osi_files(one, source)]
+        files = [
+            [None if path is None else numbered(path, variant, variants) for path in (written, page, trace)]
+            for variant in range(variants)
+        ]
         osi_wanted(trace)
-        claim([*outputs, *pages, *both], [source], force=options["force"])
+        outputs, pages, traces = zip(*files, strict=True)
+        both = [path for one in traces if one is not None for path in osi_files(one, source)]
+        claim([*outputs, *pages, *both], [source], force=said.force)
         unclean = False
-        for variant, (path, its_page, trace) in enumerate(zip(outputs, pages, traces, strict=True)):
-            result = convert(source, path, variant=variant + 1, report=its_page, **options)
-            if trace is not None:
-                result.write_osi(trace, force=True)
+        for variant, (path, its_page, its_trace) in enumerate(files, start=1):
+            result = convert(source, path, variant=variant, report=its_page, **options)
+            if its_trace is not None:
+                result.write_osi(its_trace, force=True)
             said.say(result)
             _warn_if_cut_off(result, said.quiet or said.as_json)
             unclean |= bool(result.warnings) or not result.enriched
-    if strict and unclean:
+    if options["strict"] and unclean:
         raise typer.Exit(1)
 
 
-def _convert_batch(
-    inputs: Sequence[str], output: str | None, options: Mapping[str, Any], strict: bool, said: Written
-) -> None:
-    """Convert all of them; exit code 1 if any failed, or with `strict` if anything is to be said of any."""
+def _convert_batch(inputs: Sequence[str], output: str | None, options: Mapping[str, Any], said: Written) -> None:
+    """Convert all of them; exit code 1 if any failed, or with `--strict` if anything is to be said of any."""
     from xosc_lateral.api.batch import convert_many
 
     if output is None or output == "-":
@@ -194,5 +193,5 @@ def _convert_batch(
     said.say_words(str(result), {"kind": "summary", **result.totals()}, err=False)
     if result.cut_off and (said.quiet or said.as_json):
         warn([f"{len(result.cut_off)} runs end at the time limit, not by themselves: {result.cut_off[0]} is one"])
-    if result.failed or (strict and (result.with_warnings or result.nobody_enriched)):
+    if result.failed or (options["strict"] and (result.with_warnings or result.nobody_enriched)):
         raise typer.Exit(1)

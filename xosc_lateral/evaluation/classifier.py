@@ -43,16 +43,8 @@ class TwoSampleResult:
 def snippet_features(snippets: FloatArray, *, fast: bool = False) -> FloatArray:
     """Everything that gives a model away: values, differences, log spectrum, ten metrics, roughness, memory, shape.
 
-    Parameters
-    ----------
-    snippets : array, shape (n, m)
-        [m]
-    fast : bool
-        Also what second and third differences and an even spectrum show: fast movement, with its sensor, as recorded.
-
-    Returns
-    -------
-    array, shape (n, k)
+    `snippets`, shape (n, m) [m]; `fast`: also what second and third differences and an even spectrum show: fast
+    movement, with its sensor, as recorded. Returns shape (n, k).
     """
     difference = np.diff(snippets, axis=1)
     every = max(1, snippets.shape[1] // VALUES)

@@ -61,10 +61,7 @@ def metric_distances(real: FloatArray, other: FloatArray) -> Distances:
 
     Raises `NotEnoughDataError` if `real` has fewer than two snippets, so no standard deviation.
 
-    Parameters
-    ----------
-    real, other : array, shape (n, 10) and (m, 10)
-        Results of `snippet_metrics`; `real` sets the scale.
+    `real` and `other`, shape (n, 10) and (m, 10): results of `snippet_metrics`; `real` sets the scale.
     """
     if len(real) < 2 or len(other) < 1:
         raise NotEnoughDataError(f"{len(real)} real and {len(other)} other snippets; two and one are needed")
@@ -103,18 +100,9 @@ ORDER = 0.5  # Of the variogram score: the power that its authors found most sen
 def energy_score(real: FloatArray, ensemble: FloatArray) -> FloatArray:
     """Energy score of each window: a proper score, lowest on average for the truth.
 
-    Parameters
-    ----------
-    real : array, shape (n, m)
-        What was driven. [m]
-    ensemble : array, shape (n, k, m)
-        k sampled windows for each, k >= 2. [m]
-
-    Returns
-    -------
-    array, shape (n,)
-        Mean distance to the real window minus half the mean distance among the sampled ones; unbiased for small
-        ensembles. [m]
+    `real`, shape (n, m): what was driven; `ensemble`, shape (n, k, m): k sampled windows for each, k >= 2. [m] Returns
+    shape (n,): mean distance to the real window minus half the mean distance among the sampled ones; unbiased for small
+    ensembles. [m]
 
     References
     ----------
@@ -130,17 +118,8 @@ def energy_score(real: FloatArray, ensemble: FloatArray) -> FloatArray:
 def variogram_score(real: FloatArray, ensemble: FloatArray, *, every: int = 5) -> FloatArray:
     """Variogram score of each window: sees how values depend on one another, where the energy score is dull.
 
-    Parameters
-    ----------
-    real, ensemble : array, shape (n, m) and (n, k, m)
-        As in `energy_score`. [m]
-    every : int
-        Steps between the values that are paired: all pairs of a window of 51 values would be 2601.
-
-    Returns
-    -------
-    array, shape (n,)
-        Mean over the pairs. [m]
+    `real` and `ensemble`, shape (n, m) and (n, k, m): as in `energy_score`. [m]; `every`: steps between the values that
+    are paired: all pairs of a window of 51 values would be 2601. Returns shape (n,): mean over the pairs. [m]
 
     References
     ----------

@@ -26,17 +26,8 @@ THINNED = 0.5 / HIGHEST
 def below_half_hertz(path: FloatArray, step: float) -> FloatArray:
     """A path without its movement above 0.5 Hz.
 
-    Parameters
-    ----------
-    path : array, shape (n,)
-        Evenly in time; continued beyond its ends by its mirror image through the end point. [m]
-    step : float
-        At rates that show nothing above 0.5 Hz, the path stays as it is. [s]
-
-    Returns
-    -------
-    array, shape (n,)
-        [m]
+    `path`, shape (n,) [m], is evenly in time, and continued beyond its ends by its mirror image through the end point.
+    With a `step` [s] that shows nothing above 0.5 Hz it stays as it is.
     """
     if len(path) < 2 or 0.5 / step <= HIGHEST:
         return np.array(path)

@@ -50,15 +50,8 @@ def time_to_line_crossing(
 ) -> FloatArray:
     """Time until the side that the vehicle moves towards reaches its marking, at constant lateral speed.
 
-    Parameters
-    ----------
-    offset, lane_width : array, shape (..., m)
-        [m]
-
-    Returns
-    -------
-    array, shape (..., m - 1)
-        0 where the side is beyond the marking already, at most `LONGEST_TLC`. [s]
+    `offset` and `lane_width`, shape (..., m). [m] Returns shape (..., m - 1): 0 where the side is beyond the marking
+    already, at most `LONGEST_TLC`. [s]
     """
     speed = np.diff(offset, axis=-1) / step
     towards = np.sign(speed) * offset[..., 1:]

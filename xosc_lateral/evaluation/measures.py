@@ -94,11 +94,7 @@ UNITS = {"metrics": "sd", "lane_keeping": "sd", "spectrum": "dB", "memory": "-"}
 def differences(real: Features, other: Features, rows: IntArray, other_rows: IntArray) -> dict[str, float]:
     """How far apart two sets of windows are, by family.
 
-    Parameters
-    ----------
-    real, other : Features
-    rows, other_rows : array of int
-        Windows that count, and how often (a bootstrap repeats them).
+    `rows` and `other_rows`: windows that count, and how often (a bootstrap repeats them).
 
     Returns
     -------
@@ -191,13 +187,8 @@ def real_against_real(
 ) -> dict[str, float]:
     """`differences` of real windows of other drivers.
 
-    Parameters
-    ----------
-    real, donors : Features
-    rows, donor_rows : array of int, shape (n,) and (k,)
-        Windows that count.
-    stand_ins : array of int, shape (n, draws), optional
-        Rows of the donors with the same starts, averaged over the draws; without, all of `donor_rows` at once.
+    `rows` and `donor_rows`, shape (n,) and (k,): windows that count; `stand_ins`, shape (n, draws), optional: rows of
+    the donors with the same starts, averaged over the draws; without, all of `donor_rows` at once.
     """
     if stand_ins is None:
         return differences(real, donors, rows, donor_rows)

@@ -50,11 +50,7 @@ def variance_parts(windows: FloatArray, drivers: NDArray[np.generic]) -> Varianc
     One-way random effects on the windows' means, by the method of moments for unequal counts [1]_. Neighbouring
     windows of a driver are alike, so `between` holds what changes more slowly than a drive is long.
 
-    Parameters
-    ----------
-    windows : array, shape (n, m)
-        [m]
-    drivers : array, shape (n,)
+    `windows`, shape (n, m) [m]; `drivers`, shape (n,).
 
     References
     ----------
@@ -130,12 +126,7 @@ class Realism:
 def score_realism(profile: DriverProfile, runs: Sequence[Run], *, seed: int, classify: bool = True) -> Realism:
     """Compare a profile's snippets with real ones under every condition that has enough of them.
 
-    Parameters
-    ----------
-    runs : sequence of Run
-        Measured, at the profile's step.
-    classify : bool
-        Train classifiers too: most of the work.
+    `runs`: measured, at the profile's step; `classify`: whether to train classifiers too, most of the work.
     """
     step = profile.model.step
     driver = sample_runs(profile, runs, seed, same_start=False)

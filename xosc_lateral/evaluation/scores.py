@@ -59,12 +59,8 @@ def score_snippets(
     A half of real snippets is compared with its own sampled ones, and with the other real half: both distances rest on
     as many snippets, so that their ratio is fair.
 
-    Parameters
-    ----------
-    real, sampled : array, shape (n, m)
-        Row k of both starts at the same offset under the same context. [m]
-    group : array, shape (n,)
-        Never split between halves.
+    `real` and `sampled`, shape (n, m): row k of both starts at the same offset under the same context. [m]; `group`,
+    shape (n,): never split between halves.
     """
     rng = np.random.default_rng(seed)
     metrics, artificial = snippet_metrics(real), snippet_metrics(sampled)
@@ -136,12 +132,8 @@ def score_profile(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
 
     Raises `NotEnoughDataError` with fewer than `MIN_SNIPPETS` snippets of 10 s.
 
-    Parameters
-    ----------
-    runs : sequence of Run
-        At the profile's step.
-    classify : bool
-        Whether to train the classifiers (a minute or two for some hours of driving).
+    `runs`: at the profile's step; `classify`: whether to train the classifiers (a minute or two for some hours of
+    driving).
     """
     step = profile.model.step
     short = _enough(snippets_of(runs, SNIPPET, step))

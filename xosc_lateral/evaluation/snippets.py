@@ -66,10 +66,7 @@ class Snippets:
 def snippets_of(runs: Sequence[Run], seconds: float, step: float, *, by_block: bool | None = None) -> Snippets:
     """All whole snippets, one after the other in each run, both ends counted (51 values for 10 s at 5 Hz).
 
-    Parameters
-    ----------
-    by_block : bool, optional
-        Whether groups are blocks of a drive; without, where there are fewer than `FEW_DRIVES` drives.
+    `by_block`: whether groups are blocks of a drive; without, where there are fewer than `FEW_DRIVES` drives.
     """
     length = round(seconds / step) + 1
     items = tuple(cut_snippets(runs, seconds, step)) if any(len(run) >= length for run in runs) else ()

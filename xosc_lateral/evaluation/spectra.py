@@ -79,12 +79,7 @@ class Spectrum:
 def spectrum(runs: Sequence[FloatArray], step: float) -> Spectrum:
     """Power density by Welch's method (Hann windows, half overlapping, mean removed), pooled over runs.
 
-    Parameters
-    ----------
-    runs : sequence of array, shape (n_i,)
-        Offsets of uninterrupted driving at an even step. [m]
-    step : float
-        [s]
+    `runs`, shape (n_i,) each: offsets [m] of uninterrupted driving at an even `step` [s].
     """
     by_length = {length: _periodogram(runs, length, step) for length in SEGMENTS}
     centres, densities, windows = [], [], []
@@ -121,10 +116,7 @@ def autocorrelation(runs: Sequence[FloatArray], lags: Sequence[int]) -> FloatArr
 
     Differences between drivers count: they don't decay.
 
-    Returns
-    -------
-    array, shape (len(lags),)
-        Lags that no run reaches get 0.
+    Returns shape (len(lags),): lags that no run reaches get 0.
     """
     everything = np.concatenate(list(runs))
     mean, variance = everything.mean(), everything.var()

@@ -60,7 +60,7 @@ def drives_of_table(table: pd.DataFrame, mapping: MappingLike, path: Path | str 
     if not len(table):
         raise NotEnoughDataError(f"{path}: the table has no rows; {MIN_RUN:g} s of driving are needed")
     columns = _numeric_columns(table, path)
-    levels = frozenset(name for name, values in columns.items() if _may_hold_levels(name) and _holds_levels(values))
+    levels = frozenset(name for name, values in columns.items() if _holds_levels(name, values))
     _require_columns(columns, path)
     names, every = _drive_names(table, path)
     drives = [
@@ -137,12 +137,10 @@ def _leave_out_nonsense(values: FloatArray, name: str, path: Path) -> None:
     values[wrong] = np.nan
 
 
-def _may_hold_levels(name: str) -> bool:
+def _holds_levels(name: str, values: FloatArray) -> bool:
     """Counts, indices and flags do; a speed that happens to be constant doesn't."""
-    return name not in OWN and CONTEXT_UNITS.get(name, "-") == "-"
-
-
-def _holds_levels(values: FloatArray) -> bool:
+    if name in OWN or CONTEXT_UNITS.get(name, "-") != "-":
+        return False
     known = values[~np.isnan(values)]
     return bool(np.all(known == np.round(known)) and len(np.unique(known)) <= MAX_LEVELS)
 

@@ -255,14 +255,13 @@ def matching(entries: Iterable[Entry], tags: Collection[str], where: Mapping[str
     for field in where:
         if field not in (*FIELDS, "id", "model"):
             raise XoscLateralError(f"profiles have no field {field!r}; there are id, model, {', '.join(FIELDS)}")
-    wanted = {tag.casefold() for tag in tags}
-    return [entry for entry in entries if entry.profile is not None and _matches(entry.profile, wanted, where)]
-
-
-def _matches(profile: DriverProfile, tags: set[str], where: Mapping[str, str]) -> bool:
-    facts = facts_of(profile)
-    carried = {tag.casefold() for tag in profile.metadata.tags}
-    return tags <= carried and all(facts[field].casefold() == value.casefold() for field, value in where.items())
+    wanted, found = {tag.casefold() for tag in tags}, []
+    for entry in entries:
+        if entry.profile is not None and wanted <= {tag.casefold() for tag in entry.profile.metadata.tags}:
+            facts = facts_of(entry.profile)
+            if all(facts[field].casefold() == value.casefold() for field, value in where.items()):
+                found.append(entry)
+    return found
 
 
 def facts_of(profile: DriverProfile) -> dict[str, str]:

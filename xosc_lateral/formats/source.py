@@ -52,8 +52,16 @@ class Source:
     size: int  # [byte]
 
     def unpacked(self, size: int) -> None:
-        """Refuse what unpacks to more than its size can hold. Raises `FormatError`: see `check_unpacked`."""
-        check_unpacked(size, self.size, self.path)
+        """Refuse a packed file that would take all memory; `size`: unpacked so far. [byte]
+
+        Raises `FormatError`: above `limits.UNPACKED_SIZE`, or above `UNPACKED_UNASKED` and `PACKING_RATIO`.
+        """
+        if size > UNPACKED_SIZE.bytes:
+            raise FormatError(UNPACKED_SIZE.refusal(size / 1e6), path=self.path)
+        ratio = size / max(self.size, 1)
+        if size > UNPACKED_UNASKED.bytes and ratio > PACKING_RATIO.value:
+            what = f"{PACKING_RATIO.refusal(ratio)} above {UNPACKED_UNASKED}; it looks like a decompression bomb"
+            raise FormatError(what, path=self.path)
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,22 +139,6 @@ def check_regular(path: Path) -> os.stat_result:
 def state_key(state: os.stat_result) -> tuple[int, ...]:
     """Changes whenever a file is replaced or written to, also by tools that put its time of change back."""
     return state.st_ino, state.st_ctime_ns, state.st_mtime_ns, state.st_size
-
-
-def check_unpacked(unpacked: int, packed: int, path: Path) -> None:
-    """Refuse a packed file that would take all memory.
-
-    Raises `FormatError`: Above `limits.UNPACKED_SIZE`, or above `limits.UNPACKED_UNASKED` and `limits.PACKING_RATIO`.
-
-    `unpacked`, `packed`: [byte]
-    """
-    if unpacked > UNPACKED_SIZE.bytes:
-        raise FormatError(UNPACKED_SIZE.refusal(unpacked / 1e6), path=path)
-    ratio = unpacked / max(packed, 1)
-    if unpacked > UNPACKED_UNASKED.bytes and ratio > PACKING_RATIO.value:
-        raise FormatError(
-            f"{PACKING_RATIO.refusal(ratio)} above {UNPACKED_UNASKED}; it looks like a decompression bomb", path=path
-        )
 
 
 @contextmanager

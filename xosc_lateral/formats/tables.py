@@ -5,13 +5,13 @@ from __future__ import annotations
 import codecs
 import gzip
 import io
+import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import FormatError, XoscLateralError
@@ -54,26 +54,18 @@ def seconds_of_text(column: pd.Series) -> FloatArray | None:
     known = column.dropna().astype(str).str.strip()
     if known.empty:
         return None
-    seconds = _clock_seconds(known) if known.str.fullmatch(_CLOCK).all() else _since_the_earliest(known)
-    if seconds is None:
-        return None
-    found = pd.Series(seconds, index=known.index).reindex(column.index)
-    return np.array(found, dtype=np.float64)
-
-
-def _since_the_earliest(known: pd.Series) -> FloatArray | None:
-    """Seconds of dates with times; None where one is none."""
-    stamps = _stamps(known.str.replace(r"(?<=\d),(?=\d)", ".", regex=True))
-    if stamps is None:
-        return None
-    return np.asarray((stamps - stamps.min()).dt.total_seconds().to_numpy())
-
-
-def _clock_seconds(clock: pd.Series) -> FloatArray:
-    parts = clock.str.replace(",", ".", regex=False).str.split(":", expand=True).astype(float).fillna(0.0).to_numpy()
-    seconds = parts @ np.array([3600.0, 60.0, 1.0])[: parts.shape[1]]
-    past_midnight = np.cumsum(np.diff(seconds, prepend=seconds[0]) < -0.5 * _DAY)
-    return np.asarray(seconds + _DAY * past_midnight)
+    if known.str.fullmatch(_CLOCK).all():
+        clock = known.str.replace(",", ".", regex=False).str.split(":", expand=True)
+        parts = clock.astype(float).fillna(0.0).to_numpy()
+        seconds = parts @ np.array([3600.0, 60.0, 1.0])[: parts.shape[1]]
+        past_midnight = np.cumsum(np.diff(seconds, prepend=seconds[0]) < -0.5 * _DAY)
+        seconds = seconds + _DAY * past_midnight
+    else:
+        stamps = _stamps(known.str.replace(r"(?<=\d),(?=\d)", ".", regex=True))
+        if stamps is None:
+            return None
+        seconds = (stamps - stamps.min()).dt.total_seconds().to_numpy()
+    return np.array(pd.Series(seconds, index=known.index).reindex(column.index), dtype=np.float64)
 
 
 def _stamps(text: pd.Series) -> pd.Series | None:
@@ -114,16 +106,13 @@ def indicators(name: str, column: pd.Series, drives: pd.Series | None, most: int
     Empty if it has more than `most` values, or changes in no drive: then it is a label, not a context.
     """
     codes, values = column.factorize()
-    if not 2 <= len(values) <= most or not _changes(codes, drives):
+    if not 2 <= len(values) <= most:
         return {}
+    if drives is not None:
+        by_drive = pd.Series(codes).groupby(drives.to_numpy())
+        if not (by_drive.max() > by_drive.min()).any():
+            return {}
     return {f"{name}={value}": (codes == k).astype(np.float64) for k, value in enumerate(values)}
-
-
-def _changes(codes: NDArray[np.intp], drives: pd.Series | None) -> bool:
-    if drives is None:
-        return True
-    by_drive = pd.Series(codes).groupby(drives.to_numpy())
-    return bool((by_drive.max() > by_drive.min()).any())
 
 
 PARQUET = ".parquet"
@@ -252,21 +241,18 @@ def _read_parquet(source: Source) -> pd.DataFrame:
         about = file.metadata
         groups = range(about.num_row_groups)
         source.unpacked(max(0, sum(about.row_group(group).total_byte_size for group in groups)))
-        _check_size(about.num_rows, about.num_columns, source)
+        rows, columns = about.num_rows, about.num_columns
+        if columns > TABLE_COLUMNS.value:
+            raise FormatError(TABLE_COLUMNS.refusal(columns), path=source.path)
+        if rows * columns > TABLE_CELLS.value:
+            raise FormatError(TABLE_CELLS.refusal(rows * columns), path=source.path)
+        source.unpacked(rows * columns * _DOUBLE)  # a thousand million equal values take a few bytes in the file
         table: pd.DataFrame = file.read().to_pandas()
     if not table.columns.is_unique:
         raise FormatError(
             f"column {str(table.columns[table.columns.duplicated()][0])!r} appears twice", path=source.path
         )
     return table
-
-
-def _check_size(rows: int, columns: int, source: Source) -> None:
-    if columns > TABLE_COLUMNS.value:
-        raise FormatError(TABLE_COLUMNS.refusal(columns), path=source.path)
-    if rows * columns > TABLE_CELLS.value:
-        raise FormatError(TABLE_CELLS.refusal(rows * columns), path=source.path)
-    source.unpacked(rows * columns * _DOUBLE)  # a thousand million equal values take a few bytes in the file
 
 
 def _separator(text: IO[bytes], path: Path) -> str:
@@ -287,8 +273,6 @@ def _separator(text: IO[bytes], path: Path) -> str:
 
 
 def _as_text(value: object) -> str:
-    import json
-
     if value is None or type(value).__name__ in ("NAType", "NaTType") or (isinstance(value, float) and value != value):
         return ""
     return json.dumps(value) if isinstance(value, dict | list) else str(value)

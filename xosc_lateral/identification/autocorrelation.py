@@ -171,11 +171,7 @@ def start_factors(rows: FloatArray, valid: BoolArray, order: int) -> FloatArray:
     The process says how well a row is predicted from the few before it, if the run is a piece of a stationary movement.
     Runs begin where something ended, a lane change for one: their first rows may be off by more.
 
-    Parameters
-    ----------
-    rows : array, shape (n,)
-        Whitened.
-    valid : bool array, shape (n,)
+    `rows`, shape (n,): whitened; `valid`, shape (n,).
     """
     position = positions_in_run(valid)
     early, late = (position >= 0) & (position < order), position >= order

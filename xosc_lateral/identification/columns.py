@@ -90,15 +90,7 @@ def proposed_role(column: str) -> Role:
 def roles_of(timeline: Timeline, names: Iterable[str], declared: Mapping[str, str]) -> dict[str, Assigned]:
     """Role of each column of a table.
 
-    Parameters
-    ----------
-    declared : mapping of str to str
-        Column -> role.
-
-    Raises
-    ------
-    FormatError
-        A role that there is not, or a column that the table lacks.
+    `declared`: column -> role. Raises `FormatError` for a role that there is not, or a column that the table lacks.
     """
     names = list(names)
     for column, word in declared.items():

@@ -19,6 +19,7 @@ from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import Effect
 from xosc_lateral.identification.autocorrelation import Whitener
 from xosc_lateral.identification.innovations import innovations
+from xosc_lateral.identification.refinement import Alternatives
 from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.timeline import Coarse, on_fine_grid
 
@@ -86,7 +87,6 @@ class Term(ABC):
     # Among those of a stage: smaller ones are asked first, and first where two are equally sure; then by name. [-]
     place: ClassVar[int] = 0
     weight: ClassVar[float]  # Of its component in the error budget; one for each kind of hidden effect. [-]
-    least_drives: ClassVar[int] = 1  # In a table in which it is tested.
     # Whether the mean or the innovations' scale follow terms of this class on held-out rows: not the latent path of a
     # cycle, nor what changes the slow movement alone.
     seen_held_out: ClassVar[bool] = True
@@ -94,6 +94,11 @@ class Term(ABC):
     @property
     def columns(self) -> tuple[str, ...]:
         """Context columns that it reads; empty: hidden."""
+        return ()
+
+    @property
+    def alike(self) -> Alternatives:
+        """Columns of each other effect that explains as much."""
         return ()
 
     @property
@@ -133,7 +138,7 @@ class Term(ABC):
     @classmethod
     def passes(cls, search: Search, p_value: float, fitted: Fitted) -> bool:
         """Whether the best that was found of its component is good enough to be added to the terms fitted."""
-        if p_value <= search.level_of(cls.component):
+        if p_value <= search.levels[cls.component]:
             return True
         there = sum(term.component == cls.component for term in fitted.terms)
         return search.wanted is not None and there < search.wanted.get(cls.component, 0)
@@ -156,6 +161,10 @@ class Term(ABC):
         """Add what the term did to the measured offsets; hidden ones as they most likely were."""
         coarse, path = fitted.coarse, latent_path(self, fitted)
         removal.location += on_fine_grid(path - path[coarse.valid].mean(), coarse.timeline)
+
+    def quantity(self, coarse: Coarse, effects: tuple[Effect, ...]) -> FloatArray | None:
+        """What the residual is compared by, on the 0.2 s grid, shape (fine n,); None: nothing of its own."""
+        return None
 
     @abstractmethod
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:

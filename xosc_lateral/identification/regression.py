@@ -1,7 +1,7 @@
 """The fit of all terms of the model together.
 
-Mean terms are fitted jointly by generalised least squares, scale terms by iterated
-regression of squared innovations [1]_: adding a term corrects the ones found before.
+Mean terms are fitted jointly by generalised least squares, scale terms by iterated regression of squared innovations
+[1]_: adding a term corrects the ones found before.
 
 References
 ----------
@@ -14,24 +14,19 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from xosc_lateral.arrays import FloatArray, IntArray
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression, start_factors, unbiased
-from xosc_lateral.identification.innovations import (
-    LONGEST,
-    ORDER,
-    bounded,
-    clipped_squares,
-    covariance_of_log_sizes,
-    own_levels,
-    scoring_step,
-)
+from xosc_lateral.identification.innovations import CLIP, LONGEST, ORDER, own_levels
 from xosc_lateral.identification.model import Fitted, Term, joined
-from xosc_lateral.identification.timeline import Coarse
+from xosc_lateral.identification.timeline import CLUSTER_S, Coarse, means_by_drive
 
 # White noise that the model of a drive has beside what it shows: no table knows the lane better (in the motorway
 # recording the standard error of a lane's centre is 0.03 m; docs/real_data.md). Providers smooth their tracks,
 # responses and all; without a floor an effect is sized where the smoothing left nothing of it. [m]
 FLOOR = 0.03
+# Scale terms together change the movement by at most this factor's logarithm, 20 either way: scoring steps of a factor
+# that the movement contradicts grow without end. [-]
+MOST_LOG_SCALE = 3.0
 ROUNDS = 4  # Turns of sizes, autoregression and scale; they settle in three.
 
 
@@ -106,3 +101,39 @@ def clustered_least_squares(
     clusters = int(np.count_nonzero(scores.any(axis=1)))
     freedom = clusters / max(1, clusters - 1) * (len(observed) - 1) / max(1, len(observed) - design.shape[1])
     return sizes, np.asarray(inverse @ (scores.T @ scores) @ inverse * freedom, dtype=np.float64)
+
+
+def clipped_squares(rows: FloatArray, valid: BoolArray) -> FloatArray:
+    """Squares over their mean where valid, at most `CLIP`, shape (n,). [-]"""
+    return np.asarray(np.minimum(np.square(rows) / max(float(np.mean(rows[valid] ** 2)), 1e-300), CLIP))
+
+
+def _within_drives(scales: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
+    """Valid rows of the scale's columns about their drive's mean."""
+    means = np.stack([means_by_drive(column, valid, drive) for column in scales.T], axis=1)
+    return np.asarray((scales - means[drive])[valid])
+
+
+def scoring_step(scales: FloatArray, rows: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
+    """One Fisher-scoring step [-], shape (j,), for log sd = scales . sizes (variance of a squared normal is 2)."""
+    squares, design = clipped_squares(rows, valid)[valid], _within_drives(scales, valid, drive)
+    return np.asarray(np.linalg.pinv(2.0 * design.T @ design) @ (design.T @ (squares / squares.mean() - 1.0)))
+
+
+def bounded(log_sizes: FloatArray, scales: FloatArray) -> FloatArray:
+    """Log sizes [-], shape (j,), scaled down as a whole so that no row's log scale is beyond `MOST_LOG_SCALE`."""
+    reach = float(np.max(np.abs(scales @ log_sizes), initial=0.0))
+    return log_sizes * min(1.0, MOST_LOG_SCALE / max(reach, 1e-300))
+
+
+def covariance_of_log_sizes(scales: FloatArray, rows: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
+    """Sandwich, clustered like that of the mean, shape (j, j): squares have heavy tails and come in clusters."""
+    if scales.shape[1] == 0:
+        return np.zeros((0, 0))
+    design = _within_drives(scales, valid, drive)
+    bread = np.linalg.pinv(2.0 * design.T @ design)
+    squares = clipped_squares(rows, valid)[valid]
+    scores = design * (squares / squares.mean() - 1.0)[:, None]
+    edges = np.flatnonzero(np.diff(np.flatnonzero(valid) // CLUSTER_S, prepend=-1))
+    sums = np.add.reduceat(scores, edges, axis=0)
+    return np.asarray(bread @ (sums.T @ sums) @ bread * len(sums) / max(1, len(sums) - 1))

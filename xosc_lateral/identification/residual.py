@@ -21,12 +21,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from xosc_lateral.arrays import BoolArray, FloatArray, IndexArray
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import OffsetSampler
 from xosc_lateral.driver.seeds import child
 from xosc_lateral.drives.resampling import in_digits
-from xosc_lateral.identification.timeline import LOCAL_S, PAD, Timeline, local_mean
+from xosc_lateral.identification.timeline import LOCAL_S, PAD, Timeline, local_mean, smoothed
 from xosc_lateral.segment import Segment
 
 N_BINS = 5  # Bins of a column, equally filled.
@@ -49,9 +49,9 @@ class SummaryStatistics:
     """What is compared, once for measured and sampled offsets alike."""
 
     timeline: Timeline
-    labels: Mapping[str, IndexArray]  # shape (n,): Bin of every row by group (a column's name, "time", ...), -1: none.
+    labels: Mapping[str, IntArray]  # shape (n,): Bin of every row by group (a column's name, "time", ...), -1: none.
     middles: Mapping[str, FloatArray]  # Mean of the quantity per bin, for curves.
-    oscillation: float | None = None  # Frequency of a weave that was found. [1/s]
+    oscillation: float | None = None  # Frequency of a cycle that was found. [1/s]
 
     def describe(self, offset: FloatArray, used: BoolArray) -> dict[str, FloatArray]:
         """Statistics of one series of offsets on the grid, shape (n,), by group. [m]"""
@@ -148,16 +148,12 @@ def error_between(first: Mapping[str, FloatArray], second: Mapping[str, FloatArr
 
 
 def half_samples(
-    statistics: SummaryStatistics, offset: FloatArray, blocks: IndexArray, rng: np.random.Generator, draws: int = DRAWS
+    statistics: SummaryStatistics, offset: FloatArray, blocks: IntArray, rng: np.random.Generator, draws: int = DRAWS
 ) -> list[dict[str, FloatArray]]:
     """Random halves of the blocks less all of them: their variance is that of all of them about the truth [2]_.
 
-    Parameters
-    ----------
-    offset : array, shape (n,)
-        Measured, less the effects on the mean that are known: where the car should be is no chance. [m]
-    blocks : int array, shape (n,)
-        What is drawn: whole ones.
+    `offset`, shape (n,) [m]: measured, less the effects on the mean that are known: where the car should be is no
+    chance. `blocks`, shape (n,): what is drawn, as a whole.
     """
     valid = statistics.timeline.valid
     numbers, whole = np.unique(blocks[valid]), statistics.describe(offset, valid)
@@ -250,7 +246,7 @@ def _mean_of_finite(values: FloatArray) -> FloatArray:
     return np.where(count > 0, np.nansum(values, axis=0) / np.maximum(count, 1), np.nan)
 
 
-def _by_bin(values: FloatArray, label: IndexArray, used: BoolArray) -> FloatArray:
+def _by_bin(values: FloatArray, label: IntArray, used: BoolArray) -> FloatArray:
     inside = used & (label >= 0)
     size = int(label.max()) + 1
     count = np.bincount(label[inside], minlength=size)
@@ -261,8 +257,7 @@ def _by_bin(values: FloatArray, label: IndexArray, used: BoolArray) -> FloatArra
 def _bands(offset: FloatArray, used: BoolArray, timeline: Timeline) -> FloatArray:
     if not used.any():
         return np.full(len(BANDS_S) + 1, np.nan)
-    levels = [offset, *(local_mean(offset, timeline.valid, seconds, timeline.step) for seconds in BANDS_S)]
-    inside = [level[used] for level in levels]
+    inside = [level[used] for level in (offset, *smoothed(offset, timeline, BANDS_S))]
     bands = [np.std(finer - coarser) for finer, coarser in pairwise(inside)]
     return np.array([*bands, np.std(inside[-1])])
 
@@ -282,7 +277,7 @@ def _amplitude(offset: FloatArray, used: BoolArray, timeline: Timeline, frequenc
     return float(np.sqrt(squares / max(rows, 1)))
 
 
-def _binned(values: FloatArray, valid: BoolArray, none: BoolArray) -> tuple[IndexArray, FloatArray]:
+def _binned(values: FloatArray, valid: BoolArray, none: BoolArray) -> tuple[IntArray, FloatArray]:
     """Fifths of what there is, then a bin of its own where there is none; with the mean of each, NaN for that one."""
     seen = values[valid & ~none]
     edges = np.unique(np.quantile(seen, np.linspace(0.0, 1.0, N_BINS + 1)[1:-1])) if len(seen) else np.zeros(0)
@@ -296,7 +291,7 @@ def _binned(values: FloatArray, valid: BoolArray, none: BoolArray) -> tuple[Inde
     return label.astype(np.intp), middle
 
 
-def _time_bins(timeline: Timeline, parts: int = 6) -> tuple[IndexArray, FloatArray]:
+def _time_bins(timeline: Timeline, parts: int = 6) -> tuple[IntArray, FloatArray]:
     label = np.full(len(timeline), -1, dtype=np.intp)
     for span in timeline.spans:
         rows = np.arange(span.start, span.stop)

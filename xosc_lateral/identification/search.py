@@ -12,7 +12,6 @@ from xosc_lateral.arrays import FloatArray
 from xosc_lateral.identification.candidates import candidates_of
 from xosc_lateral.identification.columns import Column
 from xosc_lateral.identification.dictionary import CROSS_BASIS, TIMINGS, Quantities, orthonormal
-from xosc_lateral.identification.significance import Budget
 from xosc_lateral.identification.timeline import Coarse
 
 # Products are tried among so many columns at most, those whose role is known first: sixty more columns must not cost
@@ -30,7 +29,7 @@ class Search:
     columns: Mapping[str, Column]  # That may act.
     quantities: Quantities
     seed: np.random.SeedSequence
-    budget: Budget  # How surely each component has to be found.
+    levels: Mapping[str, float]  # Family-wise p-value up to which the best of each component counts as found.
     progress: Callable[[str], None]  # Gets what is being done, in a few words.
     # How many terms a component has in the table that this is a part of: so many are added, best first, whatever their
     # p-values, and components that have none are not tested. None: this is the table.
@@ -43,7 +42,7 @@ class Search:
         coarse: Coarse,
         columns: list[Column],
         seed: np.random.SeedSequence,
-        budget: Budget,
+        levels: Mapping[str, float],
         progress: Callable[[str], None] = lambda _: None,
     ) -> Search:
         """Evaluate all candidates once."""
@@ -51,7 +50,7 @@ class Search:
         seen = {column.name: coarse.context[column.name][inside] for column in columns}
         candidates = candidates_of(columns, seen, most=MAX_PRODUCT_COLUMNS)
         quantities = Quantities.of(candidates, coarse.timeline, coarse.context, coarse.valid)
-        return cls(coarse, {column.name: column for column in columns}, quantities, seed, budget, progress)
+        return cls(coarse, {column.name: column for column in columns}, quantities, seed, levels, progress)
 
     def once(self, kind: object, fitted: object, make: Callable[[], Any]) -> Any:
         """What is worked out for one kind of term beside one fit, as it was or else now; the last few are kept.
@@ -75,10 +74,6 @@ class Search:
             response = self.quantities.responses(np.flatnonzero(own), response_s)
             blocks += [response[np.clip(seconds - lag, 0, len(seconds) - 1)] * valid for lag in lags]
         return orthonormal(np.concatenate(blocks, axis=1).astype(np.float64), CROSS_BASIS)
-
-    def level_of(self, component: str) -> float:
-        """Family-wise level that a component may spend."""
-        return self.budget.level_of(component, self.coarse.drives)
 
     def rng(self, *key: int) -> np.random.Generator:
         """Independent stream by purpose."""

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 from xosc_lateral.identification import terms
 from xosc_lateral.identification.model import Fitted, Stage, Term
-from xosc_lateral.identification.refinement import Alternatives
 from xosc_lateral.identification.regression import fit_model
 from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.significance import Budget
+from xosc_lateral.identification.significance import BUDGET
 from xosc_lateral.normal import NORMAL_95
 from xosc_lateral.plugins import defined_in
 
@@ -24,11 +23,14 @@ def in_stages(kinds: tuple[type[Term], ...]) -> tuple[tuple[type[Term], ...], ..
     return tuple(tuple(kind for kind in asked if stage in kind.stages) for stage in Stage)
 
 
-def shared_among(kinds: tuple[type[Term], ...]) -> Budget:
-    """The error budget by the terms' own weights; those of one component compete, and share one part of it."""
-    return Budget(
-        {kind.component: kind.weight for kind in kinds}, {kind.component: kind.least_drives for kind in kinds}
-    )
+def shared_among(kinds: tuple[type[Term], ...]) -> dict[str, float]:
+    """Part of the error budget of every component, by the terms' own weights; those of one component share a part.
+
+    Where nothing can be asked of a component, its part is not spent: a table on which something acts is searched again
+    beside it, at the same levels.
+    """
+    weights = {kind.component: kind.weight for kind in kinds}
+    return {component: BUDGET * weight / sum(weights.values()) for component, weight in weights.items()}
 
 
 STAGES = in_stages(TERMS)  # Of a stage, what has the smallest p-value is added first.
@@ -70,12 +72,6 @@ class Accepted:
     term: Term
     p_value: float
     gain: Gain | None = None
-
-    @property
-    def alike(self) -> Alternatives:
-        """Columns of each other effect that explains as much."""
-        alike: Alternatives = getattr(self.term, "alike", ())
-        return alike
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +128,7 @@ def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
                     passed.append((test.p_value, (test.term, *test.together), test.after))
                 else:
                     seen_at[component] = len(accepted)
-                    why = f"not significant: its p-value is above {search.level_of(component):.2g}"
+                    why = f"not significant: its p-value is above {search.levels[component]:.2g}"
                     rejected[component] = Rejected(component, test.columns, test.p_value, why)
             if not passed:
                 break

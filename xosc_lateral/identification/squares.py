@@ -13,13 +13,12 @@ import numpy as np
 
 from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.identification.autocorrelation import Problem, Whitener, fit_autoregression, moving_sum
-from xosc_lateral.identification.innovations import CLIP, ORDER, own_levels
+from xosc_lateral.identification.innovations import CLIP, own_levels
 from xosc_lateral.identification.model import Fitted
 from xosc_lateral.identification.timeline import COARSE, Coarse, coarse_all, coarse_mean
 
 FINE_ORDER = 15  # Past samples (3 s) that the fine movement's autoregression sees.
-# Past seconds of the squares that whitening sees: two time constants of the clusters of 6 s that are no regime. Beyond
-# `ORDER`, as means. [s]
+# Past seconds of the squares that whitening sees: two time constants of the clusters of 6 s that are no regime. [s]
 SQUARES_S = 12
 SLOW_S = 8  # Whitened seconds that are averaged for the slower movement: below 1/16 Hz. [s]
 
@@ -89,17 +88,14 @@ def of_squares(coarse: Coarse, squares: Squares, columns: FloatArray) -> Problem
     if columns.shape[1]:
         design = columns - columns[valid].mean(axis=0)
         left = series - design @ np.linalg.lstsq(design[valid], series[valid], rcond=None)[0]
-    process = fit_autoregression(np.where(valid, left, 0.0), valid, min(ORDER, SQUARES_S), longest=SQUARES_S)
+    process = fit_autoregression(np.where(valid, left, 0.0), valid, SQUARES_S, longest=SQUARES_S)
     return Problem(Whitener(process, valid, coarse.drive, np.ones(len(coarse))), series, columns)
 
 
 def log_sizes(squares: Squares, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Log-linear regression [1]_ of a standard deviation on columns, shape (n, k), from mean squares per second.
 
-    Returns
-    -------
-    sizes, errors : array, shape (k,)
-        Natural logarithm per unit.
+    Returns shape (k,): natural logarithm per unit.
     """
     design = columns[squares.valid] - columns[squares.valid].mean(axis=0)
     inverse = np.linalg.pinv(2.0 * design.T @ design)

@@ -70,10 +70,6 @@ class Timeline:
         edges = np.searchsorted(self.drive, np.arange(len(self.names) + 1))
         return [slice(int(first), int(last)) for first, last in pairwise(edges)]
 
-    def response(self, effect: ColumnEffect, context: Mapping[str, FloatArray]) -> FloatArray:
-        """An effect's quantity of columns on this grid as each drive responds to it, shape (n, k). [own unit]"""
-        return self.respond(effect.known(context), effect.lag_s, effect.response_s)
-
     def respond(self, values: FloatArray, lag_s: float, response_s: float) -> FloatArray:
         """`driver.effects.response.respond` drive by drive: shape of `values`, (n,) or (n, k), in their unit.
 
@@ -90,13 +86,20 @@ class Timeline:
         return anew[np.maximum(rows, np.minimum(starts + PAD // 2, len(rows) - 1)[self.drive])]
 
 
+def smoothed(offset: FloatArray, timeline: Timeline, times_s: Sequence[float]) -> list[FloatArray]:
+    """Moving averages of a series over each of several times, shape (n,) each, in its unit."""
+    return [local_mean(offset, timeline.valid, seconds, timeline.step) for seconds in times_s]
+
+
+def unsized(effect: ColumnEffect) -> ColumnEffect:
+    """The same effect before it was fitted."""
+    return structs.replace(effect, coefficients=(), errors=(), reference=(), between_drivers=(), response_range=())
+
+
 def join_drives(drives: Sequence[Drive], rules: CutRules = TRACE_RULES) -> Timeline:
     """Put drives on one grid.
 
-    Raises
-    ------
-    NotEnoughDataError
-        When less than two minutes of road-following are left.
+    Raises `NotEnoughDataError` when less than two minutes of road-following are left.
     """
     kept, periods = grid_drives(drives, rules, pad=PAD, multiple=COARSE)
     valid_s = STEP * sum(float(part.valid.sum()) for part in kept)
@@ -157,14 +160,8 @@ def start_anew(
     What is constant within drives must stay so: a threshold or a cell's edge would tell what is left of the drive
     before.
 
-    Parameters
-    ----------
-    response : array, shape (n,) or (n, k)
-        Of the lag, to `values` of the same shape.
-    keep : float
-        What the lag keeps of itself from row to row.
-    drive : int array, shape (n,)
-        Increasing.
+    `response`, shape (n,) or (n, k): of the lag, to `values` of the same shape; `keep`: what the lag keeps of itself
+    from row to row; `drive`, shape (n,): increasing.
     """
     _, starts, own = np.unique(drive, return_index=True, return_inverse=True)
     first = starts[own]
@@ -246,9 +243,7 @@ class Coarse:
 
     def response(self, effect: ColumnEffect, *, keep: bool = False) -> FloatArray:
         """The effect's quantity [own unit] as the driver responds to it, less its mean where valid; shape (n, k)."""
-        key = structs.replace(
-            effect, acts=Acts.LOCATION, coefficients=(), errors=(), reference=(), between_drivers=(), response_range=()
-        )
+        key = structs.replace(unsized(effect), acts=Acts.LOCATION)
         if key in self._responses:
             return self._responses[key]
         response = coarse_mean(self.fine_response(key))
@@ -259,7 +254,7 @@ class Coarse:
 
     def fine_response(self, effect: ColumnEffect) -> FloatArray:
         """The same on the 0.2 s grid, as it is, shape (fine n, k). [own unit]"""
-        return self.timeline.response(effect, self.context)
+        return self.timeline.respond(effect.known(self.context), effect.lag_s, effect.response_s)
 
     def strength(self, effect: ColumnEffect) -> FloatArray:
         """What an effect of columns that the table has does on the 0.2 s grid, shape (fine n,). [m], or log factor"""

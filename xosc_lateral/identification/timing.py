@@ -80,13 +80,7 @@ def widening(fitted: Fitted, effect: ColumnEffect, part: slice) -> float:
     it reaches with all of them known. The likelihood is that of independent rows, scaled to the variance that stretches
     of a minute show [2]_.
 
-    Parameters
-    ----------
-    fitted : Fitted
-    effect : ColumnEffect
-        With coefficients.
-    part : slice
-        Its columns of the mean.
+    `effect`: with coefficients; `part`: its columns of the mean.
 
     References
     ----------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Collection, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -283,7 +283,7 @@ def _write(
     profiles = sorted({name for name, _ in provenance.profiles.values()})
     summary = f"seed {settings.seed}, variant {provenance.variant}, {', '.join(profiles) or 'no profile'}"
     summary += ", with sensor" if settings.with_sensor else ""
-    facts = asdict(provenance)
+    facts = {field.name: getattr(provenance, field.name) for field in fields(provenance)}
     if not plan.is_replay:
         from xosc_lateral.formats.openscenario.write.lane_offset_scenario import write_lane_offset_scenario
         from xosc_lateral.formats.openscenario.write.lateral_actions import awaited, lateral_actions, overruled_until

@@ -243,6 +243,6 @@ def _plain(name: str, value: Any, folder: Path) -> Any:
 def relative(path: Path, folder: Path) -> str:
     """Path as seen from a folder, with forward slashes: the same on every machine."""
     try:
-        return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
+        return Path(os.path.relpath(os.path.realpath(path), os.path.realpath(folder))).as_posix()
     except ValueError:  # another drive of a Windows machine
         return path.resolve().as_posix()

@@ -13,7 +13,8 @@ from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.unwatched import Unwatched
 from xosc_lateral.playback.values import Values
 from xosc_lateral.road.network import RoadNetwork
-from xosc_lateral.scenario import Action, Place, Scenario, TrafficSignalController, TrafficSignalPhase
+from xosc_lateral.scenario import Action, Place, Scenario, TrafficSignalController
+from xosc_lateral.scenario.scenario import TrafficSignalPhase
 
 
 @dataclass

@@ -281,8 +281,8 @@ def world_pose(network: RoadNetwork, place: Placement) -> Pose:
     else:
         offset = network.offset_from_offset_t(place.road, place.lane, place.offset_t)
         lane = network.pose_at(place.road, place.lane, place.s, offset)
-        forward = network.travel_direction(place.road, place.lane) > 0
-        road = turned(lane, place.relative_heading if forward else place.relative_heading - pi)
+        along = wrap(place.relative_heading)
+        road = turned(lane, along if network.travel_direction(place.road, place.lane) > 0 else along - pi)
     if free is None:
         return road
     z, pitch, roll = (

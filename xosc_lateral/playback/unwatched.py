@@ -93,7 +93,7 @@ def _way_ahead(state: EntityState, distance: float) -> FloatArray:
     while start < s < end and len(found) <= MOST:
         low, high, element, begin, centre = road.stretch_of(state.lane, s)
         if isnan(centre):
-            s += way * along_reference(state.network, state.road, state.lane, s, state.offset_t, distance)
+            s += way * along_reference(state, s, distance)
             found.append(s)
         elif isinstance(element, Line | Arc):
             move = way * beside_line(element.curvature_at(s - begin), centre + state.offset_t, distance)

@@ -17,6 +17,7 @@ from xosc_lateral.evaluation.lane_keeping import LaneKeeping, keeping_of
 from xosc_lateral.evaluation.metrics import DURATION, MovementSummary, free_runs, summarise, summary_of
 from xosc_lateral.evaluation.spectra import spectrum
 from xosc_lateral.formats.profiles import FIELDS, Entry, facts_of, profile_hash
+from xosc_lateral.normal import NORMAL_95
 from xosc_lateral.report.chart import SAMPLED
 from xosc_lateral.report.figure import Figure
 from xosc_lateral.report.page import KeyFigure, Page, format_value
@@ -177,8 +178,8 @@ def _sureness(known: Provenance, keeping: LaneKeeping) -> str:
     independent = 3600.0 * known.hours / (2.0 * keeping.memory) if keeping.memory else 0.0
     if "derived_from" in known.fit or not 0.0 < known.drives < FEW or independent < 1.0:
         return ""
-    mean = 1.96 * keeping.sdlp / independent**0.5
-    spread = 1.96 * keeping.sdlp / (2.0 * independent) ** 0.5
+    mean = NORMAL_95 * keeping.sdlp / independent**0.5
+    spread = NORMAL_95 * keeping.sdlp / (2.0 * independent) ** 0.5
     return (
         f"from {60 * known.hours:.3g} min his mean is known to +- {mean:.2f} m, his SDLP to +- {spread:.2f} m (95 %), "
         "other days apart"

@@ -73,10 +73,9 @@ class Figure:
     """Of one panel without its title and labels. [pt]"""
     width: float = WIDTH
     """Of the whole figure. [pt]"""
-    share_x: Literal["", "all", "column"] = ""
-    share_y: Literal["", "all", "column"] = ""
-    """Panels with the same limits: all, those of a column, or each on its own. Tick labels stand once where all panels
-    of a column, or of a row, share them."""
+    share_x: Literal["", "all"] = ""
+    share_y: Literal["", "all"] = ""
+    """Whether all panels have the same limits; tick labels stand once then, below each column or beside each row."""
     legend: bool = False
     """Whether labels are explained above the panels."""
     axes: bool = True
@@ -106,11 +105,7 @@ class Figure:
     def settle(self) -> None:
         """Give every axis its limits."""
         for name, shared in (("x", self.share_x), ("y", self.share_y)):
-            groups: dict[int, list[Panel]] = {}
-            for number, panel in enumerate(self.panels):
-                key = 0 if shared == "all" else number % self.columns if shared else number
-                groups.setdefault(key, []).append(panel)
-            for group in groups.values():
+            for group in [self.panels] if shared else [[panel] for panel in self.panels]:
                 axes: list[Axis] = [getattr(panel, name) for panel in group]
                 drawn = [getattr(mark, name) for panel in group for mark in panel.marks]
                 held = [value for axis in axes for value in axis.holds]
@@ -167,7 +162,7 @@ def _margins(figure: Figure) -> tuple[list[float], float]:
     for column in range(figure.columns):
         panels = [panel for panel in figure.panels[column :: figure.columns] if panel.marks]
         widths = [text_width(name) for panel in panels for _, name in ticks_of(panel, "y", figure.height)]
-        numbers = max(widths, default=0.0) + 7.0 if column == 0 or figure.share_y != "all" else 2.0
+        numbers = max(widths, default=0.0) + 7.0 if column == 0 or not figure.share_y else 2.0
         left.append(numbers + (16.0 if any(panel.y.label for panel in panels) else 0.0))
     return left, BETWEEN + 3.0
 
@@ -189,7 +184,7 @@ def _body(figure: Figure, left: list[float], inner: float) -> tuple[str, float]:
         for column, panel in enumerate(panels):
             at += left[column]
             if panel.marks:
-                room = left[column] if column == 0 or figure.share_y != "all" else 0.0
+                room = left[column] if column == 0 or not figure.share_y else 0.0
                 parts += _frame(panel, at, top, inner, figure.height, room, numbered[column]) if figure.axes else []
                 parts.append(panel_svg(panel, at, top, inner, figure.height))
             at += inner + BETWEEN

@@ -12,6 +12,7 @@ from xosc_lateral.driver.effects import Acts, ColumnEffect, Cycle, Product, Regi
 from xosc_lateral.evaluation.spectra import gapped_spectrum
 from xosc_lateral.identification.close import Finding, LoopResult
 from xosc_lateral.identification.cross_validation import hold_out_blocks
+from xosc_lateral.identification.residual import LOCAL_QUANTILES
 from xosc_lateral.report.chart import BLUE, DASHED, MUTED, ORANGE, VERMILLION, Panel
 from xosc_lateral.report.figure import Figure
 from xosc_lateral.report.loop_curves import (
@@ -38,7 +39,6 @@ PANELS = 4  # Residual panels side by side.
 # Averaging times of the paths of the mean, of the spread, and of the spread with regimes. [s]
 MEAN_S, SPREAD_S, REGIME_S = 120.0, 240.0, 20.0
 GAP_S = 5.0  # Longer gaps in a drive interrupt a line. [s]
-QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)  # As `identification.residual.LOCAL_QUANTILES`.
 
 
 def _three(result: LoopResult) -> tuple[tuple[Mapping[str, FloatArray], str, str], ...]:
@@ -195,7 +195,7 @@ def _cycle(result: LoopResult, finding: Finding) -> Figure:
     panel.across(
         line - 0.002, line + 0.002, ORANGE, opacity=0.4, label=f"fitted: {line:.3f} Hz, once in {effect.period_s:.1f} s"
     )
-    longest = int(np.bincount(result.scored.statistics.timeline.drive).max())
+    longest = int(np.bincount(result.coarse.timeline.drive).max())
     draw_spectra(panel, result, min(CYCLE_ROWS, 2 ** int(np.log2(longest))), within_blocks=False)
     curves = [curve.y[(curve.x > low) & (curve.x < high)] for curve in panel.curves()]
     seen = np.concatenate([each[np.isfinite(each) & (each > 0.0)] for each in curves])
@@ -253,11 +253,8 @@ def _regimes(result: LoopResult, finding: Finding) -> Figure:
     loud = np.where(regime_probability(result) > 0.5, top, np.nan)
     over_time.band(moving.time, 0.0, loud, ORANGE, opacity=0.3, label="large spread more likely than not")
     over_time.line(moving.time, _gapped(moving, moving.measured), DRIVES, width=0.8, label="measured")
-    over_time.y.limits, over_time.y.label, over_time.x.label = (
-        (0.0, top),
-        f"spread within {REGIME_S:.0f} s [m]",
-        "time [s]",
-    )
+    over_time.y.limits, over_time.y.label = (0.0, top), f"spread within {REGIME_S:.0f} s [m]"
+    over_time.x.label = "time [s]"
     _draw_quantiles(quantiles, result)
     return figure
 
@@ -271,7 +268,7 @@ def _population(result: LoopResult, finding: Finding) -> Figure:
 
 def _draw_quantiles(panel: Panel, result: LoopResult) -> None:
     for values, color, label in _three(result):
-        place, spread = 100.0 * np.asarray(QUANTILES), values["quantiles of local spread"]
+        place, spread = 100.0 * np.asarray(LOCAL_QUANTILES), values["quantiles of local spread"]
         panel.line(place, spread, color, label=label)
         panel.dots(place, spread, color)
     panel.y.holds, panel.y.label = (0.0,), f"{SPREAD} [m]"

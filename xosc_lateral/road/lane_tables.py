@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from xosc_lateral.arrays import FloatArray, Int32Array
-from xosc_lateral.errors import PlaybackError
 from xosc_lateral.road.lanes import DRIVING, NARROW, Lane
 from xosc_lateral.road.piecewise import IndexLike, Lookup
-from xosc_lateral.road.places import limit_at
+from xosc_lateral.road.places import find_lane, limit_at
 from xosc_lateral.road.road import Road
 
 CHUNK = 8192
@@ -84,16 +83,10 @@ class LaneTables:
             self._complain(road, lane, s, row < 0)
         return int(row) if np.ndim(row) == 0 else row
 
-    def _complain(self, road: IndexLike, lane: IndexLike, s: FloatArray, wrong: object) -> None:
-        bad = np.broadcast_to(np.asarray(wrong), s.shape)
-        i = int(np.flatnonzero(bad)[0])
-        at = float(s[i])
+    def _complain(self, road: IndexLike, lane: IndexLike, s: FloatArray, wrong: ArrayLike) -> None:
+        i = int(np.argmax(np.broadcast_to(wrong, s.shape)))
         here = self.roads[int(np.broadcast_to(road, s.shape)[i])]
-        there = ", ".join(str(info.id) for info in here.section_at(at).lanes) or "none"
-        number = int(np.broadcast_to(lane, s.shape)[i])
-        raise PlaybackError(
-            f"road '{here.id}' has no lane {number} at s={at:.3f} m (lanes there: {there})", path=self._path or None
-        )
+        find_lane(here, int(np.broadcast_to(lane, s.shape)[i]), float(s[i]), self._path or None)
 
     def profile_of(self, row: IndexLike, s: FloatArray) -> LaneProfile:
         """Centre, slope and width of rows of the lane table. Shape as `s`; [m], [-], [m]."""
@@ -138,11 +131,6 @@ class LaneTables:
         """Left of the reference line -> left of travel. Shape as the arguments. [m]"""
         profile = self.lane_profile(road, lane, s)
         return np.asarray(profile.direction * (np.asarray(t, dtype=np.float64) - profile.centre))
-
-    def lane_edges(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """T of the edges to the left and right of travel. Shape as the arguments. [m]"""
-        _, centre, _, width, direction = self.lane_profile(road, lane, s)
-        return centre + 0.5 * direction * width, centre - 0.5 * direction * width
 
     def lane_index(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[Int32Array, Int32Array]:
         """Index from the right in travel direction among driving lanes of one direction, and their count.

@@ -21,8 +21,7 @@ from xosc_lateral.errors import PlaybackError
 from xosc_lateral.road.index import SurfaceIndex
 from xosc_lateral.road.lanes import DRIVING
 from xosc_lateral.road.links import Links
-from xosc_lateral.road.moving import Chooser, advance, straightest
-from xosc_lateral.road.onward import gone_on
+from xosc_lateral.road.moving import Chooser, advance, gone_on, straightest
 from xosc_lateral.road.piecewise import IndexLike
 from xosc_lateral.road.places import cross_section, find_lane, lane_at, lane_pose, surface_pose
 from xosc_lateral.road.positions import (
@@ -155,10 +154,6 @@ class RoadNetwork:
     def lane_width(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> FloatArray:
         """Width of the lane. [m] Shape as the arguments."""
         return self._tables.lane_profile(road, lane, s).width
-
-    def lane_edges_t(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """T of the lane's edges to the left and to the right of TRAVEL. [m] Shape as the arguments."""
-        return self._tables.lane_edges(road, lane, s)
 
     def curvature(self, road: ArrayLike, s: ArrayLike) -> FloatArray:
         """Curvature of the reference line along +s, positive in left turns. [1/m] Shape as the arguments."""

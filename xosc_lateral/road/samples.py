@@ -138,11 +138,7 @@ class Samples:
 
 def joined(*parts: Candidates) -> Candidates:
     """All of them, one behind the other."""
-    return Candidates(
-        np.concatenate([part.point for part in parts]),
-        np.concatenate([part.road for part in parts]),
-        np.concatenate([part.s for part in parts]),
-    )
+    return Candidates(*(np.concatenate(field) for field in zip(*parts, strict=True)))
 
 
 def _road_samples(

@@ -57,7 +57,7 @@ LEARNING = 0.8 * np.exp(-5.0 * SHARE)
 @pytest.mark.parametrize("shape", [RISE_AND_FALL, LEARNING], ids=["rises and falls", "dies away"])
 def test_a_spread_of_any_smooth_shape_is_found_and_put_where_it_was(shape: np.ndarray) -> None:
     term, p_value, coarse = spread_test(shape, 71)
-    assert p_value < ERROR_BUDGET.level_of("time_spread", 1)
+    assert p_value < ERROR_BUDGET["time_spread"]
     fitted = fit_model(coarse, (term,))
     (effect,) = fitted.terms[0].estimate(fitted)  # type: ignore[attr-defined]
     assert isinstance(effect, TimeSmooth)
@@ -70,7 +70,7 @@ def test_a_spread_of_any_smooth_shape_is_found_and_put_where_it_was(shape: np.nd
 def test_a_mean_that_dies_away_is_a_smooth_and_a_jump_a_step() -> None:
     smooth, p_smooth = mean_test(0.3 * np.exp(-3.0 * SHARE), 72)
     step, p_step = mean_test(0.25 * (SHARE > 0.4), 73)
-    level = ERROR_BUDGET.level_of("time_mean", 1)
+    level = ERROR_BUDGET["time_mean"]
     assert isinstance(smooth, TimeMeanTerm)
     assert p_smooth < level
     assert isinstance(step, StepTerm)
@@ -182,4 +182,4 @@ def test_drives_of_one_driver_change_alike() -> None:
     coarse = coarse_of(np.exp(shape) * own, drives=2)
     outcome = TimeSpreadTerm.test(search_of(coarse), fit_model(coarse, ()))
     assert outcome is not None
-    assert outcome.p_value < ERROR_BUDGET.level_of("time_spread", 2)
+    assert outcome.p_value < ERROR_BUDGET["time_spread"]

@@ -77,21 +77,24 @@ def propose_mapping(files: Sequence[Path]) -> str:
     shared = [name for name in tables[0].columns if all(name in table.columns for table in tables)]
     if not shared:
         raise FormatError("the tables have no column in common", path=files[-1])
-    values = {name: _joined([table[name] for table in tables]) for name in shared}
+    values = {name: pd.concat([table[name] for table in tables], ignore_index=True) for name in shared}
     found: dict[str, str] = {}
     for header in shared:
         bare, _ = _parts_of(header)
         name = next((name for name, words in HEADERS.items() if name not in found and _fits(words, bare)), None)
         if name is not None:
             found[name] = header
+    sides = {"distance_left", "distance_right"} <= found.keys()
+    needed = ("time",) if sides else ("time", "offset", "lane_width")
+    codes = sorted({text_encoding(path) for path in files} - {"utf-8"})
     lines = [
         f"# Proposed from {', '.join(path.name for path in files)}: read every line, correct it, save it, and give it",
         '# with --mapping FILE. NAME = "COLUMN" or "COLUMN:UNIT"; a unit with a minus turns the sign.',
-        *_how_written(files),
+        *(f"encoding = {_quoted(code)}" for code in codes[:1]),
         "",
         "[columns]",
         *(_line(name, header, values[header]) for name, header in found.items()),
-        *(f'# {name} = "?"  # needed, and not found' for name in _needed(found)),
+        *(f'# {name} = "?"  # needed, and not found' for name in needed if name not in found),
     ]
     for name, header in found.items():
         if name != "drive" and not len(_numbers(values[header])):
@@ -101,10 +104,6 @@ def propose_mapping(files: Sequence[Path]) -> str:
         lines += ["", f"# Others keep their names: {', '.join(left[:40])}"]
     lines += ["", "# [roles]  # where a column comes from, for close-loop", '# curvature = "road"', ""]
     return "\n".join(lines)
-
-
-def _joined(columns: Sequence[pd.Series]) -> pd.Series:
-    return pd.concat(columns, ignore_index=True)
 
 
 def _parts_of(header: str) -> tuple[str, str]:
@@ -161,16 +160,6 @@ def _texts(name: str, column: pd.Series) -> list[str]:
         return []
     numbers = {text: int(bool(TRUCKS.search(text))) if name == "is_truck" else k for k, text in enumerate(texts)}
     return ["", f"[values.{name}]", *(f"{_quoted(text)} = {number}" for text, number in numbers.items())]
-
-
-def _needed(found: dict[str, str]) -> list[str]:
-    sides = {"distance_left", "distance_right"} <= found.keys()
-    return [name for name in ("time", *(() if sides else ("offset", "lane_width"))) if name not in found]
-
-
-def _how_written(files: Sequence[Path]) -> list[str]:
-    codes = {code for path in files if (code := text_encoding(path)) != "utf-8"}
-    return [f"encoding = {_quoted(code)}" for code in sorted(codes)[:1]]
 
 
 def _quoted(text: str) -> str:

@@ -131,9 +131,8 @@ def _names(log: Any) -> list[str]:
 def _drive_names(files: Sequence[Path]) -> list[str]:
     """Stems, with the folder's name before those that occur twice."""
     stems = [file.stem for file in files]
-    if len(set(map(str, files))) < len(files):
-        twice = next(str(file) for file in files if [str(one) for one in files].count(str(file)) > 1)
-        raise FormatError("the log is named twice", path=twice)
+    if twice := [file for file in files if files.count(file) > 1]:
+        raise FormatError("the log is named twice", path=twice[0])
     return [file.stem if stems.count(file.stem) == 1 else str(file.with_suffix("")) for file in files]
 
 

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.arrays import FloatArray, IntArray
-from xosc_lateral.drives.cleaning import RUN
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.importers.cuts import CutSettings, lane_changes, name_states, number_runs
+from xosc_lateral.formats.importers.cuts import CutSettings, Rows, cut_table
 from xosc_lateral.formats.importers.neighbours import find_neighbours
 from xosc_lateral.formats.importers.table import Imported, finished, hash_files, without_cut
 from xosc_lateral.formats.importers.track_table import Tracks, rate
@@ -159,22 +158,15 @@ def _drive_table(placed: PlacedTracks, graph: LaneGraph, settings: CutSettings) 
     jump = same & (np.abs(step) > 0.5 * placed.lane_width)
     lane = np.cumsum(jump | (np.r_[False, inside[1:] != inside[:-1]] & same) | ~same).astype(np.int64)
     sideways = np.cumsum(np.where(jump | ~same | ~np.isfinite(step), 0.0, step))
-    changing = lane_changes(sideways, placed.offset, lane, tracks.vehicle, tracks.step, settings)
-    reasons = {"no lane": ~inside, "lane change": changing}
-    state = name_states(reasons, lane, tracks.vehicle, instant, tracks.step, settings)
-    return pd.DataFrame(
-        {
-            "drive": np.array(tracks.names, dtype=object)[tracks.vehicle],
-            "time": np.round(tracks.time, 4),
-            "offset": placed.offset,
-            "lane_width": placed.lane_width,
-            "speed": tracks.speed,
-            "acceleration": rate(tracks.speed, tracks.vehicle, tracks.step, 1.0),
-            **placed.road,
-            **near,
-            "vehicle_class": tracks.kind,
-            "is_truck": is_truck.astype(np.float64),
-            RUN: number_runs(state, lane, tracks.vehicle, instant),
-            "state": state,
-        }
-    )
+    columns = {
+        "drive": np.array(tracks.names, dtype=object)[tracks.vehicle],
+        "time": np.round(tracks.time, 4),
+        "offset": placed.offset,
+        "lane_width": placed.lane_width,
+        "speed": tracks.speed,
+        "acceleration": rate(tracks.speed, tracks.vehicle, tracks.step, 1.0),
+        **placed.road,
+        **near,
+    }
+    rows, reasons = Rows(tracks.vehicle, instant, lane, tracks.step), {"no lane": ~inside}
+    return cut_table(columns, rows, settings, sideways=sideways, reasons=reasons, kind=tracks.kind, is_truck=is_truck)

@@ -84,7 +84,7 @@ def without_cut(table: pd.DataFrame, record: ImportRecord, keep_cut: bool, sourc
     return Imported(kept.reset_index(drop=True), record)
 
 
-Importer = TypeVar("Importer", bound=Callable[..., Imported])
+Importer = TypeVar("Importer", bound="Callable[..., Imported | pd.DataFrame]")
 
 
 def guarded(read: Importer) -> Importer:
@@ -95,17 +95,17 @@ def guarded(read: Importer) -> Importer:
     """
 
     @wraps(read)
-    def within(source: Path | Sequence[Path], *args: Any, **settings: Any) -> Imported:
+    def within(source: Path | Sequence[Path], *args: Any, **settings: Any) -> Imported | pd.DataFrame:
         path = source if isinstance(source, Path) else source[0]
         with foreign_errors(path, "can't be imported"), np.errstate(all="ignore"):
             try:
-                imported = read(source, *args, **settings)
+                made = read(source, *args, **settings)
             except NotEnoughDataError as error:  # said by arithmetic that knows no files
                 if path.name in str(error):
                     raise
                 raise NotEnoughDataError(f"{path}: {error}") from error
-            _refuse_nonsense(imported.table, path)
-        return imported
+            _refuse_nonsense(made.table if isinstance(made, Imported) else made, path)
+        return made
 
     return cast(Importer, within)
 

@@ -15,7 +15,6 @@ import numpy as np
 from msgspec import Struct
 
 from xosc_lateral.arrays import FloatArray
-from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.opendrive.document import RoadFile, XmlElement
 from xosc_lateral.road.geometry import MAX_TURN, Arc, Line, ParamCubic, ReferenceElement, Spiral
 from xosc_lateral.road.piecewise import Cubic
@@ -158,21 +157,12 @@ def _element(geometry: XmlElement, length: float, source: RoadFile) -> Reference
                 v = source.cubic(shape)
                 return CubicRecord(x, y, heading, length, (0.0, 1.0, 0.0, 0.0), v, end_parameter(v, length))
             case "paramPoly3":
-                u, v = (_coefficients(shape, axis, source) for axis in "UV")
+                u, v = (source.cubic(shape, axis) for axis in "UV")
                 p_end = length if shape.get("pRange") == "arcLength" else 1.0
                 return CubicRecord(x, y, heading, length, u, v, p_end)
-    raise _unknown(geometry, source)
-
-
-def _unknown(geometry: XmlElement, source: RoadFile) -> FormatError:
     known = "line, arc, spiral, poly3, paramPoly3"
     found = ", ".join(str(child.tag) for child in geometry) or "nothing"
-    return source.error(f"no shape that is known ({known}); found {found}", geometry)
-
-
-def _coefficients(shape: XmlElement, axis: str, source: RoadFile) -> Cubic:
-    a, b, c, d = (source.number(shape, letter + axis, 0.0) for letter in "abcd")
-    return (a, b, c, d)
+    raise source.error(f"no shape that is known ({known}); found {found}", geometry)
 
 
 def _check_turn(curvature: float, length: float, shape: XmlElement, source: RoadFile) -> None:

@@ -22,11 +22,11 @@ from xosc_lateral.scenario import (
     Scenario,
     Storyboard,
     TrafficSignalController,
-    TrafficSignalPhase,
     Unsupported,
 )
 from xosc_lateral.scenario.parameters import Scope
 from xosc_lateral.scenario.place import Place
+from xosc_lateral.scenario.scenario import TrafficSignalPhase
 
 BOOLEANS = frozenset(
     {

@@ -103,7 +103,8 @@ def write_lanes(message: Any, ids: RoadIds) -> None:
         about.subtype = kinds.Lane.Classification.Subtype.Value(f"SUBTYPE_{SUBTYPES.get(lane.type, 'OTHER')}")
         about.centerline_is_driving_direction = True
         line = _line(network, road, name, _grid(section), 0.0)
-        _add_points(about.centerline, line if forward else line[::-1])
+        for x, y, z in (line if forward else line[::-1]).tolist():
+            about.centerline.add(x=x, y=y, z=z)
         for step, adjacent in ((1, about.left_adjacent_lane_id), (-1, about.right_adjacent_lane_id)):
             other = road, k, beside(name, step if forward else -step)
             if other in ids.lanes:
@@ -158,11 +159,6 @@ def _line(network: RoadNetwork, road: int, lane: int, s: FloatArray, across: flo
     way = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
     kept = np.union1d(simplify(x, y, TOLERANCE), simplify(way, z, TOLERANCE))
     return np.stack([x, y, z], axis=1)[kept]
-
-
-def _add_points(points: Any, line: FloatArray) -> None:
-    for x, y, z in line.tolist():
-        points.add(x=x, y=y, z=z)
 
 
 def _boundaries(message: Any, kinds: Any, ids: RoadIds, road: int, section: LaneSection) -> dict[int, list[int]]:

@@ -31,20 +31,8 @@ VERSION = (3, 8, 0)
 
 NANOSECONDS = 1_000_000_000
 
-KINDS: Mapping[VehicleCategory, str] = {
-    VehicleCategory.BICYCLE: "BICYCLE",
-    VehicleCategory.BUS: "BUS",
-    VehicleCategory.CAR: "MEDIUM_CAR",
-    VehicleCategory.MOTORBIKE: "MOTORBIKE",
-    VehicleCategory.SEMITRAILER: "SEMITRAILER",
-    VehicleCategory.TRAILER: "TRAILER",
-    VehicleCategory.TRAIN: "TRAIN",
-    VehicleCategory.TRAM: "TRAM",
-    VehicleCategory.TRUCK: "HEAVY_TRUCK",
-    VehicleCategory.VAN: "DELIVERY_VAN",
-}
-"""Category of OpenSCENARIO -> `VehicleClassification.Type`."""
-
+KINDS = {VehicleCategory.CAR: "MEDIUM_CAR", VehicleCategory.TRUCK: "HEAVY_TRUCK", VehicleCategory.VAN: "DELIVERY_VAN"}
+"""Category of OpenSCENARIO -> `VehicleClassification.Type`; others have the same name."""
 
 LIGHTS: Mapping[str, tuple[tuple[str, str], ...]] = {
     "brakeLights": (("brake_light_state", "BRAKE_LIGHT_STATE_NORMAL"),),
@@ -244,13 +232,8 @@ def _lights(motion: NominalMotion, entity: EntityMotion) -> list[tuple[float, An
     for one in sorted(played, key=lambda one: one.start):
         for name, lit in LIGHTS.get(one.action.light, ()):
             off = f"{lit.partition('_STATE_')[0]}_STATE_OFF"
-            setattr(
-                state,
-                name,
-                kinds.LightState.DESCRIPTOR.fields_by_name[name]
-                .enum_type.values_by_name[off if one.action.mode == "off" else lit]
-                .number,
-            )
+            states = kinds.LightState.DESCRIPTOR.fields_by_name[name].enum_type.values_by_name
+            setattr(state, name, states[off if one.action.mode == "off" else lit].number)
         kept = kinds.LightState()
         kept.CopyFrom(state)
         found.append((one.start, kept))
@@ -275,7 +258,7 @@ def _template(entity: Entity, number: int) -> Any:
         made.type = kinds.TYPE_OTHER
     else:
         made.type = kinds.TYPE_VEHICLE
-        kind = "OTHER" if entity.vehicle_category is None else KINDS[entity.vehicle_category]
+        kind = "OTHER" if (category := entity.vehicle_category) is None else KINDS.get(category, category.name)
         made.vehicle_classification.type = kinds.VehicleClassification.Type.Value(f"TYPE_{kind}")
         made.vehicle_classification.has_trailer = entity.trailer is not None
         _axle_places(made.vehicle_attributes, entity)

@@ -43,7 +43,6 @@ class BetweenTerm(ColumnTerm):
     kind: ClassVar[str] = "location"
     stages: ClassVar[tuple[Stage, ...]] = (Stage.BETWEEN_DRIVES,)
     weight: ClassVar[float] = 5.0
-    least_drives: ClassVar[int] = MANY_DRIVES
     seen_held_out: ClassVar[bool] = False
     acts: ClassVar[Acts] = Acts.LOCATION
     what: ClassVar[str] = "place that a drive keeps"

@@ -27,7 +27,7 @@ class ColumnTerm(Term):
     what: ClassVar[str]  # What it acts on, in words.
     group: ClassVar[str] = "spread"  # Mean or spread: which summary statistics show it.
     effect: ColumnEffect  # Without coefficients.
-    alike: Alternatives = ()  # Columns of each other effect that explains as much.
+    alike: Alternatives = ()
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -45,6 +45,11 @@ class ColumnTerm(Term):
             assert isinstance(effect, ColumnEffect)
             part = {Acts.LOCATION: removal.location, Acts.SPREAD: removal.spread, Acts.FINE: removal.fine}[effect.acts]
             part += fitted.coarse.strength(effect)
+
+    def quantity(self, coarse: Coarse, effects: tuple[Effect, ...]) -> FloatArray:
+        """What it does."""
+        assert isinstance(effects[0], ColumnEffect)
+        return coarse.strength(effects[0])
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Change between the 5 % and 95 % quantile of what drives it."""

@@ -173,12 +173,8 @@ def probability_of_persistence(
 ) -> float:
     """Probability that loudness which lasts for no longer than `CLUSTER_S` shows as much persistence.
 
-    Parameters
-    ----------
-    squares : array, shape (n,)
-        Of white rows, one per second, mean 0; 0 where invalid.
-    known : array, shape (n, k)
-        What is known to go with the size; taken out of the squares.
+    `squares`, shape (n,): of white rows, one per second, mean 0; 0 where invalid; `known`, shape (n, k): what is known
+    to go with the size; taken out of the squares.
     """
     if known.shape[1]:
         basis = np.linalg.qr((known - known[valid].mean(axis=0)) * valid[:, None])[0]

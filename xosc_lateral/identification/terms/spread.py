@@ -17,7 +17,7 @@ import numpy as np
 from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.identification.autocorrelation import Problem
-from xosc_lateral.identification.column_search import SearchedTerm, likely_response
+from xosc_lateral.identification.column_search import ColumnSearch, SearchedTerm
 from xosc_lateral.identification.model import Fitted, Stage
 from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, of_squares, quick_squares, slow_squares
@@ -92,7 +92,7 @@ def what_a_column_may_do(search: Search, fitted: Fitted) -> tuple[FloatArray, fl
 
     Beside it hidden changes of the size have to stand: regimes, a smooth of time.
     """
-    return likely_response(search, SpreadTerm, fitted, MAY_ACT)
+    return ColumnSearch(search, SpreadTerm, fitted).likely_response(MAY_ACT)
 
 
 @dataclass(frozen=True, eq=False)

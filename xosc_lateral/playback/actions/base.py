@@ -44,6 +44,7 @@ class RunningAction(StoryboardElement):
         self.content: Any = source.content
         self._number = -1
         """Of its record in the simulation."""
+        self._is_refused = False
         if actor is not None:
             actor.actions.append(self)
         self._prepare()
@@ -70,11 +71,14 @@ class RunningAction(StoryboardElement):
         actor = None if self.actor is None else self.actor.name
         self._number = self.simulation.record_start(self.source, actor, self.path or ("Init",))
         super().start()
+        self._is_refused = False
         self._begin()
 
     def step(self, time: float, step: float) -> None:
         """Act for one frame. [s]"""
-        if self.is_running:
+        if self.is_running and self._is_refused:
+            self.end()
+        elif self.is_running:
             self._act(time, step)
 
     def change(self, state: State, transition: State | None) -> None:
@@ -91,6 +95,11 @@ class RunningAction(StoryboardElement):
                 if other is not self and other.is_running and other.domains & self.domains:
                     other.end()
         return True
+
+    def _refuse(self, what: str) -> None:
+        """When it begins: say why nothing is done; it ends with its first step."""
+        self._note(what)
+        self._is_refused = True
 
     def _note(self, what: str) -> None:
         """Say that something was not played, or not as written."""

@@ -6,7 +6,7 @@ from math import atan, atan2, copysign, inf, pi, sqrt
 
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.playback.actions.base import Domain, RunningAction, RunningPrivateAction
-from xosc_lateral.playback.drive import along_reference, travel
+from xosc_lateral.playback.drive import move_along_lane
 from xosc_lateral.playback.positions.resolve import beside
 from xosc_lateral.playback.state import NOWHERE, EntityState
 from xosc_lateral.playback.transition import EPSILON, Transition
@@ -31,29 +31,25 @@ class RunningLaneChange(RunningPrivateAction):
     def _begin(self) -> None:
         state = self.actor
         state.locate()
-        self._transition = Transition.of(self.content.dynamics)
-        self._guide: EntityState | None = None
-        """Follows the target lane beside the entity, at its own place across the road."""
         if state.road == NOWHERE:
-            self._note(f"'{state.name}' is on no road: the lane change is not played")
+            self._refuse(f"'{state.name}' is on no road: the lane change is not played")
             return
         lane, network = self._target_lane(), state.network
         if not network.has_lane_at(state.road, lane, state.s):
             there = ", ".join(str(info.id) for info in network.lanes_at(state.road, state.s))
             what = f"road '{network.road_ids[state.road]}' has no lane {lane} at s = {state.s:.1f} m (lanes: {there})"
-            self._note(f"{what}: lane change not played")
+            self._refuse(f"{what}: lane change not played")
             return
         state.turn(0.0 if state.is_forward else pi)
-        guide = self._guide = EntityState(state.entity, network, route=state.route)
+        self._guide = EntityState(state.entity, network, route=state.route)
+        """Follows the target lane beside the entity, at its own place across the road."""
         across = state.t - network.lane_state_at(state.road, lane, state.s).centre_t
-        guide.put(state.place._replace(lane=lane, offset_t=across, pose=None))
+        self._guide.put(state.place._replace(lane=lane, offset_t=across, pose=None))
+        self._transition = Transition.of(self.content.dynamics)
         self._transition.begin(across, self.content.target_lane_offset)
 
     def _act(self, time: float, step: float) -> None:
         state, guide, transition = self.actor, self._guide, self._transition
-        if guide is None:
-            self.end()
-            return
         state.take_control(Activity.LATERAL)
         way = abs(state.speed) * step
         if abs(state.speed) < EPSILON:
@@ -64,9 +60,7 @@ class RunningLaneChange(RunningPrivateAction):
         guide.offset_t = offset
         if transition.is_step:
             ahead = way
-        distance = copysign(ahead, state.speed)
-        on_line = along_reference(guide.network, guide.road, guide.lane, guide.s, guide.offset_t, distance)
-        travel(guide, 1 if guide.is_forward else -1, on_line)
+        move_along_lane(guide, copysign(ahead, state.speed))
         self._follow_flip(flipped, offset)
         self._place(guide, turn)
         if transition.is_step:
@@ -77,9 +71,6 @@ class RunningLaneChange(RunningPrivateAction):
             self.end()
         elif guide.at_road_end:
             self.end()
-
-    def _finish(self) -> None:
-        self._guide = None
 
     # ---- in detail ---------------------------------------------------------------------------------------------------
     def _target_lane(self) -> int:
@@ -122,7 +113,6 @@ class RunningLaneChange(RunningPrivateAction):
     def _follow_flip(self, before: tuple[int, int], offset: float) -> None:
         """On a road whose s runs the other way, +t is the other side: the rest of the transition is mirrored."""
         guide, transition = self._guide, self._transition
-        assert guide is not None
         if guide.offset_t != offset and (guide.road, guide.lane) != before and guide.offset_t == -offset:
             transition.start, transition.target = -transition.start, -transition.target
 

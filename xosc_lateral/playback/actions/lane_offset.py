@@ -31,12 +31,11 @@ class RunningLaneOffset(RunningPrivateAction):
     def _begin(self) -> None:
         state = self.actor
         state.locate()
-        self._transition: Transition | None = None
         if state.road == NOWHERE:
-            self._note(f"'{state.name}' is on no road: the lane offset is not played")
+            self._refuse(f"'{state.name}' is on no road: the lane offset is not played")
             return
         state.follow_lane()
-        transition = Transition(self.content.shape, DynamicsDimension.TIME, 0.0)
+        transition = self._transition = Transition(self.content.shape, DynamicsDimension.TIME, 0.0)
         transition.begin(state.offset_t, self._target())
         limit = self.content.max_lateral_acc
         if limit is None:
@@ -44,14 +43,10 @@ class RunningLaneOffset(RunningPrivateAction):
             if self.content.shape is not DynamicsShape.STEP:
                 self._note(f"no maxLateralAcc: played with {limit:g} m/s2")
         transition.range = transition.range_for_curvature(limit)
-        self._transition = transition
         self._forward = state.is_forward
 
     def _act(self, time: float, step: float) -> None:
         state, transition = self.actor, self._transition
-        if transition is None:
-            self.end()
-            return
         state.locate()  # another action may have moved it in the world
         if state.is_forward is not self._forward:
             # The road under the entity now runs the other way, and so does its +t.

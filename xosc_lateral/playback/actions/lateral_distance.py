@@ -12,7 +12,7 @@ from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.playback.actions.base import Domain, RunningAction, RunningPrivateAction
 from xosc_lateral.playback.angles import difference
 from xosc_lateral.playback.distances import ahead_and_left, road_gap, spot_of
-from xosc_lateral.playback.drive import along_reference, travel
+from xosc_lateral.playback.drive import move_along_lane
 from xosc_lateral.playback.state import NOWHERE, EntityState, free
 from xosc_lateral.playback.transition import EPSILON
 from xosc_lateral.road import Pose
@@ -32,14 +32,11 @@ class BesideOnRoad:
     `wanted`: to the left of the other entity. [m]
     """
 
-    def __init__(
-        self, state: EntityState, other: EntityState, wanted: float, limits: DynamicConstraints | None
-    ) -> None:
+    def __init__(self, state: EntityState, other: EntityState, wanted: float, limits: DynamicConstraints) -> None:
         self._state, self._other, self._wanted = state, other, wanted
-        given = limits or DynamicConstraints()
-        self._most_speed = inf if given.max_speed is None else given.max_speed
-        self._most_acceleration = inf if given.max_acceleration is None else given.max_acceleration
-        self._most_jerk = inf if given.max_acceleration_rate is None else given.max_acceleration_rate
+        self._most_speed = inf if limits.max_speed is None else limits.max_speed
+        self._most_acceleration = inf if limits.max_acceleration is None else limits.max_acceleration
+        self._most_jerk = inf if limits.max_acceleration_rate is None else limits.max_acceleration_rate
         self._before: Pose | None = None
         """Where it was left in the frame before."""
         self._speed = 0.0
@@ -74,9 +71,7 @@ class BesideOnRoad:
         ahead = sqrt(max(state.speed * state.speed - across * across, 0.0))
         state.take_control(Activity.LATERAL)
         state.speed_taken = True
-        distance = copysign(ahead * step, state.speed)
-        ds = along_reference(state.network, state.road, state.lane, state.s, state.offset_t, distance)
-        travel(state, 1 if state.is_forward else -1, ds)
+        move_along_lane(state, copysign(ahead * step, state.speed))
         state.move_to(state.road, state.lane, state.s, state.offset_t + across * step)
         if abs(rest) <= abs(across) * step + EPSILON and self._most_acceleration == inf:
             rest = 0.0
@@ -153,12 +148,9 @@ class BesideEntity:
     `wanted`: of the line, to the left of the other entity. [m]
     """
 
-    def __init__(
-        self, state: EntityState, other: EntityState, wanted: float, limits: DynamicConstraints | None
-    ) -> None:
+    def __init__(self, state: EntityState, other: EntityState, wanted: float, limits: DynamicConstraints) -> None:
         self._state, self._other, self._wanted = state, other, wanted
-        given = None if limits is None else limits.max_acceleration
-        self._acceleration = inf if given is None else abs(given)
+        self._acceleration = inf if limits.max_acceleration is None else abs(limits.max_acceleration)
 
     @property
     def is_unlimited(self) -> bool:
@@ -231,31 +223,22 @@ class RunningLateralDistance(RunningPrivateAction):
     def _prepare(self) -> None:
         self._other = self.simulation.entity(self.content.entity_ref, self.content.place)
         self.simulation.derives_motion = True
-        self._way: BesideEntity | BesideOnRoad | None = None
 
     def _begin(self) -> None:
         content, state, other = self.content, self.actor, self._other
         on_road = content.coordinate_system in (CoordinateSystem.ROAD, CoordinateSystem.LANE)
         state.locate()
         other.locate()
-        self._way = None
         if on_road and (state.road == NOWHERE or other.road == NOWHERE):
-            self._note(f"'{state.name}' or '{other.name}' is on no road: the lateral distance is not kept")
+            self._refuse(f"'{state.name}' or '{other.name}' is on no road: the lateral distance is not kept")
             return
-        wanted = self._wanted()
-        if on_road:
-            self._way = BesideOnRoad(state, other, wanted, content.constraints)
-            return
-        self._way = BesideEntity(state, other, wanted, content.constraints)
-        if content.constraints is not None and content.constraints.max_speed is not None:
+        limits = content.constraints or DynamicConstraints()
+        self._way = (BesideOnRoad if on_road else BesideEntity)(state, other, self._wanted(), limits)
+        if not on_road and limits.max_speed is not None:
             self._note("maxSpeed of a lateral distance in the entity's frame is not played (maxAcceleration is)")
 
     def _act(self, time: float, step: float) -> None:
-        way = self._way
-        if way is None:
-            self.end()
-            return
-        state = self.actor
+        state, way = self.actor, self._way
         state.activity |= Activity.LATERAL
         before = state.plane
         rest = way.move(step)
@@ -282,6 +265,4 @@ class RunningLateralDistance(RunningPrivateAction):
         return -abs(wanted) if content.displacement is LateralDisplacement.RIGHT else abs(wanted)
 
 
-RUNNING: dict[type, type[RunningAction]] = {
-    LateralDistanceAction: RunningLateralDistance,
-}
+RUNNING: dict[type, type[RunningAction]] = {LateralDistanceAction: RunningLateralDistance}

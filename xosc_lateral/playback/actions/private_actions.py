@@ -5,7 +5,7 @@ from __future__ import annotations
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.playback.actions.base import Domain, RunningAction, RunningPrivateAction
 from xosc_lateral.playback.positions.resolve import resolve, route_guide
-from xosc_lateral.playback.state import Placement, guide
+from xosc_lateral.playback.state import guide
 from xosc_lateral.playback.trailers import align_trailers, connect, disconnect
 from xosc_lateral.scenario.enums import RouteStrategy
 from xosc_lateral.scenario.global_actions import SetMonitorAction, UserDefinedAction
@@ -68,8 +68,7 @@ class RunningAcquirePosition(RunningPrivateAction):
     def _begin(self) -> None:
         state = self.actor
         state.locate()
-        here = Placement(state.road, state.lane, state.s, state.offset_t, state.relative_heading)
-        route = guide(self.simulation.network, [here, resolve(self.content.position, self.simulation)])
+        route = guide(self.simulation.network, [state.place, resolve(self.content.position, self.simulation)])
         if route is None:
             self._note("no way leads to the position: it is not acquired")
         state.route = route
@@ -108,35 +107,23 @@ class RunningDisconnectTrailer(RunningPrivateAction):
         disconnect(self.actor)
 
 
-class RunningAppearance(RunningPrivateAction):
+class RunningAppearance(RunningAction):
     """Over at once; the start is recorded like that of every action."""
 
 
-class RunningLightState(RunningPrivateAction):
-    """Over when the light has changed. [s]"""
+class RunningForTime(RunningPrivateAction):
+    """Over after its time; what flashes or loops does so until something else is asked of it. [s]"""
 
-    content: LightStateAction
-
-    def _begin(self) -> None:
-        self._left = self.content.transition_time
-
-    def _act(self, time: float, step: float) -> None:
-        """Wait; a light that flashes does so until something else is asked of it."""
-        if self._left <= 0.0 and self.content.mode != "flashing":
-            self.end()
-        self._left -= step
-
-
-class RunningAnimation(RunningPrivateAction):
-    """Over after its duration, never when it loops. [s]"""
-
-    content: AnimationAction
+    content: LightStateAction | AnimationAction
 
     def _begin(self) -> None:
-        self._left = self.content.duration
+        if isinstance(self.content, LightStateAction):
+            self._left, self._goes_on = self.content.transition_time, self.content.mode == "flashing"
+        else:
+            self._left, self._goes_on = self.content.duration, self.content.loop
 
     def _act(self, time: float, step: float) -> None:
-        if self._left <= 0.0 and not self.content.loop:
+        if self._left <= 0.0 and not self._goes_on:
             self.end()
         self._left -= step
 
@@ -150,8 +137,8 @@ RUNNING: dict[type, type[RunningAction]] = {
     OverrideControllerValueAction: RunningController,
     ConnectTrailerAction: RunningConnectTrailer,
     DisconnectTrailerAction: RunningDisconnectTrailer,
-    AnimationAction: RunningAnimation,
-    LightStateAction: RunningLightState,
+    AnimationAction: RunningForTime,
+    LightStateAction: RunningForTime,
     SetMonitorAction: RunningAppearance,
     UserDefinedAction: RunningAppearance,
     VisibilityAction: RunningAppearance,

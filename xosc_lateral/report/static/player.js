@@ -270,8 +270,9 @@
       for (const vehicle of this.vehicles) {
         const frame = vehicle.frame(clock.time);
         if (!frame) continue;
-        const outline = vehicle.corners(vehicle.drawn, frame).map((point) => this.toScreen(point));
-        this.boxes.push({ vehicle, frame, outline });
+        const onScreen = (path) => vehicle.corners(path, frame).map((point) => this.toScreen(point));
+        const outline = onScreen(vehicle.drawn), ghost = vehicle.enriched && this.showGhosts ? onScreen(vehicle.nominal) : null;
+        this.boxes.push({ vehicle, frame, outline, top: Math.min(...[...outline, ...(ghost ?? [])].map(([, y]) => y)) });
         trace(outline);
         context.fillStyle = this.series[vehicle.number % 12];
         context.strokeStyle = this.colors.paper;
@@ -289,8 +290,8 @@
           context.fillStyle = "rgba(10, 20, 30, .5)"; // the windscreen
           context.fill();
         }
-        if (vehicle.enriched && this.showGhosts) {
-          trace(vehicle.corners(vehicle.nominal, frame).map((point) => this.toScreen(point)));
+        if (ghost) {
+          trace(ghost);
           context.lineWidth = 1.2;
           context.strokeStyle = this.colors.ghost;
           context.setLineDash([4, 3]);
@@ -314,9 +315,9 @@
       context.font = `600 12px ${this.colors.sans}`;
       context.textAlign = "center";
       const taken = [];
-      for (const { vehicle, outline } of this.boxes) {
+      for (const { vehicle, outline, top } of this.boxes) {
         const [x] = middle(outline), width = context.measureText(vehicle.name).width / 2 + 2;
-        let y = Math.min(...outline.map((p) => p[1])) - 4;
+        let y = top - 4;
         while (taken.some(([left, right, base]) => x + width > left && x - width < right && Math.abs(base - y) < 14)) y -= 14;
         taken.push([x - width, x + width, y]);
         this.write(context, vehicle.name, x, y);

@@ -11,11 +11,11 @@ from xosc_lateral.formats.openscenario.write.build import named
 from xosc_lateral.formats.openscenario.write.carla import fit_carla
 from xosc_lateral.formats.openscenario.write.draft import Draft, WrittenScenario
 from xosc_lateral.formats.openscenario.write.esmini import fit_esmini
+from xosc_lateral.formats.openscenario.write.file_references import rewrite_paths
 from xosc_lateral.formats.openscenario.write.literal import fill_in, inline_catalogs
 from xosc_lateral.formats.openscenario.write.losses import Losses
 from xosc_lateral.formats.openscenario.write.target import Player
 from xosc_lateral.formats.openscenario.write.versions import fit_version
-from xosc_lateral.formats.openscenario.write.vertices import rewrite_paths
 
 
 def fit(draft: Draft, converted: Sequence[str] | None) -> None:
@@ -61,7 +61,7 @@ def finish(
     """Fit a draft to its target, mark it as ours and write it; see the writers."""
     draft.override_parameters()
     fit(draft, None if reactive else converted)
-    rewrite_paths(draft.root, draft.scenario, output, draft.scope)
+    rewrite_paths(draft, output)
     mark(draft.root, provenance, summary)
     sha256, content, data = write_sealed(output, draft.vertices.document(draft.root), save=save)
     return WrittenScenario(output, sha256, content, tuple(converted), tuple(draft.removed), data, tuple(draft.notes))

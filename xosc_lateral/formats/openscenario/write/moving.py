@@ -136,8 +136,8 @@ def _check(entity: EntityMotion, path: WorldTrajectory) -> None:
     if any(len(values) != len(entity.time) for values in arrays):
         raise ValueError(f"trajectory of '{entity.name}' does not have the {len(entity.time)} rows of its motion")
     for rows in blocks(len(entity.time)):
-        active = (entity.activity[rows] & Activity.ACTIVE) != 0
-        if any(not np.isfinite(values[rows][active]).all() for values in arrays):
+        away = (entity.activity[rows] & Activity.ACTIVE) == 0
+        if any(not (np.isfinite(values[rows]) | away).all() for values in arrays):
             raise ValueError(f"trajectory of '{entity.name}' is not finite")
 
 
@@ -241,7 +241,8 @@ def _heading_times(times: FloatArray) -> FloatArray:
     catches up slowly, for there the path is over at once.
     """
     gaps = np.diff(times)
-    usual = 0.5 * float(np.median(gaps))
+    around = (len(gaps) - 1) // 2, len(gaps) // 2
+    usual = 0.5 * float(np.partition(gaps, around)[[*around]].mean())  # median; numpy's would load `numpy.ma`
     middle = times + np.minimum(0.5 * np.append(gaps, 0.0), usual)
     late = usual * np.minimum((times[-1] - middle) / (CATCH_UP * usual), 1.0)
     return np.asarray(np.minimum(middle - late, times[-1]))

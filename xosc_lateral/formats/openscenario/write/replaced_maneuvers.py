@@ -57,9 +57,8 @@ class Group(Struct, frozen=True):
 
     def conditions(self) -> Iterator[Condition]:
         """By which its events start."""
-        for maneuver in self.group.maneuvers:
-            for event in maneuver.events:
-                yield from conditions_of(event.start_trigger)
+        for _, event in self.group.events():
+            yield from conditions_of(event.start_trigger)
 
     def element_of(self, content: StoryboardElementStateCondition) -> Path | None:
         """What a condition is about, if that is in the group or around it."""
@@ -68,21 +67,16 @@ class Group(Struct, frozen=True):
     def _elements(self) -> Iterator[Path]:
         """The story, the act and the group, and all that is in the group."""
         yield from (self.path[:1], self.path[:2], self.path)
-        for maneuver in self.group.maneuvers:
-            yield (*self.path, maneuver.name)
-            for event in maneuver.events:
-                yield (*self.path, maneuver.name, event.name)
-                yield from ((*self.path, maneuver.name, event.name, action.name) for action in event.actions)
+        yield from ((*self.path, maneuver.name) for maneuver in self.group.maneuvers)
+        for maneuver, event in self.group.events():
+            path = (*self.path, maneuver.name, event.name)
+            yield from (path, *((*path, action.name) for action in event.actions))
 
 
 def groups_of(scenario: Scenario) -> list[Group]:
     """All maneuver groups, in file order."""
-    return [
-        Group((story.name, act.name, group.name), act, group)
-        for story in scenario.storyboard.stories
-        for act in story.acts
-        for group in act.maneuver_groups
-    ]
+    groups = scenario.storyboard.groups()
+    return [Group((story.name, act.name, group.name), act, group) for story, act, group in groups]
 
 
 def replaced_groups(scenario: Scenario, entities: Collection[str]) -> list[Group]:
@@ -119,15 +113,14 @@ def separable(scenario: Scenario, wanted: Collection[str]) -> frozenset[str]:
 def _coupled(scenario: Scenario) -> set[str]:
     found = {name for entity in scenario.entities if entity.trailer for name in (entity.name, entity.trailer)}
     for one in groups_of(scenario):
-        for maneuver in one.group.maneuvers:
-            for event in maneuver.events:
-                if one.group.actors.select_triggering_entities:
-                    found |= set(actors_of(one.act, one.group, event))
-                for action in event.actions:
-                    if isinstance(action.content, AddEntityAction | DeleteEntityAction):
-                        found.add(action.content.entity_ref)
-                    elif isinstance(action.content, ConnectTrailerAction):
-                        found |= {action.content.trailer_ref, *one.actors}
+        for _, event in one.group.events():
+            if one.group.actors.select_triggering_entities:
+                found |= set(actors_of(one.act, one.group, event))
+            for action in event.actions:
+                if isinstance(action.content, AddEntityAction | DeleteEntityAction):
+                    found.add(action.content.entity_ref)
+                elif isinstance(action.content, ConnectTrailerAction):
+                    found |= {action.content.trailer_ref, *one.actors}
     return found
 
 
