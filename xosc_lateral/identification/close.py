@@ -19,7 +19,7 @@ from xosc_lateral.identification.core_model import (
     compare_spectrum_shapes,
     test_population,
 )
-from xosc_lateral.identification.cross_validation import Progress, held_out_words, hold_out_blocks
+from xosc_lateral.identification.cross_validation import Progress, held_out_words
 from xosc_lateral.identification.held_out import HeldOut, Scorecard, Setting, fit_without, score_held_out, score_runs
 from xosc_lateral.identification.identify import Identified, identify, initial_terms
 from xosc_lateral.identification.model import Description, Fitted, Term
@@ -109,8 +109,7 @@ class LoopResult:
     @property
     def held_out(self) -> str:
         """What was held out, in words."""
-        timeline = self.coarse.timeline
-        return held_out_words(timeline, hold_out_blocks(timeline))
+        return held_out_words(self.coarse.timeline)
 
 
 def close_loop(
