@@ -14,12 +14,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.drives.periodogram import tapered_powers, without_line
 from xosc_lateral.evaluation.metrics import DIFFERENCE_SCALE, snippet_metrics
 from xosc_lateral.evaluation.shape import shape_features, turns
 from xosc_lateral.evaluation.snippets import Snippets
-
-FloatArray = NDArray[np.float64]
 
 AUTOCORRELATION_LAGS = (1, 2, 3, 5, 8, 12)  # steps; of the first difference's autocorrelation
 FOLDS = 5

@@ -13,10 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.evaluation.metrics import METRICS, snippet_metrics
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

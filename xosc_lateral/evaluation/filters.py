@@ -11,11 +11,9 @@ References
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.drives.filters import filtered, low_pass_between
-
-FloatArray = NDArray[np.float64]
 
 HIGHEST = 0.5  # Where the stop band begins. Drivers steer against what they see below it; beyond it cameras show. [Hz]
 PASSED = 0.4  # Where the pass band ends: the filter sees 11 s to each side, a quarter of most runs. [Hz]

@@ -6,16 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.jit_kernel import prepare
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.seeds import child
 from xosc_lateral.drives.cuts import HALF_WIDTH
 from xosc_lateral.segment import Segment
-
-FloatArray = NDArray[np.float64]
 
 NEAR_MARKING = 1.2  # A reference point this close to a marking counts as near: half a car (0.9 m) and 0.3 m of air. [m]
 

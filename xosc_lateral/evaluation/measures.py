@@ -20,14 +20,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.drives.periodogram import tapered_powers, without_line
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.evaluation.distances import column_distances
 from xosc_lateral.evaluation.lane_keeping import INDICATORS, lane_keeping_indicators
 from xosc_lateral.evaluation.metrics import METRICS, snippet_metrics
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 LAGS = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0)  # Of the autocorrelation; those that fit into half a window are used. [s]
 BANDS = np.geomspace(0.03, 1.0, 13)  # Edges of the spectrum's bands, eight a decade. [Hz]

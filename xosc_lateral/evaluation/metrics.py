@@ -11,14 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.seeds import child
 from xosc_lateral.segment import Segment
-
-FloatArray = NDArray[np.float64]
 
 # Columns of `snippet_metrics`, in the order of arXiv:2405.17080, section IV.
 METRICS = ("max", "min", "mean", "std", "median", "q25", "q75", "range", "diff_mean", "diff_std")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.models.two_level.fit import split_levels
 from xosc_lateral.driver.models.two_level.model import PAPER_SETTINGS
 from xosc_lateral.driver.profile import DriverProfile
@@ -33,8 +33,6 @@ class SnippetCondition:
         start = "same start" if self.same_start else "free"
         return f"{self.seconds:g} s, {start}" + (", below 0.5 Hz" if self.slow else "")
 
-
-FloatArray = NDArray[np.float64]
 
 FINE_SHIFT = 5.0  # Real fine parts are shifted round by this, to part them from their coarse parts. [s]
 

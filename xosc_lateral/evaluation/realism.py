@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.evaluation.classifier import TwoSampleResult, classifier_two_sample_test, context_features
@@ -32,8 +33,6 @@ from xosc_lateral.evaluation.measures import (
 )
 from xosc_lateral.evaluation.parts import LENGTHS, SnippetCondition
 from xosc_lateral.evaluation.snippets import Snippets, sample_runs, sample_snippets, sensor_noise, snippets_of
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -69,8 +68,6 @@ def variance_parts(windows: FloatArray, drivers: NDArray[np.generic]) -> Varianc
     effective = (n - (counts**2).sum() / n) / (k - 1)
     return VarianceParts(max((among - within) / float(effective), 0.0), within, inside)
 
-
-IntArray = NDArray[np.int64]
 
 SPLITS = 8  # Random halves of the drives that both are averaged over.
 LEAST = 20  # Fewer snippets of a length: it is left out.

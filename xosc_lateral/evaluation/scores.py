@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.errors import NotEnoughDataError
@@ -23,8 +24,6 @@ from xosc_lateral.evaluation.parts import PartEvaluation, SnippetCondition, eval
 from xosc_lateral.evaluation.realism import Realism, score_realism
 from xosc_lateral.evaluation.snippets import Snippets, sample_runs, sample_snippets, snippets_of
 from xosc_lateral.evaluation.spectra import Spectrum, autocorrelation, spectrum
-
-FloatArray = NDArray[np.float64]
 
 SNIPPET = 10.0  # The paper's. [s]
 SPLITS = 8  # Random halves of the drives that both are averaged over.

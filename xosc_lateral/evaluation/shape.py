@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.drives.periodogram import tapered_powers
-
-FloatArray = NDArray[np.float64]
 
 # Columns of `shape_features`; most are features of catch22.
 SHAPES = (

@@ -13,15 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.sampled_offsets import Snippet, cut_snippets, recorded, segment_of, sensor_error
+from xosc_lateral.driver.sampled_offsets import Snippet, cut_snippets, recorded_offsets, segment_of, sensor_error
 from xosc_lateral.driver.sampling import OffsetSampler, sample_offsets
 from xosc_lateral.driver.seeds import child
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.segment import Segment
-
-FloatArray = NDArray[np.float64]
 
 BLOCK = 120.0  # Where there are too few drives to split between them, blocks of this length are split instead. [s]
 FEW_DRIVES = 6
@@ -109,16 +108,10 @@ def sample_recorded(
     `starts` of the sums, shape (segments,) [m].
     """
     root, sensor = np.random.SeedSequence(seed), profile.sensor if with_sensor else None
-    rows = []
-    for k, (segment, start) in enumerate(zip(segments, starts.tolist(), strict=True)):
-        own = child(root, k)
-
-        def draw(begin: float, segment: Segment = segment, own: np.random.SeedSequence = own) -> FloatArray:
-            return sample_offsets(profile, segment, own, start=begin)
-
-        n = segment.lane_width[segment.inside].size
-        rows.append(recorded(sensor, draw, n, start, profile.model.step, own))
-    return rows
+    return [
+        recorded_offsets(profile, segment, child(root, k), sensor, start)
+        for k, (segment, start) in enumerate(zip(segments, starts.tolist(), strict=True))
+    ]
 
 
 def sample_parts(profile: DriverProfile, snippets: Snippets, seed: int) -> tuple[FloatArray, FloatArray]:

@@ -15,10 +15,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.drives.periodogram import tapered_powers
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 MANY_SEGMENTS = 8  # With so many segments without a gap, spectra are taken from these only.
 

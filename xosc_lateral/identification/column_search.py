@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import ColumnEffect
 from xosc_lateral.identification.autocorrelation import Problem
 from xosc_lateral.identification.dictionary import (
@@ -24,7 +25,6 @@ from xosc_lateral.identification.regression import fit_model
 from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.significance import LoopSeed, upper_tail
 from xosc_lateral.identification.terms.column import ColumnTerm, of_kind
-from xosc_lateral.identification.timeline import FloatArray
 
 CONTENDERS = 4  # Sets of columns that are refined, at most.
 WITHIN = 12.0  # Sets of columns that score lower than the best by more than this are not. [squared score]

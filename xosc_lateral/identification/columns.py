@@ -14,8 +14,9 @@ from enum import Enum, StrEnum
 
 import numpy as np
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import FormatError
-from xosc_lateral.identification.timeline import FloatArray, Timeline
+from xosc_lateral.identification.timeline import Timeline
 
 # A clock goes on in at least half of so many minutes, and hardly ever back: share of its way that is the way from end
 # to end. A random walk's is below a half. [-]

@@ -13,11 +13,12 @@ from typing import ClassVar
 
 import numpy as np
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.identification.model import Description, Fitted
 from xosc_lateral.identification.residual import simulated_runs
 from xosc_lateral.identification.significance import LEAST, LoopSeed
-from xosc_lateral.identification.timeline import FloatArray, Timeline, smoothed
+from xosc_lateral.identification.timeline import Timeline, smoothed
 
 TIMES_S = (0.4, 1.0, 2.0, 4.0, 8.0)  # Averaging times between which the bands lie. [s]
 BLOCK = 300  # Samples that one value per band is taken from: 60 s. [-]

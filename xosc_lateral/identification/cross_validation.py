@@ -14,13 +14,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.identification.autocorrelation import Whitener
 from xosc_lateral.identification.innovations import CLIP, own_levels
 from xosc_lateral.identification.model import Fitted, Term
 from xosc_lateral.identification.regression import design_of, fit_model
 from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.selection import Gain, Selection, select
-from xosc_lateral.identification.timeline import BoolArray, Coarse, FloatArray, IntArray, Timeline, coarse_middle
+from xosc_lateral.identification.timeline import Coarse, Timeline, coarse_middle
 
 Progress = Callable[[float, str], None]  # Gets the share that is done and what is being done.
 FOLDS = 4  # Every part of the drives is held out once, and predicted from the other three.

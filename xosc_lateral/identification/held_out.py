@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from msgspec import structs
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.driver.effects import Effect
 from xosc_lateral.driver.fitting import fit_population, fit_runs
 from xosc_lateral.driver.models.base import ModelKind
@@ -36,7 +37,7 @@ from xosc_lateral.identification.residual import (
 from xosc_lateral.identification.selection import Selection
 from xosc_lateral.identification.significance import LoopSeed
 from xosc_lateral.identification.terms.cycle import CycleTerm
-from xosc_lateral.identification.timeline import BoolArray, Coarse, FloatArray, IntArray, Timeline, coarse_middle
+from xosc_lateral.identification.timeline import Coarse, Timeline, coarse_middle
 from xosc_lateral.rows import true_slices
 
 FINE_S = 1.0  # Movement within this time counts as fine when a spread is taken out. [s]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression, start_factors
-from xosc_lateral.identification.timeline import BoolArray, FloatArray, IntArray
 
 ORDER = 12  # Past seconds that have a coefficient each in the movement's autoregression. [s]
 LONGEST = 96  # Past seconds that it sees as means over doubling times: drifts of a minute and a half. [s]

@@ -15,12 +15,13 @@ from typing import ClassVar, Self
 
 import numpy as np
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import Effect
 from xosc_lateral.identification.autocorrelation import Whitener
 from xosc_lateral.identification.innovations import innovations
 from xosc_lateral.identification.refinement import Alternatives
 from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.timeline import Coarse, FloatArray, on_fine_grid
+from xosc_lateral.identification.timeline import Coarse, on_fine_grid
 
 
 class Stage(IntEnum):

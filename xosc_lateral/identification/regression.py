@@ -14,10 +14,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression, start_factors, unbiased
 from xosc_lateral.identification.innovations import CLIP, LONGEST, ORDER, own_levels
 from xosc_lateral.identification.model import Fitted, Term, joined
-from xosc_lateral.identification.timeline import CLUSTER_S, BoolArray, Coarse, FloatArray, IntArray, means_by_drive
+from xosc_lateral.identification.timeline import CLUSTER_S, Coarse, means_by_drive
 
 # White noise that the model of a drive has beside what it shows: no table knows the lane better (in the motorway
 # recording the standard error of a lane's centre is 0.03 m; docs/real_data.md). Providers smooth their tracks,

@@ -21,20 +21,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import OffsetSampler
 from xosc_lateral.driver.seeds import child
 from xosc_lateral.drives.resampling import in_digits
-from xosc_lateral.identification.timeline import (
-    LOCAL_S,
-    PAD,
-    BoolArray,
-    FloatArray,
-    IntArray,
-    Timeline,
-    local_mean,
-    smoothed,
-)
+from xosc_lateral.identification.timeline import LOCAL_S, PAD, Timeline, local_mean, smoothed
 from xosc_lateral.segment import Segment
 
 N_BINS = 5  # Bins of a column, equally filled.

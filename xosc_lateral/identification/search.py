@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.identification.candidates import candidates_of
 from xosc_lateral.identification.columns import Column
 from xosc_lateral.identification.dictionary import CROSS_BASIS, TIMINGS, Quantities, orthonormal
-from xosc_lateral.identification.timeline import Coarse, FloatArray
+from xosc_lateral.identification.timeline import Coarse
 
 # Products are tried among so many columns at most, those whose role is known first: sixty more columns must not cost
 # twenty times as much.

@@ -6,7 +6,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from xosc_lateral.identification.timeline import FloatArray
+from xosc_lateral.arrays import FloatArray
 
 
 class LoopSeed(IntEnum):

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.identification.autocorrelation import Problem, Whitener, fit_autoregression, moving_sum
 from xosc_lateral.identification.innovations import CLIP, own_levels
 from xosc_lateral.identification.model import Fitted
-from xosc_lateral.identification.timeline import COARSE, BoolArray, Coarse, FloatArray, coarse_all, coarse_mean
+from xosc_lateral.identification.timeline import COARSE, Coarse, coarse_all, coarse_mean
 
 FINE_ORDER = 15  # Past samples (3 s) that the fine movement's autoregression sees.
 # Past seconds of the squares that whitening sees: two time constants of the clusters of 6 s that are no regime. [s]

@@ -17,6 +17,7 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.driver.effects import Acts, ColumnEffect
 from xosc_lateral.driver.effects.response import respond
 from xosc_lateral.drives.cuts import CutRules
@@ -24,10 +25,6 @@ from xosc_lateral.drives.drive import Drive
 from xosc_lateral.drives.gridding import GriddedDrive, grid_drives
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import NotEnoughDataError
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
 
 # Samples of the 0.2 s grid per sample of the coarse one: effects take seconds, so they are tested at 1 Hz. [-]
 COARSE = 5

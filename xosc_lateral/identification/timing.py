@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from msgspec import structs
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import ColumnEffect, Linear, Piecewise, Product, Proximity, Saturating, Threshold
 from xosc_lateral.identification.candidates import shapes_of
 from xosc_lateral.identification.columns import Column, read_column
@@ -21,7 +22,7 @@ from xosc_lateral.identification.refinement import (
     other_scales,
     running_sums,
 )
-from xosc_lateral.identification.timeline import Coarse, FloatArray
+from xosc_lateral.identification.timeline import Coarse
 
 
 def driving_range(coarse: Coarse, effect: ColumnEffect) -> tuple[FloatArray, FloatArray]:

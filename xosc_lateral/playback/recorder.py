@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, Int32Array
 from xosc_lateral.errors import PlaybackError
-from xosc_lateral.motion.nominal import Activity, EntityMotion, FloatArray, IntArray
+from xosc_lateral.motion.nominal import Activity, EntityMotion
 from xosc_lateral.playback.state import NOWHERE, EntityState
 from xosc_lateral.road import RoadNetwork
 from xosc_lateral.road.tables import turned_in_surface
@@ -196,7 +197,7 @@ class Rows:
 
 
 def _poses(
-    network: RoadNetwork, road: IntArray, lane: IntArray, s: FloatArray, offset: FloatArray, to_lane: FloatArray
+    network: RoadNetwork, road: Int32Array, lane: Int32Array, s: FloatArray, offset: FloatArray, to_lane: FloatArray
 ) -> FloatArray:
     """World poses of the rows that are on a road, shape (n, 6), turned by `to_lane` [rad] against their lanes."""
     on_road = road >= 0
@@ -213,8 +214,8 @@ def _look_up(
     rows: NDArray[np.int64],
     free: FloatArray,
     height: FloatArray | None,
-    road: IntArray,
-    lane: IntArray,
+    road: Int32Array,
+    lane: Int32Array,
     s: FloatArray,
     offset: FloatArray,
     direction: FloatArray,
@@ -247,8 +248,8 @@ def _lay_over(pose: FloatArray, rows: NDArray[np.int64], free: FloatArray) -> No
 
 def _lane_heading(
     network: RoadNetwork,
-    road: IntArray,
-    lane: IntArray,
+    road: Int32Array,
+    lane: Int32Array,
     s: FloatArray,
     offset: FloatArray,
     rows: NDArray[np.int64],
@@ -260,8 +261,8 @@ def _lane_heading(
 
 def _beside_road(
     network: RoadNetwork,
-    road: IntArray,
-    lane: IntArray,
+    road: Int32Array,
+    lane: Int32Array,
     s: FloatArray,
     offset: FloatArray,
     pose: FloatArray,

@@ -11,8 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.driver.effects import Acts, Angular, ColumnEffect, Product
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.cross_validation import hold_out_blocks
@@ -20,10 +20,6 @@ from xosc_lateral.identification.model import latent_path
 from xosc_lateral.identification.terms.between import is_between
 from xosc_lateral.identification.terms.regimes import RegimesTerm
 from xosc_lateral.identification.timeline import LOCAL_S, Timeline, coarse_mean, coarse_middle, local_mean
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
 
 POINTS = 9  # Equally wide bins between the 1 % and 99 % quantile of what drives an effect.
 LEAST_S = 30  # A bin with less driving is left out. [s]
@@ -120,7 +116,7 @@ def _fast(offset: FloatArray, timeline: Timeline) -> FloatArray:
 
 
 def _binned(
-    where: FloatArray, values: FloatArray, own: FloatArray, blocks: IntArray, inside: BoolArray
+    where: FloatArray, values: FloatArray, own: FloatArray, blocks: IndexArray, inside: BoolArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Mean place, mean value, its standard error with blocks as the independent pieces, mean of the fit, per bin."""
     low, high = _ends(where[inside])

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Cycle, Product, Regimes, Step, TimeSmooth
 from xosc_lateral.evaluation.spectra import gapped_spectrum
 from xosc_lateral.identification.close import Finding, LoopResult
@@ -26,8 +26,6 @@ from xosc_lateral.report.loop_curves import (
 )
 from xosc_lateral.report.loop_words import SPREAD, column_label, product_label
 from xosc_lateral.rows import true_slices
-
-FloatArray = NDArray[np.float64]
 
 # Measured drives, the profile before and the profile after, in every figure of the loop.
 DRIVES, BEFORE, AFTER = BLUE, MUTED, VERMILLION

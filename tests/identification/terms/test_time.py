@@ -9,6 +9,7 @@ import pytest
 from scipy import stats
 
 from tests.identification.made_coarse import coarse_of, movement
+from tests.profiles import whole_terms
 from xosc_lateral.driver.effects import Step, TimeSmooth
 from xosc_lateral.identification.low_frequencies import (
     SHORTEST_S,
@@ -131,7 +132,7 @@ def test_what_is_removed_is_what_the_profile_gets() -> None:
     removal = Removal(np.zeros(len(timeline)))
     term.remove(fitted, effects, removal)  # type: ignore[attr-defined]
     inside = timeline.valid
-    sampled = effects[0].terms(timeline.time, {}, rng).location
+    sampled = whole_terms(effects[0], timeline.time, {}, rng).location
     np.testing.assert_allclose(np.diff(removal.location[inside]), np.diff(sampled[inside]), atol=1e-12)
     assert removal.location[inside].mean() == pytest.approx(0.0, abs=1e-9)
     assert (removal.spread == 0.0).all()

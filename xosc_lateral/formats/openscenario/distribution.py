@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 
-from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.openscenario.catalogs import Boundary, allowed_roots
 from xosc_lateral.formats.openscenario.declarations import broken_constraint, declared_values, parameter_name
 from xosc_lateral.formats.openscenario.element import XmlElement
@@ -90,7 +89,7 @@ class LogicalScenario:
         self.discarded, begin = 0, time.monotonic()
         limit = PARAMETER_SETS if isinstance(self.distribution, Stochastic) else COMBINATIONS
         if self.count > limit.value:
-            raise self._error(limit.refusal(self.count))
+            raise self.place.error(limit.refusal(self.count))
         if isinstance(self.distribution, Deterministic):
             for values in self.distribution:
                 if self._accepts(values):
@@ -105,7 +104,7 @@ class LogicalScenario:
     def _check_time(self, begin: float) -> None:
         took = time.monotonic() - begin
         if took > DISTRIBUTION_TIME.value:
-            raise self._error(f"{DISTRIBUTION_TIME.refusal(took)}; constraints or limits leave out nearly all")
+            raise self.place.error(f"{DISTRIBUTION_TIME.refusal(took)}; constraints or limits leave out nearly all")
 
     @property
     def count(self) -> int:
@@ -119,15 +118,15 @@ class LogicalScenario:
             try:
                 values = distribution.sample(rng)
             except DistributionError as error:
-                raise self._error(str(error)) from error
+                raise self.place.error(str(error)) from error
             if self._accepts(values):
                 return values
-        raise self._error(f"{MAX_REDRAWS} draws in a row violate the constraints of {self.scenario_file}")
+        raise self.place.error(f"{MAX_REDRAWS} draws in a row violate the constraints of {self.scenario_file}")
 
     def _accepts(self, values: ParameterSet) -> bool:
         for name in values:
             if name not in self._declared:
-                raise self._error(f"parameter '{name}' is not declared in {self.scenario_file}")
+                raise self.place.error(f"parameter '{name}' is not declared in {self.scenario_file}")
         if not self._constrained:
             return True
         scope = Scope({**self._declared, **values})
@@ -141,9 +140,6 @@ class LogicalScenario:
                 self.discarded += 1
                 return False
         return True
-
-    def _error(self, what: str) -> FormatError:
-        return FormatError(what, path=self.place.path, line=self.place.line, element=self.place.element)
 
 
 def is_distribution(path: Path | str) -> bool:

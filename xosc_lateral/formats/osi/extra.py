@@ -14,10 +14,7 @@ SUFFIXES = (".mcap", ".osi")
 
 
 def osi(module: str) -> Any:
-    """A module of `osi3` or `osi_utilities`.
-
-    Raises `XoscLateralError`: They are not installed.
-    """
+    """A module of `osi3` or `osi_utilities`. Raises `XoscLateralError`: They are not installed."""
     try:
         found = import_module(module)
     except ImportError as error:

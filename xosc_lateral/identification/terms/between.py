@@ -16,13 +16,13 @@ from typing import ClassVar, Self
 import numpy as np
 from msgspec import structs
 
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect, Linear
 from xosc_lateral.identification.dictionary import NULL_DRAWS, beside
 from xosc_lateral.identification.model import Description, Fitted, Outcome, Stage
 from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.significance import MANY_DRIVES, LoopSeed, as_one_degree, upper_tail
 from xosc_lateral.identification.terms.column import ColumnTerm, of_kind
-from xosc_lateral.identification.timeline import BoolArray, FloatArray
 
 # Response time of an effect between drives: what a drive usually meets, as far as a run can know it. [s]
 USUAL_S = 60.0

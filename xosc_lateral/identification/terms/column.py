@@ -8,10 +8,11 @@ from typing import ClassVar, Self
 import numpy as np
 from msgspec import structs
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.identification.model import Description, Fitted, Removal, Term
 from xosc_lateral.identification.refinement import Alternatives
-from xosc_lateral.identification.timeline import Coarse, FloatArray
+from xosc_lateral.identification.timeline import Coarse
 from xosc_lateral.identification.timing import span
 
 # Responses between which a factor on the movement is believed; the report tells its size between the same. [-]

@@ -8,11 +8,12 @@ from typing import ClassVar
 import numpy as np
 from msgspec import structs
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import Acts, Effect
 from xosc_lateral.identification.autocorrelation import Problem
 from xosc_lateral.identification.column_search import SearchedTerm
 from xosc_lateral.identification.model import Fitted, Stage, Term
-from xosc_lateral.identification.timeline import Coarse, FloatArray, coarse_mean
+from xosc_lateral.identification.timeline import Coarse, coarse_mean
 from xosc_lateral.identification.timing import widening
 
 

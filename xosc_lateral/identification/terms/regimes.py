@@ -19,6 +19,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.driver.effects import Effect, Regimes
 from xosc_lateral.identification.dictionary import beside, in_another_order
 from xosc_lateral.identification.model import Description, Fitted, Outcome, Removal, Stage, Term
@@ -26,7 +27,7 @@ from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.significance import HEAVY_TAIL_SHARE, LoopSeed, upper_tail
 from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, quick_squares, slow_squares
 from xosc_lateral.identification.terms.spread import known_log_scale, what_a_column_may_do, what_columns_do
-from xosc_lateral.identification.timeline import BoolArray, Coarse, FloatArray, on_fine_grid
+from xosc_lateral.identification.timeline import Coarse, on_fine_grid
 from xosc_lateral.jit import njit
 
 

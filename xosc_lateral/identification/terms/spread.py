@@ -14,6 +14,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.identification.autocorrelation import Problem
 from xosc_lateral.identification.column_search import ColumnSearch, SearchedTerm
@@ -22,7 +23,7 @@ from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, of_squares, quick_squares, slow_squares
 from xosc_lateral.identification.terms.column import ColumnTerm, columns_on_size, of_kind
 from xosc_lateral.identification.terms.mean import MeanTerm
-from xosc_lateral.identification.timeline import Coarse, FloatArray
+from xosc_lateral.identification.timeline import Coarse
 
 # A column that p-values up to this speak for may be what makes stretches loud, rain for one (factors of 1.3 and 2 with
 # p = 0.01 and 0.05: beside rain p of regimes is 0.2, without it 3e-4 and 1e-10). The best of all columns taken out,

@@ -16,6 +16,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import Effect, Step, TimeSmooth
 from xosc_lateral.identification.low_frequencies import (
     MEAN_SHORTEST_S,
@@ -39,7 +40,7 @@ from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.significance import LoopSeed
 from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, quick_squares, slow_squares
 from xosc_lateral.identification.terms.spread import what_a_column_may_do, what_columns_do
-from xosc_lateral.identification.timeline import COARSE, Coarse, FloatArray
+from xosc_lateral.identification.timeline import COARSE, Coarse
 
 STEP_PARAMETERS = 2  # Of a step: its height and its moment.
 SURER = 0.01  # Where it is surer than the best column by this factor, what that column may do is left to time. [-]

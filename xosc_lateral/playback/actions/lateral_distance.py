@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import acos, atan2, copysign, cos, hypot, inf, pi, sin, sqrt
 
 from xosc_lateral.motion.nominal import Activity
-from xosc_lateral.playback.actions.base import Domain, RunningAction
+from xosc_lateral.playback.actions.base import Domain, RunningAction, RunningPrivateAction
 from xosc_lateral.playback.angles import difference
 from xosc_lateral.playback.distances import ahead_and_left, road_gap, spot_of
 from xosc_lateral.playback.drive import along_reference, travel
@@ -91,7 +91,7 @@ class BesideOnRoad:
     def _rest(self) -> float:
         """How far to go along +t of the own road. [m]"""
         state, other = self._state, self._other
-        gap = road_gap(state.network, other, spot_of(state))
+        gap = road_gap(other, spot_of(state))
         if gap is None:
             return 0.0
         return (self._wanted if other.is_forward is not gap.is_turned else -self._wanted) - gap.dt
@@ -217,7 +217,7 @@ CLOSE_ENOUGH = 0.01
 """A distance that is not kept continuously counts as reached. [m]"""
 
 
-class RunningLateralDistance(RunningAction):
+class RunningLateralDistance(RunningPrivateAction):
     """Beside another entity, in its own frame or in that of the road.
 
     With free space, the distance is that between boxes standing side by side. `any` side is the left one, as in the
@@ -228,21 +228,19 @@ class RunningLateralDistance(RunningAction):
     """As in the reference player, where it ends speed actions and is ended by them, and goes on beside lane changes."""
     content: LateralDistanceAction
 
-    def prepare(self) -> None:
-        """Find the entity to keep the distance to."""
+    def _prepare(self) -> None:
         self._other = self.simulation.entity(self.content.entity_ref, self.content.place)
         self.simulation.derives_motion = True
         self._way: BesideEntity | BesideOnRoad | None = None
 
-    def start(self) -> None:
-        """Decide on which side of the other entity to be."""
-        content, state, other = self.content, self.state, self._other
+    def _begin(self) -> None:
+        content, state, other = self.content, self.actor, self._other
         on_road = content.coordinate_system in (CoordinateSystem.ROAD, CoordinateSystem.LANE)
         state.locate()
         other.locate()
         self._way = None
         if on_road and (state.road == NOWHERE or other.road == NOWHERE):
-            self.note(f"'{state.name}' or '{other.name}' is on no road: the lateral distance is not kept")
+            self._note(f"'{state.name}' or '{other.name}' is on no road: the lateral distance is not kept")
             return
         wanted = self._wanted()
         if on_road:
@@ -250,15 +248,14 @@ class RunningLateralDistance(RunningAction):
             return
         self._way = BesideEntity(state, other, wanted, content.constraints)
         if content.constraints is not None and content.constraints.max_speed is not None:
-            self.note("maxSpeed of a lateral distance in the entity's frame is not played (maxAcceleration is)")
+            self._note("maxSpeed of a lateral distance in the entity's frame is not played (maxAcceleration is)")
 
-    def step(self, time: float, step: float) -> None:
-        """Move ahead and sideways."""
+    def _act(self, time: float, step: float) -> None:
         way = self._way
         if way is None:
             self.end()
             return
-        state = self.state
+        state = self.actor
         state.activity |= Activity.LATERAL
         before = state.plane
         rest = way.move(step)
@@ -266,7 +263,7 @@ class RunningLateralDistance(RunningAction):
             return
         if way.is_unlimited:
             dx, dy = state.plane.x - before.x, state.plane.y - before.y
-            self.jumped(max((dx * dx + dy * dy) ** 0.5 - abs(state.speed) * step, 0.0))
+            self._jumped(max((dx * dx + dy * dy) ** 0.5 - abs(state.speed) * step, 0.0))
         if not self.content.continuous and abs(rest) < CLOSE_ENOUGH:
             way.align()
             self.end()
@@ -275,10 +272,10 @@ class RunningLateralDistance(RunningAction):
         """Distance to the left of the other entity; negative: to the right. [m]"""
         content, other = self.content, self._other
         if content.distance is None:
-            return ahead_and_left(other, self.state.plane.x, self.state.plane.y)[1]
+            return ahead_and_left(other, self.actor.plane.x, self.actor.plane.y)[1]
         wanted = content.distance
         if content.freespace:
-            half = 0.5 * (self.state.entity.bounding_box.width + other.entity.bounding_box.width)
+            half = 0.5 * (self.actor.entity.bounding_box.width + other.entity.bounding_box.width)
             wanted += copysign(half, wanted)
         if content.displacement is LateralDisplacement.ANY and self.simulation.scenario.header.version == (1, 0):
             return wanted  # version 1.0 has no displacement: the sign of the distance tells the side

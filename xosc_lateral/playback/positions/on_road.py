@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import nan, pi
 
 from xosc_lateral.errors import PlaybackError
@@ -70,7 +69,7 @@ def _tilt(place: Placement, orientation: Orientation | None, simulation: Simulat
     scout = EntityState(simulation.entities[0].entity, simulation.network)
     scout.put(place)
     pitch, roll = tilted(orientation, scout.pose.pitch, scout.pose.roll, simulation)
-    return replace(place, pose=scout.pose._replace(pitch=pitch, roll=roll))
+    return place._replace(pose=scout.pose._replace(pitch=pitch, roll=roll))
 
 
 def _relative(

@@ -91,7 +91,7 @@ def _spot(place: Placement, simulation: Simulation) -> Spot:
     scout.put(place)
     pose = scout.pose
     if place.road == NOWHERE:
-        return Spot(pose.x, pose.y, NOWHERE, 0, 0.0, 0.0)
+        return Spot(pose.x, pose.y)
     return Spot(pose.x, pose.y, place.road, place.lane, place.s, scout.t)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from math import pi
 
 from xosc_lateral.errors import PlaybackError
@@ -83,4 +82,4 @@ def _headed(simulation: Simulation, place: Placement, direction: int, position: 
     """Without an orientation, along the route."""
     if position.orientation is not None or direction > 0:
         return place
-    return replace(place, relative_heading=place.relative_heading + pi)
+    return place._replace(relative_heading=place.relative_heading + pi)

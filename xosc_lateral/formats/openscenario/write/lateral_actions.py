@@ -12,14 +12,7 @@ from msgspec.structs import replace
 from xosc_lateral.motion.nominal import NominalMotion
 from xosc_lateral.scenario import Action, Event, Scenario
 from xosc_lateral.scenario.dependence import Dependence
-from xosc_lateral.scenario.private_actions import (
-    FollowTrajectoryAction,
-    LaneChangeAction,
-    LaneOffsetAction,
-    LateralDistanceAction,
-)
-
-LATERAL = (LaneChangeAction, LaneOffsetAction, LateralDistanceAction, FollowTrajectoryAction)
+from xosc_lateral.scenario.private_actions import LATERAL
 
 
 class LateralAction(Struct, frozen=True):

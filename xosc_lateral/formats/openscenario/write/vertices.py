@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from lxml import etree
 from msgspec import Struct
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.formats.openscenario.element import local_name
 from xosc_lateral.formats.openscenario.read import is_town
 from xosc_lateral.formats.openscenario.write import build
@@ -20,8 +20,6 @@ from xosc_lateral.scenario import Scenario
 from xosc_lateral.scenario.expressions import ExpressionError
 from xosc_lateral.scenario.parameters import Scope
 
-FloatArray = NDArray[np.float64]
-
 BLOCK = 1000
 """Vertices that are text at a time."""
 
@@ -29,6 +27,9 @@ _POSE, _MOTION = ("x", "y", "z", "h", "p", "r"), ("speed_longitudinal", "acceler
 
 _DIGITS = (6, 5, 5, 5, 6, 6, 6, 4, 4)
 """Decimals of the time and of these."""
+
+
+ColumnsOf = Callable[[slice], Sequence[FloatArray]]
 
 
 class TimedVertices(Struct, frozen=True, eq=False):
@@ -44,7 +45,7 @@ class TimedVertices(Struct, frozen=True, eq=False):
     """
 
     count: int
-    columns_of: Callable[[slice], Sequence[FloatArray]]
+    columns_of: ColumnsOf
 
     def text(self, indent: str, unit: str) -> Iterator[str]:
         """XML of the vertices, set out at `indent`, each level below by `unit` more; the first without its indent."""
