@@ -76,8 +76,8 @@ def identify(
 ) -> Identified:
     """Select terms, and keep those that predict blocks on which they were neither selected nor sized.
 
-    `initial` terms are in the model already, `excluded` columns are not tested; `roles` are what columns are declared to
-    be, see `columns.roles_of`.
+    `initial` terms are in the model already, `excluded` columns are not tested; `roles` are what columns are declared
+    to be, see `columns.roles_of`.
     """
     from threadpoolctl import threadpool_limits
 
