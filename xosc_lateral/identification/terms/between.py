@@ -44,6 +44,7 @@ class BetweenTerm(ColumnTerm):
     stages: ClassVar[tuple[Stage, ...]] = (Stage.BETWEEN_DRIVES,)
     weight: ClassVar[float] = 5.0
     seen_held_out: ClassVar[bool] = False
+    within_drives: ClassVar[bool] = False
     acts: ClassVar[Acts] = Acts.LOCATION
     what: ClassVar[str] = "place that a drive keeps"
     group: ClassVar[str] = "mean"

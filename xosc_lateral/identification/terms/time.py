@@ -52,6 +52,11 @@ class _MeanByTime(Term):
     component: ClassVar[str] = "time_mean"
     weight: ClassVar[float] = 3.0
 
+    @property
+    def kind_key(self) -> str:
+        """Two kinds share the component."""
+        return self.kind
+
     def probability_beside(self, search: Search, fitted: Fitted) -> float:
         """p-value of the mean by time, whichever of the two it looks like beside the terms fitted."""
         test = StepTerm.test(search, fitted)
