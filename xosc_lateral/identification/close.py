@@ -12,6 +12,7 @@ import numpy as np
 from xosc_lateral.driver.effects import Effect
 from xosc_lateral.driver.models.base import ModelKind
 from xosc_lateral.driver.profile import DriverProfile, Provenance
+from xosc_lateral.driver.seeds import generator
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.identification.core_model import (
     DriverVariance,
@@ -177,7 +178,7 @@ def close_loop(
         refined = fit_without(selection.final, everything, setting.refined_kind, name, provenance)
     findings = [describe_finding(*one, selection.final, scored) for one in _accepted(selection)]
     findings += [_finding(lack.described(), scored, kind=lack.KIND, p_value=lack.p_value) for lack in lacks]
-    rng = setting.rng(LoopSeed.SNIPPETS)
+    rng = generator(root, LoopSeed.SNIPPETS)
     progress(1.0, "done")
     return LoopResult(
         base=base,
