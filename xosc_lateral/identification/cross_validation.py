@@ -128,9 +128,14 @@ class Nested:
         for fold, pair in enumerate(pairs):
             if pair is not None:
                 rows += held_out_gain(*pair, self.coarse, self.blocks % len(pairs) == fold)
-        sums = np.bincount(self.blocks, rows)[np.unique(self.blocks[self.coarse.valid])]
-        error = float(np.std(sums, ddof=1) / np.sqrt(len(sums))) if len(sums) > 1 else 0.0
-        return Gain(float(sums.mean()), error, folds)
+        return gain_over(rows, self.blocks, self.coarse.valid, folds)
+
+
+def gain_over(rows: FloatArray, blocks: IntArray, valid: BoolArray, folds: int) -> Gain:
+    """Mean over blocks of what their rows gain, shape (n,), with its standard error. [nat]"""
+    sums = np.bincount(blocks, rows)[np.unique(blocks[valid])]
+    error = float(np.std(sums, ddof=1) / np.sqrt(len(sums))) if len(sums) > 1 else 0.0
+    return Gain(float(sums.mean()), error, folds)
 
 
 def nest(
