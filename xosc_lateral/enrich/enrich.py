@@ -394,17 +394,14 @@ def _apart(
     every = max(1, round(SAMPLE_STEP / motion.step))
     rows = np.arange(0, len(motion.entities[0].time), every)
     moves = give_way(motion, network, [_sampled(one, rows) for one in drawn], rows)
-    return [
-        one
-        if move is None
-        else replace(
-            one,
-            segments=tuple(
-                (span, knots, kept(offset + np.interp(knots, rows, move))) for span, knots, offset in one.segments
-            ),
-        )
-        for one, move in zip(drawn, moves, strict=True)
-    ]
+    return [one if move is None else _moved(one, rows, move) for one, move in zip(drawn, moves, strict=True)]
+
+
+def _moved(one: _Drawn, rows: IntArray, move: FloatArray) -> _Drawn:
+    """Its offsets and what it moves aside, known on these rows. [m]"""
+    give_back(len(rows))
+    segments = ((span, knots, kept(offset + np.interp(knots, rows, move))) for span, knots, offset in one.segments)
+    return replace(one, segments=tuple(segments))
 
 
 def _sampled(one: _Drawn, rows: IntArray) -> SampledVehicle:
