@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 import xosc_lateral.enrich.enrich as conversion
 from xosc_lateral.api.templates import list_templates, write_template
 from xosc_lateral.driver.drivability import Bound, drivable
-from xosc_lateral.enrich.enrich import SAMPLE_STEP
+from xosc_lateral.enrich.seen import SAMPLE_STEP
 from xosc_lateral.errors import XoscLateralError
 from xosc_lateral.pipeline.drivers import choose_drivers
 from xosc_lateral.pipeline.load import Played, play_scenario

@@ -13,11 +13,12 @@ from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.identification.columns import Column, Values
 from xosc_lateral.identification.cross_validation import Nested, _over_blocks
 from xosc_lateral.identification.held_out import _quantities, fit_without
-from xosc_lateral.identification.regression import Coarse, fit_model
+from xosc_lateral.identification.model import Term
+from xosc_lateral.identification.regression import fit_model
 from xosc_lateral.identification.selection import Accepted, Gain, Selection
-from xosc_lateral.identification.terms.base import Term
-from xosc_lateral.identification.terms.column import MeanTerm
+from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.time import StepTerm
+from xosc_lateral.identification.timeline import Coarse
 
 SECONDS = 900.0
 N = round(SECONDS / 0.2)

@@ -18,7 +18,7 @@ from xosc_lateral.driver.effects import (
     Saturating,
     Threshold,
 )
-from xosc_lateral.identification.regression import Coarse
+from xosc_lateral.identification.timeline import Coarse
 from xosc_lateral.identification.timing import driving_range, span
 
 N = 3000

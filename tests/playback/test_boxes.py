@@ -19,7 +19,6 @@ from xosc_lateral.playback.boxes import (
     corners,
     distance_between,
     gaps,
-    gaps_between,
     holds_point,
     overlap,
 )
@@ -77,21 +76,21 @@ def test_boxes_on_different_levels_do_not_touch() -> None:
     ],
 )
 def test_gaps_are_positive_ahead_and_to_the_left(x: float, y: float, expected: tuple[float, float]) -> None:
-    assert gaps(car(), corners(car(x, y))) == pytest.approx(expected)
+    assert gaps(corners(car()), corners(car(x, y)), 0.0) == pytest.approx(expected)
 
 
 def test_gaps_turn_with_the_entity_that_asks() -> None:
     """Heading north: what is north of it is ahead, what is west of it on the left."""
     own = car(heading=pi / 2.0, centre=0.0)
-    assert gaps(own, corners(car(0.0, 10.0, pi / 2.0, centre=0.0))) == pytest.approx((6.0, 0.0))
-    assert gaps(own, corners(car(-5.0, 0.0, pi / 2.0, centre=0.0))) == pytest.approx((0.0, 3.0))
+    assert gaps(corners(own), corners(car(0.0, 10.0, pi / 2.0, centre=0.0)), -pi / 2.0) == pytest.approx((6.0, 0.0))
+    assert gaps(corners(own), corners(car(-5.0, 0.0, pi / 2.0, centre=0.0)), -pi / 2.0) == pytest.approx((0.0, 3.0))
 
 
 def test_gaps_in_a_turned_frame() -> None:
     square = ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0))
     there = tuple((x + 5.0, y + 5.0) for x, y in square)
-    assert gaps_between(square, there, 0.0) == pytest.approx((3.0, 3.0))
-    along, across = gaps_between(square, there, -pi / 4.0)  # along the diagonal between them
+    assert gaps(square, there, 0.0) == pytest.approx((3.0, 3.0))
+    along, across = gaps(square, there, -pi / 4.0)  # along the diagonal between them
     assert along == pytest.approx(hypot(5.0, 5.0) - 2.0 * hypot(1.0, 1.0))
     assert across == 0.0
 
@@ -115,10 +114,10 @@ def test_a_box_holds_what_lies_within_it_in_its_own_frame(x: float, y: float, he
 # ---- limits ----------------------------------------------------------------------------------------------------------
 def test_limits_are_the_tighter_of_action_and_vehicle() -> None:
     performance = Performance(50.0, 4.0, 9.0, 10.0, 20.0)
-    assert limits_of(None, performance).speed == 50.0
-    assert limits_of(None, performance).acceleration == inf  # an action without constraints has none at all
+    assert limits_of(None, performance).max_speed == 50.0
+    assert limits_of(None, performance).max_acceleration == inf  # an action without constraints has none at all
     own = limits_of(DynamicConstraints(max_acceleration=2.0, max_deceleration=12.0), performance)
-    assert (own.speed, own.acceleration, own.deceleration, own.acceleration_rate) == (50.0, 2.0, 9.0, 10.0)
+    assert own == Performance(50.0, 2.0, 9.0, 10.0, 20.0)
 
 
 # ---- comparisons and values ------------------------------------------------------------------------------------------

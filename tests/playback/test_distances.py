@@ -10,13 +10,12 @@ import pytest
 
 from tests.playback.stage import Stage, arc, car, line, map_of, road
 from xosc_lateral.playback.distances import (
+    Measure,
     RoadGap,
     ahead_and_left,
     apart,
-    entity_distance,
     free_road_gap,
     road_gap,
-    spot_distance,
     spot_of,
     straight_distance,
 )
@@ -64,7 +63,7 @@ def world(tmp_path: Path) -> World:
 
 
 def distance(world: World, own: EntityState, other: EntityState, system, kind, *, freespace: bool = False):
-    return entity_distance(world.network, own, other, system, kind, freespace=freespace)
+    return Measure(system, kind, freespace).to_entity(own, other)
 
 
 # ---- in the entity's own frame ---------------------------------------------------------------------------------------
@@ -112,7 +111,7 @@ def test_there_is_no_way_between_roads_that_are_not_linked(world: World) -> None
     own, other = world.put(0, -1, 100.0), world.put(1, -1, 100.0, on=1)
     assert distance(world, own, other, ROAD, AHEAD) is None
     assert distance(world, own, other, ENTITY, STRAIGHT_WAY) == pytest.approx(-100.0)  # abreast counts as behind
-    assert road_gap(world.network, own, spot_of(other)) is None
+    assert road_gap(own, spot_of(other)) is None
 
 
 def test_who_is_beside_the_road_is_seen_from_its_nearest_place(world: World) -> None:
@@ -124,10 +123,10 @@ def test_who_is_beside_the_road_is_seen_from_its_nearest_place(world: World) -> 
 
 def test_lanes_are_counted_without_the_middle_one(world: World) -> None:
     own = world.put(0, -1, 100.0)
-    assert road_gap(world.network, own, spot_of(world.put(1, -2, 130.0))) == RoadGap(30.0, -3.5, -1, False)
-    across = road_gap(world.network, own, spot_of(world.put(1, 1, 130.0)))
+    assert road_gap(own, spot_of(world.put(1, -2, 130.0))) == RoadGap(30.0, -3.5, -1, False)
+    across = road_gap(own, spot_of(world.put(1, 1, 130.0)))
     assert across == RoadGap(30.0, 3.5, 1, True)
-    far = road_gap(world.network, own, spot_of(world.put(1, 2, 70.0)))
+    far = road_gap(own, spot_of(world.put(1, 2, 70.0)))
     assert far == RoadGap(-30.0, 7.0, 2, True)
 
 
@@ -135,10 +134,10 @@ def test_lanes_are_counted_without_the_middle_one(world: World) -> None:
 def test_with_free_space_lanes_are_those_of_front_right_corners(world: World, offset_t: float, lanes: int) -> None:
     """Cars of 2 m in lanes of 3.5 m: 0.75 m to the right of the middle, a corner is in the next lane."""
     own = world.put(0, -1, 100.0)
-    gap = free_road_gap(world.network, own, world.put(1, -1, 130.0, offset_t))
+    gap = free_road_gap(own, world.put(1, -1, 130.0, offset_t))
     assert gap is not None
     assert (gap.ds, gap.lanes) == (pytest.approx(25.0), lanes)
-    touching = free_road_gap(world.network, own, world.put(1, -1, 102.0, offset_t))
+    touching = free_road_gap(own, world.put(1, -1, 102.0, offset_t))
     assert touching == RoadGap(0.0, 0.0, 0, False)
 
 
@@ -164,10 +163,10 @@ def test_cars_that_touch_have_no_free_space(world: World, system: CoordinateSyst
 
 def test_free_space_to_a_point(world: World) -> None:
     own, spot = world.put(0, -1, 100.0), spot_of(world.put(1, -1, 140.0))
-    assert spot_distance(world.network, own, spot, ENTITY, AHEAD, freespace=True) == pytest.approx(36.0)
-    assert spot_distance(world.network, own, spot, ROAD, AHEAD, freespace=True) == pytest.approx(36.0, abs=1e-6)
+    assert Measure(ENTITY, AHEAD, freespace=True).to_spot(own, spot) == pytest.approx(36.0)
+    assert Measure(ROAD, AHEAD, freespace=True).to_spot(own, spot) == pytest.approx(36.0, abs=1e-6)
     inside = spot_of(world.put(1, -1, 101.0))
-    assert spot_distance(world.network, own, inside, ENTITY, STRAIGHT_WAY, freespace=True) == 0.0
+    assert Measure(ENTITY, STRAIGHT_WAY, freespace=True).to_spot(own, inside) == 0.0
 
 
 # ---- trailers --------------------------------------------------------------------------------------------------------

@@ -13,12 +13,7 @@ import pytest
 from xosc_lateral.formats.openscenario.conditions import ENTITY_CONDITIONS, VALUE_CONDITIONS
 from xosc_lateral.formats.openscenario.private_actions import PRIVATE_ACTIONS
 from xosc_lateral.playback.actions.global_actions import RunningEnvironment, RunningTraffic, RunningUnsupported
-from xosc_lateral.playback.actions.private_actions import (
-    RunningAnimation,
-    RunningAppearance,
-    RunningController,
-    RunningLightState,
-)
+from xosc_lateral.playback.actions.private_actions import RunningAppearance, RunningController, RunningForTime
 from xosc_lateral.playback.actions.registry import RUNNING
 from xosc_lateral.playback.conditions.registry import ENTITY_CHECKS, VALUE_CHECKS
 from xosc_lateral.playback.conditions.value import prepare_user_defined
@@ -75,7 +70,7 @@ def _said(name: str) -> str:
     runner = ACTIONS.get(PARTS.get(name, name), RUNNING[Unsupported])
     if issubclass(runner, RunningController | RunningUnsupported | RunningTraffic):
         return NOT_PLAYED
-    aside = (RunningAppearance, RunningLightState, RunningAnimation, RunningEnvironment)
+    aside = (RunningAppearance, RunningForTime, RunningEnvironment)
     return PASSED_ON if issubclass(runner, aside) else PLAYED
 
 

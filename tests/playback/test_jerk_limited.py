@@ -9,12 +9,13 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from xosc_lateral.playback.actions.speed_profile import Limits, NoSolutionError, Row, SpeedTarget, follow
+from xosc_lateral.playback.actions.speed_profile import NoSolutionError, Piece, follow
+from xosc_lateral.scenario import Performance
 
-LIMITS = Limits(100.0, 3.0, 5.0, 2.0, 4.0)
+LIMITS = Performance(100.0, 3.0, 5.0, 2.0, 4.0)
 
 
-def assert_joined(rows: list[Row]) -> None:
+def assert_joined(rows: list[Piece]) -> None:
     """Speed and acceleration at the end of each piece are those that the next begins with."""
     for (t0, v0, a0, jerk), (t1, v1, a1, _) in pairwise(rows):
         dt = t1 - t0
@@ -24,10 +25,10 @@ def assert_joined(rows: list[Row]) -> None:
 
 
 def single(
-    speed: float, wanted: float, seconds: float, *, limits: Limits = LIMITS, acceleration: float = 0.0
-) -> list[Row]:
+    speed: float, wanted: float, seconds: float, *, limits: Performance = LIMITS, acceleration: float = 0.0
+) -> list[Piece]:
     slope = (wanted - speed) / seconds
-    targets = [SpeedTarget(0.0, speed, slope), SpeedTarget(seconds, wanted, 0.0)]
+    targets = [Piece(0.0, speed, slope), Piece(seconds, wanted, 0.0)]
     rows, why = follow(targets, acceleration, limits)
     assert not why
     return rows
@@ -73,13 +74,13 @@ def test_any_single_target_keeps_its_limits(speed: float, wanted: float, seconds
 
 
 def test_a_target_without_limits_of_jerk_is_a_straight_line() -> None:
-    rows = single(10.0, 20.0, 5.0, limits=Limits(inf, inf, inf, inf, inf))
+    rows = single(10.0, 20.0, 5.0, limits=Performance(inf, inf, inf, inf, inf))
     assert rows[1][2] == pytest.approx(2.0, abs=1e-5)
     assert rows[-1][0] == pytest.approx(5.0, abs=1e-4)
 
 
 def test_several_targets_round_the_corners_between_their_lines() -> None:
-    targets = [SpeedTarget(0.0, 10.0, 1.0), SpeedTarget(10.0, 20.0, -0.5), SpeedTarget(20.0, 15.0, 0.0)]
+    targets = [Piece(0.0, 10.0, 1.0), Piece(10.0, 20.0, -0.5), Piece(20.0, 15.0, 0.0)]
     rows, why = follow(targets, 0.0, LIMITS)
     assert not why
     assert_joined(rows)
@@ -90,20 +91,20 @@ def test_several_targets_round_the_corners_between_their_lines() -> None:
 
 
 def test_a_target_that_leaves_no_time_goes_on_in_straight_lines_and_says_so() -> None:
-    targets = [SpeedTarget(0.0, 10.0, 2.9), SpeedTarget(0.2, 10.58, -4.9), SpeedTarget(0.4, 9.6, 0.0)]
+    targets = [Piece(0.0, 10.0, 2.9), Piece(0.2, 10.58, -4.9), Piece(0.4, 9.6, 0.0)]
     rows, why = follow(targets, 0.0, LIMITS)
     assert "leaves no time for the jerk" in why
     assert all(jerk == 0.0 for *_, jerk in rows[2:])
 
 
 def test_an_acceleration_beyond_the_limits_has_no_profile() -> None:
-    targets = [SpeedTarget(0.0, 10.0, 1.0), SpeedTarget(5.0, 15.0, 0.5), SpeedTarget(9.0, 17.0, 0.0)]
+    targets = [Piece(0.0, 10.0, 1.0), Piece(5.0, 15.0, 0.5), Piece(9.0, 17.0, 0.0)]
     with pytest.raises(NoSolutionError, match=r"the present acceleration of 6\.00 m/s2 is beyond the limits"):
         follow(targets, 6.0, LIMITS)
 
 
 def test_one_target_alone_is_where_it_is() -> None:
-    assert follow([SpeedTarget(1.0, 20.0, 0.0)], 0.0, LIMITS) == ([(1.0, 20.0, 0.0, 0.0)], "")
+    assert follow([Piece(1.0, 20.0, 0.0)], 0.0, LIMITS) == ([(1.0, 20.0, 0.0, 0.0)], "")
     assert follow([], 0.0, LIMITS) == ([], "")
 
 

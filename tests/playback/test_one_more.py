@@ -14,7 +14,7 @@ from xosc_lateral.formats.openscenario import private_actions
 from xosc_lateral.formats.openscenario.context import Context
 from xosc_lateral.formats.openscenario.element import XmlElement
 from xosc_lateral.playback.actions import registry as running_actions
-from xosc_lateral.playback.actions.base import Domain, RunningAction
+from xosc_lateral.playback.actions.base import Domain, RunningPrivateAction
 from xosc_lateral.playback.conditions import registry as running_conditions
 from xosc_lateral.playback.conditions.base import EntityCheck
 from xosc_lateral.playback.simulation import Simulation
@@ -49,16 +49,16 @@ def read_beyond(e: XmlElement, context: Context) -> Any:
 
 
 # ---- what is done: playback/ -----------------------------------------------------------------------------------------
-class RunningHurry(RunningAction):
+class RunningHurry(RunningPrivateAction):
     domains = Domain.LONGITUDINAL
     content: HurryAction
 
-    def start(self) -> None:
+    def _begin(self) -> None:
         self._left = self.content.duration
 
-    def step(self, time: float, step: float) -> None:
+    def _act(self, time: float, step: float) -> None:
         step = min(step, self._left)
-        self.state.set_speed(self.state.speed + self.content.acceleration * step)
+        self.actor.set_speed(self.actor.speed + self.content.acceleration * step)
         self._left -= step
         if self._left <= 1e-9:
             self.end()

@@ -17,15 +17,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.sensor.quantisation import COARSEST, uniform_variance
 from xosc_lateral.drives.filters import filtered
 from xosc_lateral.segment import Segment
-
-FloatArray = NDArray[np.float64]
 
 GRAVITY = 9.80665
 MPH = 0.44704

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.enrich.result import EntityResult, LaneDeparture
 from xosc_lateral.motion.gaps import BoxPath, Gap, smallest_gaps
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.rows import blocks, give_back, kept, slices_where
-
-FloatArray = NDArray[np.float64]
 
 GAP_STEP = 0.1
 """Rows that gaps are looked for on. [s]"""
@@ -58,7 +56,7 @@ def _lateral_within_a_lane(motion: EntityMotion) -> list[tuple[int, int]]:
     Lane changes cross markings anyway.
     """
 
-    def lateral(rows: slice) -> NDArray[np.bool_]:
+    def lateral(rows: slice) -> BoolArray:
         activity = motion.activity[rows]
         at_work = ((activity & Activity.LATERAL) != 0) & ((activity & Activity.ACTIVE) != 0)
         return np.asarray(at_work & (motion.road[rows] >= 0))

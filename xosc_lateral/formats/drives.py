@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.plausibility import first_implausible, implausible, implausible_rows, nobody
 from xosc_lateral.drives.cleaning import MAX_MEDIAN_SPEED, MAX_OUTSIDE, OWN, clean_drive
 from xosc_lateral.drives.cuts import MIN_RUN
@@ -17,12 +17,8 @@ from xosc_lateral.drives.drive import Drive
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping
 from xosc_lateral.formats.tables import comma_numbers, indicators, numbers_of, plain_cells, read_table
+from xosc_lateral.lazy import pd
 from xosc_lateral.segment import CONTEXT_UNITS
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-FloatArray = NDArray[np.float64]
 
 MAX_LEVELS = 12
 """A column of whole numbers with at most so many values holds levels, not a quantity."""
@@ -64,7 +60,7 @@ def drives_of_table(table: pd.DataFrame, mapping: MappingLike, path: Path | str 
     if not len(table):
         raise NotEnoughDataError(f"{path}: the table has no rows; {MIN_RUN:g} s of driving are needed")
     columns = _numeric_columns(table, path)
-    levels = frozenset(name for name, values in columns.items() if _may_hold_levels(name) and _holds_levels(values))
+    levels = frozenset(name for name, values in columns.items() if _holds_levels(name, values))
     _require_columns(columns, path)
     names, every = _drive_names(table, path)
     drives = [
@@ -81,8 +77,6 @@ def drives_of_table(table: pd.DataFrame, mapping: MappingLike, path: Path | str 
 
 def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.DataFrame:
     """The table under standard names and in standard units; what is not mapped stays as it is."""
-    import pandas as pd
-
     table = table.rename(columns=lambda name: str(name).strip())
     if not table.columns.is_unique:
         twice = sorted(set(table.columns[table.columns.duplicated()]))
@@ -106,13 +100,12 @@ def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.Dat
 def _numeric_columns(table: pd.DataFrame, path: Path) -> dict[str, FloatArray]:
     """Columns that hold numbers or categories, as float64; infinite values count as missing, but for those of distances
     to others: nobody is within reach."""
-    from pandas.api import types
 
     columns: dict[str, FloatArray] = {}
     for name in table.columns:
         if name == "drive":
             continue
-        if name in OWN or name == "speed" or types.is_numeric_dtype(table[name]) or types.is_bool_dtype(table[name]):
+        if name in (*OWN, "speed") or pd.api.types.is_numeric_dtype(table[name]):
             columns[name] = _cleaned(table, name, path)
         elif table[name].isna().all():
             columns[name] = np.full(len(table), np.nan)
@@ -144,12 +137,10 @@ def _leave_out_nonsense(values: FloatArray, name: str, path: Path) -> None:
     values[wrong] = np.nan
 
 
-def _may_hold_levels(name: str) -> bool:
+def _holds_levels(name: str, values: FloatArray) -> bool:
     """Counts, indices and flags do; a speed that happens to be constant doesn't."""
-    return name not in OWN and CONTEXT_UNITS.get(name, "-") == "-"
-
-
-def _holds_levels(values: FloatArray) -> bool:
+    if name in OWN or CONTEXT_UNITS.get(name, "-") != "-":
+        return False
     known = values[~np.isnan(values)]
     return bool(np.all(known == np.round(known)) and len(np.unique(known)) <= MAX_LEVELS)
 

@@ -67,10 +67,7 @@ def is_folder(output: str | Path) -> bool:
 
 
 def output_folder(output: str | Path) -> Path:
-    """Path of an output folder, which need not be there yet.
-
-    Raises `FormatError` if a file is there.
-    """
+    """Path of an output folder, which need not be there yet. Raises `FormatError` if a file is there."""
     path = Path(output)
     if path.is_file():
         raise FormatError("is a file, expected a folder", path=path)
@@ -192,12 +189,11 @@ def _own_parquet(path: Path) -> bool:
         return PACKAGE in file.read() or b"xosc_lateral" in _head(path)
 
 
+# of other tables than Parquet the file beside them says so
 _CHECKS: dict[str, Callable[[Path], bool]] = {
     ".xosc": _own_xml,
     ".xodr": _own_xml,
     ".json": _own_json,
-    ".csv": _own_table,
-    ".csv.gz": _own_table,
     ".parquet": _own_parquet,
     ".html": lambda path: b'content="xosc-lateral ' in _head(path),
     ".mcap": lambda path: PACKAGE in _head(path),  # its header and metadata are not compressed

@@ -7,16 +7,13 @@ import hashlib
 import io
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 from xosc_lateral.formats.atomic import write_atomically
 from xosc_lateral.formats.json_text import canonical_json
 from xosc_lateral.formats.output_paths import SIDECAR_SUFFIX
+from xosc_lateral.lazy import pd
 from xosc_lateral.version import __version__
-
-if TYPE_CHECKING:
-    import pandas as pd
-
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 

@@ -14,12 +14,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.identification.autocorrelation import Whitener
 from xosc_lateral.identification.innovations import CLIP, own_levels
-from xosc_lateral.identification.regression import Coarse, Fitted, design_of, fit_model
-from xosc_lateral.identification.selection import Gain, Search, Selection, select
-from xosc_lateral.identification.terms.base import Term
-from xosc_lateral.identification.timeline import BoolArray, FloatArray, IntArray, Timeline, coarse_middle
+from xosc_lateral.identification.model import Fitted, Term
+from xosc_lateral.identification.regression import design_of, fit_model
+from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.selection import Gain, Selection, select
+from xosc_lateral.identification.timeline import Coarse, Timeline, coarse_middle
 
 Progress = Callable[[float, str], None]  # Gets the share that is done and what is being done.
 FOLDS = 4  # Every part of the drives is held out once, and predicted from the other three.
@@ -65,13 +67,7 @@ def held_out_gain(fitted: Fitted, rest: Fitted, coarse: Coarse, held: BoolArray)
     held-out row, also where the term does nothing: on the motorway recording it cost 0.3 to 0.5 nat a vehicle, as much
     as the neighbour on the right gains. The held-out rows' own levels of place and spread are taken from themselves.
 
-    Parameters
-    ----------
-    fitted, rest : Fitted
-        Without the held-out rows.
-    coarse : Coarse
-        With the held-out rows valid.
-    held : bool array, shape (n,)
+    `fitted` and `rest`: without the held-out rows; `coarse`: with the held-out rows valid; `held`, shape (n,).
     """
     return _log_likelihood(fitted, fitted, coarse, held) - _log_likelihood(rest, fitted, coarse, held)
 
@@ -146,12 +142,8 @@ def nest(
     A level that all have to reach would bias the gain. What a fold lacks of an effect, the others have more of: it is
     significant in just those whose own held-out rows show least of it.
 
-    Parameters
-    ----------
-    blocks : int array, shape (n,)
-        On the 0.2 s grid.
-    wanted : mapping of str to int
-        Terms that the table has, of the components in which any was accepted.
+    `blocks`, shape (n,): on the 0.2 s grid; `wanted`: terms that the table has, of the components in which any was
+    accepted.
     """
     from joblib import cpu_count
 

@@ -8,7 +8,8 @@ from functools import cached_property
 import numpy as np
 from msgspec import structs
 
-from xosc_lateral.driver.effects import ColumnEffect, Effect, TimeSmooth
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.driver.effects import Effect
 from xosc_lateral.driver.fitting import fit_population, fit_runs
 from xosc_lateral.driver.models.base import ModelKind
 from xosc_lateral.driver.place import COLUMNS as KNOWN_TO_THE_BASE
@@ -22,7 +23,8 @@ from xosc_lateral.evaluation.distances import Distances, mean_distances, metric_
 from xosc_lateral.evaluation.metrics import METRICS, snippet_metrics
 from xosc_lateral.identification.columns import Column
 from xosc_lateral.identification.cross_validation import Nested, Progress, folds_of, hold_out_blocks
-from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
+from xosc_lateral.identification.model import Fitted, Removal
+from xosc_lateral.identification.regression import fit_model
 from xosc_lateral.identification.residual import (
     SummaryStatistics,
     error_between,
@@ -34,10 +36,8 @@ from xosc_lateral.identification.residual import (
 )
 from xosc_lateral.identification.selection import Selection
 from xosc_lateral.identification.significance import LoopSeed
-from xosc_lateral.identification.terms.base import Removal
 from xosc_lateral.identification.terms.cycle import CycleTerm
-from xosc_lateral.identification.terms.time import StepTerm
-from xosc_lateral.identification.timeline import COARSE, BoolArray, FloatArray, IntArray, Timeline, coarse_middle
+from xosc_lateral.identification.timeline import Coarse, Timeline, coarse_middle
 from xosc_lateral.rows import true_slices
 
 FINE_S = 1.0  # Movement within this time counts as fine when a spread is taken out. [s]
@@ -195,13 +195,8 @@ def _quantities(fitted: Fitted, columns: list[Column]) -> dict[str, FloatArray]:
             angle = 2.0 * np.pi / column.period * quantities.pop(column.name)
             quantities |= {f"sin({column.name})": np.sin(angle), f"cos({column.name})": np.cos(angle)}
     for key, (term, effects) in fitted.estimates.items():
-        effect = effects[0] if effects else None
-        if isinstance(effect, ColumnEffect):
-            quantities[f"effect: {key}"] = coarse.strength(effect)
-        elif isinstance(effect, TimeSmooth):
-            quantities[f"effect: {key}"] = effect.path(effect.location or effect.spread, coarse.timeline.time)
-        elif isinstance(term, StepTerm):
-            quantities[f"effect: {key}"] = (np.arange(len(coarse.timeline)) >= term.at * COARSE).astype(float)
+        if (own := term.quantity(coarse, effects)) is not None:
+            quantities[f"effect: {key}"] = own
     return quantities
 
 

@@ -15,13 +15,14 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.identification.columns import Assigned, Column, Role, known_columns, roles_of
 from xosc_lateral.identification.cross_validation import Nested, Progress, hold_out_blocks, nest
 from xosc_lateral.identification.feedback import Feedback, find_feedback
-from xosc_lateral.identification.regression import Coarse
-from xosc_lateral.identification.selection import ERROR_BUDGET, Gain, Rejected, Search, Selection, select
-from xosc_lateral.identification.terms.base import Term
+from xosc_lateral.identification.model import Term
+from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.selection import ERROR_BUDGET, Gain, Rejected, Selection, select
 from xosc_lateral.identification.terms.between import BetweenTerm, is_between
-from xosc_lateral.identification.terms.column import MeanTerm, SpreadTerm
+from xosc_lateral.identification.terms.mean import MeanTerm
+from xosc_lateral.identification.terms.spread import SpreadTerm
 from xosc_lateral.identification.terms.time import StepTerm, TimeMeanTerm, TimeSpreadTerm
-from xosc_lateral.identification.timeline import Timeline
+from xosc_lateral.identification.timeline import Coarse, Timeline, unsized
 
 # Why a term that loses on held-out rows is rejected.
 VETOED = "significant, but chosen and estimated on other blocks it predicts the held-out ones worse than nothing"
@@ -133,21 +134,12 @@ def initial_terms(base: DriverProfile, timeline: Timeline) -> tuple[Term, ...]:
     terms: list[Term] = []
     for effect in base.effects:
         if isinstance(effect, ColumnEffect) and set(effect.columns) <= there:
-            unsized = structs.replace(
-                effect,
-                coefficients=(),
-                errors=(),
-                reference=(),
-                between_drivers=(),
-                response_range=(),
-                response_s=effect.response_time,
-                response_order=1,
-            )
+            known = structs.replace(unsized(effect), response_s=effect.response_time, response_order=1)
             if effect.acts is Acts.LOCATION:
                 between = is_between(effect) or _same_throughout(effect, timeline)
-                terms.append(BetweenTerm.of(unsized) if between else MeanTerm.of(unsized))
+                terms.append(BetweenTerm.of(known) if between else MeanTerm.of(known))
             elif effect.acts is Acts.SPREAD:
-                terms.append(SpreadTerm.of(unsized))
+                terms.append(SpreadTerm.of(known))
         elif isinstance(effect, VarianceTrend):
             terms.append(TimeSpreadTerm(order=1))
         elif isinstance(effect, Drift):

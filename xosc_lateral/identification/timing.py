@@ -7,10 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from msgspec import structs
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import ColumnEffect, Linear, Piecewise, Product, Proximity, Saturating, Threshold
 from xosc_lateral.identification.candidates import shapes_of
 from xosc_lateral.identification.columns import Column, read_column
 from xosc_lateral.identification.dictionary import beside
+from xosc_lateral.identification.model import Fitted
 from xosc_lateral.identification.refinement import (
     FINE_RESPONSES,
     LAG_STEPS,
@@ -20,8 +22,7 @@ from xosc_lateral.identification.refinement import (
     other_scales,
     running_sums,
 )
-from xosc_lateral.identification.regression import Coarse, Fitted
-from xosc_lateral.identification.timeline import FloatArray
+from xosc_lateral.identification.timeline import Coarse
 
 
 def driving_range(coarse: Coarse, effect: ColumnEffect) -> tuple[FloatArray, FloatArray]:
@@ -79,13 +80,7 @@ def widening(fitted: Fitted, effect: ColumnEffect, part: slice) -> float:
     it reaches with all of them known. The likelihood is that of independent rows, scaled to the variance that stretches
     of a minute show [2]_.
 
-    Parameters
-    ----------
-    fitted : Fitted
-    effect : ColumnEffect
-        With coefficients.
-    part : slice
-        Its columns of the mean.
+    `effect`: with coefficients; `part`: its columns of the mean.
 
     References
     ----------

@@ -14,18 +14,17 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.enrich.result import Neighbours
 from xosc_lateral.errors import SimulationError
+from xosc_lateral.live.paths import Moves
 from xosc_lateral.live.scene import KINDS
 from xosc_lateral.live.surroundings import Places
-from xosc_lateral.live.traffic import Moment, Moves, Traffic
-from xosc_lateral.motion.context import REACH, TRUCKS, Reach
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from xosc_lateral.live.traffic import Moment, Traffic
+from xosc_lateral.motion.around import REACH, Reach
+from xosc_lateral.motion.context import TRUCKS
 
 HOLD = 0.5
 """A lane change is over when SUMO has wanted none for so long, and moves the vehicle no more. [s]"""

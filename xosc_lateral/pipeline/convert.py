@@ -16,7 +16,7 @@ from xosc_lateral.errors import DriverProfileError, FormatError
 from xosc_lateral.formats.context_table import read_context
 from xosc_lateral.formats.openscenario.provenance import PENDING
 from xosc_lateral.formats.openscenario.write.build import named
-from xosc_lateral.formats.openscenario.write.result import WrittenScenario
+from xosc_lateral.formats.openscenario.write.draft import WrittenScenario
 from xosc_lateral.formats.openscenario.write.sampled import motion_unknown_to
 from xosc_lateral.formats.openscenario.write.target import Player
 from xosc_lateral.formats.openscenario.write.trajectory_scenario import write_trajectory_scenario

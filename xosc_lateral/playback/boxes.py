@@ -51,19 +51,7 @@ def overlap(a: EntityState, b: EntityState) -> bool:
     if hypot(pb.x - pa.x, pb.y - pa.y) > reach or abs(b.pose.z - a.pose.z) > HEIGHT_APART:
         return False
     own, other = corners(a), corners(b)
-    for heading in (pa.heading, pb.heading):
-        c, s = cos(heading), sin(heading)
-        if axis_gap(own, other, (c, s)) or axis_gap(own, other, (-s, c)):
-            return False
-    return True
-
-
-def gaps(own: EntityState, shape: tuple[Point, ...]) -> tuple[float, float]:
-    """Gap from the own box to a shape along the own axes: (longitudinal, lateral), 0 where they overlap."""
-    heading = own.plane.heading
-    c, s = cos(heading), sin(heading)
-    mine = corners(own)
-    return axis_gap(mine, shape, (c, s)), axis_gap(mine, shape, (-s, c))
+    return not any(any(gaps(own, other, -heading)) for heading in (pa.heading, pb.heading))
 
 
 def distance_between(a: tuple[Point, ...], b: tuple[Point, ...]) -> float:
@@ -95,7 +83,7 @@ def _to_edge(point: Point, start: Point, end: Point) -> float:
     return hypot(point[0] - start[0] - u * ux, point[1] - start[1] - u * uy)
 
 
-def gaps_between(own: tuple[Point, ...], shape: tuple[Point, ...], turn: float) -> tuple[float, float]:
-    """Gap between two shapes along the axes of a frame that is turned back by `turn` [rad], 0 where they overlap."""
+def gaps(own: tuple[Point, ...], shape: tuple[Point, ...], turn: float) -> tuple[float, float]:
+    """Gap from `own` to a shape along the axes of a frame turned back by `turn` [rad]; 0 where they overlap."""
     c, s = cos(turn), sin(turn)
     return axis_gap(own, shape, (c, -s)), axis_gap(own, shape, (s, c))

@@ -6,6 +6,7 @@ that the entity points; without a road, the entity's own heading (as in the refe
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import copysign, cos, hypot, inf, sin
 
 from msgspec import Struct
@@ -25,14 +26,14 @@ FAR = 1e10
 
 
 class Spot(Struct, frozen=True):
-    """A place that distances are measured to. `lane` is 0 and `road` -1 where it is on no road. [m]"""
+    """A place that distances are measured to; without road coordinates where it has none, or nobody needs them. [m]"""
 
     x: float
     y: float
-    road: int
-    lane: int
-    s: float
-    t: float
+    road: int = NOWHERE
+    lane: int = 0
+    s: float = 0.0
+    t: float = 0.0
 
 
 class RoadGap(Struct, frozen=True):
@@ -74,18 +75,16 @@ def spot_of(state: EntityState) -> Spot:
     state.locate()
     pose = state.pose
     if state.road == NOWHERE:
-        return Spot(pose.x, pose.y, NOWHERE, 0, 0.0, 0.0)
+        return Spot(pose.x, pose.y)
     return Spot(pose.x, pose.y, state.road, state.lane, state.s, state.t)
 
 
-def road_gap(network: RoadNetwork, state: EntityState, spot: Spot, *, limit: float = FAR) -> RoadGap | None:
+def road_gap(state: EntityState, spot: Spot, *, limit: float = FAR) -> RoadGap | None:
     """Way from an entity to a spot along the roads; None: there is none."""
-    return _gap_between(network, spot_of(state), spot, 1 if state.is_forward else -1, limit)
+    return _gap_between(state, spot_of(state), spot, limit)
 
 
-def free_road_gap(
-    network: RoadNetwork, state: EntityState, other: EntityState, *, limit: float = FAR
-) -> RoadGap | None:
+def free_road_gap(state: EntityState, other: EntityState, *, limit: float = FAR) -> RoadGap | None:
     """Free space along the roads to another entity, and the lanes between their front right corners; None: no way.
 
     A box may lie in two lanes, and the standard does not say which counts: the corner as in the reference player,
@@ -93,78 +92,127 @@ def free_road_gap(
     """
     if boxes.overlap(state, other):
         return RoadGap(0.0, 0.0, 0, opposite=False)
-    ds = entity_distance(
-        network, state, other, CoordinateSystem.ROAD, RelativeDistanceType.LONGITUDINAL, freespace=True
-    )
+    ds = Measure(CoordinateSystem.ROAD, RelativeDistanceType.LONGITUDINAL, freespace=True).to_entity(state, other)
     if ds is None:
         return None
-    own, theirs = (_project(network, state, *boxes.corners(one)[-1]) for one in (state, other))
-    gap = _gap_between(network, own, theirs, 1 if state.is_forward else -1, limit)
+    own, theirs = (_project(state, *boxes.corners(one)[-1]) for one in (state, other))
+    gap = _gap_between(state, own, theirs, limit)
     return gap and replace(gap, ds=ds)
 
 
-def _gap_between(network: RoadNetwork, own: Spot, spot: Spot, direction: int, limit: float) -> RoadGap | None:
-    if own.road == NOWHERE or spot.road == NOWHERE:
-        return None
-    path = network.path_between((own.road, own.s), (spot.road, spot.s), direction=direction, limit=limit)
+def _gap_between(state: EntityState, own: Spot, spot: Spot, limit: float) -> RoadGap | None:
+    path = _path_between(state, own, spot, limit)
     if path is None:
         return None
-    lane = _lane_there(network, own, path)
+    lane = _lane_there(state.network, own, path)
     opposite = lane * spot.lane < 0
     lanes = spot.lane - lane
     if opposite:
         lanes -= 1 if lanes > 0 else -1
-    return RoadGap(path.ds, spot.t - (-own.t if path.is_turned else own.t), lanes, opposite, path.is_turned)
+    return RoadGap(path.ds, _across(own, spot, path), lanes, opposite, path.is_turned)
 
 
-def entity_distance(
-    network: RoadNetwork,
-    state: EntityState,
-    other: EntityState,
-    system: CoordinateSystem,
-    kind: RelativeDistanceType,
-    *,
-    freespace: bool,
-) -> float | None:
-    """Distance to another entity; None: no way along the roads."""
-    if not freespace:
-        return spot_distance(network, state, spot_for(other, system, kind), system, kind)
-    if kind is RelativeDistanceType.EUCLIDIAN or system not in _ALONG_ROADS:
-        shape = boxes.corners(other)
-        if system is CoordinateSystem.WORLD and kind is not RelativeDistanceType.EUCLIDIAN:
-            east, north = boxes.gaps_between(boxes.corners(state), shape, network.header_offset.heading)
-            return north if kind is RelativeDistanceType.LATERAL else east
-        ahead, left = boxes.gaps(state, shape)
-        if kind is RelativeDistanceType.LONGITUDINAL:
-            return ahead
-        if kind is RelativeDistanceType.LATERAL:
-            return left
+def _path_between(state: EntityState, own: Spot, spot: Spot, limit: float = FAR) -> RoadPath | None:
+    """The way that an entity would drive from one place to another; None: there is none."""
+    if own.road == NOWHERE or spot.road == NOWHERE:
+        return None
+    direction = 1 if state.is_forward else -1
+    return state.network.path_between((own.road, own.s), (spot.road, spot.s), direction=direction, limit=limit)
+
+
+def _across(own: Spot, spot: Spot, path: RoadPath) -> float:
+    """Change of t on the way, as it is counted there. [m]"""
+    return spot.t - (-own.t if path.is_turned else own.t)
+
+
+class Measure(Struct, frozen=True):
+    """How a distance is measured: in which coordinate system, which part of it, between boxes or reference points.
+
+    A distance is None where no way leads along the roads.
+    """
+
+    system: CoordinateSystem
+    kind: RelativeDistanceType
+    freespace: bool = False
+
+    @property
+    def is_along_roads(self) -> bool:
+        """Whether it needs road coordinates."""
+        return self.kind is not RelativeDistanceType.EUCLIDIAN and self.system in _ALONG_ROADS
+
+    def between(self, state: EntityState, target: Spot | EntityState) -> float | None:
+        """From an entity to a spot or to another entity. [m]
+
+        Free space is that of the nearest two of both vehicles and all trailers that they draw.
+        """
+        if isinstance(target, Spot):
+            return self.to_spot(state, target)
+        pairs = [(own, theirs) for own in _train(state) for theirs in _train(target)]
+        if not self.freespace or len(pairs) == 1:
+            return self.to_entity(state, target)
+        nearness = self if self.is_along_roads else replace(self, kind=RelativeDistanceType.EUCLIDIAN)
+        found = [nearness.to_entity(*pair) for pair in pairs]
+        gap, nearest = min(zip(found, pairs, strict=True), key=lambda one: inf if one[0] is None else abs(one[0]))
+        return gap if nearness is self else self.to_entity(*nearest)
+
+    def to_entity(self, state: EntityState, other: EntityState) -> float | None:
+        """From one entity to another. [m]"""
+        if not self.freespace:
+            if self.is_along_roads:
+                return self.to_spot(state, spot_of(other))
+            pose = other.plane
+            return self.to_spot(state, Spot(pose.x, pose.y))
+        if not self.is_along_roads:
+            return self._between_boxes(state, boxes.corners(other), lambda: boxes.overlap(state, other))
         if boxes.overlap(state, other):
             return 0.0
-        return copysign(boxes.distance_between(boxes.corners(state), shape), ahead or 1.0)
-    if boxes.overlap(state, other):
-        return 0.0
-    return _road_freespace(network, state, [_project(network, state, x, y) for x, y in boxes.corners(other)], kind)
+        return self._between_corners(state, [_project(state, x, y) for x, y in boxes.corners(other)])
 
+    def to_spot(self, state: EntityState, spot: Spot) -> float | None:
+        """From an entity to a spot. [m]"""
+        if self.freespace:
+            if self.is_along_roads:
+                return self._between_corners(state, [spot])
+            point = spot.x, spot.y
+            return self._between_boxes(state, (point,), lambda: boxes.holds_point(boxes.corners(state), point))
+        if self.kind is RelativeDistanceType.EUCLIDIAN:
+            return straight_distance(state, spot.x, spot.y)
+        lateral = self.kind is RelativeDistanceType.LATERAL
+        if self.system is CoordinateSystem.WORLD:
+            pose, turn = state.plane, state.network.header_offset.heading
+            dx, dy = spot.x - pose.x, spot.y - pose.y
+            return dx * sin(turn) + dy * cos(turn) if lateral else dx * cos(turn) - dy * sin(turn)
+        if self.system is CoordinateSystem.TRAJECTORY:
+            return _along_trajectory(state, spot, lateral=lateral)
+        if self.system is CoordinateSystem.ENTITY:
+            ahead, left = ahead_and_left(state, spot.x, spot.y)
+            return left if lateral else ahead
+        gap = road_gap(state, spot)
+        if gap is None:
+            return None
+        return gap.dt if lateral else gap.ds
 
-def train_distance(
-    network: RoadNetwork,
-    state: EntityState,
-    other: EntityState,
-    system: CoordinateSystem,
-    kind: RelativeDistanceType,
-    *,
-    freespace: bool,
-) -> float | None:
-    """As `entity_distance`; free space is that of the nearest two of both vehicles and all trailers that they draw."""
-    pairs = [(own, theirs) for own in _train(state) for theirs in _train(other)]
-    if not freespace or len(pairs) == 1:
-        return entity_distance(network, state, other, system, kind, freespace=freespace)
-    along = system in _ALONG_ROADS and kind is not RelativeDistanceType.EUCLIDIAN
-    apart = kind if along else RelativeDistanceType.EUCLIDIAN
-    found = [entity_distance(network, *pair, system, apart, freespace=True) for pair in pairs]
-    gap, nearest = min(zip(found, pairs, strict=True), key=lambda one: inf if one[0] is None else abs(one[0]))
-    return gap if apart is kind else entity_distance(network, *nearest, system, kind, freespace=True)
+    def _between_boxes(self, state: EntityState, shape: tuple[boxes.Point, ...], touches: Callable[[], bool]) -> float:
+        """Gap from an entity's box to a shape, straight or along the axes of the world or of the entity. [m]"""
+        own, along_own = boxes.corners(state), -state.plane.heading
+        if self.kind is RelativeDistanceType.EUCLIDIAN:
+            ahead, _ = boxes.gaps(own, shape, along_own)
+            return 0.0 if touches() else copysign(boxes.distance_between(own, shape), ahead or 1.0)
+        in_world = self.system is CoordinateSystem.WORLD
+        along, across = boxes.gaps(own, shape, state.network.header_offset.heading if in_world else along_own)
+        return across if self.kind is RelativeDistanceType.LATERAL else along
+
+    def _between_corners(self, state: EntityState, spots: list[Spot]) -> float | None:
+        """Smallest gap along (or across) the road between the projected corners; 0 where they overlap. [m]"""
+        state.locate()
+        values = []
+        for own in (_project(state, x, y) for x, y in boxes.corners(state)):
+            for spot in spots:
+                path = _path_between(state, own, spot)
+                if path is None:
+                    return None
+                values.append(_across(own, spot, path) if self.kind is RelativeDistanceType.LATERAL else path.ds)
+        return 0.0 if min(values) < 0.0 <= max(values) else min(values, key=abs)
 
 
 def _train(state: EntityState) -> list[EntityState]:
@@ -176,42 +224,6 @@ def _train(state: EntityState) -> list[EntityState]:
         state = state.trailer
         members.append(state)
     return members
-
-
-def spot_distance(
-    network: RoadNetwork,
-    state: EntityState,
-    spot: Spot,
-    system: CoordinateSystem,
-    kind: RelativeDistanceType,
-    *,
-    freespace: bool = False,
-) -> float | None:
-    """Distance to a spot; None: no way along the roads."""
-    if freespace and system is CoordinateSystem.WORLD and kind is not RelativeDistanceType.EUCLIDIAN:
-        own, point = boxes.corners(state), ((spot.x, spot.y),)
-        east, north = boxes.gaps_between(own, point, network.header_offset.heading)
-        return north if kind is RelativeDistanceType.LATERAL else east
-    if freespace and (kind is RelativeDistanceType.EUCLIDIAN or system not in _ALONG_ROADS):
-        return _freespace_to_point(state, (spot.x, spot.y), kind)
-    if freespace:
-        return _road_freespace(network, state, [spot], kind)
-    if kind is RelativeDistanceType.EUCLIDIAN:
-        return straight_distance(state, spot.x, spot.y)
-    lateral = kind is RelativeDistanceType.LATERAL
-    if system is CoordinateSystem.WORLD:
-        pose, turn = state.plane, network.header_offset.heading
-        dx, dy = spot.x - pose.x, spot.y - pose.y
-        return dx * sin(turn) + dy * cos(turn) if lateral else dx * cos(turn) - dy * sin(turn)
-    if system is CoordinateSystem.TRAJECTORY:
-        return _along_trajectory(state, spot, lateral=lateral)
-    if system is CoordinateSystem.ENTITY:
-        ahead, left = ahead_and_left(state, spot.x, spot.y)
-        return left if lateral else ahead
-    gap = road_gap(network, state, spot)
-    if gap is None:
-        return None
-    return gap.dt if lateral else gap.ds
 
 
 def _along_trajectory(state: EntityState, spot: Spot, *, lateral: bool) -> float:
@@ -226,52 +238,11 @@ def _along_trajectory(state: EntityState, spot: Spot, *, lateral: bool) -> float
     return (spot.y - point.y) * cos(point.tangent) - (spot.x - point.x) * sin(point.tangent)
 
 
-def spot_for(state: EntityState, system: CoordinateSystem, kind: RelativeDistanceType) -> Spot:
-    """Where an entity is, with road coordinates only when the distance needs them."""
-    if kind is RelativeDistanceType.EUCLIDIAN or system not in _ALONG_ROADS:
-        pose = state.plane
-        return Spot(pose.x, pose.y, NOWHERE, 0, 0.0, 0.0)
-    return spot_of(state)
-
-
-def _freespace_to_point(state: EntityState, point: boxes.Point, kind: RelativeDistanceType) -> float:
-    own = boxes.corners(state)
-    ahead, left = boxes.gaps(state, (point,))
-    if kind is RelativeDistanceType.LONGITUDINAL:
-        return ahead
-    if kind is RelativeDistanceType.LATERAL:
-        return left
-    if boxes.holds_point(own, point):
-        return 0.0
-    return copysign(boxes.distance_between(own, (point,)), ahead or 1.0)
-
-
-def _road_freespace(
-    network: RoadNetwork, state: EntityState, spots: list[Spot], kind: RelativeDistanceType
-) -> float | None:
-    """Smallest gap along (or across) the road between the projected corners; 0 where they overlap."""
-    state.locate()
-    lateral = kind is RelativeDistanceType.LATERAL
-    values = []
-    direction = 1 if state.is_forward else -1
-    for own in (_project(network, state, x, y) for x, y in boxes.corners(state)):
-        for spot in spots:
-            if own.road == NOWHERE or spot.road == NOWHERE:
-                return None
-            path = network.path_between((own.road, own.s), (spot.road, spot.s), direction=direction)
-            if path is None:
-                return None
-            values.append(spot.t - (-own.t if path.is_turned else own.t) if lateral else path.ds)
-    if min(values) < 0.0 <= max(values):
-        return 0.0
-    return min(values, key=abs)
-
-
-def _project(network: RoadNetwork, state: EntityState, x: float, y: float) -> Spot:
+def _project(state: EntityState, x: float, y: float) -> Spot:
     """Road coordinates of a point near an entity."""
     if state.road == NOWHERE:
-        return Spot(x, y, NOWHERE, 0, 0.0, 0.0)
-    found = network.world_to_lane_at(x, y, near=(state.road, state.s), lane_types=None)
+        return Spot(x, y)
+    found = state.network.world_to_lane_at(x, y, near=(state.road, state.s), lane_types=None)
     return Spot(x, y, found.road, found.lane, found.s, found.t)
 
 

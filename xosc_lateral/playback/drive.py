@@ -7,7 +7,7 @@ from math import inf, pi
 
 from xosc_lateral.playback.state import NOWHERE, EntityState
 from xosc_lateral.playback.transition import EPSILON
-from xosc_lateral.road import LaneLink, RoadNetwork
+from xosc_lateral.road import LaneLink
 from xosc_lateral.road.moving import most_turning
 from xosc_lateral.road.network import DRIVING
 
@@ -16,20 +16,27 @@ _TIGHT = 1e-3
 
 
 def drive(state: EntityState, distance: float) -> None:
-    """Move an entity along its lane as far as it goes, lateral offset and relative heading kept.
+    """Let the default driver move an entity, `distance` [m] on its own track; negative: backwards.
 
-    The way along the reference line follows from the curvature at the START of the step (explicit Euler, as the
-    reference player does it). Without a road there is no lane to follow: the entity stops.
-
-    `distance`: way on the entity's own track; negative: backwards. [m]
+    Without a road there is no lane to follow: the entity stops.
     """
     state.follow_lane()
     if state.road == NOWHERE:
         state.set_speed(0.0)
         return
-    way = 1 if state.is_forward else -1
-    travel(state, way, along_reference(state.network, state.road, state.lane, state.s, state.offset_t, distance))
-    state.set_speed(state.speed)
+    move_along_lane(state, distance)
+    state.speed_taken = True
+
+
+def move_along_lane(state: EntityState, distance: float) -> None:
+    """Move an entity along its lane as far as it goes, lateral offset and relative heading kept.
+
+    The way along the reference line follows from the curvature at the START of the step (explicit Euler, as the
+    reference player does it).
+
+    `distance`: way on the entity's own track; negative: backwards. [m]
+    """
+    travel(state, 1 if state.is_forward else -1, along_reference(state, state.s, distance))
 
 
 def halt_at_road_end(state: EntityState, step: float) -> None:
@@ -51,12 +58,13 @@ def halt_at_road_end(state: EntityState, step: float) -> None:
     state.stuck = moved < EPSILON * step
 
 
-def along_reference(network: RoadNetwork, road: int, lane: int, s: float, offset_t: float, distance: float) -> float:
-    """Length along the reference line of a way that lies beside it. [m]"""
-    curvature = network.curvature_at(road, s)
+def along_reference(state: EntityState, s: float, distance: float) -> float:
+    """Length along the reference line of an entity's way beside it, from `s` on. [m]"""
+    curvature = state.network.curvature_at(state.road, s)
     if abs(curvature) < EPSILON:
         return distance
-    return beside_line(curvature, network.lane_state_at(road, lane, s).centre_t + offset_t, distance)
+    t = state.network.lane_state_at(state.road, state.lane, s).centre_t + state.offset_t
+    return beside_line(curvature, t, distance)
 
 
 def beside_line(curvature: float, t: float, distance: float) -> float:

@@ -13,19 +13,20 @@ from math import cos, hypot, sin
 
 import numpy as np
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import PlaybackError
-from xosc_lateral.motion.nominal import CUT_OFF, Activity, FloatArray, NominalMotion, Note
+from xosc_lateral.motion.nominal import CUT_OFF, Activity, NominalMotion, Note
 from xosc_lateral.playback.drive import drive, halt_at_road_end
 from xosc_lateral.playback.recorder import NO_LANE
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import NOWHERE, EntityState
-from xosc_lateral.playback.storyboard import ElementState
 from xosc_lateral.playback.storyboard_builder import build_storyboard, init_actions
 from xosc_lateral.playback.trailers import align_trailers, connect, pull_trailers
 from xosc_lateral.playback.transition import EPSILON
 from xosc_lateral.road import RoadNetwork
 from xosc_lateral.rows import BLOCK, columns, give_back, kept
 from xosc_lateral.scenario import Scenario
+from xosc_lateral.scenario.enums import StoryboardElementState
 from xosc_lateral.scenario.private_actions import FollowTrajectoryAction, TeleportAction
 
 _LATERAL = int(Activity.LATERAL)  # plain: arithmetic of flags takes ten times as long
@@ -102,14 +103,14 @@ class _Player:
 
     def _goes_on(self) -> bool:
         """Whether a story still has something to do."""
-        return any(story.state is not ElementState.COMPLETE for story in self.root.children)
+        return any(story.state is not StoryboardElementState.COMPLETE for story in self.root.children)
 
     def _begin(self) -> bool:
         """The moment in which everything starts; whether there is another."""
         for state in self.simulation.entities:
             state.begin_frame()
-        for element in self.init:
-            element.start()
+        for action in self.init:
+            action.start()
         self.root.start()
         if self.simulation.derives_motion:
             for state in self.simulation.entities:
@@ -125,12 +126,12 @@ class _Player:
         time = simulation.time
         simulation.stamp = time
         root.evaluate_triggers(time)
-        if root.state is not ElementState.RUNNING:
+        if not root.is_running:
             return False
         simulation.stamp = time + step
-        for element in self.init:
-            element.step(time, step)
-        self.init = [element for element in self.init if element.is_running]
+        for action in self.init:
+            action.step(time, step)
+        self.init = [action for action in self.init if action.is_running]
         root.step(time, step)
         simulation.time = time + step
         for state in simulation.unwatched.awake:
@@ -178,30 +179,20 @@ class _Player:
 
     def _leave_out_later_entities(self) -> None:
         """Entities without init actions are not there until an action adds them (trailers are, with their tractor)."""
-        init = self.simulation.scenario.storyboard.init
-        present = {private.entity_ref for private in init.privates}
-        placed = {
-            private.entity_ref
-            for private in init.privates
-            if any(isinstance(action.content, TeleportAction | FollowTrajectoryAction) for action in private.actions)
-        }
+        privates = self.simulation.scenario.storyboard.init.privates
+        present = {private.entity_ref for private in privates}
+        placing = TeleportAction | FollowTrajectoryAction
+        placed = {one.entity_ref for one in privates if any(isinstance(a.content, placing) for a in one.actions)}
         for state in self.simulation.entities:
             if state.tow is not None or state.name in placed:
                 continue
-            self._note_unplaced(state, state.name in present)
-
-    def _note_unplaced(self, state: EntityState, is_present: bool) -> None:
-        """Absent without init actions; at the origin without a position in them."""
-        if not is_present:
-            state.active = False
-            self.simulation.note(
-                f"'{state.name}' has no init actions: it is not there until it is added", state.entity.place
-            )
-        else:
-            self.simulation.note(
-                f"'{state.name}' has no initial position: it stands at the world's origin", state.entity.place
-            )
-            state.put_in_world(state.pose)
+            if state.name not in present:
+                state.active = False
+                what = "no init actions: it is not there until it is added"
+            else:
+                state.put_in_world(state.pose)
+                what = "no initial position: it stands at the world's origin"
+            self.simulation.note(f"'{state.name}' has {what}", state.entity.place)
 
     def _write(self, time: float) -> None:
         self.times.append(time)
@@ -228,7 +219,7 @@ class _Player:
         return NominalMotion(
             step=self.step_size,
             entities=tuple(rows.motion(simulation.network, time) for rows in self.rows),
-            actions=simulation.played(),
+            actions=tuple(simulation.played),
             end_time=float(time[-1]),
             ended_by=ended_by,
             notes=tuple(simulation.notes),

@@ -5,13 +5,14 @@ from __future__ import annotations
 from array import array
 from collections.abc import Iterator
 from math import pi
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from xosc_lateral.errors import PlaybackError
-from xosc_lateral.motion.nominal import Activity, EntityMotion, FloatArray, IntArray
+from xosc_lateral.motion.nominal import Activity, EntityMotion
 from xosc_lateral.playback.state import NOWHERE, EntityState
 from xosc_lateral.road import RoadNetwork
 from xosc_lateral.road.tables import turned_in_surface
@@ -56,7 +57,7 @@ class Rows:
         self._rows_put_away = 0
         self._free_rows = array("q")
         self._free = array("d")
-        self._free_put_away: list[tuple[NDArray[np.int64], FloatArray]] = []
+        self._free_put_away: list[tuple[IntArray, FloatArray]] = []
         self._knows_height = True
         """Of all rows whose road nobody has asked for."""
 
@@ -132,7 +133,7 @@ class Rows:
         """Columns of `motion`, in blocks of rows."""
         begin, before = 0, tuple[NDArray[Any], ...]()
         for s, offset, along, speed, road, lane, activity in self._blocks():
-            n = len(s)
+            n, where = len(s), _Where(road, lane, s, offset)
             free_rows, free = self._free_within(begin, begin + n)
             direction = np.ones(n)
             unknown = road[free_rows] == _UNKNOWN
@@ -143,16 +144,18 @@ class Rows:
             offset *= direction
             if len(looked_up):
                 height = free[unknown, 2] if self._knows_height else None
-                _look_up(network, looked_up, free[unknown], height, road, lane, s, offset, direction)
+                _look_up(network, looked_up, free[unknown], height, where, direction)
             to_lane = along - np.where(direction > 0, 0.0, pi)
             on_road = road >= 0
-            pose = _poses(network, road, lane, s, offset, to_lane)
-            _lay_over(pose, free_rows, free)
-            to_lane[looked_up] = pose[looked_up, 3] - _lane_heading(network, road, lane, s, offset, looked_up)
+            pose = _poses(network, where, to_lane)
+            pose[free_rows] = np.where(np.isnan(free), pose[free_rows], free)  # what was left to the road stays
+            to_lane[looked_up] = pose[looked_up, 3]
+            if len(looked_up) and network.road_ids:
+                to_lane[looked_up] -= network.lane_to_world(*where.at(looked_up)).heading
             checked = (time[begin : begin + n], pose[:, 0], pose[:, 1], activity)
             self._check_jumps(*(np.concatenate(two) for two in zip(before, checked, strict=True)) if begin else checked)
             before = tuple(values[-1:].copy() for values in checked)
-            beside = _beside_road(network, road, lane, s, offset, pose, on_road)
+            beside = _beside_road(network, where, pose)
             activity[beside & (activity & np.uint8(Activity.ACTIVE) > 0)] |= np.uint8(Activity.OFF_ROAD)
             road[~on_road], lane[~on_road], s[~on_road], offset[~on_road] = NOWHERE, 0, 0.0, 0.0
             heading = np.mod(pose[:, 3], 2.0 * pi, out=pose[:, 3])
@@ -176,7 +179,7 @@ class Rows:
                 yield [np.concatenate(column) for column in zip(*together, strict=True)]
                 together = []
 
-    def _free_within(self, begin: int, end: int) -> tuple[NDArray[np.int64], FloatArray]:
+    def _free_within(self, begin: int, end: int) -> tuple[IntArray, FloatArray]:
         """World poses that were given, shape (n, 6), and their rows, counted from `begin`, before `end`."""
         parts = [(rows, free) for rows, free in self._free_put_away if rows[0] < end and rows[-1] >= begin]
         if not parts:
@@ -195,85 +198,66 @@ class Rows:
             raise self._implausible(float(time[k]), f"{moved[k - 1]:g} m in one frame")
 
 
-def _poses(
-    network: RoadNetwork, road: IntArray, lane: IntArray, s: FloatArray, offset: FloatArray, to_lane: FloatArray
-) -> FloatArray:
+class _Where(NamedTuple):
+    """Road coordinates of rows."""
+
+    road: Int32Array
+    lane: Int32Array
+    s: FloatArray
+    offset: FloatArray
+
+    def at(self, rows: IntArray) -> tuple[Int32Array, Int32Array, FloatArray, FloatArray]:
+        """Those of some rows."""
+        return self.road[rows], self.lane[rows], self.s[rows], self.offset[rows]
+
+
+def _poses(network: RoadNetwork, where: _Where, to_lane: FloatArray) -> FloatArray:
     """World poses of the rows that are on a road, shape (n, 6), turned by `to_lane` [rad] against their lanes."""
-    on_road = road >= 0
-    pose = np.zeros((len(road), 6), order="F")  # each column is then an array of its own
+    on_road = where.road >= 0
+    pose = np.zeros((len(on_road), 6), order="F")  # each column is then an array of its own
     rows = np.flatnonzero(on_road)
     if len(rows):
-        pose[rows] = np.column_stack(network.lane_to_world(road[rows], lane[rows], s[rows], offset[rows]))
-    _turn(pose, to_lane, on_road)
+        pose[rows] = np.column_stack(network.lane_to_world(*where.at(rows)))
+    turned = on_road & (to_lane != 0.0)
+    sloped = turned & ((pose[:, 4] != 0.0) | (pose[:, 5] != 0.0))
+    flat = turned & ~sloped
+    pose[flat, 3] += to_lane[flat]
+    if sloped.any():
+        turn, pose[sloped, 4], pose[sloped, 5] = turned_in_surface(to_lane[sloped], pose[sloped, 4], pose[sloped, 5])
+        pose[sloped, 3] += turn
     return pose
 
 
 def _look_up(
     network: RoadNetwork,
-    rows: NDArray[np.int64],
+    rows: IntArray,
     free: FloatArray,
     height: FloatArray | None,
-    road: IntArray,
-    lane: IntArray,
-    s: FloatArray,
-    offset: FloatArray,
+    where: _Where,
     direction: FloatArray,
 ) -> None:
     """Road coordinates of rows that only have a world pose."""
     if not network.road_ids:
-        road[rows] = NOWHERE
+        where.road[rows] = NOWHERE
         return
     found = network.world_to_lane(free[:, 0], free[:, 1], height)
-    road[rows], lane[rows], s[rows], offset[rows] = found.road, found.lane, found.s, found.offset
+    where.road[rows], where.lane[rows], where.s[rows], where.offset[rows] = (
+        found.road,
+        found.lane,
+        found.s,
+        found.offset,
+    )
     direction[rows] = network.travel_directions(found.road, found.lane)
 
 
-def _turn(pose: FloatArray, angle: FloatArray, rows: NDArray[np.bool_]) -> None:
-    """Turn poses about the normal of the surface that they stand on."""
-    turned = rows & (angle != 0.0)
-    sloped = turned & ((pose[:, 4] != 0.0) | (pose[:, 5] != 0.0))
-    flat = turned & ~sloped
-    pose[flat, 3] += angle[flat]
-    if sloped.any():
-        turn, pose[sloped, 4], pose[sloped, 5] = turned_in_surface(angle[sloped], pose[sloped, 4], pose[sloped, 5])
-        pose[sloped, 3] += turn
-
-
-def _lay_over(pose: FloatArray, rows: NDArray[np.int64], free: FloatArray) -> None:
-    """World poses where they were given; what was left to the road stays."""
-    if len(rows):
-        pose[rows] = np.where(np.isnan(free), pose[rows], free)
-
-
-def _lane_heading(
-    network: RoadNetwork,
-    road: IntArray,
-    lane: IntArray,
-    s: FloatArray,
-    offset: FloatArray,
-    rows: NDArray[np.int64],
-) -> FloatArray:
-    if not len(rows) or not network.road_ids:
-        return np.zeros(len(rows))
-    return network.lane_to_world(road[rows], lane[rows], s[rows], offset[rows]).heading
-
-
-def _beside_road(
-    network: RoadNetwork,
-    road: IntArray,
-    lane: IntArray,
-    s: FloatArray,
-    offset: FloatArray,
-    pose: FloatArray,
-    on_road: NDArray[np.bool_],
-) -> NDArray[np.bool_]:
+def _beside_road(network: RoadNetwork, where: _Where, pose: FloatArray) -> BoolArray:
     """Rows whose reference point is on no lane of any kind."""
-    beside = ~on_road
-    if not on_road.any():
+    beside = where.road < 0
+    rows = np.flatnonzero(~beside)
+    if not len(rows):
         return beside
-    rows = np.flatnonzero(on_road)
-    half = 0.5 * network.lane_width(road[rows], lane[rows], s[rows])
-    suspects = rows[np.abs(offset[rows]) > half + _TOUCH]  # beyond their own lane
+    road, lane, s, offset = where.at(rows)
+    suspects = rows[np.abs(offset) > 0.5 * network.lane_width(road, lane, s) + _TOUCH]  # beyond their own lane
     if len(suspects):
         types = {lane.type for r in network.roads for section in r.sections for lane in section.lanes} - {NO_LANE}
         found = network.world_to_lane(pose[suspects, 0], pose[suspects, 1], lane_types=types)

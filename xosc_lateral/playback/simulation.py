@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from typing import Any
 
@@ -13,26 +14,29 @@ from xosc_lateral.playback.unwatched import Unwatched
 from xosc_lateral.playback.values import Values
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import Action, Place, Scenario, TrafficSignalController
+from xosc_lateral.scenario.scenario import TrafficSignalPhase
 
 
+@dataclass
 class _Clock:
-    """Phases of one controller, for ever."""
+    """Phases of one controller, for ever, from `start` on. [s]"""
 
-    def __init__(self, controller: TrafficSignalController, start: float) -> None:
-        self.phases = controller.phases
-        self.start = start
-        self.cycle = sum(phase.duration for phase in controller.phases)
+    phases: Sequence[TrafficSignalPhase]
+    start: float
 
-    def phase_at(self, time: float) -> int | None:
-        """Index of the phase; None before the first, or without phases."""
+    def phase_at(self, time: float) -> tuple[TrafficSignalPhase, float] | None:
+        """The phase and when it began [s]; None before the first, or without phases."""
         if not self.phases or time < self.start:
             return None
-        left = (time - self.start) % self.cycle if self.cycle > 0.0 else 0.0
-        for index, phase in enumerate(self.phases):
-            if left < phase.duration:
-                return index
+        cycle = sum(phase.duration for phase in self.phases)
+        into = (time - self.start) % cycle if cycle > 0.0 else 0.0
+        left, before = into, 0.0
+        for phase in self.phases:
+            if left < phase.duration or phase is self.phases[-1]:
+                break
             left -= phase.duration
-        return len(self.phases) - 1
+            before += phase.duration
+        return phase, time - into + before
 
     def go_to(self, name: str, time: float) -> bool:
         """Start the named phase now; False if there is none of that name."""
@@ -54,7 +58,7 @@ class TrafficSignals:
 
     def __init__(self, controllers: Sequence[TrafficSignalController]) -> None:
         self._controllers = {controller.name: controller for controller in controllers}
-        self._clocks = {c.name: _Clock(c, self._start(c)) for c in controllers}
+        self._clocks = {c.name: _Clock(c.phases, self._start(c)) for c in controllers}
         self._set: dict[str, tuple[str, float]] = {}
 
     def set_state(self, signal: str, state: str, time: float) -> None:
@@ -69,24 +73,20 @@ class TrafficSignals:
     def phase(self, controller: str, time: float) -> str | None:
         """Name of a controller's phase; None: unknown controller, or not started."""
         clock = self._clocks.get(controller)
-        index = None if clock is None else clock.phase_at(time)
-        return None if clock is None or index is None else clock.phases[index].name
+        found = None if clock is None else clock.phase_at(time)
+        return None if found is None else found[0].name
 
     def state(self, signal: str, time: float) -> str | None:
         """What a signal shows; None: nobody has said."""
-        best: tuple[float, str] | None = None
+        best: tuple[str, float] | None = None
         for clock in self._clocks.values():
-            index = clock.phase_at(time)
-            if index is None:
-                continue
-            states = dict(clock.phases[index].states)
-            if signal in states:
-                best = (self._phase_start(clock, index, time), states[signal])
-        if signal in self._set:
-            state, since = self._set[signal]
-            if best is None or since >= best[0]:
-                return state
-        return None if best is None else best[1]
+            found = clock.phase_at(time)
+            if found is not None and signal in (states := dict(found[0].states)):
+                best = states[signal], found[1]
+        given = self._set.get(signal)
+        if given is not None and (best is None or given[1] >= best[1]):
+            return given[0]
+        return None if best is None else best[0]
 
     def _start(self, controller: TrafficSignalController) -> float:
         start, seen = 0.0, set[str]()
@@ -96,11 +96,6 @@ class TrafficSignals:
             start += current.delay
             current = self._controllers.get(current.reference) if current.reference else None
         return start
-
-    @staticmethod
-    def _phase_start(clock: _Clock, index: int, time: float) -> float:
-        into = (time - clock.start) % clock.cycle if clock.cycle > 0.0 else 0.0
-        return time - into + sum(phase.duration for phase in clock.phases[:index])
 
 
 class Simulation:
@@ -132,7 +127,8 @@ class Simulation:
         """Called with the root of the storyboard once it stands: conditions on its elements look for theirs."""
         self.notes: list[Note] = []
         self._noted: set[tuple[str, str, int | None]] = set()
-        self._played: list[_Record] = []
+        self.played: list[PlayedAction] = []
+        """All actions started so far, in order of start."""
         for remark in scenario.remarks:
             self.note(remark.reason or "is not read", remark.place)
 
@@ -155,9 +151,7 @@ class Simulation:
         """The entity of that name, for actions of its own alone; raises `PlaybackError` as `entity` does."""
         state = self.by_name.get(name)
         if state is None:
-            raise PlaybackError(
-                f"entity '{name}' is not in the scenario", path=place.path, line=place.line, element=place.element
-            )
+            raise place.error(f"entity '{name}' is not in the scenario", PlaybackError)
         return state
 
     def note(self, what: str, place: Place) -> None:
@@ -177,23 +171,9 @@ class Simulation:
     # ---- what was played ---------------------------------------------------------------------------------------------
     def record_start(self, action: Action, actor: str | None, path: tuple[str, ...]) -> int:
         """Note the start of an action; returns the number under which to note its end."""
-        self._played.append(_Record(action, actor, path, self.time))
-        return len(self._played) - 1
+        self.played.append(PlayedAction(action, actor, path, self.time, None))
+        return len(self.played) - 1
 
     def record_end(self, number: int) -> None:
         """Note the end of an action."""
-        self._played[number].end = self.stamp
-
-    def played(self) -> tuple[PlayedAction, ...]:
-        """All actions started so far, in order of start."""
-        return tuple(PlayedAction(r.action, r.actor, r.path, r.start, r.end) for r in self._played)
-
-
-class _Record:
-    """A started action; `PlayedAction` while its end is not known."""
-
-    __slots__ = ("action", "actor", "end", "path", "start")
-
-    def __init__(self, action: Action, actor: str | None, path: tuple[str, ...], start: float) -> None:
-        self.action, self.actor, self.path, self.start = action, actor, path, start
-        self.end: float | None = None
+        self.played[number] = replace(self.played[number], end=self.stamp)

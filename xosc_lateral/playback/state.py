@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import cos, nan, pi, sin
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.playback.angles import difference, is_forward, wrap
@@ -18,8 +18,7 @@ NOWHERE = -1
 """Road of what is on none."""
 
 
-@dataclass(frozen=True, slots=True)
-class Placement:
+class Placement(NamedTuple):
     """A place and an orientation, in road coordinates and, where it was not given in them, in world coordinates too.
 
     - `road`: index of the road; -1 where there is none
@@ -87,6 +86,9 @@ def guide(network: RoadNetwork, stops: Sequence[Placement]) -> RouteGuide | None
 _ACTIVE = int(Activity.ACTIVE)  # plain: arithmetic of flags takes ten times as long
 
 
+_ORIGIN = Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
 class Running(Protocol):
     """An action of the storyboard."""
 
@@ -94,7 +96,15 @@ class Running(Protocol):
     def is_running(self) -> bool:
         """Whether it runs now."""
 
+    @property
+    def domains(self) -> int:
+        """What it needs to have for itself, as a bit set."""
 
+    def end(self) -> None:
+        """Come to a regular end."""
+
+
+@dataclass(slots=True, eq=False)
 class EntityState:
     """Where an entity is, how fast, and what happened to it in the present frame.
 
@@ -104,94 +114,65 @@ class EntityState:
     the rows of a `NominalMotion` are converted at the end.
     """
 
-    __slots__ = (
-        "_free_pose",
-        "_located",
-        "_pose",
-        "acceleration",
-        "active",
-        "activity",
-        "at_road_end",
-        "entity",
-        "event_actions",
-        "init_actions",
-        "is_watched",
-        "lane",
-        "last_place",
-        "longitudinal_taken",
-        "name",
-        "network",
-        "odometer",
-        "off_road_since",
-        "offset_t",
-        "path",
-        "previous",
-        "relative_heading",
-        "road",
-        "road_end_since",
-        "route",
-        "s",
-        "section",
-        "speed",
-        "speed_taken",
-        "standing_since",
-        "stuck",
-        "teleported",
-        "tow",
-        "trailer",
-        "velocity",
-    )
-
-    def __init__(self, entity: Entity, network: RoadNetwork) -> None:
-        self.entity = entity
-        self.name = entity.name
-        self.network = network
-        self.active = True
-        self.speed = 0.0
-        self.road = NOWHERE
-        self.lane = 0
-        self.s = 0.0
-        self.offset_t = 0.0
-        self.relative_heading = 0.0
-        self.section = (0.0, -1.0)
-        """Range of s in which the lane id holds; empty: unknown. [m]"""
-        self.at_road_end = False
-        self.last_place: tuple[int, float, float] | None = None
-        """Road, s and offset in the frame before; None in the world's coordinates. [m]"""
-        self.stuck = False
-        """It has not moved in the frame before: the road had ended."""
-        self._free_pose: Pose | None = Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        self._located = True
-        self._pose: Pose | None = None
-        self.activity = 0
-        self.longitudinal_taken = False
-        """An action has moved the entity along in this frame: the default driver does not."""
-        self.speed_taken = False
-        """Somebody has set the speed in this frame: it is not derived from the movement."""
-        self.teleported = False
-        self.previous: Pose | None = None
-        self.velocity = (0.0, 0.0, 0.0)
-        self.acceleration = (0.0, 0.0, 0.0)
-        self.odometer = 0.0
-        self.standing_since: float | None = None
-        self.road_end_since: float | None = None
-        self.off_road_since: float | None = None
-        self.route: RouteGuide | None = None
-        self.path: PathProgress | None = None
-        self.tow: EntityState | None = None
-        self.trailer: EntityState | None = None
-        self.init_actions: list[Running] = []
-        self.event_actions: list[Running] = []
-        self.is_watched = False
-        """Somebody else looks at it, perhaps in every frame."""
+    entity: Entity
+    network: RoadNetwork
+    active: bool = True
+    speed: float = 0.0
+    road: int = NOWHERE
+    lane: int = 0
+    s: float = 0.0
+    offset_t: float = 0.0
+    relative_heading: float = 0.0
+    section: tuple[float, float] = (0.0, -1.0)
+    """Range of s in which the lane id holds; empty: unknown. [m]"""
+    at_road_end: bool = False
+    last_place: tuple[int, float, float] | None = None
+    """Road, s and offset in the frame before; None in the world's coordinates. [m]"""
+    stuck: bool = False
+    """It has not moved in the frame before: the road had ended."""
+    _free_pose: Pose | None = _ORIGIN
+    _located: bool = True
+    _pose: Pose | None = None
+    activity: int = 0
+    longitudinal_taken: bool = False
+    """An action has moved the entity along in this frame: the default driver does not."""
+    speed_taken: bool = False
+    """Somebody has set the speed in this frame: it is not derived from the movement."""
+    teleported: bool = False
+    previous: Pose | None = None
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    acceleration: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    odometer: float = 0.0
+    standing_since: float | None = None
+    road_end_since: float | None = None
+    off_road_since: float | None = None
+    route: RouteGuide | None = None
+    path: PathProgress | None = None
+    tow: EntityState | None = None
+    trailer: EntityState | None = None
+    actions: list[Running] = field(default_factory=list)
+    """All that it may do: those of the init first."""
+    is_watched: bool = False
+    """Somebody else looks at it, perhaps in every frame."""
 
     # ---- where it is -------------------------------------------------------------------------------------------------
+    @property
+    def name(self) -> str:
+        """The entity's name in the scenario."""
+        return self.entity.name
+
+    @property
+    def place(self) -> Placement:
+        """All of it at once; the road coordinates of a free pose as they were last looked up."""
+        return Placement(self.road, self.lane, self.s, self.offset_t, self.relative_heading, self._free_pose)
+
     @property
     def pose(self) -> Pose:
         """World pose. [m], [rad]"""
         if self._pose is None:
-            free = self._free_pose
-            self._pose = self._pose_on_road() if free is None else self._pose_in_world(free)
+            if self._free_pose is not None and not _is_whole(self._free_pose):
+                self.locate()
+            self._pose = world_pose(self.network, self.place)
         return self._pose
 
     @property
@@ -253,12 +234,8 @@ class EntityState:
         """Look up the road coordinates of a free pose."""
         if self._located or self._free_pose is None:
             return
-        place = locate(self.network, self._free_pose, near=(self.road, self.s) if self.road != NOWHERE else None)
-        self.road, self.lane, self.s, self.offset_t = place.road, place.lane, place.s, place.offset_t
-        self.relative_heading = place.relative_heading
-        self.section = (0.0, -1.0)
-        self._located = True
-        self._pose = None
+        near = (self.road, self.s) if self.road != NOWHERE else None
+        self.put(locate(self.network, self._free_pose, near=near))
 
     def road_heading(self) -> float:
         """Heading of the road's s-direction where the entity is; its own without a road. [rad]"""
@@ -285,7 +262,7 @@ class EntityState:
 
     def acts(self) -> bool:
         """Whether one of its actions runs."""
-        return any(action.is_running for actions in (self.init_actions, self.event_actions) for action in actions)
+        return any(action.is_running for action in self.actions)
 
     def body_frame(self, vector: tuple[float, float, float]) -> tuple[float, float, float]:
         """A world vector along the entity's own axes (in the plane)."""
@@ -293,32 +270,30 @@ class EntityState:
         c, s = cos(heading), sin(heading)
         return vector[0] * c + vector[1] * s, vector[1] * c - vector[0] * s, vector[2]
 
-    # ---- in detail ---------------------------------------------------------------------------------------------------
-    def _pose_on_road(self) -> Pose:
-        network = self.network
-        offset = network.offset_from_offset_t(self.road, self.lane, self.offset_t)
-        pose = network.pose_at(self.road, self.lane, self.s, offset)
-        along = (
-            self.relative_heading if network.travel_direction(self.road, self.lane) > 0 else self.relative_heading - pi
-        )
-        return turned(pose, along)
 
-    def _pose_in_world(self, free: Pose) -> Pose:
-        if free.z == free.z and free.pitch == free.pitch and free.roll == free.roll:
-            return free
-        self.locate()
-        if self.road == NOWHERE:
-            return Pose(free.x, free.y, _or_zero(free.z), free.heading, _or_zero(free.pitch), _or_zero(free.roll))
-        road = self._pose_on_road()
-        z, pitch, roll = (
-            given if given == given else own
-            for given, own in ((free.z, road.z), (free.pitch, road.pitch), (free.roll, road.roll))
-        )
-        return Pose(free.x, free.y, z, free.heading, pitch, roll)
+def world_pose(network: RoadNetwork, place: Placement) -> Pose:
+    """World pose of a place; what is left to the road in z, pitch and roll is looked up there. [m], [rad]"""
+    free = place.pose
+    if free is not None and _is_whole(free):
+        return free
+    if place.road == NOWHERE:
+        road = _ORIGIN
+    else:
+        offset = network.offset_from_offset_t(place.road, place.lane, place.offset_t)
+        lane = network.pose_at(place.road, place.lane, place.s, offset)
+        along = wrap(place.relative_heading)
+        road = turned(lane, along if network.travel_direction(place.road, place.lane) > 0 else along - pi)
+    if free is None:
+        return road
+    z, pitch, roll = (
+        given if given == given else own
+        for given, own in ((free.z, road.z), (free.pitch, road.pitch), (free.roll, road.roll))
+    )
+    return Pose(free.x, free.y, z, free.heading, pitch, roll)
 
 
-def _or_zero(value: float) -> float:
-    return value if value == value else 0.0
+def _is_whole(free: Pose) -> bool:
+    return free.z == free.z and free.pitch == free.pitch and free.roll == free.roll
 
 
 def turned(pose: Pose, angle: float) -> Pose:

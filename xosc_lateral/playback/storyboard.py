@@ -7,64 +7,18 @@ children have all ended; events and maneuver groups then start again as often as
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from enum import Enum
-from typing import Protocol
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 
-from xosc_lateral.playback.simulation import Simulation
-from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.trigger import RunningTrigger
-from xosc_lateral.scenario import Action
 from xosc_lateral.scenario.enums import Priority, StoryboardElementType
+from xosc_lateral.scenario.enums import StoryboardElementState as State
+
+Watcher = Callable[[State, State | None], None]
+"""Told of a change: the state, and the transition that led to it (none to standby)."""
 
 
-class ElementState(Enum):
-    """Where an element is in its life."""
-
-    INIT = "init"
-    STANDBY = "standby"
-    RUNNING = "running"
-    COMPLETE = "complete"
-
-
-class ElementTransition(Enum):
-    """How it came there."""
-
-    NONE = "none"
-    TO_STANDBY = "to standby"
-    START = "start"
-    END = "end"
-    STOP = "stop"
-
-
-class Watcher(Protocol):
-    """Whoever wants to know of an element's changes."""
-
-    def register(self, state: ElementState, transition: ElementTransition) -> None:
-        """The element has changed."""
-
-
-class Behaviour(Protocol):
-    """What an action does while it runs (see `actions.base.RunningAction`)."""
-
-    element: ActionElement
-    source: Action
-    actor: EntityState | None
-
-    @property
-    def domains(self) -> int:
-        """What it needs to have for itself, as a bit set."""
-
-    def start(self) -> None:
-        """Begin."""
-
-    def step(self, time: float, step: float) -> None:
-        """Act for one frame. [s]"""
-
-    def finish(self) -> None:
-        """Clean up."""
-
-
+@dataclass(eq=False)
 class StoryboardElement:
     """One element of the tree.
 
@@ -72,43 +26,28 @@ class StoryboardElement:
     be run again by themselves.
     """
 
-    __slots__ = (
-        "children",
-        "count",
-        "kind",
-        "maximum_count",
-        "name",
-        "parent",
-        "path",
-        "start_trigger",
-        "state",
-        "stop_trigger",
-        "watchers",
-    )
+    name: str
+    kind: StoryboardElementType | None
+    children: Sequence[StoryboardElement] = ()
+    start_trigger: RunningTrigger | None = None
+    stop_trigger: RunningTrigger | None = None
+    maximum_count: int | None = None
+    state: State | None = field(default=None, init=False)
+    """None: its parent has not started it."""
+    count: int = field(default=0, init=False)
+    parent: StoryboardElement | None = field(default=None, init=False, repr=False)
+    path: tuple[str, ...] = field(default=(), init=False)
+    watchers: list[Watcher] = field(default_factory=list, init=False)
 
-    def __init__(
-        self,
-        name: str,
-        kind: StoryboardElementType | None,
-        children: Sequence[StoryboardElement] = (),
-        *,
-        start_trigger: RunningTrigger | None = None,
-        stop_trigger: RunningTrigger | None = None,
-        maximum_count: int | None = None,
-    ) -> None:
-        self.name = name
-        self.kind = kind
-        self.children = tuple(children)
-        self.start_trigger = start_trigger
-        self.stop_trigger = stop_trigger
-        self.maximum_count = maximum_count
-        self.state = ElementState.INIT
-        self.count = 0
-        self.parent: StoryboardElement | None = None
-        self.path: tuple[str, ...] = ()
-        self.watchers: list[Watcher] = []
+    def __post_init__(self) -> None:
+        """Join the children."""
         for child in self.children:
             child.parent = self
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it runs now."""
+        return self.state is State.RUNNING
 
     # ---- the tree ----------------------------------------------------------------------------------------------------
     def settle(self, path: tuple[str, ...] = ()) -> None:
@@ -125,12 +64,12 @@ class StoryboardElement:
 
     # ---- life --------------------------------------------------------------------------------------------------------
     def start(self) -> None:
-        """Go from init to standby (with a start trigger) or on to running, with all children."""
-        if self.state is ElementState.INIT and self.start_trigger is not None:
-            self.change(ElementState.STANDBY, ElementTransition.TO_STANDBY)
+        """Go to standby (with a start trigger) or on to running, with all children."""
+        if self.state is None and self.start_trigger is not None:
+            self.change(State.STANDBY, None)
             return
         self.count += 1
-        self.change(ElementState.RUNNING, ElementTransition.START)
+        self.change(State.RUNNING, State.START_TRANSITION)
         self.start_children()
 
     def start_children(self) -> None:
@@ -138,52 +77,56 @@ class StoryboardElement:
         for child in self.children:
             child.start()
 
+    def make_room(self) -> bool:
+        """Before it starts to run: end what is in its way; False if it may not start."""
+        return True
+
     def evaluate_triggers(self, time: float) -> None:
         """One pass over the triggers of this element and, when it runs, of its children."""
-        if self.state is ElementState.RUNNING and self.stop_trigger is not None and self.stop_trigger.evaluate(time):
+        if self.is_running and self.stop_trigger is not None and self.stop_trigger.evaluate(time):
             self.stop()
-        if self.state is ElementState.STANDBY and (self.start_trigger is None or self.start_trigger.evaluate(time)):
+        if self.state is State.STANDBY and (self.start_trigger is None or self.start_trigger.evaluate(time)):
             self.start()
-        if self.state is ElementState.RUNNING:
+        if self.is_running:
             for child in self.children:
                 child.evaluate_triggers(time)
 
     def step(self, time: float, step: float) -> None:
-        """Let running actions move their actors."""
-        if self.state is ElementState.RUNNING:
+        """Let running actions move their actors for one frame from `time` on. [s]"""
+        if self.is_running:
             for child in self.children:
                 child.step(time, step)
 
     def end(self) -> None:
         """Come to a regular end, with all that still runs below; perhaps to start again."""
-        if self.state is ElementState.COMPLETE:
+        if self.state is State.COMPLETE:
             return
         for child in self.children:
-            if child.state is ElementState.RUNNING:
+            if child.is_running:
                 child.end()
-        if self.state in (ElementState.RUNNING, ElementState.STANDBY):
+        if self.state is not None:
             if self.maximum_count is not None and self.count < self.maximum_count:
                 self._reset_triggers()
-                self.change(ElementState.STANDBY, ElementTransition.END)
+                self.change(State.STANDBY, State.END_TRANSITION)
                 for child in self.children:
                     child.reset()
             else:
-                self.change(ElementState.COMPLETE, ElementTransition.END)
-        self.tell_parent()
+                self.change(State.COMPLETE, State.END_TRANSITION)
+        self._tell_parent()
 
     def stop(self) -> None:
         """Be cut off, with everything below."""
         for child in self.children:
             child.stop()
-        if self.state in (ElementState.STANDBY, ElementState.RUNNING):
-            self.change(ElementState.COMPLETE, ElementTransition.STOP)
-            self.tell_parent()
+        if self.state in (State.STANDBY, State.RUNNING):
+            self.change(State.COMPLETE, State.STOP_TRANSITION)
+            self._tell_parent()
 
     def reset(self) -> None:
-        """Back to init, to be started again by the parent; what its conditions saw before no longer counts."""
+        """To be started again by the parent; what its conditions saw before no longer counts."""
         for child in self.children:
             child.reset()
-        self.state = ElementState.INIT
+        self.state = None
         self.count = 0
         self._reset_triggers()
 
@@ -192,120 +135,50 @@ class StoryboardElement:
             if trigger is not None:
                 trigger.reset()
 
-    def change(self, state: ElementState, transition: ElementTransition) -> None:
+    def change(self, state: State, transition: State | None) -> None:
         """Change the state and tell conditions that watch it."""
         if state is self.state:
             return
         self.state = state
         for watcher in self.watchers:
-            watcher.register(state, transition)
+            watcher(state, transition)
 
-    def tell_parent(self) -> None:
+    def _tell_parent(self) -> None:
         """The parent ends when its last child has."""
         parent = self.parent
-        if parent is None or parent.kind is None or parent.state is ElementState.COMPLETE:
+        if parent is None or parent.kind is None or parent.state is State.COMPLETE:
             return
-        if all(child.state is ElementState.COMPLETE for child in parent.children):
+        if all(child.state is State.COMPLETE for child in parent.children):
             parent.end()
 
 
+@dataclass(eq=False, kw_only=True)
 class EventElement(StoryboardElement):
     """An event: priorities among its siblings, and conflicts of its actions with others of the same actor."""
 
-    __slots__ = ("priority",)
-
-    def __init__(
-        self,
-        name: str,
-        actions: Sequence[ActionElement],
-        *,
-        priority: Priority,
-        start_trigger: RunningTrigger,
-        maximum_count: int,
-    ) -> None:
-        super().__init__(
-            name, StoryboardElementType.EVENT, actions, start_trigger=start_trigger, maximum_count=maximum_count
-        )
-        self.priority = priority
+    priority: Priority
 
     def start(self) -> None:
         """As any element, but the priority decides what happens to events beside it, or to itself."""
-        if self.state is ElementState.STANDBY and not self._make_room():
+        if self.state is State.STANDBY and not self.make_room():
             return
         super().start()
-        if self.state is ElementState.RUNNING and not self.children:
+        if self.is_running and not self.children:
             self.end()
 
     def start_children(self) -> None:
         """Start the actions one after another; each ends running ones of its actor that it conflicts with."""
         for action in self.children:
-            assert isinstance(action, ActionElement)
-            action.end_conflicting()
+            action.make_room()
             action.start()
 
-    def _make_room(self) -> bool:
+    def make_room(self) -> bool:
+        """By the priority among the events of the maneuver."""
         siblings = () if self.parent is None else self.parent.children
-        running = [event for event in siblings if event is not self and event.state is ElementState.RUNNING]
+        running = [event for event in siblings if event is not self and event.is_running]
         if self.priority is Priority.SKIP:
             return not running
         if self.priority is Priority.OVERRIDE:
             for event in running:
                 event.end()
         return True
-
-
-class ActionElement(StoryboardElement):
-    """An action as a leaf of the tree; what it does is in its `Behaviour`."""
-
-    __slots__ = ("_number", "action", "simulation")
-
-    def __init__(self, name: str, action: Behaviour, simulation: Simulation) -> None:
-        super().__init__(name, StoryboardElementType.ACTION)
-        self.action = action
-        self.simulation = simulation
-        self._number: int | None = None
-        action.element = self
-
-    def start(self) -> None:
-        """Start to act."""
-        actor = None if self.action.actor is None else self.action.actor.name
-        if self.action.actor is not None:
-            self.simulation.wake(self.action.actor)
-        self._number = self.simulation.record_start(self.action.source, actor, self.path or ("Init",))
-        self.count += 1
-        self.change(ElementState.RUNNING, ElementTransition.START)
-        self.action.start()
-
-    @property
-    def is_running(self) -> bool:
-        """Whether it acts now."""
-        return self.state is ElementState.RUNNING
-
-    def step(self, time: float, step: float) -> None:
-        """Act for one frame."""
-        if self.state is ElementState.RUNNING:
-            self.action.step(time, step)
-
-    def change(self, state: ElementState, transition: ElementTransition) -> None:
-        """As any element; the end is written down."""
-        if state is ElementState.COMPLETE and self.state is ElementState.RUNNING and self._number is not None:
-            self.simulation.record_end(self._number)
-            self.action.finish()
-        super().change(state, transition)
-
-    def end_conflicting(self) -> None:
-        """End what the actor does in a domain that this action needs."""
-        actor, domains = self.action.actor, self.action.domains
-        if actor is None or not domains:
-            return
-        for other in (*actor.init_actions, *actor.event_actions):
-            assert isinstance(other, ActionElement)
-            if other is not self and other.state is ElementState.RUNNING and other.action.domains & domains:
-                other.end()
-
-
-def storyboard_root(stories: Sequence[StoryboardElement], stop_trigger: RunningTrigger | None) -> StoryboardElement:
-    """The storyboard element above the stories."""
-    root = StoryboardElement("", None, stories, stop_trigger=stop_trigger)
-    root.settle()
-    return root

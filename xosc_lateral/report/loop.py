@@ -31,14 +31,9 @@ from xosc_lateral.report.loop_words import (
 from xosc_lateral.report.page import KeyFigure, Page, Tone
 from xosc_lateral.report.violins import LABELS, violin_figure
 
-NAMED_DRIVES = 3
-"""So many drives are named in the title; more are counted."""
-
-LEFT_ROWS = 8
-"""Rows of the table of what is left."""
-
-FAR, CLOSE = 2.0, 1.2
-"""Ratios to the floor from which a number is marked bad, and up to which it is marked good. [-]"""
+NAMED_DRIVES = 3  # So many drives are named in the title; more are counted.
+LEFT_ROWS = 8  # Rows of the table of what is left.
+FAR, CLOSE = 2.0, 1.2  # Ratios to the floor from which a number is marked bad, and up to which it is marked good. [-]
 
 
 def loop_text(result: LoopResult) -> str:

@@ -16,18 +16,16 @@ from functools import cached_property
 
 from numpy.typing import ArrayLike
 
+from xosc_lateral.arrays import FloatArray, Int32Array
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.road.index import SurfaceIndex
 from xosc_lateral.road.lanes import DRIVING
 from xosc_lateral.road.links import Links
-from xosc_lateral.road.moving import Chooser, advance, straightest
-from xosc_lateral.road.onward import gone_on
+from xosc_lateral.road.moving import Chooser, advance, gone_on, straightest
 from xosc_lateral.road.piecewise import IndexLike
 from xosc_lateral.road.places import cross_section, find_lane, lane_at, lane_pose, surface_pose
 from xosc_lateral.road.positions import (
     Advance,
-    FloatArray,
-    IntArray,
     LaneCoordinates,
     LaneInfo,
     LaneLink,
@@ -47,34 +45,17 @@ from xosc_lateral.road.tables import NetworkTables
 
 @dataclass(frozen=True, eq=False)
 class RoadNetwork:
-    """Roads, their lanes and their links, as read from one OpenDRIVE file.
-
-    Attributes
-    ----------
-    roads : tuple of Road
-    junctions : tuple of Junction
-    path : str
-        The file.
-    sha256 : str
-        Of the bytes that were parsed; empty for a network that was not read from a file.
-    notes : tuple of str
-        What was repaired, ignored or degenerate on reading: never silent.
-    geo_reference : str or None
-        Projection of inertial x, y (PROJ string).
-    header_offset : HeaderOffset
-        From the coordinates of the file, which all answers are in, to inertial ones.
-    road_ids : tuple of str
-        ``road/@id`` in file order.
-    """
+    """Roads, their lanes and their links, as read from one OpenDRIVE file."""
 
     roads: tuple[Road, ...]
     junctions: tuple[Junction, ...] = ()
-    path: str = ""
-    notes: tuple[str, ...] = ()
-    geo_reference: str | None = None
-    sha256: str = ""
+    path: str = ""  # the file
+    notes: tuple[str, ...] = ()  # what was repaired, ignored or degenerate on reading: never silent
+    geo_reference: str | None = None  # projection of inertial x, y (PROJ string)
+    sha256: str = ""  # of the bytes that were parsed; empty: not read from a file
+    # from the coordinates of the file, which all answers are in, to inertial ones
     header_offset: HeaderOffset = field(default_factory=HeaderOffset)
-    road_ids: tuple[str, ...] = field(init=False)
+    road_ids: tuple[str, ...] = field(init=False)  # ``road/@id`` in file order
     _indices: dict[str, int] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -107,7 +88,7 @@ class RoadNetwork:
         """+1: the lane is driven along s, -1: against s. Lane id and ``road/@rule`` (RHT, LHT) decide."""
         return self.roads[road].directions.get(lane, 1)
 
-    def travel_directions(self, road: ArrayLike, lane: ArrayLike) -> IntArray:
+    def travel_directions(self, road: ArrayLike, lane: ArrayLike) -> Int32Array:
         """`travel_direction` for arrays. Shape as the arguments. [-]"""
         return self._tables.travel_directions(road, lane)
 
@@ -160,13 +141,7 @@ class RoadNetwork:
         return self._index.world_to_lane(x, y, z, heading, near=near, lane_types=lane_types)
 
     def path_to_lane(
-        self,
-        x: ArrayLike,
-        y: ArrayLike,
-        road: ArrayLike,
-        s: ArrayLike,
-        *,
-        lane_types: Collection[str] | None = DRIVING,
+        self, x: ArrayLike, y: ArrayLike, road: ArrayLike, s: ArrayLike, *, lane_types: Collection[str] | None = DRIVING
     ) -> LanePositions:
         """Like `world_to_lane`, on known roads and from a guess of `s` per point (a written path, say): cheap."""
         return self._index.path_to_lane(x, y, road, s, lane_types=lane_types)
@@ -180,10 +155,6 @@ class RoadNetwork:
         """Width of the lane. [m] Shape as the arguments."""
         return self._tables.lane_profile(road, lane, s).width
 
-    def lane_edges_t(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """T of the lane's edges to the left and to the right of TRAVEL. [m] Shape as the arguments."""
-        return self._tables.lane_edges(road, lane, s)
-
     def curvature(self, road: ArrayLike, s: ArrayLike) -> FloatArray:
         """Curvature of the reference line along +s, positive in left turns. [1/m] Shape as the arguments."""
         return self._tables.curvature(road, s)
@@ -195,7 +166,7 @@ class RoadNetwork:
         """
         return self._tables.lane_curvature(road, lane, s, offset)
 
-    def lane_index(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[IntArray, IntArray]:
+    def lane_index(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[Int32Array, Int32Array]:
         """Index among the driving lanes of its direction (0 = rightmost in travel direction), and their count.
 
         Index -1 for a lane that is no driving lane.
@@ -256,7 +227,7 @@ class RoadNetwork:
         """
         return lane_at(self.roads[road], road, s, t, lane_types)
 
-    def section_numbers(self, road: IntArray, s: FloatArray) -> IndexLike:
+    def section_numbers(self, road: Int32Array, s: FloatArray) -> IndexLike:
         """Numbers of lane sections, counted over all roads; road and s [m] of the same shape (n,)."""
         return self._tables.section_of(road, s)
 
@@ -314,12 +285,7 @@ class RoadNetwork:
         return straightest(self.roads, options)
 
     def path_between(
-        self,
-        start: tuple[int, float],
-        end: tuple[int, float],
-        *,
-        direction: int = 1,
-        limit: float = float("inf"),
+        self, start: tuple[int, float], end: tuple[int, float], *, direction: int = 1, limit: float = float("inf")
     ) -> RoadPath | None:
         """Shortest way along the reference lines of linked roads between two (road, s).
 

@@ -24,13 +24,13 @@ def normal_angle(angle: float) -> float:
     return angle - TWO_PI * ceil((angle - pi) / TWO_PI)
 
 
-def find_lane(road: Road, lane: int, s: float) -> Lane:
+def find_lane(road: Road, lane: int, s: float, path: str | None = None) -> Lane:
     """A lane at s; raises `PlaybackError` naming the road, the lane and the lanes that are there. `s` in [m]."""
     section = road.section_at(s)
     found = section.by_id.get(lane)
     if found is None:
         there = ", ".join(str(other.id) for other in section.lanes) or "none"
-        raise PlaybackError(f"road '{road.id}' has no lane {lane} at s={s:.3f} m (lanes there: {there})")
+        raise PlaybackError(f"road '{road.id}' has no lane {lane} at s={s:.3f} m (lanes there: {there})", path=path)
     return found
 
 

@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, Int32Array
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.road.lanes import Lane, LaneSection
-from xosc_lateral.road.positions import FloatArray, IntArray
 from xosc_lateral.road.tables import NetworkTables
 
 SPACING = 8.0
@@ -35,19 +35,12 @@ class Candidates(NamedTuple):
     """Roads that a point may lie on: index of the point, road, guess of s."""
 
     point: NDArray[np.int64]
-    road: IntArray
+    road: Int32Array
     s: FloatArray
 
 
 class Samples:
-    """Samples of all lanes of some types, in a grid.
-
-    Parameters
-    ----------
-    tables : NetworkTables
-    lane_types : collection of str or None
-        None: all but lane 0.
-    """
+    """Samples of all lanes of some types (None: all but lane 0), in a grid."""
 
     def __init__(self, tables: NetworkTables, lane_types: Collection[str] | None) -> None:
         """Lay samples over the lanes, and list for each cell those in it and around it."""
@@ -145,11 +138,7 @@ class Samples:
 
 def joined(*parts: Candidates) -> Candidates:
     """All of them, one behind the other."""
-    return Candidates(
-        np.concatenate([part.point for part in parts]),
-        np.concatenate([part.road for part in parts]),
-        np.concatenate([part.s for part in parts]),
-    )
+    return Candidates(*(np.concatenate(field) for field in zip(*parts, strict=True)))
 
 
 def _road_samples(

@@ -16,10 +16,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.road.lane_tables import LaneProfile, LaneTables
 from xosc_lateral.road.lanes import Lane
 from xosc_lateral.road.piecewise import IndexLike, Lookup, PiecewiseCubic
-from xosc_lateral.road.positions import FloatArray, Poses, RoadMark
+from xosc_lateral.road.positions import Poses, RoadMark
 from xosc_lateral.road.reference_line import Frame, ReferenceLines
 from xosc_lateral.road.road import Road
 from xosc_lateral.road.surface import BEND_STEP

@@ -7,6 +7,8 @@ from typing import Annotated
 
 from msgspec import UNSET, Struct
 
+from xosc_lateral.errors import FormatError
+
 
 @dataclass(frozen=True, slots=True)
 class Place:
@@ -28,6 +30,10 @@ class Place:
     line: int | None
     element: str
     node: tuple[int, ...] = field(default=(), repr=False, compare=False)
+
+    def error(self, what: str, kind: type[FormatError] = FormatError) -> FormatError:
+        """An error that names the place."""
+        return kind(what, path=self.path, line=self.line, element=self.element)
 
 
 class Content(Struct, frozen=True, kw_only=True):

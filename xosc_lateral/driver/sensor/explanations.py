@@ -15,14 +15,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.digits import significant
 from xosc_lateral.driver.sensor.likelihood import Colour, Known, Solution, solve
 from xosc_lateral.driver.sensor.periodogram import Periodogram
 from xosc_lateral.driver.sensor.second_view import SecondView
-
-FloatArray = NDArray[np.float64]
 
 ORDERS = (1, 2, 4)
 SLOWEST, FASTEST, GRID = 0.05, 1.4, 1.3

@@ -10,13 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.sensor.periodogram import Periodogram, climb
 from xosc_lateral.driver.sensor.second_view import LEVEL_SD, SecondView
 from xosc_lateral.driver.sensor.vehicle_bound import KNOTS, N_KNOTS, N_STATE, interpolation, prior
-
-FloatArray = NDArray[np.float64]
 
 ABOVE = 1.0
 """No driver is seen above this in a sensor worth splitting: where white noise is estimated at first. [Hz]"""

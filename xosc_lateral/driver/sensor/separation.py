@@ -13,8 +13,8 @@ from dataclasses import replace as replaced
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.digits import all_significant
 from xosc_lateral.driver.sensor.explanations import Explanation, explanations
 from xosc_lateral.driver.sensor.likelihood import Colour, Known, Solution, solve
@@ -26,8 +26,6 @@ from xosc_lateral.driver.sensor.vehicle_bound import density
 from xosc_lateral.drives.filters import scale_frequencies
 from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.normal import NORMAL_95
-
-FloatArray = NDArray[np.float64]
 
 PLAUSIBLE = 6.0
 """Explanations whose information criterion is within this of the best count for the interval: e^-3 as likely. [-]"""

@@ -17,22 +17,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings
 from xosc_lateral.formats.importers.lane_shapes import LaneShape, curvature_along, place_in_shapes
-from xosc_lateral.formats.importers.placed import (
-    LaneGraph,
-    ground_speed,
-    import_each,
-    import_placed,
-    travel_heading,
-)
+from xosc_lateral.formats.importers.placed import LaneGraph, import_each, import_placed
 from xosc_lateral.formats.importers.table import Imported, guarded
-from xosc_lateral.formats.importers.track_table import Tracks
+from xosc_lateral.formats.importers.track_table import Tracks, ground_speed, travel_heading
 from xosc_lateral.formats.xml import read_xml
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 LICENCE = "that of the CommonRoad scenario and of the recording that it was made from"
 
@@ -99,10 +91,7 @@ def _opened(path: Path) -> Any:
 
 
 def read_obstacles(path: Path) -> Tracks:
-    """All obstacles that move along a recorded trajectory.
-
-    Raises `FormatError`, `NotEnoughDataError`.
-    """
+    """All obstacles that move along a recorded trajectory. Raises `FormatError`, `NotEnoughDataError`."""
     return _tracks(_opened(path), path)
 
 

@@ -24,12 +24,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.normal import MAD_TO_SD
 from xosc_lateral.rows import true_slices
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 KNOT_SPACING = 50.0  # [m]; chosen by leave-vehicles-out error on DLR HT (docs/real_data.md)
 MAX_ERROR = 0.15  # [m]; where the centre's standard error is larger (ends of the road), rows are cut

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 
-REACH = 200.0  # [m]; who is farther away is none, as in `motion.context`
+REACH = 200.0  # [m]; who is farther away is none, as in `motion.around`
 LONGEST = 30.0  # [m]; no vehicle is longer (German road traffic regulations: 25.25 m)
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from os import PathLike
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from xosc_lateral.formats.opendrive.document import RoadFile, XmlElement, open_document
 from xosc_lateral.formats.opendrive.lane_sections import read_sections, speed_limit
@@ -25,20 +27,9 @@ LONGEST = 1e6
 
 
 def read_opendrive(path: str | PathLike[str]) -> RoadNetwork:
-    """Read one ``.xodr``.
+    """Read one ``.xodr``; the network's `notes` name what was repaired, ignored or degenerate.
 
-    Raises `FormatError` if it is no OpenDRIVE, or can't be understood: file, line, element and value; `OSError` if it
-    can't be opened.
-
-    Parameters
-    ----------
-    path : path-like
-        The file.
-
-    Returns
-    -------
-    RoadNetwork
-        Its `notes` name what was repaired, ignored or degenerate.
+    Raises `FormatError` if it is no OpenDRIVE, or can't be understood: file, line, element and value.
     """
     root, source = open_document(path)
     elements = list(root.iterfind("road"))
@@ -59,6 +50,17 @@ def read_opendrive(path: str | PathLike[str]) -> RoadNetwork:
         geo_reference=reference.strip() if reference and reference.strip() else None,
         header_offset=_read_header_offset(root, source),
     )
+
+
+def read_road(data: bytes, name: str) -> RoadNetwork:
+    """Read a road that is no file of its own, and that messages call by this name.
+
+    Raises `FormatError`: see `read_opendrive`.
+    """
+    with TemporaryDirectory() as folder:
+        path = Path(folder, f"{name}.xodr")
+        path.write_bytes(data)
+        return read_opendrive(path)
 
 
 def _read_header_offset(root: XmlElement, source: RoadFile) -> HeaderOffset:

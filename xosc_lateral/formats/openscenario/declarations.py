@@ -11,6 +11,9 @@ from xosc_lateral.scenario.parameters import Scope, satisfies
 from xosc_lateral.scenario.place import Unsupported
 from xosc_lateral.scenario.scenario import Parameter
 
+NAMES = frozenset({"parameterRef", "variableRef", "parameterName"})
+"""Attributes that name a parameter instead of standing for its value."""
+
 
 def parameter_name(text: str) -> str:
     """Name without the ``$`` that references in field files carry."""
@@ -45,9 +48,13 @@ def entry_scope(entry: XmlElement, reference: XmlElement) -> Scope:
     assignments = reference.child("ParameterAssignments")
     for assignment in assignments.children("ParameterAssignment") if assignments else ():
         assigned[parameter_name(assignment.raw("parameterRef") or "")] = assignment.text("value")
-    # A value assigned is final: a `$` in it is text.
-    final = {name: f"\\{value}" if value.startswith("$") else value for name, value in assigned.items()}
-    return Scope({**declared_values(entry), **final}, reference.scope)
+    values = {name: final(value) for name, value in assigned.items()}
+    return Scope({**declared_values(entry), **values}, reference.scope)
+
+
+def final(value: str) -> str:
+    """A value in which a leading ``$`` is text: nobody fills it in again."""
+    return f"\\{value}" if value.startswith("$") else value
 
 
 def read_declarations(

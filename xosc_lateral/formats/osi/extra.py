@@ -13,10 +13,7 @@ SUFFIXES = (".mcap", ".osi")
 
 
 def osi(module: str) -> Any:
-    """A module of `osi3` or `osi_utilities`.
-
-    Raises `XoscLateralError`: They are not installed.
-    """
+    """A module of `osi3` or `osi_utilities`. Raises `XoscLateralError`: They are not installed."""
     import logging
 
     try:

@@ -8,8 +8,10 @@ from typing import Any
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
-from xosc_lateral.playback.storyboard import ActionElement
+from xosc_lateral.playback.storyboard import StoryboardElement
 from xosc_lateral.scenario import Action
+from xosc_lateral.scenario.enums import StoryboardElementState as State
+from xosc_lateral.scenario.enums import StoryboardElementType
 
 JUMP = 0.05
 """When an action puts the entity further away than this at once, the entity's motion is not continuous. [m]"""
@@ -24,53 +26,97 @@ class Domain(IntFlag):
     BOTH = 3
 
 
-class RunningAction:
-    """One action of one actor (or of none).
+class RunningAction(StoryboardElement):
+    """One action of one actor (or of none): a leaf of the storyboard.
 
-    `start` is called when the event starts, `step` in every frame from then on (the first time in the same frame), with
-    the time at its start and its length, 0 in the very first frame. An action that has done its work calls `end`.
+    A kind of action says what it does in `_prepare`, `_begin`, `_act` and `_finish`; one that has done its work calls
+    `end`.
 
-    `source`: as read; `actor`: who acts; None for global and user-defined actions.
+    `source`: as read; `actor`: who acts (an `EntityState`); None for global and user-defined actions.
     """
 
     domains: Domain = Domain.NONE
 
     def __init__(self, source: Action, actor: EntityState | None, simulation: Simulation) -> None:
-        self.source = source
-        self.actor = actor
-        self.simulation = simulation
+        super().__init__(source.name, StoryboardElementType.ACTION)
+        self.source, self.simulation = source, simulation
+        self.actor: Any = actor
         self.content: Any = source.content
-        self.element: ActionElement
-        self.prepare()
+        self._number = -1
+        """Of its record in the simulation."""
+        self._is_refused = False
+        if actor is not None:
+            actor.actions.append(self)
+        self._prepare()
 
-    @property
-    def state(self) -> EntityState:
-        """The actor of a private action."""
-        assert self.actor is not None, "private actions have an actor"
-        return self.actor
-
-    def prepare(self) -> None:
+    # ---- what a kind of action does ----------------------------------------------------------------------------------
+    def _prepare(self) -> None:
         """Look at the content once, before the run: refuse what can't be played, say what the run has to provide."""
 
-    def start(self) -> None:
-        """Begin; state from an earlier execution must be forgotten."""
+    def _begin(self) -> None:
+        """When the event starts; nothing of an earlier execution counts."""
 
-    def step(self, time: float, step: float) -> None:
-        """Act for one frame from `time` on. [s]"""
+    def _act(self, time: float, step: float) -> None:
+        """In every frame from then on (the first time in the same one), from `time` on; no length in the first. [s]"""
         self.end()
 
-    def finish(self) -> None:
+    def _finish(self) -> None:
         """Clean up, however the action came to its end."""
 
-    def end(self) -> None:
-        """Come to a regular end."""
-        self.element.end()
+    # ---- as an element -----------------------------------------------------------------------------------------------
+    def start(self) -> None:
+        """Start to act, and write it down."""
+        if self.actor is not None:
+            self.simulation.wake(self.actor)
+        actor = None if self.actor is None else self.actor.name
+        self._number = self.simulation.record_start(self.source, actor, self.path or ("Init",))
+        super().start()
+        self._is_refused = False
+        self._begin()
 
-    def jumped(self, distance: float) -> None:
-        """The actor was put so far away at once [m]: up to here and from here on, its path is another one."""
-        if abs(distance) > JUMP:
-            self.state.activity |= Activity.TELEPORTED
+    def step(self, time: float, step: float) -> None:
+        """Act for one frame. [s]"""
+        if self.is_running and self._is_refused:
+            self.end()
+        elif self.is_running:
+            self._act(time, step)
 
-    def note(self, what: str) -> None:
+    def change(self, state: State, transition: State | None) -> None:
+        """As any element; the end is written down."""
+        if state is State.COMPLETE and self.is_running:
+            self.simulation.record_end(self._number)
+            self._finish()
+        super().change(state, transition)
+
+    def make_room(self) -> bool:
+        """End what the actor does in a domain that this action needs."""
+        if self.actor is not None and self.domains:
+            for other in self.actor.actions:
+                if other is not self and other.is_running and other.domains & self.domains:
+                    other.end()
+        return True
+
+    def _refuse(self, what: str) -> None:
+        """When it begins: say why nothing is done; it ends with its first step."""
+        self._note(what)
+        self._is_refused = True
+
+    def _note(self, what: str) -> None:
         """Say that something was not played, or not as written."""
         self.simulation.note(what, self.content.place)
+
+
+class RunningPrivateAction(RunningAction):
+    """One that has an actor."""
+
+    actor: EntityState
+
+    def _referred(self, target: object) -> EntityState | None:
+        """The entity that a target is relative to; None: it is absolute."""
+        name: str | None = getattr(target, "entity_ref", None)
+        return None if name is None else self.simulation.entity(name, self.content.place)
+
+    def _jumped(self, distance: float) -> None:
+        """The actor was put so far away at once [m]: up to here and from here on, its path is another one."""
+        if abs(distance) > JUMP:
+            self.actor.activity |= Activity.TELEPORTED

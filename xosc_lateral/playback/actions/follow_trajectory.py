@@ -5,9 +5,9 @@ from __future__ import annotations
 from math import copysign, cos, hypot, pi, sin
 
 from xosc_lateral.motion.nominal import Activity
-from xosc_lateral.playback.actions.base import Domain, RunningAction
+from xosc_lateral.playback.actions.base import Domain, RunningAction, RunningPrivateAction
 from xosc_lateral.playback.angles import HALF_PI, difference
-from xosc_lateral.playback.paths.base import Path, PathPoint, PathProgress
+from xosc_lateral.playback.paths.base import PathPoint, PathProgress
 from xosc_lateral.playback.paths.registry import duration, path_of
 from xosc_lateral.playback.positions.resolve import pose_of
 from xosc_lateral.playback.state import free
@@ -16,7 +16,7 @@ from xosc_lateral.scenario.enums import FollowingMode, ReferenceContext
 from xosc_lateral.scenario.private_actions import FollowTrajectoryAction
 
 
-class RunningFollowTrajectory(RunningAction):
+class RunningFollowTrajectory(RunningPrivateAction):
     """The entity jumps onto the path when the action starts (there is no approach).
 
     Headings that the file gives are kept; an entity that thereby points against the path drives backwards, as does one
@@ -26,28 +26,18 @@ class RunningFollowTrajectory(RunningAction):
 
     content: FollowTrajectoryAction
 
-    def prepare(self) -> None:
-        """Without times the speed is left to others; the path may depend on where entities are when it starts."""
+    def _prepare(self) -> None:
         self._is_timed = self.content.timing is not None and duration(self.content.trajectory.shape) > EPSILON
-        self.domains = Domain.BOTH if self._is_timed else Domain.LATERAL
-        self._path: Path | None = None
-        self._s = 0.0
-        self._time = 0.0
-        self._points = 1.0
-        """+1: the entity points along the path, -1: against it."""
-        self._was_headed = False
-        self._is_first = True
-        """No frame of any length has been driven yet: absolute times may begin further on."""
+        self.domains = Domain.BOTH if self._is_timed else Domain.LATERAL  # without times, others see to the speed
 
-    def start(self) -> None:
-        """Lay the path out and jump onto it."""
-        state, content = self.state, self.content
+    def _begin(self) -> None:
+        state, content = self.actor, self.content
         follow = content.following_mode is FollowingMode.FOLLOW
         before = state.plane
         path = path_of(content.trajectory, self.simulation, pose_of, follower=state, follow=follow, speed=state.speed)
         self._path = path
         if content.timing is not None and not self._is_timed:
-            self.note(f"trajectory '{content.trajectory.name}' has no times: followed with the entity's own speed")
+            self._note(f"trajectory '{content.trajectory.name}' has no times: followed with the entity's own speed")
         self._s = min(max(content.initial_distance_offset, 0.0), path.length)
         point = path.at(self._s)
         self._time = path.time_at(self._s) if self._is_timed else 0.0
@@ -59,49 +49,45 @@ class RunningFollowTrajectory(RunningAction):
             sign = _way(heading, point)
         self._was_headed = point.is_headed
         self._is_first = True
-        self._points = 1.0 if point.is_headed and self._ignores_headings else _way(heading, point)
+        """No frame of any length has been driven yet: absolute times may begin further on."""
+        # A property of the reference player's vehicles: headings are for the eye, the direction is the path's.
+        ignores_headings = state.entity.properties.get("ignoreHeadingForTrajMotion") == "true"
+        self._points = 1.0 if point.is_headed and ignores_headings else _way(heading, point)
+        """+1: the entity points along the path, -1: against it."""
         self._put(point, heading)
         state.path = PathProgress(path, self._s)
         if self._is_timed:
             state.set_speed(sign * path.speed_at(self._s))
         state.take_control(Activity.TRAJECTORY)
-        self.jumped(hypot(point.x - before.x, point.y - before.y))
+        self._jumped(hypot(point.x - before.x, point.y - before.y))
 
-    def step(self, time: float, step: float) -> None:
-        """Move along."""
-        state, path = self.state, self._path
-        if path is None:
-            self.end()
-            return
+    def _act(self, time: float, step: float) -> None:
+        state, path = self.actor, self._path
         state.take_control(Activity.TRAJECTORY)
         state.speed_taken = True
         before = self._s
-        way = self._advance(path, time, step)
+        way = self._advance(time, step)
         point = path.at(self._s)
         self._place(point)
         state.path = PathProgress(path, self._s)
-        if self._is_at_end(path, way, step):
-            self._go_straight_on(point.heading, self._left_over(path, abs(self._s - before), step))
+        if self._is_at_end(way, step):
+            rest, pose = self._left_over(abs(self._s - before), step), state.plane
+            x, y = pose.x + rest * cos(point.heading), pose.y + rest * sin(point.heading)
+            state.put_in_world(pose._replace(x=x, y=y))
             self.end()
 
-    def finish(self) -> None:
-        """Leave the path; where it ended is the place to go on from."""
-        self.state.path = None
+    def _finish(self) -> None:
+        self.actor.path = None
 
     # ---- in detail ---------------------------------------------------------------------------------------------------
     @property
-    def _ignores_headings(self) -> bool:
-        """A property of the reference player's vehicles: headings are for the eye, the direction is the path's."""
-        return self.state.entity.properties.get("ignoreHeadingForTrajMotion") == "true"
+    def _clock(self) -> float:
+        """Time of the path's own clock. [s]"""
+        return self._time + (0.0 if self.content.timing is None else self.content.timing.offset)
 
-    @property
-    def _offset(self) -> float:
-        timing = self.content.timing
-        return 0.0 if timing is None else timing.offset
-
-    def _advance(self, path: Path, time: float, step: float) -> float:
+    def _advance(self, time: float, step: float) -> float:
         """Move by one frame; returns the direction of movement on the path, +1 or -1."""
-        state, timing = self.state, self.content.timing
+        state, path, timing = self.actor, self._path, self.content.timing
         if timing is None or not self._is_timed:
             way = copysign(1.0, state.speed) * self._points
             s = self._s + way * abs(state.speed) * step
@@ -115,32 +101,32 @@ class RunningFollowTrajectory(RunningAction):
             clock = self._time + timing.offset
         else:
             self._time = clock = (time + step) * timing.scale
-        before, self._s = self._s, path.s_at(self._time + timing.offset)
+        before, self._s = self._s, path.s_at(self._clock)
         if self._is_first and timing.domain is ReferenceContext.ABSOLUTE:
             if clock > path.end_time + EPSILON and step > 0.0:
-                self.note(
+                self._note(
                     f"the times of trajectory '{self.content.trajectory.name}' are over when it starts: "
                     f"'{state.name}' is put where its speed would have taken it since"
                 )
-            self.jumped(max(abs(self._s - before) - 2.0 * abs(path.speed_at(before)) * step, 0.0))
+            self._jumped(max(abs(self._s - before) - 2.0 * abs(path.speed_at(before)) * step, 0.0))
         self._is_first = step <= 0.0
         # Beyond its end the path has no speed to give: the last one stays.
         if step > EPSILON and clock < path.end_time + EPSILON:
             state.set_speed(points * (self._s - before) / step)
         return 1.0
 
-    def _is_at_end(self, path: Path, way: float, step: float) -> bool:
+    def _is_at_end(self, way: float, step: float) -> bool:
         if self._is_timed:
-            return self._time + self._offset > path.end_time - EPSILON
-        if self.content.trajectory.closed or step <= 0.0 or self.state.speed == 0.0:
+            return self._clock > self._path.end_time - EPSILON
+        if self.content.trajectory.closed or step <= 0.0 or self.actor.speed == 0.0:
             return False
-        return self._s > path.length - EPSILON if way > 0.0 else self._s < EPSILON
+        return self._s > self._path.length - EPSILON if way > 0.0 else self._s < EPSILON
 
-    def _left_over(self, path: Path, moved: float, step: float) -> float:
+    def _left_over(self, moved: float, step: float) -> float:
         """Way of the frame beyond the end of the path. [m]"""
         if self._is_timed:
-            return (self._time + self._offset - path.end_time) * self.state.speed
-        return abs(self.state.speed) * step - moved if self._s > 0.0 else 0.0
+            return (self._clock - self._path.end_time) * self.actor.speed
+        return abs(self.actor.speed) * step - moved if self._s > 0.0 else 0.0
 
     def _place(self, point: PathPoint) -> None:
         """On the path, with the heading given there, else along it as it came."""
@@ -150,16 +136,10 @@ class RunningFollowTrajectory(RunningAction):
         turned = self._points < 0.0 and not point.is_headed
         self._put(point, point.heading + (pi if turned else 0.0))
 
-    def _go_straight_on(self, heading: float, distance: float) -> None:
-        state = self.state
-        pose = state.free_pose
-        assert pose is not None
-        state.put_in_world(pose._replace(x=pose.x + distance * cos(heading), y=pose.y + distance * sin(heading)))
-
     def _put(self, point: PathPoint, heading: float) -> None:
         on_ground = point.z != point.z
         pitch, roll = (point.z, point.z) if on_ground else (point.pitch, point.roll)
-        self.state.put_in_world(free(point.x, point.y, heading, point.z, pitch, roll))
+        self.actor.put_in_world(free(point.x, point.y, heading, point.z, pitch, roll))
 
 
 def _way(heading: float, point: PathPoint) -> float:

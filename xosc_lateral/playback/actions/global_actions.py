@@ -5,8 +5,8 @@ from __future__ import annotations
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.playback.actions.base import RunningAction
 from xosc_lateral.playback.positions.resolve import resolve
-from xosc_lateral.playback.storyboard import ActionElement, ElementState
 from xosc_lateral.playback.trailers import disconnect
+from xosc_lateral.playback.values import Values
 from xosc_lateral.scenario import Unsupported
 from xosc_lateral.scenario.global_actions import (
     AddEntityAction,
@@ -27,65 +27,47 @@ class RunningEnvironment(RunningAction):
 
     content: EnvironmentAction
 
-    def start(self) -> None:
-        """Set the clock."""
+    def _begin(self) -> None:
         clock = self.content.environment.time_of_day
         if clock is not None:
             self.simulation.time_of_day = (clock.date_time, clock.animation, self.simulation.time)
 
 
-class RunningParameterSet(RunningAction):
+class _OfValue(RunningAction):
+    """About a parameter or a variable."""
+
+    @property
+    def _values(self) -> tuple[str, Values, str]:
+        """What it is called in notes, all of its kind, and its name."""
+        if isinstance(self.content, ParameterSetAction | ParameterModifyAction):
+            return "parameter", self.simulation.parameters, self.content.parameter_ref
+        return "variable", self.simulation.variables, self.content.variable_ref
+
+
+class RunningSet(_OfValue):
     """Conditions see the new value from now on; what was read from the file before does not change."""
 
-    content: ParameterSetAction
+    content: ParameterSetAction | VariableSetAction
 
-    def start(self) -> None:
-        """Set it."""
-        if self.content.parameter_ref in self.simulation.parameters:
-            self.simulation.parameters.set(self.content.parameter_ref, self.content.value)
+    def _begin(self) -> None:
+        kind, values, name = self._values
+        if name in values:
+            values.set(name, self.content.value)
         else:
-            self.note(f"parameter '{self.content.parameter_ref}' is not declared: nothing is set")
+            self._note(f"{kind} '{name}' is not declared: nothing is set")
 
 
-class RunningParameterModify(RunningAction):
-    """Add to a parameter, or multiply it."""
+class RunningModify(_OfValue):
+    """Add to a value, or multiply it."""
 
-    content: ParameterModifyAction
+    content: ParameterModifyAction | VariableModifyAction
 
-    def start(self) -> None:
-        """Modify it."""
-        name = self.content.parameter_ref
-        if name not in self.simulation.parameters:
-            self.note(f"parameter '{name}' is not declared: nothing is modified")
-        elif not self.simulation.parameters.modify(name, self.content.operation, self.content.value):
-            self.note(f"parameter '{name}' is not a number: nothing is modified")
-
-
-class RunningVariableSet(RunningAction):
-    """Conditions see the new value from now on."""
-
-    content: VariableSetAction
-
-    def start(self) -> None:
-        """Set it."""
-        if self.content.variable_ref in self.simulation.variables:
-            self.simulation.variables.set(self.content.variable_ref, self.content.value)
-        else:
-            self.note(f"variable '{self.content.variable_ref}' is not declared: nothing is set")
-
-
-class RunningVariableModify(RunningAction):
-    """Add to a variable, or multiply it."""
-
-    content: VariableModifyAction
-
-    def start(self) -> None:
-        """Modify it."""
-        name = self.content.variable_ref
-        if name not in self.simulation.variables:
-            self.note(f"variable '{name}' is not declared: nothing is modified")
-        elif not self.simulation.variables.modify(name, self.content.operation, self.content.value):
-            self.note(f"variable '{name}' is not a number: nothing is modified")
+    def _begin(self) -> None:
+        kind, values, name = self._values
+        if name not in values:
+            self._note(f"{kind} '{name}' is not declared: nothing is modified")
+        elif not values.modify(name, self.content.operation, self.content.value):
+            self._note(f"{kind} '{name}' is not a number: nothing is modified")
 
 
 class RunningSignalState(RunningAction):
@@ -93,8 +75,7 @@ class RunningSignalState(RunningAction):
 
     content: TrafficSignalStateAction
 
-    def start(self) -> None:
-        """Set it."""
+    def _begin(self) -> None:
         self.simulation.signals.set_state(self.content.name, self.content.state, self.simulation.time)
 
 
@@ -103,12 +84,10 @@ class RunningSignalController(RunningAction):
 
     content: TrafficSignalControllerAction
 
-    def start(self) -> None:
-        """Send it there."""
-        if not self.simulation.signals.go_to_phase(
-            self.content.controller_ref, self.content.phase, self.simulation.time
-        ):
-            self.note(f"no signal controller '{self.content.controller_ref}' with a phase '{self.content.phase}'")
+    def _begin(self) -> None:
+        controller, phase = self.content.controller_ref, self.content.phase
+        if not self.simulation.signals.go_to_phase(controller, phase, self.simulation.time):
+            self._note(f"no signal controller '{controller}' with a phase '{phase}'")
 
 
 class RunningAddEntity(RunningAction):
@@ -116,11 +95,10 @@ class RunningAddEntity(RunningAction):
 
     content: AddEntityAction
 
-    def start(self) -> None:
-        """Put it there; one that exists already is left alone."""
+    def _begin(self) -> None:
         state = self.simulation.entity(self.content.entity_ref, self.content.place)
         if state.active:
-            self.note(f"'{state.name}' exists already: it is not added")
+            self._note(f"'{state.name}' exists already: it is not added")
             return
         state.active = True
         state.put(resolve(self.content.position, self.simulation))
@@ -129,22 +107,20 @@ class RunningAddEntity(RunningAction):
 
 
 class RunningDeleteEntity(RunningAction):
-    """The entity is gone, and with it what it was doing."""
+    """The entity is gone, and with it what it was doing; trailers are left behind."""
 
     content: DeleteEntityAction
 
-    def start(self) -> None:
-        """Take it out; trailers are left behind."""
+    def _begin(self) -> None:
         state = self.simulation.entity(self.content.entity_ref, self.content.place)
         state.active = False
         state.activity = 0
         disconnect(state)
         if state.tow is not None:
             disconnect(state.tow)
-        for element in (*state.init_actions, *state.event_actions):
-            assert isinstance(element, ActionElement)
-            if element.state is ElementState.RUNNING:
-                element.end()
+        for action in state.actions:
+            if action.is_running:
+                action.end()
 
 
 class RunningTraffic(RunningAction):
@@ -152,9 +128,8 @@ class RunningTraffic(RunningAction):
 
     content: TrafficAction
 
-    def start(self) -> None:
-        """Say that there is none."""
-        self.note(f"{self.content.kind}: its vehicles are made by the simulator and are not played")
+    def _begin(self) -> None:
+        self._note(f"{self.content.kind}: its vehicles are made by the simulator and are not played")
 
 
 class RunningUnsupported(RunningAction):
@@ -162,19 +137,18 @@ class RunningUnsupported(RunningAction):
 
     content: Unsupported
 
-    def start(self) -> None:
-        """Say so."""
-        self.note(self.content.reason or f"{self.content.kind} is not played")
+    def _begin(self) -> None:
+        self._note(self.content.reason or f"{self.content.kind} is not played")
 
 
 RUNNING: dict[type, type[RunningAction]] = {
     EnvironmentAction: RunningEnvironment,
-    ParameterModifyAction: RunningParameterModify,
-    ParameterSetAction: RunningParameterSet,
+    ParameterModifyAction: RunningModify,
+    ParameterSetAction: RunningSet,
     TrafficSignalControllerAction: RunningSignalController,
     TrafficSignalStateAction: RunningSignalState,
-    VariableModifyAction: RunningVariableModify,
-    VariableSetAction: RunningVariableSet,
+    VariableModifyAction: RunningModify,
+    VariableSetAction: RunningSet,
     AddEntityAction: RunningAddEntity,
     DeleteEntityAction: RunningDeleteEntity,
     TrafficAction: RunningTraffic,

@@ -5,16 +5,16 @@ from __future__ import annotations
 from math import atan, atan2, copysign, inf, pi, sqrt
 
 from xosc_lateral.motion.nominal import Activity
-from xosc_lateral.playback.actions.base import Domain, RunningAction
-from xosc_lateral.playback.drive import along_reference, travel
+from xosc_lateral.playback.actions.base import Domain, RunningAction, RunningPrivateAction
+from xosc_lateral.playback.drive import move_along_lane
 from xosc_lateral.playback.positions.resolve import beside
-from xosc_lateral.playback.state import NOWHERE, EntityState, Placement
+from xosc_lateral.playback.state import NOWHERE, EntityState
 from xosc_lateral.playback.transition import EPSILON, Transition
 from xosc_lateral.scenario.enums import DynamicsDimension, DynamicsShape
 from xosc_lateral.scenario.private_actions import AbsoluteTargetLane, LaneChangeAction
 
 
-class RunningLaneChange(RunningAction):
+class RunningLaneChange(RunningPrivateAction):
     """From the present lateral position to the target lane, while moving on.
 
     The lateral position is measured from the centre of the target lane: its width and course are thereby followed. The
@@ -25,56 +25,31 @@ class RunningLaneChange(RunningAction):
     domains = Domain.LATERAL
     content: LaneChangeAction
 
-    def prepare(self) -> None:
-        """Find the entity that the lane is relative to."""
-        target = self.content.target
-        self._reference = (
-            None
-            if isinstance(target, AbsoluteTargetLane)
-            else self.simulation.entity(target.entity_ref, self.content.place)
-        )
-        self._transition = Transition.of(self.content.dynamics)
-        self._guide: EntityState | None = None
+    def _prepare(self) -> None:
+        self._reference = self._referred(self.content.target)
 
-    def start(self) -> None:
-        """Align with the road; measure the way to the target lane."""
-        state = self.state
+    def _begin(self) -> None:
+        state = self.actor
         state.locate()
-        self._guide = None
         if state.road == NOWHERE:
-            self.note(f"'{state.name}' is on no road: the lane change is not played")
+            self._refuse(f"'{state.name}' is on no road: the lane change is not played")
             return
-        lane = self._target_lane()
-        if not self.simulation.network.has_lane_at(state.road, lane, state.s):
-            self._note_missing(lane)
+        lane, network = self._target_lane(), state.network
+        if not network.has_lane_at(state.road, lane, state.s):
+            there = ", ".join(str(info.id) for info in network.lanes_at(state.road, state.s))
+            what = f"road '{network.road_ids[state.road]}' has no lane {lane} at s = {state.s:.1f} m (lanes: {there})"
+            self._refuse(f"{what}: lane change not played")
             return
         state.turn(0.0 if state.is_forward else pi)
-        guide = self._guide = self._guide_on(lane)
+        self._guide = EntityState(state.entity, network, route=state.route)
+        """Follows the target lane beside the entity, at its own place across the road."""
+        across = state.t - network.lane_state_at(state.road, lane, state.s).centre_t
+        self._guide.put(state.place._replace(lane=lane, offset_t=across, pose=None))
         self._transition = Transition.of(self.content.dynamics)
-        self._transition.begin(guide.offset_t, self.content.target_lane_offset)
+        self._transition.begin(across, self.content.target_lane_offset)
 
-    def _note_missing(self, lane: int) -> None:
-        """Name the lanes that there are."""
-        network, state = self.simulation.network, self.state
-        there = ", ".join(str(info.id) for info in network.lanes_at(state.road, state.s))
-        road = network.road_ids[state.road]
-        self.note(f"road '{road}' has no lane {lane} at s = {state.s:.1f} m (lanes: {there}): lane change not played")
-
-    def _guide_on(self, lane: int) -> EntityState:
-        """One that follows the target lane beside the entity, at its own place across the road."""
-        state = self.state
-        centre = self.simulation.network.lane_state_at(state.road, lane, state.s).centre_t
-        guide = EntityState(state.entity, state.network)
-        guide.put(Placement(state.road, lane, state.s, state.t - centre, state.relative_heading))
-        guide.route = state.route
-        return guide
-
-    def step(self, time: float, step: float) -> None:
-        """Move ahead and sideways."""
-        state, guide, transition = self.state, self._guide, self._transition
-        if guide is None:
-            self.end()
-            return
+    def _act(self, time: float, step: float) -> None:
+        state, guide, transition = self.actor, self._guide, self._transition
         state.take_control(Activity.LATERAL)
         way = abs(state.speed) * step
         if abs(state.speed) < EPSILON:
@@ -85,23 +60,17 @@ class RunningLaneChange(RunningAction):
         guide.offset_t = offset
         if transition.is_step:
             ahead = way
-        distance = copysign(ahead, state.speed)
-        on_line = along_reference(guide.network, guide.road, guide.lane, guide.s, guide.offset_t, distance)
-        travel(guide, 1 if guide.is_forward else -1, on_line)
+        move_along_lane(guide, copysign(ahead, state.speed))
         self._follow_flip(flipped, offset)
         self._place(guide, turn)
         if transition.is_step:
-            self.jumped(transition.target - transition.start)
+            self._jumped(transition.target - transition.start)
         state.speed_taken = True
         if transition.is_done or self._is_there(offset, side):
             state.turn(0.0 if guide.is_forward else pi)
             self.end()
         elif guide.at_road_end:
             self.end()
-
-    def finish(self) -> None:
-        """Nothing leads any more."""
-        self._guide = None
 
     # ---- in detail ---------------------------------------------------------------------------------------------------
     def _target_lane(self) -> int:
@@ -144,13 +113,12 @@ class RunningLaneChange(RunningAction):
     def _follow_flip(self, before: tuple[int, int], offset: float) -> None:
         """On a road whose s runs the other way, +t is the other side: the rest of the transition is mirrored."""
         guide, transition = self._guide, self._transition
-        assert guide is not None
         if guide.offset_t != offset and (guide.road, guide.lane) != before and guide.offset_t == -offset:
             transition.start, transition.target = -transition.start, -transition.target
 
     def _place(self, guide: EntityState, turn: float) -> None:
         """Put the actor where its guide is, on the lane that is under it."""
-        network, state = self.simulation.network, self.state
+        network, state = self.simulation.network, self.actor
         t = guide.t
         found = network.lane_at(guide.road, guide.s, t)
         lane = found.lane or guide.lane

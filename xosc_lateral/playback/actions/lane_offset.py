@@ -5,62 +5,48 @@ from __future__ import annotations
 from math import atan, pi
 
 from xosc_lateral.motion.nominal import Activity
-from xosc_lateral.playback.actions.base import Domain, RunningAction
+from xosc_lateral.playback.actions.base import Domain, RunningAction, RunningPrivateAction
 from xosc_lateral.playback.state import NOWHERE
 from xosc_lateral.playback.transition import EPSILON, Transition
 from xosc_lateral.scenario.enums import DynamicsDimension, DynamicsShape
-from xosc_lateral.scenario.private_actions import AbsoluteTargetLaneOffset, LaneOffsetAction
+from xosc_lateral.scenario.private_actions import LaneOffsetAction
 
 DEFAULT_LATERAL_ACCELERATION = 0.5
 """Where the file has none; the standard says as fast as can be, the reference player has this value. [m/s2]"""
 
 
-class RunningLaneOffset(RunningAction):
+class RunningLaneOffset(RunningPrivateAction):
     """Sideways within the lane, or beyond, while the default driver (or an action) moves ahead.
 
-    The duration follows from the lateral acceleration. In the first frame nothing moves yet.
+    The duration follows from the lateral acceleration; a relative target is read once. Each frame has the offset of its
+    start, and a heading along the movement: in the first one nothing moves yet.
     """
 
     domains = Domain.LATERAL
     content: LaneOffsetAction
 
-    def prepare(self) -> None:
-        """Find the entity that the offset is relative to."""
-        target = self.content.target
-        self._reference = (
-            None
-            if isinstance(target, AbsoluteTargetLaneOffset)
-            else self.simulation.entity(target.entity_ref, self.content.place)
-        )
-        self._transition: Transition | None = None
-        self._road = NOWHERE
+    def _prepare(self) -> None:
+        self._reference = self._referred(self.content.target)
 
-    def start(self) -> None:
-        """From the present offset; a relative target is read once."""
-        state = self.state
+    def _begin(self) -> None:
+        state = self.actor
         state.locate()
-        self._transition = None
         if state.road == NOWHERE:
-            self.note(f"'{state.name}' is on no road: the lane offset is not played")
+            self._refuse(f"'{state.name}' is on no road: the lane offset is not played")
             return
         state.follow_lane()
-        transition = Transition(self.content.shape, DynamicsDimension.TIME, 0.0)
+        transition = self._transition = Transition(self.content.shape, DynamicsDimension.TIME, 0.0)
         transition.begin(state.offset_t, self._target())
         limit = self.content.max_lateral_acc
         if limit is None:
             limit = DEFAULT_LATERAL_ACCELERATION
             if self.content.shape is not DynamicsShape.STEP:
-                self.note(f"no maxLateralAcc: played with {limit:g} m/s2")
+                self._note(f"no maxLateralAcc: played with {limit:g} m/s2")
         transition.range = transition.range_for_curvature(limit)
-        self._transition = transition
         self._forward = state.is_forward
 
-    def step(self, time: float, step: float) -> None:
-        """Set the offset of the start of the frame, and a heading along the movement."""
-        state, transition = self.state, self._transition
-        if transition is None:
-            self.end()
-            return
+    def _act(self, time: float, step: float) -> None:
+        state, transition = self.actor, self._transition
         state.locate()  # another action may have moved it in the world
         if state.is_forward is not self._forward:
             # The road under the entity now runs the other way, and so does its +t.
@@ -72,7 +58,7 @@ class RunningLaneOffset(RunningAction):
         state.activity |= Activity.LATERAL
         if done:
             if transition.is_step:
-                self.jumped(transition.target - state.offset_t)
+                self._jumped(transition.target - state.offset_t)
             state.move_to(state.road, state.lane, state.s, transition.target)
             state.turn(along)
             self.end()
@@ -84,16 +70,13 @@ class RunningLaneOffset(RunningAction):
         transition.advance(step)
 
     def _target(self) -> float:
-        target, state = self.content.target, self.state
-        if isinstance(target, AbsoluteTargetLaneOffset):
-            if self.simulation.scenario.header.is_left_handed:  # counts from the lane's direction, not the road's
-                return target.value * self.simulation.network.travel_direction(state.road, state.lane)
-            return target.value
-        reference = self._reference
-        assert reference is not None
-        reference.locate()
-        wanted_t = reference.t + (target.value if reference.is_forward else -target.value)
-        return wanted_t - (state.t - state.offset_t)
+        value, state, reference = self.content.target.value, self.actor, self._reference
+        if reference is not None:
+            reference.locate()
+            return reference.t + (value if reference.is_forward else -value) - (state.t - state.offset_t)
+        if self.simulation.scenario.header.is_left_handed:  # counts from the lane's direction, not the road's
+            return value * state.network.travel_direction(state.road, state.lane)
+        return value
 
 
 RUNNING: dict[type, type[RunningAction]] = {LaneOffsetAction: RunningLaneOffset}

@@ -9,10 +9,10 @@ from __future__ import annotations
 from math import acos, atan2, copysign, cos, hypot, inf, pi, sin, sqrt
 
 from xosc_lateral.motion.nominal import Activity
-from xosc_lateral.playback.actions.base import Domain, RunningAction
+from xosc_lateral.playback.actions.base import Domain, RunningAction, RunningPrivateAction
 from xosc_lateral.playback.angles import difference
 from xosc_lateral.playback.distances import ahead_and_left, road_gap, spot_of
-from xosc_lateral.playback.drive import along_reference, travel
+from xosc_lateral.playback.drive import move_along_lane
 from xosc_lateral.playback.state import NOWHERE, EntityState, free
 from xosc_lateral.playback.transition import EPSILON
 from xosc_lateral.road import Pose
@@ -32,14 +32,11 @@ class BesideOnRoad:
     `wanted`: to the left of the other entity. [m]
     """
 
-    def __init__(
-        self, state: EntityState, other: EntityState, wanted: float, limits: DynamicConstraints | None
-    ) -> None:
+    def __init__(self, state: EntityState, other: EntityState, wanted: float, limits: DynamicConstraints) -> None:
         self._state, self._other, self._wanted = state, other, wanted
-        given = limits or DynamicConstraints()
-        self._most_speed = inf if given.max_speed is None else given.max_speed
-        self._most_acceleration = inf if given.max_acceleration is None else given.max_acceleration
-        self._most_jerk = inf if given.max_acceleration_rate is None else given.max_acceleration_rate
+        self._most_speed = inf if limits.max_speed is None else limits.max_speed
+        self._most_acceleration = inf if limits.max_acceleration is None else limits.max_acceleration
+        self._most_jerk = inf if limits.max_acceleration_rate is None else limits.max_acceleration_rate
         self._before: Pose | None = None
         """Where it was left in the frame before."""
         self._speed = 0.0
@@ -74,9 +71,7 @@ class BesideOnRoad:
         ahead = sqrt(max(state.speed * state.speed - across * across, 0.0))
         state.take_control(Activity.LATERAL)
         state.speed_taken = True
-        distance = copysign(ahead * step, state.speed)
-        ds = along_reference(state.network, state.road, state.lane, state.s, state.offset_t, distance)
-        travel(state, 1 if state.is_forward else -1, ds)
+        move_along_lane(state, copysign(ahead * step, state.speed))
         state.move_to(state.road, state.lane, state.s, state.offset_t + across * step)
         if abs(rest) <= abs(across) * step + EPSILON and self._most_acceleration == inf:
             rest = 0.0
@@ -91,7 +86,7 @@ class BesideOnRoad:
     def _rest(self) -> float:
         """How far to go along +t of the own road. [m]"""
         state, other = self._state, self._other
-        gap = road_gap(state.network, other, spot_of(state))
+        gap = road_gap(other, spot_of(state))
         if gap is None:
             return 0.0
         return (self._wanted if other.is_forward is not gap.is_turned else -self._wanted) - gap.dt
@@ -153,12 +148,9 @@ class BesideEntity:
     `wanted`: of the line, to the left of the other entity. [m]
     """
 
-    def __init__(
-        self, state: EntityState, other: EntityState, wanted: float, limits: DynamicConstraints | None
-    ) -> None:
+    def __init__(self, state: EntityState, other: EntityState, wanted: float, limits: DynamicConstraints) -> None:
         self._state, self._other, self._wanted = state, other, wanted
-        given = None if limits is None else limits.max_acceleration
-        self._acceleration = inf if given is None else abs(given)
+        self._acceleration = inf if limits.max_acceleration is None else abs(limits.max_acceleration)
 
     @property
     def is_unlimited(self) -> bool:
@@ -217,7 +209,7 @@ CLOSE_ENOUGH = 0.01
 """A distance that is not kept continuously counts as reached. [m]"""
 
 
-class RunningLateralDistance(RunningAction):
+class RunningLateralDistance(RunningPrivateAction):
     """Beside another entity, in its own frame or in that of the road.
 
     With free space, the distance is that between boxes standing side by side. `any` side is the left one, as in the
@@ -228,37 +220,25 @@ class RunningLateralDistance(RunningAction):
     """As in the reference player, where it ends speed actions and is ended by them, and goes on beside lane changes."""
     content: LateralDistanceAction
 
-    def prepare(self) -> None:
-        """Find the entity to keep the distance to."""
+    def _prepare(self) -> None:
         self._other = self.simulation.entity(self.content.entity_ref, self.content.place)
         self.simulation.derives_motion = True
-        self._way: BesideEntity | BesideOnRoad | None = None
 
-    def start(self) -> None:
-        """Decide on which side of the other entity to be."""
-        content, state, other = self.content, self.state, self._other
+    def _begin(self) -> None:
+        content, state, other = self.content, self.actor, self._other
         on_road = content.coordinate_system in (CoordinateSystem.ROAD, CoordinateSystem.LANE)
         state.locate()
         other.locate()
-        self._way = None
         if on_road and (state.road == NOWHERE or other.road == NOWHERE):
-            self.note(f"'{state.name}' or '{other.name}' is on no road: the lateral distance is not kept")
+            self._refuse(f"'{state.name}' or '{other.name}' is on no road: the lateral distance is not kept")
             return
-        wanted = self._wanted()
-        if on_road:
-            self._way = BesideOnRoad(state, other, wanted, content.constraints)
-            return
-        self._way = BesideEntity(state, other, wanted, content.constraints)
-        if content.constraints is not None and content.constraints.max_speed is not None:
-            self.note("maxSpeed of a lateral distance in the entity's frame is not played (maxAcceleration is)")
+        limits = content.constraints or DynamicConstraints()
+        self._way = (BesideOnRoad if on_road else BesideEntity)(state, other, self._wanted(), limits)
+        if not on_road and limits.max_speed is not None:
+            self._note("maxSpeed of a lateral distance in the entity's frame is not played (maxAcceleration is)")
 
-    def step(self, time: float, step: float) -> None:
-        """Move ahead and sideways."""
-        way = self._way
-        if way is None:
-            self.end()
-            return
-        state = self.state
+    def _act(self, time: float, step: float) -> None:
+        state, way = self.actor, self._way
         state.activity |= Activity.LATERAL
         before = state.plane
         rest = way.move(step)
@@ -266,7 +246,7 @@ class RunningLateralDistance(RunningAction):
             return
         if way.is_unlimited:
             dx, dy = state.plane.x - before.x, state.plane.y - before.y
-            self.jumped(max((dx * dx + dy * dy) ** 0.5 - abs(state.speed) * step, 0.0))
+            self._jumped(max((dx * dx + dy * dy) ** 0.5 - abs(state.speed) * step, 0.0))
         if not self.content.continuous and abs(rest) < CLOSE_ENOUGH:
             way.align()
             self.end()
@@ -275,16 +255,14 @@ class RunningLateralDistance(RunningAction):
         """Distance to the left of the other entity; negative: to the right. [m]"""
         content, other = self.content, self._other
         if content.distance is None:
-            return ahead_and_left(other, self.state.plane.x, self.state.plane.y)[1]
+            return ahead_and_left(other, self.actor.plane.x, self.actor.plane.y)[1]
         wanted = content.distance
         if content.freespace:
-            half = 0.5 * (self.state.entity.bounding_box.width + other.entity.bounding_box.width)
+            half = 0.5 * (self.actor.entity.bounding_box.width + other.entity.bounding_box.width)
             wanted += copysign(half, wanted)
         if content.displacement is LateralDisplacement.ANY and self.simulation.scenario.header.version == (1, 0):
             return wanted  # version 1.0 has no displacement: the sign of the distance tells the side
         return -abs(wanted) if content.displacement is LateralDisplacement.RIGHT else abs(wanted)
 
 
-RUNNING: dict[type, type[RunningAction]] = {
-    LateralDistanceAction: RunningLateralDistance,
-}
+RUNNING: dict[type, type[RunningAction]] = {LateralDistanceAction: RunningLateralDistance}

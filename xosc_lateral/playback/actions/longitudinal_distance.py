@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from math import inf, sqrt
 
-from xosc_lateral.playback.actions.base import Domain, RunningAction
+from xosc_lateral.playback.actions.base import Domain, RunningAction, RunningPrivateAction
 from xosc_lateral.playback.actions.speed_profile import limits_of
-from xosc_lateral.playback.distances import ahead_and_left, entity_distance
+from xosc_lateral.playback.distances import Measure, ahead_and_left
 from xosc_lateral.playback.drive import drive
 from xosc_lateral.scenario.enums import CoordinateSystem, LongitudinalDisplacement, RelativeDistanceType
 from xosc_lateral.scenario.private_actions import LongitudinalDistanceAction
@@ -18,20 +18,24 @@ STIFFNESS = 0.4
 """Of the spring that pulls towards the distance, per acceleration available. [1/m]"""
 
 
-class RunningLongitudinalDistance(RunningAction):
+class RunningLongitudinalDistance(RunningPrivateAction):
     """At once without dynamic constraints, else a critically damped spring within them."""
 
     domains = Domain.LONGITUDINAL
     content: LongitudinalDistanceAction
 
-    def prepare(self) -> None:
-        """Find the entity to keep the distance to."""
+    def _prepare(self) -> None:
+        self._measure = Measure(
+            # with free space, the reference player measures in the own frame, whatever is asked for
+            (not self.content.freespace and self.content.coordinate_system) or CoordinateSystem.ENTITY,
+            RelativeDistanceType.LONGITUDINAL,
+            self.content.freespace,
+        )
         self._other = self.simulation.entity(self.content.entity_ref, self.content.place)
-        self._acceleration = 0.0
+        self._limits = limits_of(self.content.constraints, self.actor.entity.performance)
         self._ahead: bool | None = None
-        self._kept: float | None = None
 
-    def start(self) -> None:
+    def _begin(self) -> None:
         """Decide on which side of the other entity to stay: the first time, as in the reference player."""
         self._acceleration = 0.0
         displacement = self.content.displacement
@@ -40,50 +44,37 @@ class RunningLongitudinalDistance(RunningAction):
         elif displacement is not LongitudinalDisplacement.ANY:
             # None given: behind the other (the reference player's default; version 1.0 knows nothing else).
             self._ahead = displacement is not LongitudinalDisplacement.LEADING
-        self._kept = None
-        if self.content.distance is None and self.content.time_gap is None:
-            self._kept = self._distance()
+        keeps = self.content.distance is None and self.content.time_gap is None
+        self._kept = self._distance() if keeps else None
 
-    def step(self, time: float, step: float) -> None:
-        """Accelerate towards the wanted distance."""
-        state, other = self.state, self._other
+    def _act(self, time: float, step: float) -> None:
+        state, other = self.actor, self._other
         distance = self._distance()
         if distance is None:
-            self.note(f"no way from '{state.name}' to '{other.name}': the distance is not kept")
+            self._note(f"no way from '{state.name}' to '{other.name}': the distance is not kept")
             self.end()
             return
         rest = distance - self._wanted()
         if not self.content.continuous and abs(rest) < CLOSE_ENOUGH:
             self.end()
-        limits = limits_of(self.content.constraints, state.entity.performance)
-        if limits.acceleration == inf and limits.deceleration == inf:
+        limits = self._limits
+        if limits.max_acceleration == inf and limits.max_deceleration == inf:
             drive(state, rest)
             state.set_speed(other.speed)
             return
         self._acceleration = self._pull(rest, step)
         speed = state.speed + self._acceleration * step
-        state.set_speed(min(max(speed, -limits.speed), limits.speed))
+        state.set_speed(min(max(speed, -limits.max_speed), limits.max_speed))
 
     # ---- in detail ---------------------------------------------------------------------------------------------------
     def _is_ahead(self) -> bool:
         """Whether the other one is ahead; with free space also while it is alongside."""
         if self.content.freespace:
             return (self._distance() or 0.0) >= 0.0
-        return ahead_and_left(self.state, self._other.pose.x, self._other.pose.y)[0] >= 0.0
+        return ahead_and_left(self.actor, self._other.pose.x, self._other.pose.y)[0] >= 0.0
 
     def _distance(self) -> float | None:
-        system = self.content.coordinate_system or CoordinateSystem.ENTITY
-        # With free space, the reference player measures between the boxes in the own frame, whatever is asked for.
-        if self.content.freespace:
-            system = CoordinateSystem.ENTITY
-        return entity_distance(
-            self.simulation.network,
-            self.state,
-            self._other,
-            system,
-            RelativeDistanceType.LONGITUDINAL,
-            freespace=self.content.freespace,
-        )
+        return self._measure.to_entity(self.actor, self._other)
 
     def _wanted(self) -> float:
         if self._kept is not None:
@@ -95,16 +86,16 @@ class RunningLongitudinalDistance(RunningAction):
         return amount if self._ahead else -amount
 
     def _pull(self, rest: float, step: float) -> float:
-        limits = limits_of(self.content.constraints, self.state.entity.performance)
-        tension = limits.acceleration if rest < 0.0 else limits.deceleration
+        limits = self._limits
+        tension = limits.max_acceleration if rest < 0.0 else limits.max_deceleration
         stiffness = STIFFNESS * min(tension, 1e10)
-        wanted = rest * stiffness - (self.state.speed - self._other.speed) * 2.0 * sqrt(stiffness)
-        wanted = min(max(wanted, -limits.deceleration), limits.acceleration)
+        wanted = rest * stiffness - (self.actor.speed - self._other.speed) * 2.0 * sqrt(stiffness)
+        wanted = min(max(wanted, -limits.max_deceleration), limits.max_acceleration)
         before = self._acceleration
         if wanted < 0.0 and wanted < before:
-            return max(before - _grown(limits.deceleration_rate, step), wanted)
+            return max(before - _grown(limits.max_deceleration_rate, step), wanted)
         if wanted >= 0.0 and wanted > before:
-            return min(before + _grown(limits.acceleration_rate, step), wanted)
+            return min(before + _grown(limits.max_acceleration_rate, step), wanted)
         return wanted
 
 

@@ -17,27 +17,22 @@ from xosc_lateral.playback.actions import (
 from xosc_lateral.playback.actions.base import RunningAction
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
-from xosc_lateral.playback.storyboard import ActionElement
 from xosc_lateral.scenario import Action
 
-FAMILIES = (
-    follow_trajectory,
-    global_actions,
-    lane_change,
-    lane_offset,
-    lateral_distance,
-    longitudinal_distance,
-    private_actions,
-    speed,
-    speed_profile,
-    synchronize,
-)
-
 RUNNING: dict[type, type[RunningAction]] = {
-    content: running for family in FAMILIES for content, running in family.RUNNING.items()
+    **follow_trajectory.RUNNING,
+    **global_actions.RUNNING,
+    **lane_change.RUNNING,
+    **lane_offset.RUNNING,
+    **lateral_distance.RUNNING,
+    **longitudinal_distance.RUNNING,
+    **private_actions.RUNNING,
+    **speed.RUNNING,
+    **speed_profile.RUNNING,
+    **synchronize.RUNNING,
 }
 
 
-def prepare_action(action: Action, actor: EntityState | None, simulation: Simulation) -> ActionElement:
+def prepare_action(action: Action, actor: EntityState | None, simulation: Simulation) -> RunningAction:
     """An action as an element of the storyboard, ready to be started."""
-    return ActionElement(action.name, RUNNING[type(action.content)](action, actor, simulation), simulation)
+    return RUNNING[type(action.content)](action, actor, simulation)

@@ -4,36 +4,33 @@ from __future__ import annotations
 
 from math import copysign
 
-from xosc_lateral.playback.actions.base import Domain, RunningAction
+from xosc_lateral.playback.actions.base import Domain, RunningAction, RunningPrivateAction
 from xosc_lateral.playback.transition import EPSILON, Transition
 from xosc_lateral.scenario.enums import DynamicsDimension, SpeedTargetValueType
-from xosc_lateral.scenario.private_actions import AbsoluteTargetSpeed, RelativeTargetSpeed, SpeedAction
+from xosc_lateral.scenario.private_actions import (
+    AbsoluteTargetSpeed,
+    RelativeSpeedToMaster,
+    RelativeTargetSpeed,
+    SpeedAction,
+)
 
 
-class RunningSpeed(RunningAction):
+class RunningSpeed(RunningPrivateAction):
     """Speed along a transition over time, within the performance of the entity.
 
     A transition over a distance is turned into one over the time that it takes at the mean of both speeds. A relative
-    target is read anew in each frame; a continuous one is followed for ever once it is reached.
+    target is read anew in each frame; a continuous one is followed for ever once it is reached. A frame is driven with
+    the speed of its end.
     """
 
     domains = Domain.LONGITUDINAL
     content: SpeedAction
 
-    def prepare(self) -> None:
-        """Find the entity that the speed is relative to."""
-        target = self.content.target
-        self._reference = (
-            self.simulation.entity(target.entity_ref, self.content.place)
-            if isinstance(target, RelativeTargetSpeed)
-            else None
-        )
-        self._reached = False
-        self._transition = Transition.of(self.content.dynamics)
+    def _prepare(self) -> None:
+        self._reference = self._referred(self.content.target)
 
-    def start(self) -> None:
-        """Begin at the present speed. A step is there at once."""
-        state = self.state
+    def _begin(self) -> None:
+        state = self.actor
         self._reached = False
         self._transition = transition = Transition.of(self.content.dynamics)
         target = self._limited(self._target())
@@ -44,9 +41,8 @@ class RunningSpeed(RunningAction):
         transition.limit_slope(limits.max_acceleration if target > state.speed else limits.max_deceleration)
         state.set_speed(transition.value())
 
-    def step(self, time: float, step: float) -> None:
-        """Set the speed of the end of the frame; the whole frame is driven with it."""
-        state, transition = self.state, self._transition
+    def _act(self, time: float, step: float) -> None:
+        state, transition = self.actor, self._transition
         if self._reference is not None:
             transition.aim(self._limited(self._target()))
         if transition.range > 0.0 and transition.is_done:
@@ -57,30 +53,23 @@ class RunningSpeed(RunningAction):
             self._reached = True
             speed = self._limited(self._target())
         state.set_speed(speed)
-        if self._reached and not self._goes_on():
+        if self._reached and not getattr(self.content.target, "continuous", False):
             self.end()
 
     # ---- in detail ---------------------------------------------------------------------------------------------------
     def _target(self) -> float:
         target = self.content.target
-        if isinstance(target, AbsoluteTargetSpeed):
+        if self._reference is None or isinstance(target, AbsoluteTargetSpeed):
             return target.value
-        assert self._reference is not None
-        if target.value_type is SpeedTargetValueType.DELTA:
-            return self._reference.speed + target.value
-        return self._reference.speed * target.value
-
-    def _goes_on(self) -> bool:
-        target = self.content.target
-        return isinstance(target, RelativeTargetSpeed) and target.continuous
+        return relative_to(self._reference.speed, target)
 
     def _limited(self, speed: float) -> float:
-        limit = self.state.entity.performance.max_speed
+        limit = self.actor.entity.performance.max_speed
         return min(max(speed, -limit), limit)
 
     def _approach(self, target: float, step: float) -> float:
         """After the transition: as fast as the entity can."""
-        state, limits = self.state, self.state.entity.performance
+        state, limits = self.actor, self.actor.entity.performance
         if step <= EPSILON:
             return state.speed
         change = (target - state.speed) / step
@@ -88,7 +77,7 @@ class RunningSpeed(RunningAction):
         return self._limited(state.speed + change * step)
 
     def _along_transition(self, step: float) -> float:
-        state, limits, transition = self.state, self.state.entity.performance, self._transition
+        state, limits, transition = self.actor, self.actor.entity.performance, self._transition
         transition.advance(step)
         speed = transition.value()
         if step <= EPSILON:
@@ -100,6 +89,11 @@ class RunningSpeed(RunningAction):
         speed = self._limited(state.speed + possible * step)
         transition.advance(-(step - (speed - state.speed) / wanted))
         return speed
+
+
+def relative_to(speed: float, target: RelativeTargetSpeed | RelativeSpeedToMaster) -> float:
+    """What is asked for while the other entity has this speed. [m/s]"""
+    return speed + target.value if target.value_type is SpeedTargetValueType.DELTA else speed * target.value
 
 
 def duration_of(start: float, target: float, distance: float) -> float:

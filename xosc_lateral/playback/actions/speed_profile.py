@@ -14,91 +14,71 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
-from math import inf, sqrt
+from math import sqrt
 from typing import NamedTuple
 
-from xosc_lateral.playback.actions.base import Domain, RunningAction
+from msgspec.structs import asdict
+
+from xosc_lateral.playback.actions.base import Domain, RunningAction, RunningPrivateAction
 from xosc_lateral.playback.transition import EPSILON
 from xosc_lateral.scenario import Performance
 from xosc_lateral.scenario.enums import FollowingMode
 from xosc_lateral.scenario.private_actions import DynamicConstraints, SpeedProfileAction
 
 
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """[m/s], [m/s2], [m/s3]; infinite: none."""
-
-    speed: float
-    acceleration: float
-    deceleration: float
-    acceleration_rate: float
-    deceleration_rate: float
-
-
-def limits_of(constraints: DynamicConstraints | None, performance: Performance) -> Limits:
-    """Constraints that are not given are the entity's own; without any constraints, there are none at all."""
+def limits_of(constraints: DynamicConstraints | None, performance: Performance) -> Performance:
+    """Constraints that are not given are the entity's own; without any constraints, only the speed has a limit."""
     if constraints is None:
-        return Limits(performance.max_speed, inf, inf, inf, inf)
-    return Limits(
-        _capped(constraints.max_speed, performance.max_speed),
-        _capped(constraints.max_acceleration, performance.max_acceleration),
-        _capped(constraints.max_deceleration, performance.max_deceleration),
-        _capped(constraints.max_acceleration_rate, performance.max_acceleration_rate),
-        _capped(constraints.max_deceleration_rate, performance.max_deceleration_rate),
-    )
-
-
-def _capped(value: float | None, own: float) -> float:
-    return own if value is None else min(value, own)
+        return Performance(performance.max_speed)
+    own = asdict(performance)
+    given = {name: min(value, own[name]) for name, value in asdict(constraints).items() if value is not None}
+    return Performance(**own | given)
 
 
 _NO_LIMIT = 1e10
 """In place of infinite jerks and accelerations, so that formulas stay finite."""
 
-Row = tuple[float, float, float, float]
-"""Time [s], speed [m/s], acceleration [m/s2], jerk [m/s3] of a piece."""
 
-
-class SpeedTarget(NamedTuple):
-    """A speed to have at a time, and the acceleration from there to the next. [s], [m/s], [m/s2]"""
+class Piece(NamedTuple):
+    """A stretch of the profile: from `time` on, speed + slope u + jerk u^2 / 2. [s], [m/s], [m/s2], [m/s3]"""
 
     time: float
     speed: float
     slope: float
+    jerk: float = 0.0
 
 
 class NoSolutionError(ValueError):
     """No jerk-limited profile meets the speeds at their times."""
 
 
-def follow(targets: Sequence[SpeedTarget], acceleration: float, limits: Limits) -> tuple[list[Row], str]:
+def follow(targets: Sequence[Piece], acceleration: float, limits: Performance) -> tuple[list[Piece], str]:
     """Pieces of the profile through `targets`, beginning with the present acceleration, and why the last of them are
     straight lines (empty: they are not). [m/s2]
 
     Raises `NoSolutionError`: when not even the first target can be met so.
     """
-    up, down = min(limits.acceleration_rate, _NO_LIMIT), min(limits.deceleration_rate, _NO_LIMIT)
+    up, down = min(limits.max_acceleration_rate, _NO_LIMIT), min(limits.max_deceleration_rate, _NO_LIMIT)
     if len(targets) < 2:
-        return [(target.time, target.speed, 0.0, 0.0) for target in targets], ""
+        return [Piece(target.time, target.speed, 0.0) for target in targets], ""
     if len(targets) == 2:
         return _single(targets, acceleration, limits, up, down), ""
-    if not -limits.deceleration - EPSILON <= acceleration <= limits.acceleration + EPSILON:
+    if not -limits.max_deceleration - EPSILON <= acceleration <= limits.max_acceleration + EPSILON:
         raise NoSolutionError(f"the present acceleration of {acceleration:.2f} m/s2 is beyond the limits")
     return _several(targets, acceleration, up, down)
 
 
-def _several(targets: Sequence[SpeedTarget], acceleration: float, up: float, down: float) -> tuple[list[Row], str]:
+def _several(targets: Sequence[Piece], acceleration: float, up: float, down: float) -> tuple[list[Piece], str]:
     first = targets[0]
-    rows: list[Row] = []
+    pieces: list[Piece] = []
     time, jerk = first.time, 0.0
     if abs(first.slope) > EPSILON:
         jerk = -down if first.slope < acceleration else up
-        rows.append((first.time, first.speed, acceleration, jerk))
+        pieces.append(Piece(first.time, first.speed, acceleration, jerk))
         time += (first.slope - acceleration) / jerk
     u = time - first.time
     speed = first.speed + u * (acceleration + 0.5 * jerk * u)
-    rows.append((time, speed, first.slope, 0.0))
+    pieces.append(Piece(time, speed, first.slope))
     slope, intercept = first.slope, speed - first.slope * time
     for index, target in enumerate(targets[1:], 1):
         following, its_intercept = target.slope, target.speed - target.slope * target.time
@@ -109,26 +89,25 @@ def _several(targets: Sequence[SpeedTarget], acceleration: float, up: float, dow
             )
             if corner < time:
                 # the reference player goes on in straight lines, from the target after the one that it came for
-                rest = [(later.time, later.speed, later.slope, 0.0) for later in targets[index:]]
-                return rows + rest, f"the speed at {target.time:.2f} s leaves no time for the jerk"
+                return [*pieces, *targets[index:]], f"the speed at {target.time:.2f} s leaves no time for the jerk"
             at_corner = speed + slope * (corner - time)
-            rows.append((corner, at_corner, slope, jerk))
+            pieces.append(Piece(corner, at_corner, slope, jerk))
             time = corner + (following - slope) / jerk
             u = time - corner
             speed = at_corner + u * (slope + 0.5 * jerk * u)
-        rows.append((time, speed, following, 0.0))
+        pieces.append(Piece(time, speed, following))
         slope, intercept = following, its_intercept
-    return rows, ""
+    return pieces, ""
 
 
-def _single(targets: Sequence[SpeedTarget], acceleration: float, limits: Limits, up: float, down: float) -> list[Row]:
-    (t0, v0, wanted), (t3, v3, _) = targets
+def _single(targets: Sequence[Piece], acceleration: float, limits: Performance, up: float, down: float) -> list[Piece]:
+    (t0, v0, wanted, _), (t3, v3, _, _) = targets
     a0 = acceleration
     j0 = -down if wanted < a0 else up
     j1 = up if wanted < 0.0 else -down
     if abs(j1 - j0) < EPSILON:
         return _one_way(targets, a0, j1)
-    middle: Row | None = None
+    middle: list[Piece] = []
     room = (
         j0
         * j1
@@ -148,24 +127,21 @@ def _single(targets: Sequence[SpeedTarget], acceleration: float, limits: Limits,
         a1 = a0 + j0 * (t1 - t0)
         t2 = a1 / j1 + t3
         v2 = v1 + a1 * (t2 - t1)
-        middle = (t1, v1, a1, 0.0)
-    if not -limits.deceleration <= a1 <= limits.acceleration:
-        a1 = min(max(a1, -limits.deceleration), limits.acceleration)
+        middle = [Piece(t1, v1, a1)]
+    if not -limits.max_deceleration <= a1 <= limits.max_acceleration:
+        a1 = min(max(a1, -limits.max_deceleration), limits.max_acceleration)
         t1 = t0 + (a1 - a0) / j0
         v1 = v0 + a0 * (t1 - t0) + 0.5 * j0 * (t1 - t0) ** 2
         t2 = (v3 - v1) / a1 + t1 + a1 / (2 * j1)
         v2 = v3 + a1 * a1 / (2 * j1)
         t3 = (v3 - v1) / a1 + t1 - a1 / (2 * j1)
-        middle = (t1, v1, a1, 0.0)
-    rows = [(t0, v0, a0, j0)]
-    if middle is not None:
-        rows.append(middle)
-    return [*rows, (t2, v2, a1, j1), (t3, v3, 0.0, 0.0)]
+        middle = [Piece(t1, v1, a1)]
+    return [Piece(t0, v0, a0, j0), *middle, Piece(t2, v2, a1, j1), Piece(t3, v3, 0.0)]
 
 
-def _one_way(targets: Sequence[SpeedTarget], a0: float, jerk: float) -> list[Row]:
+def _one_way(targets: Sequence[Piece], a0: float, jerk: float) -> list[Piece]:
     """Both ends with the same jerk: the present acceleration is beyond what is needed, and is taken back."""
-    (t0, v0, _), (t3, v3, _) = targets
+    (t0, v0, *_), (t3, v3, *_) = targets
     span = jerk * (t0 - t3) - a0
     if abs(span) < EPSILON:
         raise NoSolutionError("the present acceleration leaves no way to the speed")
@@ -177,19 +153,11 @@ def _one_way(targets: Sequence[SpeedTarget], a0: float, jerk: float) -> list[Row
     if not t0 <= t1 <= t2 <= t3 + EPSILON:
         raise NoSolutionError("the present acceleration is already beyond what is needed")
     v1 = v0 + a0 * (t1 - t0) + 0.5 * jerk * (t1 - t0) ** 2
-    return [(t0, v0, a0, jerk), (t1, v1, a1, 0.0), (t2, v1 + a1 * (t2 - t1), a1, jerk), (t3, v3, 0.0, 0.0)]
+    v2 = v1 + a1 * (t2 - t1)
+    return [Piece(t0, v0, a0, jerk), Piece(t1, v1, a1), Piece(t2, v2, a1, jerk), Piece(t3, v3, 0.0)]
 
 
-class Piece(NamedTuple):
-    """A stretch of the profile: from `time` on, speed + slope u + jerk u^2 / 2. [s], [m/s], [m/s2], [m/s3]"""
-
-    time: float
-    speed: float
-    slope: float
-    jerk: float = 0.0
-
-
-class RunningSpeedProfile(RunningAction):
+class RunningSpeedProfile(RunningPrivateAction):
     """Straight lines between the speeds (`position`), or the same with a limited jerk (`follow`).
 
     An entry without a time is reached as fast as the constraints allow, one whose time is too short likewise. Times
@@ -199,44 +167,33 @@ class RunningSpeedProfile(RunningAction):
     domains = Domain.LONGITUDINAL
     content: SpeedProfileAction
 
-    def prepare(self) -> None:
-        """Find the entity that the speeds are relative to; the acceleration to start from is needed."""
-        name = self.content.entity_ref
-        self._reference = None if name is None else self.simulation.entity(name, self.content.place)
-        self.simulation.derives_motion = (
-            self.simulation.derives_motion or self.content.following_mode is FollowingMode.FOLLOW
-        )
-        self._pieces: list[Piece] = []
-        self._current = 0
+    def _prepare(self) -> None:
+        self._reference = self._referred(self.content)
+        self._follows = self.content.following_mode is FollowingMode.FOLLOW
+        if self._follows:
+            self.simulation.derives_motion = True  # the acceleration to start from is needed
 
-    def start(self) -> None:
-        """Lay the profile out from the present speed (and acceleration)."""
-        state = self.state
+    def _begin(self) -> None:
+        state = self.actor
         offset = 0.0 if self._reference is None else self._reference.speed
         if self._reference is not None:
-            self.note(f"speeds are relative to that of '{self.content.entity_ref}' as it is now: {offset:.2f} m/s")
+            self._note(f"speeds are relative to that of '{self.content.entity_ref}' as it is now: {offset:.2f} m/s")
         limits = limits_of(self.content.constraints, state.entity.performance)
         self._current = 0
-        targets = self._targets(offset, limits)
-        self._pieces = [Piece(*target) for target in targets]
-        if self.content.following_mode is FollowingMode.FOLLOW:
+        self._pieces = self._targets(offset, limits)
+        if self._follows:
             acceleration = state.body_frame(state.acceleration)[0]
             try:
-                pieces, why_straight = follow(targets, acceleration, limits)
+                self._pieces, why_straight = follow(self._pieces, acceleration, limits)
             except NoSolutionError as error:
-                self.note(f"{error}: played as straight lines between the speeds")
+                self._note(f"{error}: played as straight lines between the speeds")
                 return
-            self._pieces = [Piece(*piece) for piece in pieces]
             if why_straight:
-                self.note(f"{why_straight}: played as straight lines between the speeds from there on")
+                self._note(f"{why_straight}: played as straight lines between the speeds from there on")
 
-    def step(self, time: float, step: float) -> None:
-        """Set the speed of the end of the frame."""
-        state, pieces = self.state, self._pieces
+    def _act(self, time: float, step: float) -> None:
+        state, pieces = self.actor, self._pieces
         now = time + step
-        if not pieces:
-            self.end()
-            return
         while self._current < len(pieces) - 1 and now > pieces[self._current + 1].time - EPSILON:
             self._current += 1
         piece = pieces[self._current]
@@ -249,33 +206,25 @@ class RunningSpeedProfile(RunningAction):
             self.end()
 
     # ---- in detail ---------------------------------------------------------------------------------------------------
-    def _targets(self, offset: float, limits: Limits) -> list[SpeedTarget]:
+    def _targets(self, offset: float, limits: Performance) -> list[Piece]:
         """Speeds at absolute times, the present one first unless the first entry is to hold now."""
-        entries = self.content.entries
-        follows = self.content.following_mode is FollowingMode.FOLLOW
-        time, speed = self.simulation.time, self.state.speed
+        time, speed = self.simulation.time, self.actor.speed
         points = [(time, speed)]
-        for index, entry in enumerate(entries):
+        for index, entry in enumerate(self.content.entries):
             target = entry.speed + offset
             if index == 0 and entry.time is not None and entry.time <= EPSILON:
-                if not follows:
+                if not self._follows:
                     points[0] = (time, target)
                 continue
-            time += max(_fastest(target - points[-1][1], limits), entry.time or 0.0)
+            change = target - points[-1][1]
+            limit = limits.max_acceleration if change > 0.0 else limits.max_deceleration
+            time += max(abs(change) / max(limit, EPSILON), entry.time or 0.0)
             if time - points[-1][0] < EPSILON:
                 points[-1] = (points[-1][0], target)
             else:
                 points.append((time, target))
         slopes = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in itertools.pairwise(points)]
-        return [SpeedTarget(t, v, k) for (t, v), k in zip(points, (*slopes, 0.0), strict=True)]
+        return [Piece(t, v, k) for (t, v), k in zip(points, (*slopes, 0.0), strict=True)]
 
 
-def _fastest(change: float, limits: Limits) -> float:
-    """Time for a change of speed within the limits; none where there are no limits. [s]"""
-    limit = limits.acceleration if change > 0.0 else limits.deceleration
-    return 0.0 if limit == inf else abs(change) / max(limit, EPSILON)
-
-
-RUNNING: dict[type, type[RunningAction]] = {
-    SpeedProfileAction: RunningSpeedProfile,
-}
+RUNNING: dict[type, type[RunningAction]] = {SpeedProfileAction: RunningSpeedProfile}

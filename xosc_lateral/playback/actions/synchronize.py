@@ -9,16 +9,16 @@ from __future__ import annotations
 from enum import Enum
 from math import copysign, cos, inf, sin, sqrt
 
-from xosc_lateral.playback.actions.base import Domain, RunningAction
+from xosc_lateral.playback.actions.base import Domain, RunningAction, RunningPrivateAction
+from xosc_lateral.playback.actions.speed import relative_to
 from xosc_lateral.playback.angles import is_forward
 from xosc_lateral.playback.distances import FAR, Spot, ahead_and_left, apart, road_gap
 from xosc_lateral.playback.paths.base import Path, PathProgress, nearest_s
 from xosc_lateral.playback.positions.resolve import spot_at
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.transition import EPSILON
-from xosc_lateral.scenario.enums import SpeedTargetValueType
 from xosc_lateral.scenario.position import Position, TrajectoryPosition
-from xosc_lateral.scenario.private_actions import AbsoluteSpeed, SynchronizeAction
+from xosc_lateral.scenario.private_actions import RelativeSpeedToMaster, SynchronizeAction
 
 HARD_BRAKING = 8.0
 """When the entity comes so early that it has to stop at once. [m/s2]"""
@@ -39,8 +39,8 @@ class SpeedPhase(Enum):
     STEADY = "at the final speed"
 
 
-class RunningSynchronize(RunningAction):
-    """Speeds that bring both to their places at the same time.
+class RunningSynchronize(RunningPrivateAction):
+    """Speeds that bring both to their places at the same time; it ends when either is there, or has gone past.
 
     Without a final speed: one constant acceleration, worked out anew in each frame. With one: two accelerations
     that differ in sign (first up then down, or first down then up, perhaps with a stop in between).
@@ -49,28 +49,20 @@ class RunningSynchronize(RunningAction):
     domains = Domain.LONGITUDINAL
     content: SynchronizeAction
 
-    def prepare(self) -> None:
-        """Find master and places; velocities along the road are needed."""
+    def _prepare(self) -> None:
         self.simulation.derives_motion = True
         self._master = self.simulation.entity(self.content.master_entity_ref, self.content.place)
-        self._own_spot: Spot | None = None
-        self._master_spot: Spot | None = None
         self._on_paths: dict[Spot, tuple[Path, float]] = {}
-        self._mode = SpeedPhase.NONE
-        self._rushes = False
-        self._last = (FAR, FAR)
 
-    def start(self) -> None:
+    def _begin(self) -> None:
         """Places are looked up once."""
         self._own_spot = spot_at(self.content.target_position, self.simulation)()
         self._master_spot = spot_at(self.content.target_position_master, self.simulation)()
         self._mode = SpeedPhase.NONE
         self._last = (FAR, FAR)
 
-    def step(self, time: float, step: float) -> None:
-        """Set the speed for this frame; end when either is there, or has gone past."""
-        assert self._own_spot is not None and self._master_spot is not None
-        state, content = self.state, self.content
+    def _act(self, time: float, step: float) -> None:
+        state, content = self.actor, self.content
         distance = abs(self._way_to(state, self._own_spot, content.target_position))
         master_way = self._way_to(self._master, self._master_spot, content.target_position_master)
         master_distance = abs(master_way)
@@ -92,20 +84,14 @@ class RunningSynchronize(RunningAction):
                 state.set_speed(final)
             self.end()
             return
-        if final is None:
-            if time_left == FAR:
-                state.speed_taken = True
-                return
+        state.speed_taken = True
+        if final is not None:
+            state.speed = self._speed_towards(final, distance, time_left, step)
+        elif time_left != FAR:
             self._mode = SpeedPhase.LINE
             mean = distance / time_left
             acceleration = 2.0 * (mean - state.speed) / time_left
-            state.set_speed(state.speed + acceleration * step)
-            return
-        speed = self._speed_towards(final, distance, time_left, step)
-        if speed is not None:
-            state.set_speed(speed)
-        else:
-            state.speed_taken = True
+            state.speed += acceleration * step
 
     # ---- in detail ---------------------------------------------------------------------------------------------------
     def _way_to(self, entity: EntityState, spot: Spot, position: Position) -> float:
@@ -114,7 +100,7 @@ class RunningSynchronize(RunningAction):
             way = self._target_s(entity.path, spot, position) - entity.path.s
             tangent = entity.path.path.at(entity.path.s).tangent
             return way if is_forward(entity.plane.heading - tangent) else -way
-        gap = road_gap(self.simulation.network, entity, spot)
+        gap = road_gap(entity, spot)
         if gap is not None:
             return gap.ds
         ahead, _ = ahead_and_left(entity, spot.x, spot.y)
@@ -132,11 +118,9 @@ class RunningSynchronize(RunningAction):
 
     def _final_speed(self) -> float | None:
         final = self.content.final_speed
-        if final is None or isinstance(final, AbsoluteSpeed):
-            return None if final is None else final.value
-        if final.value_type is SpeedTargetValueType.DELTA:
-            return self._master.speed + final.value
-        return self._master.speed * final.value
+        if isinstance(final, RelativeSpeedToMaster):
+            return relative_to(self._master.speed, final)
+        return None if final is None else final.value
 
     def _steady_distance(self, final: float) -> float | None:
         steady = None if self.content.final_speed is None else self.content.final_speed.steady_state
@@ -144,9 +128,9 @@ class RunningSynchronize(RunningAction):
             return None
         return steady.distance if steady.distance is not None else (steady.time or 0.0) * final
 
-    def _speed_towards(self, final: float, distance: float, time_left: float, step: float) -> float | None:
-        """The next speed; None: keep the present one."""
-        state = self.state
+    def _speed_towards(self, final: float, distance: float, time_left: float, step: float) -> float:
+        """The next speed. [m/s]"""
+        state = self.actor
         steady = self._steady_distance(final)
         if steady is not None and self._mode is not SpeedPhase.STEADY:
             steady_time = steady / final if final else inf
@@ -158,7 +142,7 @@ class RunningSynchronize(RunningAction):
             return final
         if self._mode is SpeedPhase.WAITING:
             if time_left >= FAR:
-                return None
+                return state.speed
             self._mode = SpeedPhase.NONE
         if self._mode is SpeedPhase.STOPPING:
             speed = state.speed - HARD_BRAKING * step
@@ -171,7 +155,7 @@ class RunningSynchronize(RunningAction):
             self._mode = SpeedPhase.LINE
         if self._mode is SpeedPhase.TO_APEX and time_left < FAR and self._is_on_line(final, distance, time_left):
             self._mode = SpeedPhase.LINE
-            return None
+            return state.speed
         if self._mode is SpeedPhase.LINE:
             return _on_line(final, distance, time_left)
         if self._mode is SpeedPhase.NONE:
@@ -180,10 +164,10 @@ class RunningSynchronize(RunningAction):
         return self._to_apex(final, distance, time_left, step)
 
     def _is_on_line(self, final: float, distance: float, time_left: float) -> bool:
-        return abs(self.state.speed - (2.0 * distance / time_left - final)) < SAME_SPEED
+        return abs(self.actor.speed - (2.0 * distance / time_left - final)) < SAME_SPEED
 
-    def _to_apex(self, final: float, s: float, t: float, step: float) -> float | None:
-        state = self.state
+    def _to_apex(self, final: float, s: float, t: float, step: float) -> float:
+        state = self.actor
         now = along_road(state)
         apex, acceleration = _two_accelerations(now, final, s, t)
         if acceleration < 0.0 if self._rushes else acceleration > 0.0:
@@ -212,9 +196,7 @@ def along_road(state: EntityState) -> float:
 
 def _on_line(final: float, distance: float, time_left: float) -> float:
     """Speed now that a constant acceleration turns into the final speed at the place; 0 while the master stands."""
-    if time_left > FAR - 1.0:
-        return 0.0
-    if time_left < 0.001 or distance < 0.001:
+    if time_left > FAR - 1.0 or time_left < 0.001 or distance < 0.001:
         return 0.0
     return max(2.0 * distance / time_left - max(final, 0.0), 0.0)
 

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 from xosc_lateral.playback.angles import difference
 from xosc_lateral.playback.boxes import overlap
 from xosc_lateral.playback.conditions.base import EntityCheck, EntityChecks
-from xosc_lateral.playback.distances import FAR, apart, spot_distance, train_distance
+from xosc_lateral.playback.distances import FAR, Measure, Spot, apart
 from xosc_lateral.playback.positions.resolve import pose_of, spot_at
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.transition import EPSILON
 from xosc_lateral.playback.values import holds
-from xosc_lateral.scenario import Place
 from xosc_lateral.scenario.conditions import (
     CollisionCondition,
     DistanceCondition,
+    Measured,
     ReachPositionCondition,
     RelativeDistanceCondition,
     TimeHeadwayCondition,
@@ -26,31 +24,7 @@ from xosc_lateral.scenario.enums import CoordinateSystem, RelativeDistanceType, 
 _SHORTEST = (None, RoutingAlgorithm.UNDEFINED, RoutingAlgorithm.SHORTEST)
 
 
-class Measured(Protocol):
-    """A condition that measures a distance."""
-
-    @property
-    def coordinate_system(self) -> CoordinateSystem | None:
-        """In which it is measured; None: not said."""
-
-    @property
-    def distance_type(self) -> RelativeDistanceType | None:
-        """What of it; None: not said."""
-
-    @property
-    def routing_algorithm(self) -> RoutingAlgorithm | None:
-        """Which way along the road; None: not said."""
-
-    @property
-    def freespace(self) -> bool:
-        """Between boxes, not between reference points."""
-
-    @property
-    def place(self) -> Place:
-        """Where it stands."""
-
-
-def measure_of(content: Measured, simulation: Simulation) -> tuple[CoordinateSystem, RelativeDistanceType]:
+def measure_of(content: Measured | RelativeDistanceCondition, simulation: Simulation) -> Measure:
     """Defaults of the standard: entity frame, euclidian. `alongRoute` of version 1.0 names the road, but not which
     component of the distance; a euclidian one is the same in every frame (so the reference player has it, too).
 
@@ -58,54 +32,41 @@ def measure_of(content: Measured, simulation: Simulation) -> tuple[CoordinateSys
     """
     along_route = getattr(content, "along_route", None)
     system = content.coordinate_system or (CoordinateSystem.ROAD if along_route else CoordinateSystem.ENTITY)
-    kind = content.distance_type or RelativeDistanceType.EUCLIDIAN
-    if kind is RelativeDistanceType.EUCLIDIAN:
-        return system, kind
-    if content.routing_algorithm not in _SHORTEST and system in (CoordinateSystem.ROAD, CoordinateSystem.LANE):
+    measure = Measure(system, content.distance_type or RelativeDistanceType.EUCLIDIAN, content.freespace)
+    if measure.is_along_roads and content.routing_algorithm not in _SHORTEST:
         simulation.note(
             f"routingAlgorithm '{content.routing_algorithm}': measured along the shortest way instead", content.place
         )
-    if content.freespace and system is CoordinateSystem.TRAJECTORY:
+    if (
+        content.freespace
+        and system is CoordinateSystem.TRAJECTORY
+        and measure.kind is not RelativeDistanceType.EUCLIDIAN
+    ):
         simulation.note("free space along a trajectory: measured along the entity's own axes instead", content.place)
-    return system, kind
+    return measure
+
+
+def _amount(measure: Measure, state: EntityState, target: Spot | EntityState) -> float:
+    """Never negative; huge where no road leads there. [m]"""
+    if measure.kind is RelativeDistanceType.EUCLIDIAN and not measure.freespace:
+        place = target.plane if isinstance(target, EntityState) else target
+        return apart(state, place.x, place.y)
+    distance = measure.between(state, target)
+    return FAR if distance is None else abs(distance)
 
 
 def prepare_distance(content: DistanceCondition, simulation: Simulation) -> EntityCheck:
-    """Its amount counts; where no road leads there, it is huge. [m]"""
-    system, kind = measure_of(content, simulation)
+    """Its amount counts. [m]"""
+    measure = measure_of(content, simulation)
     spot = spot_at(content.position, simulation)
-
-    if kind is RelativeDistanceType.EUCLIDIAN and not content.freespace:
-
-        def check_straight(state: EntityState) -> bool:
-            target = spot()
-            return holds(apart(state, target.x, target.y), content.rule, content.value)
-
-        return check_straight
-
-    def check(state: EntityState) -> bool:
-        distance = spot_distance(simulation.network, state, spot(), system, kind, freespace=content.freespace)
-        return holds(FAR if distance is None else abs(distance), content.rule, content.value)
-
-    return check
+    return lambda state: holds(_amount(measure, state, spot()), content.rule, content.value)
 
 
 def prepare_relative_distance(content: RelativeDistanceCondition, simulation: Simulation) -> EntityCheck:
-    """Its amount counts; where no road leads there, it is huge. [m]"""
+    """Its amount counts. [m]"""
     other = simulation.entity(content.entity_ref, content.place)
-    system, kind = measure_of(content, simulation)
-    straight = kind is RelativeDistanceType.EUCLIDIAN and not content.freespace
-
-    def check(state: EntityState) -> bool:
-        if not other.active:
-            return False
-        if straight:
-            place = other.plane
-            return holds(apart(state, place.x, place.y), content.rule, content.value)
-        distance = train_distance(simulation.network, state, other, system, kind, freespace=content.freespace)
-        return holds(FAR if distance is None else abs(distance), content.rule, content.value)
-
-    return check
+    measure = measure_of(content, simulation)
+    return lambda state: other.active and holds(_amount(measure, state, other), content.rule, content.value)
 
 
 ANGULAR_TOLERANCE = 0.05
@@ -135,12 +96,12 @@ def prepare_reach_position(content: ReachPositionCondition, simulation: Simulati
 def prepare_time_headway(content: TimeHeadwayCondition, simulation: Simulation) -> EntityCheck:
     """Not defined, hence false, when the other is behind or the entity does not move forward. [s]"""
     other = simulation.entity(content.entity_ref, content.place)
-    system, kind = measure_of(content, simulation)
+    measure = measure_of(content, simulation)
 
     def check(state: EntityState) -> bool:
         if not other.active or state.speed < EPSILON:
             return False
-        distance = train_distance(simulation.network, state, other, system, kind, freespace=content.freespace)
+        distance = measure.between(state, other)
         distance = FAR if distance is None else distance
         return distance >= 0.0 and holds(distance / state.speed, content.rule, content.value)
 
@@ -149,19 +110,11 @@ def prepare_time_headway(content: TimeHeadwayCondition, simulation: Simulation) 
 
 def prepare_collision(content: CollisionCondition, simulation: Simulation) -> EntityCheck:
     """With one entity, or with any other of a category. Who is named touches itself, as in the reference player."""
-    others: tuple[EntityState, ...]
-    is_named = content.entity_ref is not None
     if content.entity_ref is not None:
-        others = (simulation.entity(content.entity_ref, content.place),)
-    else:
-        others = tuple(
-            o for o in simulation.everybody() if content.by_type is None or o.entity.category is content.by_type
-        )
-
-    def check(state: EntityState) -> bool:
-        return any((is_named or other is not state) and other.active and overlap(state, other) for other in others)
-
-    return check
+        named = simulation.entity(content.entity_ref, content.place)
+        return lambda state: named.active and overlap(state, named)
+    others = [o for o in simulation.everybody() if content.by_type in (None, o.entity.category)]
+    return lambda state: any(o is not state and o.active and overlap(state, o) for o in others)
 
 
 CHECKS: EntityChecks = {

@@ -34,9 +34,9 @@ def prepare(content: RelativeClearanceCondition, simulation: Simulation) -> Enti
 
     def occupied(state: EntityState, other: EntityState) -> bool:
         if content.freespace:
-            gap = free_road_gap(simulation.network, state, other, limit=reach + 100.0)
+            gap = free_road_gap(state, other, limit=reach + 100.0)
         else:
-            gap = road_gap(simulation.network, state, spot_of(other), limit=reach + 100.0)
+            gap = road_gap(state, spot_of(other), limit=reach + 100.0)
         return (
             gap is not None
             and -content.distance_backward <= gap.ds <= content.distance_forward

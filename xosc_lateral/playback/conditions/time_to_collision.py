@@ -11,7 +11,7 @@ from math import copysign, hypot
 
 from xosc_lateral.playback.conditions.base import EntityCheck, EntityChecks
 from xosc_lateral.playback.conditions.distance import measure_of
-from xosc_lateral.playback.distances import FAR, spot_distance, train_distance
+from xosc_lateral.playback.distances import FAR
 from xosc_lateral.playback.positions.resolve import spot_at
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
@@ -22,31 +22,15 @@ from xosc_lateral.scenario.conditions import TimeToCollisionCondition
 
 def prepare(content: TimeToCollisionCondition, simulation: Simulation) -> EntityCheck:
     """Not defined, hence false, when they don't come closer. [s]"""
-    system, kind = measure_of(content, simulation)
-    freespace = content.freespace
-    target = content.target
+    measure, target = measure_of(content, simulation), content.target
     if isinstance(target, str):
-        return _to_entity(content, simulation, simulation.entity(target, content.place))
+        other = simulation.entity(target, content.place)
+        simulation.derives_motion = True
+        return lambda state: (
+            other.active and _holds(measure.between(state, other), _closing_speed(state, other), content)
+        )
     spot = spot_at(target, simulation)
-
-    def to_position(state: EntityState) -> bool:
-        distance = spot_distance(simulation.network, state, spot(), system, kind, freespace=freespace)
-        return _holds(distance, state.speed, content)
-
-    return to_position
-
-
-def _to_entity(content: TimeToCollisionCondition, simulation: Simulation, other: EntityState) -> EntityCheck:
-    simulation.derives_motion = True
-    system, kind = measure_of(content, simulation)
-
-    def check(state: EntityState) -> bool:
-        if not other.active:
-            return False
-        distance = train_distance(simulation.network, state, other, system, kind, freespace=content.freespace)
-        return _holds(distance, _closing_speed(state, other), content)
-
-    return check
+    return lambda state: _holds(measure.between(state, spot()), state.speed, content)
 
 
 def _holds(distance: float | None, closing: float, content: TimeToCollisionCondition) -> bool:
@@ -59,10 +43,9 @@ def _holds(distance: float | None, closing: float, content: TimeToCollisionCondi
 def _closing_speed(state: EntityState, other: EntityState) -> float:
     """Own velocity along the other's velocity, minus the other's speed; own speed when the other stands. [m/s]"""
     vx, vy, _ = other.velocity
-    length = hypot(vx, vy)
     if abs(vx) < EPSILON and abs(vy) < EPSILON:
         return state.speed
-    along = (state.velocity[0] * vx + state.velocity[1] * vy) / length
+    along = (state.velocity[0] * vx + state.velocity[1] * vy) / hypot(vx, vy)
     return copysign(1.0, state.speed) * copysign(1.0, along) * (along - abs(other.speed))
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate
 from math import nan, pi
 
 from xosc_lateral.playback.angles import wrap
-from xosc_lateral.playback.paths.base import PathPoint
+from xosc_lateral.playback.paths.base import Path, PathPoint
 from xosc_lateral.road.geometry import Spiral
 
 
@@ -36,17 +37,17 @@ class TimedClothoid:
         return x, y, heading % (2.0 * pi)
 
 
-class ClothoidPath:
+class ClothoidPath(Path):
     """Clothoid pieces one after another.
 
     `pieces`: at least one; `end_time`: [s]; NaN without times.
     """
 
     def __init__(self, pieces: Sequence[TimedClothoid], end_time: float = nan) -> None:
+        lengths = accumulate((piece.length for piece in pieces), initial=0.0)
+        super().__init__(tuple(lengths), (*(piece.start_time for piece in pieces), end_time))
         self.pieces = tuple(pieces)
-        self.length = sum(piece.length for piece in pieces)
-        self.start_time = pieces[0].start_time
-        self.end_time = end_time
+        self.spans = tuple(piece.length for piece in pieces)
 
     def at(self, s: float) -> PathPoint:
         """The point at a length; beyond the ends, the ends."""
@@ -57,39 +58,3 @@ class ClothoidPath:
                 return PathPoint(x, y, nan, wrap(heading), nan, nan, wrap(heading))
             left -= piece.length
         raise AssertionError("a clothoid path has pieces")
-
-    def s_at(self, time: float) -> float:
-        """Length at a time, evenly on each piece; beyond its times, the end."""
-        if not self.start_time <= time <= self.end_time:
-            return 0.0 if time < self.start_time else self.length
-        before = 0.0
-        for piece, end in zip(self.pieces, self._piece_ends(), strict=True):
-            if time < end or piece is self.pieces[-1]:
-                duration = end - piece.start_time
-                share = (time - piece.start_time) / duration if duration > 0.0 else 1.0
-                return before + share * piece.length
-            before += piece.length
-        return self.length
-
-    def time_at(self, s: float) -> float:
-        """Time at a length, evenly on each piece. [s]"""
-        before = 0.0
-        for piece, end in zip(self.pieces, self._piece_ends(), strict=True):
-            if s < before + piece.length or piece is self.pieces[-1]:
-                share = min((s - before) / piece.length, 1.0) if piece.length > 0.0 else 1.0
-                return piece.start_time + share * (end - piece.start_time)
-            before += piece.length
-        raise AssertionError("a clothoid path has pieces")
-
-    def speed_at(self, s: float) -> float:
-        """Speed of the piece. [m/s]"""
-        before = 0.0
-        for piece, end in zip(self.pieces, self._piece_ends(), strict=True):
-            if s < before + piece.length or piece is self.pieces[-1]:
-                duration = end - piece.start_time
-                return piece.length / duration if duration > 0.0 else 0.0
-            before += piece.length
-        return 0.0
-
-    def _piece_ends(self) -> tuple[float, ...]:
-        return (*(piece.start_time for piece in self.pieces[1:]), self.end_time)

@@ -13,14 +13,12 @@ from math import hypot, nan
 
 import numpy as np
 from msgspec import Struct
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.playback.angles import wrap
-from xosc_lateral.playback.paths.base import PathPoint
+from xosc_lateral.playback.paths.base import Path, PathPoint
 from xosc_lateral.playback.paths.polyline import Corner, PolylinePath
 from xosc_lateral.playback.transition import EPSILON
-
-FloatArray = NDArray[np.float64]
 
 SAMPLE = 1.0
 """Length of the control polygon per sample. [m]"""
@@ -41,7 +39,7 @@ class Control(Struct, frozen=True):
     time: float = nan
 
 
-class NurbsPath:
+class NurbsPath(Path):
     """A NURBS curve of order `order` (degree + 1).
 
     `controls`: at least `order`; `knots`: as many as control points and order together, none smaller than the one
@@ -56,39 +54,16 @@ class NurbsPath:
         weighed = np.array([(c.weight * c.x, c.weight * c.y, c.weight) for c in self.controls])
         self._curve = BSpline(self._knots, weighed, self._degree)
         self._parameters, self._line = self._sample()
-        self.length = self._line.length
-        self.start_time = self.controls[0].time
-        self.end_time = self.controls[-1].time
+        super().__init__(self._line.lengths, self._line.times)
 
     def at(self, s: float) -> PathPoint:
         """The point of the curve itself at the parameter that belongs to a length."""
-        i, u = self._line._piece(s)
+        i, u = self.piece(s)
         following = min(i + 1, len(self._parameters) - 1)
         parameter = self._parameters[i] + u * (self._parameters[following] - self._parameters[i])
         ((x, y),) = self.points(np.array([parameter])).tolist()
-        sampled = self._line.at(s)
-        return PathPoint(x, y, nan, sampled.heading, nan, nan, sampled.heading)
-
-    def s_at(self, time: float) -> float:
-        """Length at a time, evenly between samples."""
-        corners, lengths = self._line.corners, self._line.lengths
-        if not time > corners[0].time:
-            return 0.0
-        for i in range(len(corners) - 1):
-            a, b = corners[i].time, corners[i + 1].time
-            if a <= time < b:
-                return lengths[i] + (time - a) / (b - a) * (lengths[i + 1] - lengths[i])
-        return self.length
-
-    def time_at(self, s: float) -> float:
-        """Time at a length, evenly between samples. [s]"""
-        return self._line.time_at(s)
-
-    def speed_at(self, s: float) -> float:
-        """Speed of the sampled piece. [m/s]"""
-        i = min(self._line._piece(s)[0], len(self._line.corners) - 2)
-        dt = self._line.corners[i + 1].time - self._line.corners[i].time
-        return (self._line.lengths[i + 1] - self._line.lengths[i]) / dt if dt > EPSILON else 0.0
+        heading = self._line.at(s).heading
+        return PathPoint(x, y, nan, heading, nan, nan, heading)
 
     def points(self, parameters: FloatArray) -> FloatArray:
         """x and y at parameters of shape (n,), shape (n, 2). [m]"""

@@ -19,7 +19,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from xosc_lateral.playback.angles import difference, wrap
-from xosc_lateral.playback.paths.base import PathPoint
+from xosc_lateral.playback.paths.base import Path, PathPoint
 from xosc_lateral.playback.transition import EPSILON
 
 CORNER = 2.0
@@ -52,7 +52,7 @@ class Corner(Struct, frozen=True):
     is_fixed: bool = True
 
 
-class PolylinePath:
+class PolylinePath(Path):
     """A polyline.
 
     `corners`: at least one; `follow`: follow mode, else position mode; `initial_speed`: with which the entity comes
@@ -62,8 +62,7 @@ class PolylinePath:
     def __init__(self, corners: Sequence[Corner], *, follow: bool = False, initial_speed: float = 0.0) -> None:
         self.corners = _lifted(corners)
         self.follow = follow
-        self.lengths = _lengths(self.corners)
-        self._times = [corner.time for corner in self.corners]
+        super().__init__(_lengths(self.corners), [corner.time for corner in self.corners])
         self.tangents = _tangents(self.corners)
         self.headings = tuple(
             tangent if c.heading != c.heading else wrap(c.heading)
@@ -73,24 +72,9 @@ class PolylinePath:
         self._rolls = tuple(c.roll if c.roll == c.roll else 0.0 for c in self.corners)
         self._speeds, self._accelerations = self._lay_out_speed(initial_speed)
 
-    @property
-    def length(self) -> float:
-        """[m]"""
-        return self.lengths[-1]
-
-    @property
-    def start_time(self) -> float:
-        """[s]"""
-        return self.corners[0].time
-
-    @property
-    def end_time(self) -> float:
-        """[s]"""
-        return self.corners[-1].time
-
     def at(self, s: float) -> PathPoint:
         """The point at a length; beyond the ends, the ends."""
-        i, u = self._piece(s)
+        i, u = self.piece(s)
         a = self.corners[i]
         if i == len(self.corners) - 1:
             x, y, z = a.x, a.y, a.z
@@ -104,7 +88,7 @@ class PolylinePath:
 
     def s_at(self, time: float) -> float:
         """Length at a time: before the first and after the last time stamp, the ends."""
-        times = self._times
+        times = self.times
         if time > times[-1] or len(times) == 1:
             return self.length
         i = max(bisect_left(times, time) - 1, 0)
@@ -114,38 +98,24 @@ class PolylinePath:
             elapsed = min(elapsed, -self._speeds[i] / acceleration)
         return min(self.lengths[i] + elapsed * (self._speeds[i] + 0.5 * acceleration * elapsed), self.lengths[i + 1])
 
-    def time_at(self, s: float) -> float:
-        """Time at a length, evenly on each piece. [s]"""
-        i, u = self._piece(s)
-        following = min(i + 1, len(self.corners) - 1)
-        return self.corners[i].time + u * (self.corners[following].time - self.corners[i].time)
-
     def speed_at(self, s: float) -> float:
         """Speed where a piece begins, and linearly from there to the next. [m/s]"""
-        i, u = self._piece(s)
-        if i == len(self.corners) - 1:
+        i, u = self.piece(s)
+        if i == len(self.spans):
             return self._speeds[i]
         following = self._speeds[i + 1] if self.follow or i + 2 < len(self.corners) else 0.0
         return self._speeds[i] + u * (following - self._speeds[i])
 
     # ---- in detail ---------------------------------------------------------------------------------------------------
-    def _piece(self, s: float) -> tuple[int, float]:
-        """The piece that s lies on (on a corner: the one before it), and how far along it, 0 to 1."""
-        if s > self.length or len(self.corners) == 1:
-            return len(self.corners) - 1, 0.0
-        i = max(bisect_left(self.lengths, s - EPSILON) - 1, 0)
-        length = max(self.lengths[i + 1] - self.lengths[i], EPSILON)
-        return i, min(max((s - self.lengths[i]) / length, 0.0), 1.0)
-
     def _angle(self, angles: tuple[float, ...], i: int, u: float) -> float:
         if i == len(angles) - 1:
             return angles[i]
         if self.follow:
             return wrap(angles[i] + u * difference(angles[i + 1], angles[i]))
-        return self._around_corners(angles, i, u * (self.lengths[i + 1] - self.lengths[i]))
+        return self._around_corners(angles, i, u * self.spans[i])
 
     def _around_corners(self, headings: tuple[float, ...], i: int, along: float) -> float:
-        length = self.lengths[i + 1] - self.lengths[i]
+        length = self.spans[i]
         radius = max(min(CORNER, 0.5 * length), EPSILON)
         here = headings[i]
         if along < radius:
@@ -163,14 +133,13 @@ class PolylinePath:
         """Speed at each corner (the start of its piece), and acceleration on the piece."""
         speed = initial_speed
         speeds, accelerations = [speed], [0.0]
-        for i in range(1, len(self.corners)):
-            ds = self.lengths[i] - self.lengths[i - 1]
-            dt = self.corners[i].time - self.corners[i - 1].time
+        for i, ds in enumerate(self.spans):
+            dt = self.times[i + 1] - self.times[i]
             if not self.follow:
                 speed = ds / dt if dt > EPSILON else 0.0
-                speeds[i - 1] = speed
+                speeds[i] = speed
             else:
-                accelerations[i - 1], speed = _constant_acceleration(speed, ds, dt)
+                accelerations[i], speed = _constant_acceleration(speed, ds, dt)
             speeds.append(speed)
             accelerations.append(0.0)
         return speeds, accelerations

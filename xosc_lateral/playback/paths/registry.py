@@ -8,7 +8,7 @@ from typing import Any
 
 from msgspec import Struct
 
-from xosc_lateral.errors import PlaybackError, UnsupportedElementError
+from xosc_lateral.errors import FormatError, PlaybackError, UnsupportedElementError
 from xosc_lateral.playback.paths.base import Path
 from xosc_lateral.playback.paths.clothoid import ClothoidPath, TimedClothoid
 from xosc_lateral.playback.paths.nurbs import Control, NurbsPath, clamped_knots
@@ -42,36 +42,44 @@ class Layout(Struct, frozen=True):
     """What laying out a path may depend on, besides the world: who follows it, how, and how fast it comes. [m/s]"""
 
     simulation: Simulation
-    pose_of: Callable[[Position, Simulation], Pose]
+    locate: Callable[[Position, Simulation], Pose]
     place: Place
     follower: EntityState | None
     follow: bool
     speed: float
 
+    def pose_of(self, position: Position) -> Pose:
+        """World pose of a position now. [m], [rad]"""
+        return self.locate(position, self.simulation)
+
+    def note(self, what: str) -> None:
+        """Say that the trajectory is not followed as written."""
+        self.simulation.note(what, self.place)
+
+    def error(self, what: str) -> FormatError:
+        """That it can't be followed."""
+        return self.place.error(what, PlaybackError)
+
 
 def _polyline(shape: Polyline, layout: Layout) -> Path:
     if not shape.vertices:
-        raise _error("the polyline has no vertices", layout.place)
+        raise layout.error("the polyline has no vertices")
     corners = [_corner(vertex, layout) for vertex in shape.vertices]
-    _check_times([corner.time for corner in corners], "vertex", layout.place)
+    _check_times([corner.time for corner in corners], "vertex", layout)
     if has_gaps_in_time(corners):
-        layout.simulation.note(
-            "vertices without a time get it by their distance from those that have one", layout.place
-        )
+        layout.note("vertices without a time get it by their distance from those that have one")
         corners = fill_times(corners)
     merged = merge_close(corners, VERTEX_RADIUS)
     if len(merged) < len(corners):
         left_out = len(corners) - len(merged)
-        layout.simulation.note(
-            f"{left_out} vertices nearer than {VERTEX_RADIUS:g} m to the one before are left out", layout.place
-        )
+        layout.note(f"{left_out} vertices nearer than {VERTEX_RADIUS:g} m to the one before are left out")
     return PolylinePath(merged, follow=layout.follow, initial_speed=layout.speed)
 
 
 def _corner(vertex: Vertex, layout: Layout) -> Corner:
     """A vertex where it is now; its height counts where the file gives one, and then its pitch and roll do."""
     position = vertex.position
-    pose = layout.pose_of(position, layout.simulation)
+    pose = layout.pose_of(position)
     heading, pitch, roll = (
         own if given is not None else nan
         for own, given in zip((pose.heading, pose.pitch, pose.roll), _given_angles(position), strict=True)
@@ -80,31 +88,27 @@ def _corner(vertex: Vertex, layout: Layout) -> Corner:
         pitch, roll = nan, nan
     elif roll != roll:
         roll = pose.roll
-    z, time = (pose.z if _gives_height(position) else nan), (nan if vertex.time is None else vertex.time)
-    return Corner(pose.x, pose.y, z, heading, pitch, roll, time, pose.z, reference_of(position) is None)
+    z, is_fixed = (pose.z if _gives_height(position) else nan), reference_of(position) is None
+    return Corner(pose.x, pose.y, z, heading, pitch, roll, _or_nan(vertex.time), pose.z, is_fixed)
 
 
 def _clothoid(shape: Clothoid, layout: Layout) -> Path:
-    pose = layout.pose_of(shape.position, layout.simulation)
     end = shape.curvature + shape.curvature_prime * shape.length
-    start_time = nan if shape.start_time is None else shape.start_time
-    _check_turning(shape.curvature, end, shape.length, layout.place)
-    piece = TimedClothoid(pose.x, pose.y, pose.heading, shape.curvature, end, shape.length, start_time)
-    return ClothoidPath([piece], nan if shape.stop_time is None else shape.stop_time)
+    start = shape.start_time
+    piece = ClothoidSplineSegment(shape.curvature, end, shape.length, position_start=shape.position, time_start=start)
+    return _clothoid_spline(ClothoidSpline((piece,), shape.stop_time), layout)
 
 
 def _clothoid_spline(shape: ClothoidSpline, layout: Layout) -> Path:
     if not shape.segments:
-        raise _error("the clothoid spline has no segments", layout.place)
+        raise layout.error("the clothoid spline has no segments")
     pieces: list[TimedClothoid] = []
     for segment in shape.segments:
         x, y, heading = _start_of(segment, pieces, layout)
-        time = nan if segment.time_start is None else segment.time_start
-        _check_turning(segment.curvature_start, segment.curvature_end, segment.length, layout.place)
-        pieces.append(
-            TimedClothoid(x, y, heading, segment.curvature_start, segment.curvature_end, segment.length, time)
-        )
-    return ClothoidPath(pieces, nan if shape.time_end is None else shape.time_end)
+        begin, end, length = segment.curvature_start, segment.curvature_end, segment.length
+        _check_turning(begin, end, length, layout)
+        pieces.append(TimedClothoid(x, y, heading, begin, end, length, _or_nan(segment.time_start)))
+    return ClothoidPath(pieces, _or_nan(shape.time_end))
 
 
 def _start_of(
@@ -112,7 +116,7 @@ def _start_of(
 ) -> tuple[float, float, float]:
     """Its own position, the end of the piece before, or where the follower is. [m], [m], [rad]"""
     if segment.position_start is not None:
-        pose = layout.pose_of(segment.position_start, layout.simulation)
+        pose = layout.pose_of(segment.position_start)
         x, y, heading = pose.x, pose.y, pose.heading
     elif pieces:
         x, y, heading = pieces[-1].at(pieces[-1].length)
@@ -120,26 +124,25 @@ def _start_of(
         pose = layout.follower.plane
         x, y, heading = pose.x, pose.y, pose.heading
     else:
-        raise _error("the clothoid spline has no start", layout.place)
+        raise layout.error("the clothoid spline has no start")
     return x, y, heading + segment.h_offset
 
 
-def _check_turning(start: float, end: float, length: float, place: Place) -> None:
+def _check_turning(start: float, end: float, length: float, layout: Layout) -> None:
     """A curvature that makes an entity spin is a mistake in the file (and would take for ever to integrate)."""
     if not (length >= 0.0 and max(abs(start), abs(end)) * length <= MOST_TURNING):
-        raise _error(
+        raise layout.error(
             f"a clothoid of {length:g} m with curvatures {start:g} to {end:g} 1/m: needs a length of at least 0 m and "
-            f"less than {MOST_TURNING:g} rad of turning",
-            place,
+            f"less than {MOST_TURNING:g} rad of turning"
         )
 
 
-def _check_times(times: Sequence[float], what: str, place: Place) -> None:
+def _check_times(times: Sequence[float], what: str, layout: Layout) -> None:
     """Times never run backwards."""
     last = -inf
     for k, time in enumerate(times):
         if time < last:
-            raise _error(f"time {time:g} s of {what} {k + 1} is before that of an earlier one, {last:g} s", place)
+            raise layout.error(f"time {time:g} s of {what} {k + 1} is before that of an earlier one, {last:g} s")
         last = time if time == time else last
 
 
@@ -147,27 +150,24 @@ def _nurbs(shape: Nurbs, layout: Layout) -> Path:
     count = len(shape.control_points)
     knots = shape.knots or clamped_knots(count, shape.order)
     if count < max(shape.order, 2) or len(knots) != count + shape.order:
-        raise _error(
+        raise layout.error(
             f"a NURBS curve of order {shape.order} with {count} control points and {len(shape.knots)} knots: "
-            "needs at least as many control points as its order, and knots = control points + order",
-            layout.place,
+            "needs at least as many control points as its order, and knots = control points + order"
         )
     controls = []
     for point in shape.control_points:
-        pose = layout.pose_of(point.position, layout.simulation)
-        controls.append(Control(pose.x, pose.y, point.weight, nan if point.time is None else point.time))
-    _check_times([control.time for control in controls], "control point", layout.place)
+        pose = layout.pose_of(point.position)
+        controls.append(Control(pose.x, pose.y, point.weight, _or_nan(point.time)))
+    _check_times([control.time for control in controls], "control point", layout)
     return NurbsPath(controls, knots, shape.order)
 
 
-SHAPES: tuple[tuple[type, Callable[[Any, Layout], Path]], ...] = (
-    (Clothoid, _clothoid),
-    (ClothoidSpline, _clothoid_spline),
-    (Nurbs, _nurbs),
-    (Polyline, _polyline),
-)
-
-_SHAPES = dict(SHAPES)
+SHAPES: dict[type, Callable[[Any, Layout], Path]] = {
+    Clothoid: _clothoid,
+    ClothoidSpline: _clothoid_spline,
+    Nurbs: _nurbs,
+    Polyline: _polyline,
+}
 
 
 def path_of(
@@ -182,27 +182,22 @@ def path_of(
     """A trajectory laid out in the world as it is now; `pose_of` tells where a position is."""
     shape = trajectory.shape
     if isinstance(shape, Unsupported):
-        place = shape.place
-        raise UnsupportedElementError(
-            shape.reason or f"a {shape.kind} can't be followed", path=place.path, line=place.line, element=place.element
-        )
-    return _SHAPES[type(shape)](shape, Layout(simulation, pose_of, trajectory.place, follower, follow, speed))
+        raise shape.place.error(shape.reason or f"a {shape.kind} can't be followed", UnsupportedElementError)
+    return SHAPES[type(shape)](shape, Layout(simulation, pose_of, trajectory.place, follower, follow, speed))
 
 
 def duration(shape: Shape) -> float:
     """Time from the first to the last time stamp; 0 where there are none. [s]"""
+    times: list[float | None] = []
     if isinstance(shape, Polyline):
-        ends = (shape.vertices[0].time, shape.vertices[-1].time) if shape.vertices else (None, None)
+        times = [vertex.time for vertex in shape.vertices]
     elif isinstance(shape, Clothoid):
-        ends = (shape.start_time, shape.stop_time)
+        times = [shape.start_time, shape.stop_time]
     elif isinstance(shape, ClothoidSpline):
-        ends = (shape.segments[0].time_start if shape.segments else None, shape.time_end)
-    elif isinstance(shape, Nurbs):
+        times = [*(segment.time_start for segment in shape.segments), shape.time_end]
+    elif isinstance(shape, Nurbs) and all(point.time is not None for point in shape.control_points):
         times = [point.time for point in shape.control_points]
-        ends = (times[0], times[-1]) if times and None not in times else (None, None)
-    else:
-        return 0.0
-    start, end = ends
+    start, end = (times[0], times[-1]) if times else (None, None)
     return 0.0 if start is None or end is None else end - start
 
 
@@ -218,5 +213,5 @@ def _gives_height(position: Position) -> bool:
     return getattr(position, "dz", None) is not None
 
 
-def _error(what: str, place: Place) -> PlaybackError:
-    return PlaybackError(what, path=place.path, line=place.line, element=place.element)
+def _or_nan(value: float | None) -> float:
+    return nan if value is None else value

@@ -1,1 +1,1 @@
-"""Positions while playing, one per file. A new one is a file here and a line in the tuple of `resolve`."""
+"""Positions while playing: all of them in `resolve`, from road coordinates in `on_road`, from latitudes in `geo`."""

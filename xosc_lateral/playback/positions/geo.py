@@ -14,7 +14,7 @@ from __future__ import annotations
 from math import asinh, atan2, atanh, cos, cosh, hypot, log, nan, pi, radians, sin, sinh, sqrt, tan
 
 from xosc_lateral.errors import PlaybackError
-from xosc_lateral.playback.positions.on_road import heading_of
+from xosc_lateral.playback.positions.on_road import headed
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import Placement, free, locate
 from xosc_lateral.scenario.position import GeoPosition
@@ -22,15 +22,14 @@ from xosc_lateral.scenario.position import GeoPosition
 
 def geo_position(position: GeoPosition, simulation: Simulation) -> Placement:
     """Needs the road network's geoReference."""
-    place = position.place
     try:
         x, y = project(simulation.network.geo_reference, position.latitude, position.longitude)
     except ProjectionError as error:
-        raise PlaybackError(str(error), path=place.path, line=place.line, element=place.element) from error
+        raise position.place.error(str(error), PlaybackError) from error
     offset = simulation.network.header_offset
     x, y = offset.undo(x, y)
     z = nan if position.altitude is None else position.altitude - offset.z
-    return locate(simulation.network, free(x, y, heading_of(position.orientation) - offset.heading, z))
+    return locate(simulation.network, free(x, y, headed(position.orientation, 0.0, simulation) - offset.heading, z))
 
 
 _RADIUS = 6378137.0

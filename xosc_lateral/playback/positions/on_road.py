@@ -2,100 +2,119 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import nan, pi
 
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.playback.drive import travel
 from xosc_lateral.playback.simulation import Simulation
-from xosc_lateral.playback.state import NOWHERE, EntityState, Placement, RouteGuide
+from xosc_lateral.playback.state import NOWHERE, EntityState, Placement, RouteGuide, world_pose
 from xosc_lateral.road import Pose
-from xosc_lateral.scenario import Place
 from xosc_lateral.scenario.enums import ReferenceContext
-from xosc_lateral.scenario.position import FromCurrentEntity, Orientation, Position, RoutePosition
+from xosc_lateral.scenario.position import (
+    FromCurrentEntity,
+    LanePosition,
+    Orientation,
+    Position,
+    RelativeLanePosition,
+    RelativeRoadPosition,
+    RoadPosition,
+    RoutePosition,
+)
 
-
-def road_index(simulation: Simulation, road_id: str, place: Place) -> int:
-    """Index of a road; raises `PlaybackError` at `place` if it is not there."""
-    if road_id not in simulation.network.road_ids:
-        known = ", ".join(simulation.network.road_ids[:8]) or "none"
-        raise _error(f"there is no road '{road_id}' (roads: {known})", place)
-    return simulation.network.index_of(road_id)
-
-
-def lane_placement(
-    simulation: Simulation,
-    road: int,
-    lane: int,
-    s: float,
-    offset_t: float,
-    orientation: Orientation | None,
-    place: Place,
-    *,
-    along_lane: bool = True,
-) -> Placement:
-    """A place on a lane. Relative headings count from the lane's direction of travel, or else from s. [m], [rad]"""
-    network = simulation.network
-    length = network.roads[road].length
-    if not -_SLACK <= s <= length + _SLACK:
-        simulation.note(f"s = {s:g} m is beyond the road's {length:g} m: taken as its end", place)
-    s = min(max(s, 0.0), length)
-    if not network.has_lane_at(road, lane, s):
-        there = ", ".join(str(info.id) for info in network.lanes_at(road, s))
-        raise _error(f"road '{network.road_ids[road]}' has no lane {lane} at s = {s:g} m (lanes: {there})", place)
-    against = along_lane and network.travel_direction(road, lane) < 0
-    relative = _relative(simulation, road, lane, s, orientation, against=against)
-    return _tilt(Placement(road, lane, s, offset_t, relative), orientation, simulation)
-
-
-def road_placement(
-    simulation: Simulation, road: int, s: float, t: float, orientation: Orientation | None, place: Place
-) -> Placement:
-    """A place beside the reference line; relative headings count from s. [m], [rad]"""
-    network = simulation.network
-    length = network.roads[road].length
-    if not -_SLACK <= s <= length + _SLACK:
-        simulation.note(f"s = {s:g} m is beyond the road's {length:g} m: taken as its end", place)
-    s = min(max(s, 0.0), length)
-    found = network.lane_at(road, s, t)
-    offset_t = t - network.lane_state_at(road, found.lane, s).centre_t
-    relative = _relative(simulation, road, found.lane, s, orientation, against=False)
-    return _tilt(Placement(road, found.lane, s, offset_t, relative), orientation, simulation)
-
-
-def _tilt(place: Placement, orientation: Orientation | None, simulation: Simulation) -> Placement:
-    """Pitch and roll that are given hold until the entity drives on."""
-    if orientation is None or not (orientation.p or orientation.r):
-        return place
-    scout = EntityState(simulation.entities[0].entity, simulation.network)
-    scout.put(place)
-    pitch, roll = tilted(orientation, scout.pose.pitch, scout.pose.roll, simulation)
-    return replace(place, pose=scout.pose._replace(pitch=pitch, roll=roll))
-
-
-def _relative(
-    simulation: Simulation, road: int, lane: int, s: float, orientation: Orientation | None, *, against: bool
-) -> float:
-    heading = heading_of(orientation)
-    if not is_absolute(orientation, simulation):
-        return heading + (pi if against else 0.0)
-    lane_heading = simulation.network.pose_at(road, lane, s).heading
-    return heading - lane_heading + (0.0 if simulation.network.travel_direction(road, lane) > 0 else pi)
-
+OnRoad = LanePosition | RelativeLanePosition | RoadPosition | RelativeRoadPosition | RoutePosition
 
 _SLACK = 0.01
 """Roads are written a little shorter or longer than they are. [m]"""
-
-
-def _error(what: str, place: Place) -> PlaybackError:
-    return PlaybackError(what, path=place.path, line=place.line, element=place.element)
-
 
 _RELATIVE_SINCE = (1, 3)
 """Version from which an orientation without a type is relative; before, it was absolute."""
 
 
-def is_absolute(orientation: Orientation | None, simulation: Simulation) -> bool:
+def road_index(position: LanePosition | RoadPosition, simulation: Simulation) -> int:
+    """Index of its road; raises `PlaybackError` if that is not there."""
+    ids = simulation.network.road_ids
+    if position.road_id not in ids:
+        known = ", ".join(ids[:8]) or "none"
+        raise position.place.error(f"there is no road '{position.road_id}' (roads: {known})", PlaybackError)
+    return simulation.network.index_of(position.road_id)
+
+
+def lane_placement(
+    position: OnRoad,
+    simulation: Simulation,
+    road: int,
+    lane: int,
+    s: float,
+    offset_t: float,
+    *,
+    along_lane: bool = True,
+) -> Placement:
+    """A place on a lane. Relative headings count from the lane's direction of travel, or else from s. [m], [rad]"""
+    network = simulation.network
+    s = _on(position, simulation, road, s)
+    if not network.has_lane_at(road, lane, s):
+        there = ", ".join(str(info.id) for info in network.lanes_at(road, s))
+        what = f"road '{network.road_ids[road]}' has no lane {lane} at s = {s:g} m (lanes: {there})"
+        raise position.place.error(what, PlaybackError)
+    against = along_lane and network.travel_direction(road, lane) < 0
+    return _placement(position, simulation, road, lane, s, offset_t, against=against)
+
+
+def road_placement(position: OnRoad, simulation: Simulation, road: int, s: float, t: float) -> Placement:
+    """A place beside the reference line; relative headings count from s. [m], [rad]"""
+    network = simulation.network
+    s = _on(position, simulation, road, s)
+    lane = network.lane_at(road, s, t).lane
+    offset_t = t - network.lane_state_at(road, lane, s).centre_t
+    return _placement(position, simulation, road, lane, s, offset_t, against=False)
+
+
+def _on(position: OnRoad, simulation: Simulation, road: int, s: float) -> float:
+    """s on the road. [m]"""
+    length = simulation.network.roads[road].length
+    if not -_SLACK <= s <= length + _SLACK:
+        simulation.note(f"s = {s:g} m is beyond the road's {length:g} m: taken as its end", position.place)
+    return min(max(s, 0.0), length)
+
+
+def _placement(
+    position: OnRoad, simulation: Simulation, road: int, lane: int, s: float, offset_t: float, *, against: bool
+) -> Placement:
+    """With the orientation; pitch and roll that are given hold until the entity drives on."""
+    network, orientation = simulation.network, position.orientation
+    heading = headed(orientation, pi if against else 0.0, simulation)
+    if _is_absolute(orientation, simulation):
+        heading -= network.pose_at(road, lane, s).heading
+        heading += 0.0 if network.travel_direction(road, lane) > 0 else pi
+    place = Placement(road, lane, s, offset_t, heading)
+    if orientation is None or not (orientation.p or orientation.r):
+        return place
+    pose = world_pose(network, place)
+    pitch, roll = _tilted(orientation, pose, simulation)
+    return place._replace(pose=pose._replace(pitch=pitch, roll=roll))
+
+
+# ---- orientations ----------------------------------------------------------------------------------------------------
+def headed(orientation: Orientation | None, heading: float, simulation: Simulation) -> float:
+    """That of the reference plus what is given, or what is given alone where it is absolute. [rad]"""
+    given = 0.0 if orientation is None or orientation.h is None else orientation.h
+    return given if _is_absolute(orientation, simulation) else given + heading
+
+
+def tilted_or_road(orientation: Orientation | None, pose: Pose, simulation: Simulation) -> tuple[float, float]:
+    """Pitch and roll beside an entity; NaN (those of the road) where none are given. [rad]"""
+    if orientation is None or (orientation.p is None and orientation.r is None):
+        return nan, nan
+    return _tilted(orientation, pose, simulation)
+
+
+def _tilted(orientation: Orientation, pose: Pose, simulation: Simulation) -> tuple[float, float]:
+    """Pitch and roll, as `headed`. [rad]"""
+    p, r = orientation.p or 0.0, orientation.r or 0.0
+    return (p, r) if _is_absolute(orientation, simulation) else (pose.pitch + p, pose.roll + r)
+
+
+def _is_absolute(orientation: Orientation | None, simulation: Simulation) -> bool:
     """Whether it is meant in the world; no orientation at all is relative (along the road, like the entity)."""
     if orientation is None:
         return False
@@ -104,35 +123,14 @@ def is_absolute(orientation: Orientation | None, simulation: Simulation) -> bool
     return orientation.type is ReferenceContext.ABSOLUTE
 
 
-def tilted(orientation: Orientation | None, pitch: float, roll: float, simulation: Simulation) -> tuple[float, float]:
-    """Pitch and roll: those of the reference plus what is given, or what is given alone where it is absolute. [rad]"""
-    p, r = (0.0, 0.0) if orientation is None else (orientation.p or 0.0, orientation.r or 0.0)
-    return (p, r) if is_absolute(orientation, simulation) else (pitch + p, roll + r)
-
-
-def tilted_or_road(orientation: Orientation | None, pose: Pose, simulation: Simulation) -> tuple[float, float]:
-    """Pitch and roll beside an entity; NaN (those of the road) where none are given. [rad]"""
-    if orientation is None or (orientation.p is None and orientation.r is None):
-        return nan, nan
-    return tilted(orientation, pose.pitch, pose.roll, simulation)
-
-
-def heading_of(orientation: Orientation | None) -> float:
-    """Its heading; 0 where none is given. [rad]"""
-    return 0.0 if orientation is None or orientation.h is None else orientation.h
-
-
-def on_road(simulation: Simulation, name: str, place: Place) -> EntityState:
-    """The entity, with its road coordinates; raises `PlaybackError` if it is on no road."""
-    state = simulation.entity(name, place)
+# ---- beside an entity ------------------------------------------------------------------------------------------------
+def on_road(position: RelativeLanePosition | RelativeRoadPosition, simulation: Simulation) -> EntityState:
+    """The entity that it refers to, with its road coordinates; raises `PlaybackError` if it is on no road."""
+    state = simulation.entity(position.entity_ref, position.place)
     state.locate()
     if state.road == NOWHERE:
-        raise PlaybackError(
-            f"'{name}' is on no road, so there is no place beside it in road coordinates",
-            path=place.path,
-            line=place.line,
-            element=place.element,
-        )
+        what = f"'{state.name}' is on no road, so there is no place beside it in road coordinates"
+        raise position.place.error(what, PlaybackError)
     return state
 
 
@@ -145,17 +143,9 @@ def reference_of(position: Position) -> str | None:
     return name
 
 
-def pose_at(place: Placement, simulation: Simulation) -> Pose:
-    """World pose of a place. [m], [rad]"""
-    scout = EntityState(simulation.entities[0].entity, simulation.network)
-    scout.put(place)
-    return scout.pose
-
-
 def moved_along(state: EntityState, distance: float, way: int, route: RouteGuide | None = None) -> Placement:
     """Where an entity would be after a way along the road, on `route` or else its own; `way` +1: along s. [m]"""
-    scout = EntityState(state.entity, state.network)
-    scout.put(Placement(state.road, state.lane, state.s, state.offset_t, state.relative_heading))
-    scout.route = route or state.route
+    scout = EntityState(state.entity, state.network, route=route or state.route)
+    scout.put(state.place._replace(pose=None))
     travel(scout, way, distance)
-    return Placement(scout.road, scout.lane, scout.s, scout.offset_t, scout.relative_heading)
+    return scout.place

@@ -3,30 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import cos, nan, sin
-from typing import Any
+from math import cos, nan, pi, sin
 
-from xosc_lateral.errors import UnsupportedElementError
+from xosc_lateral.errors import PlaybackError, UnsupportedElementError
 from xosc_lateral.playback.distances import Spot
 from xosc_lateral.playback.paths.registry import path_of
 from xosc_lateral.playback.positions.geo import geo_position
 from xosc_lateral.playback.positions.on_road import (
-    heading_of,
-    is_absolute,
+    headed,
     lane_placement,
     moved_along,
     on_road,
-    pose_at,
     road_index,
     road_placement,
     tilted_or_road,
 )
-from xosc_lateral.playback.positions.route import route_position
 from xosc_lateral.playback.simulation import Simulation
-from xosc_lateral.playback.state import NOWHERE, EntityState, Placement, RouteGuide, free, guide, locate
+from xosc_lateral.playback.state import NOWHERE, Placement, RouteGuide, free, guide, locate, world_pose
 from xosc_lateral.road import Pose
 from xosc_lateral.scenario import Unsupported
 from xosc_lateral.scenario.position import (
+    FromCurrentEntity,
+    FromLaneCoordinates,
     GeoPosition,
     LanePosition,
     Position,
@@ -52,17 +50,9 @@ def resolve(position: Position, simulation: Simulation, *, route: RouteGuide | N
     route of that other one.
     """
     if isinstance(position, Unsupported):
-        where = position.place
-        raise UnsupportedElementError(
-            position.reason or f"{position.kind} can't be played",
-            path=where.path,
-            line=where.line,
-            element=where.element,
-        )
-    if isinstance(position, RelativeLanePosition):
-        return relative_lane_position(position, simulation, route)
-    if isinstance(position, RelativeRoadPosition):
-        return relative_road_position(position, simulation, route)
+        raise position.place.error(position.reason or f"{position.kind} can't be played", UnsupportedElementError)
+    if isinstance(position, RelativeLanePosition | RelativeRoadPosition):
+        return POSITIONS[type(position)](position, simulation, route)
     return POSITIONS[type(position)](position, simulation)
 
 
@@ -78,7 +68,7 @@ def pose_of(position: Position, simulation: Simulation) -> Pose:
     """World pose of a position now. z, pitch and roll are the road's where none are given. [m], [rad]"""
     if isinstance(position, WorldPosition) and None not in (position.z, position.p, position.r):
         return _world_pose(position)  # nothing of it is the road's, which need not be looked for
-    return pose_at(resolve(position, simulation), simulation)
+    return world_pose(simulation.network, resolve(position, simulation))
 
 
 def route_guide(route_: Route, simulation: Simulation) -> RouteGuide | None:
@@ -87,30 +77,23 @@ def route_guide(route_: Route, simulation: Simulation) -> RouteGuide | None:
 
 
 def _spot(place: Placement, simulation: Simulation) -> Spot:
-    scout = EntityState(simulation.entities[0].entity, simulation.network)
-    scout.put(place)
-    pose = scout.pose
+    network = simulation.network
+    pose = world_pose(network, place)
     if place.road == NOWHERE:
-        return Spot(pose.x, pose.y, NOWHERE, 0, 0.0, 0.0)
-    return Spot(pose.x, pose.y, place.road, place.lane, place.s, scout.t)
-
-
-def _route_position(position: RoutePosition, simulation: Simulation) -> Placement:
-    return route_position(position, simulation, route_guide)
+        return Spot(pose.x, pose.y)
+    t = network.lane_state_at(place.road, place.lane, place.s).centre_t + place.offset_t
+    return Spot(pose.x, pose.y, place.road, place.lane, place.s, t)
 
 
 def lane_position(position: LanePosition, simulation: Simulation) -> Placement:
     """Without an orientation, in the lane's direction of travel."""
-    road = road_index(simulation, position.road_id, position.place)
-    return lane_placement(
-        simulation, road, position.lane_id, position.s, position.offset, position.orientation, position.place
-    )
+    road = road_index(position, simulation)
+    return lane_placement(position, simulation, road, position.lane_id, position.s, position.offset)
 
 
 def road_position(position: RoadPosition, simulation: Simulation) -> Placement:
     """Without an orientation, along s."""
-    road = road_index(simulation, position.road_id, position.place)
-    return road_placement(simulation, road, position.s, position.t, position.orientation, position.place)
+    return road_placement(position, simulation, road_index(position, simulation), position.s, position.t)
 
 
 def _world_pose(position: WorldPosition) -> Pose:
@@ -136,7 +119,7 @@ def relative_lane_position(
     """`ds` goes along the road's s and counts lanes and offset along +t; `dsLane` goes along the lane's direction of
     travel and counts them to the left of it.
     """
-    state = on_road(simulation, position.entity_ref, position.place)
+    state = on_road(position, simulation)
     network = simulation.network
     if position.ds_lane is None:
         there = moved_along(state, position.ds or 0.0, 1, route)
@@ -150,16 +133,7 @@ def relative_lane_position(
     else:
         offset = position.offset * side
     along_lane = position.ds_lane is not None
-    return lane_placement(
-        simulation,
-        there.road,
-        lane,
-        there.s,
-        offset,
-        position.orientation,
-        position.place,
-        along_lane=along_lane,
-    )
+    return lane_placement(position, simulation, there.road, lane, there.s, offset, along_lane=along_lane)
 
 
 def beside(lane: int, lanes: int) -> int:
@@ -174,18 +148,14 @@ def relative_road_position(
     position: RelativeRoadPosition, simulation: Simulation, route: RouteGuide | None = None
 ) -> Placement:
     """`ds` and `dt` along the road's axes; the way goes on over linked roads."""
-    state = on_road(simulation, position.entity_ref, position.place)
-    there = moved_along(state, position.ds, 1, route)
+    there = moved_along(on_road(position, simulation), position.ds, 1, route)
     t = simulation.network.lane_state_at(there.road, there.lane, there.s).centre_t + there.offset_t
-    return road_placement(simulation, there.road, there.s, t + position.dt, position.orientation, position.place)
+    return road_placement(position, simulation, there.road, there.s, t + position.dt)
 
 
 def relative_object_position(position: RelativeObjectPosition, simulation: Simulation) -> Placement:
-    """Relative headings count from the entity's; its pitch and roll tilt the way there."""
+    """Along the entity's own axes; its pitch and roll tilt the way there."""
     pose = simulation.entity(position.entity_ref, position.place).pose
-    heading = heading_of(position.orientation)
-    if not is_absolute(position.orientation, simulation):
-        heading += pose.heading
     c, s = cos(pose.heading), sin(pose.heading)
     ahead, left, up = position.dx, position.dy, position.dz or 0.0
     flat_ahead = ahead * cos(pose.pitch) + (left * sin(pose.roll) + up * cos(pose.roll)) * sin(pose.pitch)
@@ -193,34 +163,81 @@ def relative_object_position(position: RelativeObjectPosition, simulation: Simul
     rise = (left * sin(pose.roll) + up * cos(pose.roll)) * cos(pose.pitch) - ahead * sin(pose.pitch)
     x = pose.x + flat_ahead * c - flat_left * s
     y = pose.y + flat_ahead * s + flat_left * c
-    z = nan if position.dz is None else pose.z + rise
-    return locate(simulation.network, free(x, y, heading, z, *tilted_or_road(position.orientation, pose, simulation)))
+    return _near(position, simulation, pose, x, y, pose.z + rise)
 
 
 def relative_world_position(position: RelativeWorldPosition, simulation: Simulation) -> Placement:
-    """Relative headings count from the entity's."""
+    """Along the world's axes."""
     pose = simulation.entity(position.entity_ref, position.place).pose
-    heading = heading_of(position.orientation)
-    if not is_absolute(position.orientation, simulation):
-        heading += pose.heading
     dx, dy = simulation.network.header_offset.turned_back(position.dx, position.dy)
-    z = nan if position.dz is None else pose.z + position.dz
+    return _near(position, simulation, pose, pose.x + dx, pose.y + dy, pose.z + (position.dz or 0.0))
+
+
+def _near(
+    position: RelativeObjectPosition | RelativeWorldPosition,
+    simulation: Simulation,
+    pose: Pose,
+    x: float,
+    y: float,
+    z: float,
+) -> Placement:
+    """There, at that height if the file gives one; relative angles count from the entity's pose."""
+    heading = headed(position.orientation, pose.heading, simulation)
     tilt = tilted_or_road(position.orientation, pose, simulation)
-    return locate(simulation.network, free(pose.x + dx, pose.y + dy, heading, z, *tilt))
+    return locate(simulation.network, free(x, y, heading, nan if position.dz is None else z, *tilt))
 
 
 def trajectory_position(position: TrajectoryPosition, simulation: Simulation) -> Placement:
     """Relative headings count from the trajectory's."""
     point = path_of(position.trajectory, simulation, pose_of).at(position.s)
-    heading = heading_of(position.orientation)
-    if not is_absolute(position.orientation, simulation):
-        heading += point.heading
+    heading = headed(position.orientation, point.heading, simulation)
     x = point.x - position.t * sin(point.heading)
     y = point.y + position.t * cos(point.heading)
     return locate(simulation.network, free(x, y, heading, point.z))
 
 
-POSITIONS: dict[type, Callable[[Any, Simulation], Placement]] = {
+def route_position(position: RoutePosition, simulation: Simulation) -> Placement:
+    """The way along the route counts from its first waypoint; an entity on it is where it is."""
+    network, where = simulation.network, position.in_route
+    if position.route is None or where is None:
+        raise position.place.error("names no route or no place on it", PlaybackError)
+    if isinstance(where, FromCurrentEntity):
+        state = simulation.entity(where.entity_ref, position.place)
+        state.locate()
+        return state.place._replace(pose=state.pose if state.road == NOWHERE else None)
+    route = route_guide(position.route, simulation)
+    if route is None:
+        raise position.place.error(f"no way leads along route '{position.route.name}'", PlaybackError)
+    road, s, direction = route.at(where.path_s)
+    if direction < 0:
+        simulation.note(
+            "the route runs against s here: lanes, offset and heading count along it "
+            "(in esmini only with --align_routepositions)",
+            position.place,
+        )
+    if isinstance(where, FromLaneCoordinates):
+        turned = _is_turned(simulation, road, where.lane_id, direction)
+        lane, offset = (-where.lane_id, -where.lane_offset) if turned else (where.lane_id, where.lane_offset)
+        return lane_placement(position, simulation, road, lane, s, offset)
+    t = -where.t if _is_turned(simulation, road, network.lane_at(road, s, where.t).lane, direction) else where.t
+    place = road_placement(position, simulation, road, s, t)
+    if position.orientation is not None or direction > 0:
+        return place
+    return place._replace(relative_heading=place.relative_heading + pi)  # along the route
+
+
+def _is_turned(simulation: Simulation, road: int, lane: int, direction: int) -> bool:
+    """Where the route runs against s, a lane that is driven against the route was counted from it: its twin is meant.
+
+    Files do both: ids as the road has them, and ids as if each road ran along the route. Along s these are the same.
+    """
+    network = simulation.network
+    if direction > 0 or lane == 0 or network.travel_direction(road, lane) == direction:
+        return False
+    return any(-lane in section.by_id for section in network.roads[road].sections)
+
+
+POSITIONS: dict[type, Callable[..., Placement]] = {
     GeoPosition: geo_position,
     LanePosition: lane_position,
     RelativeLanePosition: relative_lane_position,
@@ -228,7 +245,7 @@ POSITIONS: dict[type, Callable[[Any, Simulation], Placement]] = {
     RelativeRoadPosition: relative_road_position,
     RelativeWorldPosition: relative_world_position,
     RoadPosition: road_position,
-    RoutePosition: _route_position,
+    RoutePosition: route_position,
     TrajectoryPosition: trajectory_position,
     WorldPosition: world_position,
 }

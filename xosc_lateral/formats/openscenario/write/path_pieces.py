@@ -16,11 +16,9 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.rows import blocks, give_back, rows_where, scratch, slices_where
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 VERTEX_STEP = 0.1
 """Time between vertices where distance and bends allow it. [s]"""

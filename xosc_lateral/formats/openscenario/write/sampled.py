@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from xosc_lateral.formats.openscenario.write.build import Version, named
-from xosc_lateral.formats.openscenario.write.non_motion_actions import MOTION, source_of
+from xosc_lateral.formats.openscenario.write.draft import source_of
 from xosc_lateral.formats.openscenario.write.versions import newer_than
 from xosc_lateral.formats.xml import parse_xml
 from xosc_lateral.motion.nominal import NominalMotion
 from xosc_lateral.scenario import Scenario
-from xosc_lateral.scenario.private_actions import ConnectTrailerAction
+from xosc_lateral.scenario.private_actions import MOTION, ConnectTrailerAction
 
 
 def motion_unknown_to(
