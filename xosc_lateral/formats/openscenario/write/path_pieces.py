@@ -289,7 +289,7 @@ def _head(time: FloatArray, way: FloatArray, until: float, step: float) -> Float
     """Vertices up to where those of the tail begin; evenly, since a player turns the car within half a gap."""
     times = [time[:1]]
     step = (until - float(time[0])) / max(1, round((until - float(time[0])) / step))
-    count = 16
+    count = 512
     while True:
         # As long as neither bound counts many at once, the more the longer that holds.
         even = np.add.accumulate(np.array([times[-1][-1], *[step] * count]))
