@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from xosc_lateral.drives.cuts import MIN_RUN
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping
-from xosc_lateral.formats.tables import comma_numbers, indicators, numbers_of, plain_cells, read_table
+from xosc_lateral.formats.tables import comma_numbers, indicators, listed, numbers_of, plain_cells, read_table
 from xosc_lateral.lazy import pd
 from xosc_lateral.segment import CONTEXT_UNITS
 
@@ -69,9 +69,8 @@ def drives_of_table(table: pd.DataFrame, mapping: MappingLike, path: Path | str 
     ]
     found = [drive for drive in drives if drive is not None]
     if not found:
-        raise NotEnoughDataError(
-            f"{path}: no drive has two rows with time, offset and lane width; {MIN_RUN:g} s are needed"
-        )
+        what = f"no drive has two rows with time, offset and lane width; {MIN_RUN:g} s are needed"
+        raise NotEnoughDataError(f"{path}: {what}")
     return found
 
 
@@ -84,9 +83,8 @@ def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.Dat
     taken = {source.column for source in mapping.columns.values()}
     for name, source in mapping.columns.items():
         if source.column not in table.columns:
-            raise FormatError(
-                f"no column {source.column!r} for {name}; there are {_listed(table.columns)}", path=path, line=1
-            )
+            what = f"no column {source.column!r} for {name}; there are {listed(table.columns)}"
+            raise FormatError(what, path=path, line=1)
     own = [name for name in table.columns if name not in taken and name not in mapping.columns]
     kept = {name: mapping.numbers(name, plain_cells(table[name]), path) for name in own}
     for name, source in mapping.columns.items():
@@ -146,18 +144,14 @@ def _holds_levels(name: str, values: FloatArray) -> bool:
 
 
 def _require_columns(columns: Mapping[str, FloatArray], path: Path) -> None:
+    what = ""
     if "time" not in columns:
-        raise FormatError(
-            f"no column 'time'; there are {_listed(columns)} (translate with --map time=COLUMN)", path=path, line=1
-        )
-    if {"offset", "lane_width"} <= columns.keys() or {"distance_left", "distance_right"} <= columns.keys():
-        return
-    raise FormatError(
-        "needs distance_left and distance_right, or offset and lane_width; "
-        f"there are {_listed(columns)} (translate with --map NAME=COLUMN)",
-        path=path,
-        line=1,
-    )
+        what = f"no column 'time'; there are {listed(columns)} (translate with --map time=COLUMN)"
+    elif not ({"offset", "lane_width"} <= columns.keys() or {"distance_left", "distance_right"} <= columns.keys()):
+        needed = "needs distance_left and distance_right, or offset and lane_width"
+        what = f"{needed}; there are {listed(columns)} (translate with --map NAME=COLUMN)"
+    if what:
+        raise FormatError(what, path=path, line=1)
 
 
 def _drive_names(table: pd.DataFrame, path: Path) -> tuple[list[str], list[NDArray[np.intp]]]:
@@ -169,8 +163,3 @@ def _drive_names(table: pd.DataFrame, path: Path) -> tuple[list[str], list[NDArr
     order = np.argsort(codes, kind="stable")
     bounds = np.searchsorted(codes[order], np.arange(1, len(names)))
     return [str(name) for name in names], list(np.split(order, bounds))
-
-
-def _listed(columns: Iterable[object]) -> str:
-    names = [str(name) for name in columns]
-    return ", ".join(names[:20]) + (f" and {len(names) - 20} more" if len(names) > 20 else "")

@@ -137,12 +137,8 @@ class TableMapping:
         texts = column.map(lambda cell: "" if pd.isna(cell) else _as_word(cell))
         strange = texts[(texts != "") & ~texts.isin(list(known))]
         if len(strange):
-            raise FormatError(
-                f"{strange.iloc[0]!r} is not in [values.{name}] of the mapping: {', '.join(self.values[name])}",
-                path=path,
-                line=int(strange.index[0]) + 2,
-                element=f"column {name!r}",
-            )
+            what = f"{strange.iloc[0]!r} is not in [values.{name}] of the mapping: {', '.join(self.values[name])}"
+            raise FormatError(what, path=path, line=int(strange.index[0]) + 2, element=f"column {name!r}")
         return texts.map({**known, "": np.nan}).astype(np.float64)
 
 

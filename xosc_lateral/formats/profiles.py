@@ -231,20 +231,17 @@ def read_library(folders: Iterable[Path] = ()) -> list[Entry]:
     first: dict[str, Path] = {}
     entries = []
     for path in list_profiles(folders):
-        entries.append(_entry(path, first.get(path.stem)))
+        profile, problem = None, ""
+        try:
+            profile = read_profile(path)
+            if profile.name != path.stem:
+                what = f"holds the profile {profile.name!r}, but is looked up as {path.stem!r}"
+                problem = f"{path}: {what}: rename one of them"
+        except (XoscLateralError, OSError) as error:
+            problem = " ".join(str(error).split())
+        entries.append(Entry(path, profile, problem, first.get(path.stem)))
         first.setdefault(path.stem, path)
     return entries
-
-
-def _entry(path: Path, hidden_by: Path | None) -> Entry:
-    try:
-        profile = read_profile(path)
-    except (XoscLateralError, OSError) as error:
-        return Entry(path, None, " ".join(str(error).split()), hidden_by)
-    problem = ""
-    if profile.name != path.stem:
-        problem = f"{path}: holds the profile {profile.name!r}, but is looked up as {path.stem!r}: rename one of them"
-    return Entry(path, profile, problem, hidden_by)
 
 
 def matching(entries: Iterable[Entry], tags: Collection[str], where: Mapping[str, str]) -> list[Entry]:

@@ -181,7 +181,7 @@ def _levelx(source: Path, road: Path | None, columns: TableMapping) -> RecordedT
     if len(files) != 1:
         raise FormatError(f"{len(files)} recordings (XX_tracks.csv); name one", path=source)
     table, meta, about = levelx.read_recording_files(files[0])
-    rate = float(levelx.cell(about, "frameRate", files[0]))
+    rate = levelx.frame_rate(about, files[0])
     if "latLaneCenterOffset" in table.columns:
         kinds = meta.set_index("trackId").reindex(table["trackId"])["class"].astype(str).to_numpy()
         named = table.assign(time=table["frame"] / rate, heading=np.radians(table["heading"]), vehicle_class=kinds)

@@ -6,7 +6,7 @@ import codecs
 import gzip
 import io
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
@@ -77,6 +77,12 @@ def _stamps(text: pd.Series) -> pd.Series | None:
         except ValueError:
             continue
     return None
+
+
+def listed(columns: Iterable[object]) -> str:
+    """The first twenty names, and how many more there are."""
+    names = [str(name) for name in columns]
+    return ", ".join(names[:20]) + (f" and {len(names) - 20} more" if len(names) > 20 else "")
 
 
 def numbers_of(column: pd.Series, path: Path, name: str) -> FloatArray:
@@ -229,9 +235,8 @@ def _in_utf8(text: IO[bytes], path: Path, encoding: str | None = None) -> IO[byt
     try:
         return io.BytesIO(text.read().decode(given).encode())
     except (UnicodeDecodeError, LookupError) as error:
-        raise FormatError(
-            f'not in UTF-8 nor in {given}: {error}; `encoding = "..."` in the file of --mapping names it', path=path
-        ) from error
+        what = f'not in UTF-8 nor in {given}: {error}; `encoding = "..."` in the file of --mapping names it'
+        raise FormatError(what, path=path) from error
 
 
 def _read_parquet(source: Source) -> pd.DataFrame:
@@ -249,9 +254,8 @@ def _read_parquet(source: Source) -> pd.DataFrame:
         source.unpacked(rows * columns * _DOUBLE)  # a thousand million equal values take a few bytes in the file
         table: pd.DataFrame = file.read().to_pandas()
     if not table.columns.is_unique:
-        raise FormatError(
-            f"column {str(table.columns[table.columns.duplicated()][0])!r} appears twice", path=source.path
-        )
+        twice = str(table.columns[table.columns.duplicated()][0])
+        raise FormatError(f"column {twice!r} appears twice", path=source.path)
     return table
 
 
@@ -263,12 +267,9 @@ def _separator(text: IO[bytes], path: Path) -> str:
     if header.count(separator) >= TABLE_COLUMNS.value:
         raise FormatError(TABLE_COLUMNS.refusal(header.count(separator) + 1), path=path, line=1)
     if separator == "," and '"' not in first and first.rstrip(",").count(",") > header.count(","):
-        raise FormatError(
-            f"{first.count(',') + 1} values under {header.count(',') + 1} headers; if numbers have a decimal comma, "
-            "separate them by semicolons or tabs",
-            path=path,
-            line=2,
-        )
+        what = f"{first.count(',') + 1} values under {header.count(',') + 1} headers"
+        advice = "if numbers have a decimal comma, separate them by semicolons or tabs"
+        raise FormatError(f"{what}; {advice}", path=path, line=2)
     return separator
 
 

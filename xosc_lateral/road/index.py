@@ -12,7 +12,7 @@ from xosc_lateral.arrays import FloatArray, Int32Array
 from xosc_lateral.road.places import lane_at
 from xosc_lateral.road.positions import LaneCoordinates, LanePositions
 from xosc_lateral.road.projection import Feet, project, project_at
-from xosc_lateral.road.samples import BRUTE_FORCE, Candidates, Samples, joined
+from xosc_lateral.road.samples import Candidates, Samples
 from xosc_lateral.road.tables import NetworkTables
 
 WRONG_WAY = 2.0
@@ -41,7 +41,6 @@ class SurfaceIndex:
         z: ArrayLike | None,
         heading: ArrayLike | None,
         *,
-        near: Sequence[int] | None,
         lane_types: Collection[str] | None,
     ) -> LanePositions:
         """Nearest lanes (see `RoadNetwork.world_to_lane`)."""
@@ -55,38 +54,14 @@ class SurfaceIndex:
         best = _Best(len(flat[0]))
         for begin in range(0, len(flat[0]), 16384):
             part = slice(begin, begin + 16384)
-            found = self._candidates(flat[0][part], flat[1][part], near, types)
+            found = self._candidates(flat[0][part], flat[1][part], types)
             self._score(best, found._replace(point=found.point + begin), flat[0], flat[1], height, direction, types)
         return best.positions(arrays[0].shape)
 
-    def _candidates(
-        self, x: FloatArray, y: FloatArray, near: Sequence[int] | None, types: frozenset[str] | None
-    ) -> Candidates:
+    def _candidates(self, x: FloatArray, y: FloatArray, types: frozenset[str] | None) -> Candidates:
         if types not in self._samples:
             self._samples[types] = Samples(self._tables, types)
-        samples = self._samples[types]
-        found = samples.near(x, y)
-        if near is None:
-            return found
-        kept = np.isin(found.road, np.asarray(near, dtype=np.int32))
-        found = Candidates(found.point[kept], found.road[kept], found.s[kept])
-        missing = np.setdiff1d(np.arange(len(x)), found.point)
-        extra = [self._on_road(samples, missing, x, y, int(road)) for road in near] if len(missing) else []
-        return joined(found, *extra)
-
-    @staticmethod
-    def _on_road(samples: Samples, points: NDArray[np.int64], x: FloatArray, y: FloatArray, road: int) -> Candidates:
-        """The nearest sample of one road to each point."""
-        own = np.flatnonzero(samples.road == road)
-        if not len(own):
-            return Candidates(points[:0], samples.road[:0], samples.s[:0])
-        nearest = np.empty(len(points), dtype=np.int64)
-        rows = max(1, BRUTE_FORCE // len(own))
-        for begin in range(0, len(points), rows):
-            part = points[begin : begin + rows]
-            squared = (x[part, None] - samples.x[own]) ** 2 + (y[part, None] - samples.y[own]) ** 2
-            nearest[begin : begin + rows] = own[np.argmin(squared, axis=1)]
-        return Candidates(points, samples.road[nearest], samples.s[nearest])
+        return self._samples[types].near(x, y)
 
     def path_to_lane(
         self, x: ArrayLike, y: ArrayLike, road: ArrayLike, s: ArrayLike, *, lane_types: Collection[str] | None
@@ -103,7 +78,7 @@ class SurfaceIndex:
         # Driven off the road that it was on, onto the next one: look again, without prejudice.
         lost = np.flatnonzero(best.distance > TOUCHING)
         if len(lost):
-            found = self._candidates(flat[0][lost], flat[1][lost], None, types)
+            found = self._candidates(flat[0][lost], flat[1][lost], types)
             self._score(best, found._replace(point=lost[found.point]), flat[0], flat[1], None, None, types)
         return best.positions(arrays[0].shape)
 
@@ -124,7 +99,7 @@ class SurfaceIndex:
             here = lane_at(road, near[0], s, t, lane_types)
             if abs(ahead) <= TOUCHING and here.distance <= TOUCHING and here.lane != 0:
                 return here
-        best = self.world_to_lane(x, y, z, heading, near=None, lane_types=lane_types)
+        best = self.world_to_lane(x, y, z, heading, lane_types=lane_types)
         return LaneCoordinates(int(best.road), int(best.lane), *(float(values) for values in best[2:]))
 
     # ---- choosing ----------------------------------------------------------------------------------------------------

@@ -41,7 +41,6 @@ class LaneTables:
     """
 
     def __init__(self, roads: Sequence[Road], path: str) -> None:
-        """Gather everything."""
         self.roads = roads
         self._path = path
         self.lengths = np.array([road.length for road in roads])
@@ -121,16 +120,6 @@ class LaneTables:
         both, inverse = np.unique(road_.ravel() * np.int64(2**32) + lane_.ravel(), return_inverse=True)
         found = [self.roads[(k + 2**31) >> 32].directions.get((k + 2**31) % 2**32 - 2**31, 1) for k in both.tolist()]
         return np.array(found, dtype=np.int32)[inverse.ravel()].reshape(road_.shape)
-
-    def offset_to_t(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, offset: ArrayLike) -> FloatArray:
-        """Left of travel -> left of the reference line. Shape as the arguments. [m]"""
-        profile = self.lane_profile(road, lane, s)
-        return np.asarray(profile.centre + profile.direction * np.asarray(offset, dtype=np.float64))
-
-    def t_to_offset(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, t: ArrayLike) -> FloatArray:
-        """Left of the reference line -> left of travel. Shape as the arguments. [m]"""
-        profile = self.lane_profile(road, lane, s)
-        return np.asarray(profile.direction * (np.asarray(t, dtype=np.float64) - profile.centre))
 
     def lane_index(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[Int32Array, Int32Array]:
         """Index from the right in travel direction among driving lanes of one direction, and their count.

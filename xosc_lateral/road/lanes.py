@@ -97,7 +97,6 @@ class LaneSection:
     by_id: Mapping[int, Lane] = field(init=False)  # lane 0 included
 
     def __post_init__(self) -> None:
-        """Index the lanes by id."""
         object.__setattr__(self, "by_id", {lane.id: lane for lane in (*self.lanes, self.centre)})
 
 

@@ -16,7 +16,6 @@ class Links:
     """Links between lanes and roads; look-ups are kept, since a player asks the same ones again and again."""
 
     def __init__(self, roads: Sequence[Road], junctions: Sequence[Junction]) -> None:
-        """Index roads and junctions by id."""
         self.roads = roads
         self._index = {road.id: i for i, road in enumerate(roads)}
         self._junctions = {junction.id: junction for junction in junctions}

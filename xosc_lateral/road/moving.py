@@ -58,7 +58,9 @@ def advance(
         # A ring of roads without length would never end.
         if not options or links_passed > 100_000:
             return Advance(road, lane, s, way, distance)
-        link = _chosen(links, options, choose)
+        link = options[0]
+        if len(options) > 1:
+            link = choose(options) if choose else straightest(links.roads, options)
         road, lane, s, way = link
         here = links.roads[road]
         section = here.sections[0 if way > 0 else -1]
@@ -76,12 +78,6 @@ def most_turning(roads: Sequence[Road], options: Sequence[LaneLink]) -> LaneLink
 
 def _turn(road: Road) -> float:
     return normal_angle(road.reference_at(road.length)[2] - road.reference_at(0.0)[2])
-
-
-def _chosen(links: Links, options: Sequence[LaneLink], choose: Chooser | None) -> LaneLink:
-    if len(options) == 1:
-        return options[0]
-    return choose(options) if choose else straightest(links.roads, options)
 
 
 def follow_section(road: Road, section: LaneSection, beyond: LaneSection, lane: int, way: int) -> int | None:

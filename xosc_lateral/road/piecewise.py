@@ -105,7 +105,6 @@ class Lookup:
     """
 
     def __init__(self, starts: Sequence[Sequence[float]]) -> None:
-        """Lay the owners out one behind the other."""
         counts = np.array([len(owner) for owner in starts], dtype=np.int64)
         self.starts: FloatArray = np.array([s for owner in starts for s in owner], dtype=np.float64)
         last = np.cumsum(counts)

@@ -11,7 +11,7 @@ from math import asin, atan, atan2, ceil, cos, inf, pi, sin
 
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.road.lanes import Lane
-from xosc_lateral.road.positions import LaneCoordinates, LaneInfo, Pose
+from xosc_lateral.road.positions import LaneCoordinates, Pose
 from xosc_lateral.road.road import Road
 
 TWO_PI = 2.0 * pi
@@ -109,15 +109,6 @@ def across_lane(lane: Lane, t: float, centre: float, width: float) -> float:
         return 0.0
     outwards = (t - centre) / width if lane.id > 0 else (centre - t) / width
     return min(max(0.5 + outwards, 0.0), 1.0)
-
-
-def cross_section(road: Road, s: float) -> tuple[LaneInfo, ...]:
-    """All lanes but lane 0, from left to right looking along s. `s` in [m]."""
-    infos = []
-    for lane in road.section_at(s).lanes:
-        centre, _, width = lane.state_at(s)
-        infos.append(LaneInfo(lane.id, lane.type, centre, width, lane.direction))
-    return tuple(infos)
 
 
 def lane_at(road: Road, index: int, s: float, t: float, lane_types: Collection[str] | None) -> LaneCoordinates:

@@ -36,7 +36,6 @@ class ReferenceLines:
     """All reference lines of a network."""
 
     def __init__(self, roads: Sequence[Road]) -> None:
-        """Gather the pieces of all elements."""
         starts: list[list[float]] = []
         pieces: list[tuple[float, bool, int]] = []  # s of what it is expanded about, whether a cubic, row of its table
         clothoids: list[ClothoidPiece] = []

@@ -9,7 +9,6 @@ from math import inf, nan
 
 from xosc_lateral.road.geometry import Line, ReferenceElement
 from xosc_lateral.road.lanes import LaneSection
-from xosc_lateral.road.positions import RoadMark
 from xosc_lateral.road.surface import Surface
 
 
@@ -65,7 +64,6 @@ class Road:
     is_flat: bool = field(init=False)
 
     def __post_init__(self) -> None:
-        """Keep what every look-up needs."""
         object.__setattr__(self, "section_starts", tuple(section.start for section in self.sections))
         heights = any(lane.heights for section in self.sections for lane in section.lanes)
         object.__setattr__(self, "is_flat", self.surface.is_flat and not heights)
@@ -110,14 +108,3 @@ class Road:
         low = max(low, found.starts[j] if j else -inf)
         high = min(high, (*found.starts[j + 1 :], inf)[0])
         return low, high, element, self.starts[i], nan if any(found.centre[j][1:]) else found.centre[j][0]
-
-
-def road_marks(road: Road) -> tuple[RoadMark, ...]:
-    """Markings at the outer edges of all lanes, lane 0 included, section by section from left to right."""
-    marks: list[RoadMark] = []
-    for section in road.sections:
-        left = [lane for lane in section.lanes if lane.id > 0]
-        right = [lane for lane in section.lanes if lane.id < 0]
-        for lane in (*left, section.centre, *right):
-            marks += [mark for mark in lane.marks if mark.type != "none"]
-    return tuple(marks)

@@ -42,18 +42,10 @@ DEFAULT_CUTS = CutSettings()
 def lane_changes(
     x: FloatArray, offset: FloatArray, lane: IntArray, vehicle: IntArray, step: float, settings: CutSettings
 ) -> BoolArray:
-    """Rows from where a vehicle sets off towards another lane to where it has settled there.
+    """Rows from where a vehicle sets off towards another lane to where it has settled there; arrays of shape (n,).
 
-    Parameters
-    ----------
-    x : array, shape (n,)
-        Lateral position, continuous through lane changes; NaN where unknown. [m]
-    offset : array, shape (n,)
-        From the centre of its lane; NaN where unknown. [m]
-    lane, vehicle : array of int, shape (n,)
-        Rows sorted by vehicle and time.
-    step : float
-        Between two rows of a vehicle. [s]
+    `x`: lateral position, continuous through lane changes. [m] `offset`: from the centre of its lane. [m] Both NaN
+    where unknown; rows sorted by vehicle and time, `step` apart. [s]
     """
     changing = np.zeros(len(x), dtype=np.bool_)
     reach, margin = round(settings.longest_change / step), round(settings.margin / step)

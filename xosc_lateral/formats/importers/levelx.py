@@ -75,10 +75,7 @@ def _read_recording(path: Path, settings: CutSettings) -> tuple[pd.DataFrame, st
     """Table with `state`, layout and step of one recording."""
     tracks, tracks_meta, recording = read_recording_files(path)
     number = path.name.split("_")[0]
-    rate = cell(recording, "frameRate", path)
-    if not (rate.replace(".", "", 1).isdigit() and 1.0 <= float(rate) <= 1000.0):
-        raise FormatError(f"frameRate={rate!r}, expected 1 to 1000 per second", path=path)
-    step = 1.0 / float(rate)
+    step = 1.0 / frame_rate(recording, path)
     if "latLaneCenterOffset" in tracks.columns:
         return _from_exid(tracks, tracks_meta, number, step, path, settings), "exiD", step
     return _from_highd(tracks, tracks_meta, recording, number, step, path, settings), "highD", step
@@ -106,6 +103,14 @@ def cell(frame: pd.DataFrame, column: str, path: Path) -> str:
     if column not in frame.columns or frame.empty:
         raise FormatError(f"no value of {column} in the recording's meta file", path=path)
     return str(frame[column].iloc[0])
+
+
+def frame_rate(recording: pd.DataFrame, path: Path) -> float:
+    """Of a recording. [1/s]"""
+    rate = cell(recording, "frameRate", path)
+    if not (rate.replace(".", "", 1).isdigit() and 1.0 <= float(rate) <= 1000.0):
+        raise FormatError(f"frameRate={rate!r}, expected 1 to 1000 per second", path=path)
+    return float(rate)
 
 
 def require(frame: pd.DataFrame, columns: Sequence[str], path: Path) -> None:

@@ -89,11 +89,9 @@ def require_lanes(placed: PlacedTracks, where: str, path: Path) -> None:
     """Refuse tracks that lie beside all lanes. Raises `FormatError`."""
     if not (placed.piece >= 0).any():
         x, y = placed.tracks.x, placed.tracks.y
-        raise FormatError(
-            f"no row lies in a driving lane of {where}: x from {x.min():.1f} to {x.max():.1f} m, "
-            f"y from {y.min():.1f} to {y.max():.1f} m; are both in the same coordinates?",
-            path=path,
-        )
+        there = f"x from {x.min():.1f} to {x.max():.1f} m, y from {y.min():.1f} to {y.max():.1f} m"
+        what = f"no row lies in a driving lane of {where}: {there}; are both in the same coordinates?"
+        raise FormatError(what, path=path)
 
 
 def import_placed(

@@ -46,18 +46,11 @@ class ReferenceLine:
 def fit_reference_line(xy: FloatArray, forward: NDArray[np.bool_]) -> tuple[ReferenceLine, FloatArray, FloatArray]:
     """Line midway between the innermost lanes of both directions, and every point's (s, d) on it.
 
-    Raises `NotEnoughDataError` if the tracks don't cover at least 1 km in both directions.
+    Raises `NotEnoughDataError` if the tracks don't cover at least 1 km in both directions. The road has to be a
+    function of its principal axis: true for a few kilometres of motorway, not for a loop.
 
-    Parameters
-    ----------
-    xy : array, shape (n, 2)
-        Positions of all vehicles, sorted by vehicle and time. [m]
-    forward : array of bool, shape (n,)
-        True where the vehicle travels in the first direction (`s` grows with it).
-
-    Notes
-    -----
-    The road has to be a function of its principal axis: true for a few kilometres of motorway, not for a loop.
+    `xy`: positions of all vehicles, sorted by vehicle and time, shape (n, 2). [m] `forward`: where the vehicle travels
+    in the first direction (`s` grows with it), shape (n,).
     """
     from scipy.interpolate import CubicSpline
 

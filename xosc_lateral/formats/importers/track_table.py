@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping, parse_map
 from xosc_lateral.formats.source import open_source
 from xosc_lateral.formats.states import COLUMNS
-from xosc_lateral.formats.tables import foreign_errors, numbers_of, read_table, unpacked_text
+from xosc_lateral.formats.tables import foreign_errors, listed, numbers_of, read_table, unpacked_text
 from xosc_lateral.lazy import pd
 
 if TYPE_CHECKING:
@@ -155,12 +155,8 @@ def _columns(table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequen
         header = next((by_lower[one] for one in headers if one in by_lower), None) if source is None else source.column
         if header is None or header not in table.columns:
             if source is not None or name in ("vehicle", "time", "x", "y"):
-                raise FormatError(
-                    f"no column {header or name!r}; there are {', '.join(map(str, table.columns[:20]))} "
-                    f"(translate with --map {name}=COLUMN)",
-                    path=path,
-                    line=1,
-                )
+                there = f"there are {listed(table.columns)} (translate with --map {name}=COLUMN)"
+                raise FormatError(f"no column {header or name!r}; {there}", path=path, line=1)
             continue
         column = table[header]
         if name in ("vehicle", "vehicle_class"):
@@ -208,7 +204,10 @@ def read_esmini_log(path: Path) -> pd.DataFrame:
     """
     with open_source(path) as source, foreign_errors(path, "can't be read as a log of esmini"):
         text = unpacked_text(source)
-        names = _head(text, path)
+        head = (text.readline().decode("utf-8", "replace") for _ in range(MOST_LINES))
+        names = next((line.rstrip().rstrip(",").split(",") for line in head if line.startswith(HEAD)), None)
+        if names is None:
+            raise FormatError(f"a log of esmini without a line that begins with '{HEAD}'", path=path)
         table = pd.read_csv(text, header=None, names=range(len(names)), skipinitialspace=True, index_col=False)
     places: dict[str, dict[str, int]] = {}
     for column, name in enumerate(names):
@@ -225,11 +224,3 @@ def read_esmini_log(path: Path) -> pd.DataFrame:
     rows = pd.concat(frames, ignore_index=True)
     rows["vehicle"] = rows["vehicle"].astype(str).str.strip()
     return rows
-
-
-def _head(text: IO[bytes], path: Path) -> list[str]:
-    for _ in range(MOST_LINES):
-        line = text.readline().decode("utf-8", "replace")
-        if line.startswith(HEAD):
-            return line.rstrip().rstrip(",").split(",")
-    raise FormatError(f"a log of esmini without a line that begins with '{HEAD}'", path=path)

@@ -34,17 +34,8 @@ def parameter_pieces(u: FloatArray, v: FloatArray, p_end: FloatArray, length: Fl
     The curve's arc length over [0, p_end] is scaled to `length`, as the reference player does: files whose length
     attribute differs from it by rounding stay continuous.
 
-    Parameters
-    ----------
-    u, v : array, shape (n, 4)
-        Coefficients of the two coordinates, lowest power first.
-    p_end, length : array, shape (n,)
-        Parameter at the end; length attribute [m].
-
-    Returns
-    -------
-    array, shape (n, PIECES, 4)
-        Cubics of ds about each piece's start.
+    `u`, `v`: coefficients of the two coordinates, lowest power first, shape (n, 4). `p_end`, `length`: parameter at the
+    end and length attribute [m], shape (n,). The result: cubics of ds about each piece's start, shape (n, PIECES, 4).
     """
 
     def integral(begin: FloatArray, reach: FloatArray) -> FloatArray:

@@ -60,7 +60,6 @@ class RoadIds:
     free: int = field(init=False)
 
     def __post_init__(self) -> None:
-        """Number all lanes that have a width."""
         pieces = [
             (road, k, lane.id)
             for road, part in enumerate(self.network.roads)

@@ -82,45 +82,34 @@ def host_of(motion: NominalMotion, under_test: Iterable[str]) -> str | None:
 
 
 def _save(path: Path, messages: Iterator[Any], description: str) -> None:
-    writers = osi("osi_utilities")
-    is_mcap = path.suffix.lower() == ".mcap"
+    writers, is_mcap = osi("osi_utilities"), path.suffix.lower() == ".mcap"
     writer = writers.MultiTraceWriter() if is_mcap else writers.SingleTraceWriter()
-    if not writer.open(path, **({"metadata": _metadata(description)} if is_mcap else {})):
+    version, protobuf = ".".join(map(str, VERSION)), str(osi("google.protobuf").__version__)
+    # without the time of writing, so that the same motion gives the same bytes
+    metadata = {
+        "version": "1.0.0",
+        "min_osi_version": version,
+        "max_osi_version": version,
+        "min_protobuf_version": protobuf,
+        "max_protobuf_version": protobuf,
+        "description": description,
+        "authors": f"xosc-lateral {__version__}",
+        "data_sources": "OpenSCENARIO, played by xosc-lateral",
+        "zero_time": "",
+    }
+    if not writer.open(path, **({"metadata": metadata} if is_mcap else {})):
         raise OSError(f"{path}: can't be opened for writing")
     with writer:
         if is_mcap:
             about = {
-                "net.asam.osi.trace.channel.osi_version": _version(),
-                "net.asam.osi.trace.channel.protobuf_version": _protobuf(),
+                "net.asam.osi.trace.channel.osi_version": version,
+                "net.asam.osi.trace.channel.protobuf_version": protobuf,
                 "net.asam.osi.trace.channel.description": "ground truth, one message per step",
             }
             writer.add_channel(TOPIC, osi("osi3.osi_groundtruth_pb2").GroundTruth, about)
         for message in messages:
             if not writer.write_message(message, TOPIC):
                 raise OSError(f"{path}: can't be written to")
-
-
-def _metadata(description: str) -> dict[str, str]:
-    """Without the time of writing, so that the same motion gives the same bytes."""
-    return {
-        "version": "1.0.0",
-        "min_osi_version": _version(),
-        "max_osi_version": _version(),
-        "min_protobuf_version": _protobuf(),
-        "max_protobuf_version": _protobuf(),
-        "description": description,
-        "authors": f"xosc-lateral {__version__}",
-        "data_sources": "OpenSCENARIO, played by xosc-lateral",
-        "zero_time": "",
-    }
-
-
-def _version() -> str:
-    return ".".join(map(str, VERSION))
-
-
-def _protobuf() -> str:
-    return str(osi("google.protobuf").__version__)
 
 
 def ground_truths(
