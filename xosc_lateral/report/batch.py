@@ -13,39 +13,20 @@ GAPS = ("smallest gap, nominal [m]", "smallest gap, enriched [m]")
 
 @dataclass(frozen=True, slots=True)
 class BatchEntry:
-    """One output of a batch.
+    """One output of a batch."""
 
-    Parameters
-    ----------
-    output, scenario : str
-        Paths below the batch's folders.
-    page, thumbnail : str
-        Relative links; empty if there is none.
-    enriched, entities : int
-        Entities that got offsets, and all.
-    segment_seconds : float
-        Road-following time of the enriched entities together. [s]
-    offset_spread : float
-        Standard deviation of all sampled offsets. [m]
-    gap_before, gap_after : float or None
-        Smallest gap between vehicles, nominal and enriched. [m]
-    warnings : tuple of str
-    error : str
-        Why there is no output; empty if there is one.
-    """
-
-    output: str
+    output: str  # output, scenario: paths below the batch's folders
     scenario: str
-    page: str
+    page: str  # page, thumbnail: relative links; empty if there is none
     thumbnail: str
-    enriched: int
-    entities: int
-    segment_seconds: float
-    offset_spread: float
-    gap_before: float | None
+    enriched: int  # entities that got offsets
+    entities: int  # all
+    segment_seconds: float  # road-following time of the enriched entities together [s]
+    offset_spread: float  # standard deviation of all sampled offsets [m]
+    gap_before: float | None  # smallest gap between vehicles, nominal and enriched [m]
     gap_after: float | None
     warnings: tuple[str, ...]
-    error: str
+    error: str  # why there is no output; empty if there is one
 
     @property
     def has_new_contact(self) -> bool:
