@@ -100,4 +100,4 @@ def test_curves_bend_to_the_other_side() -> None:
     assert mirrored_shape(spline) == turned
     assert mirrored_shape(mirrored_shape(spline)) == spline
 
-    assert mirrored_shape(LINE) is LINE
+    assert mirrored_shape(LINE) == LINE

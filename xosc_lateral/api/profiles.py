@@ -108,7 +108,7 @@ def derive_profile(
     figures = Asked(**stated) if chosen is None else replace(chosen.asked, **stated)  # type: ignore[arg-type]
     made = derive(known, figures, name or preset or f"{known.name}-derived", preset=chosen)
     origin = made.profile.provenance
-    origin = structs.replace(origin, fit={**origin.fit, "sha256": profile_hash(known)})
+    origin = structs.replace(origin, fit={"derived_from": known.name, "sha256": profile_hash(known), **origin.fit})
     return made._replace(profile=structs.replace(made.profile, provenance=origin))
 
 

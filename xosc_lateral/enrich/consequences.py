@@ -15,7 +15,7 @@ from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.rows import blocks, give_back, kept, slices_where
 
 GAP_STEP = 0.1
-"""Rows that gaps are looked for on. [s]"""
+"""Between rows that gaps are measured on. [s]"""
 
 
 HalfWidths = dict[tuple[str, int], FloatArray]

@@ -264,6 +264,7 @@ def _apart(
 
 
 def _moved(sample: _Sample, rows: IntArray, move: FloatArray) -> _Sample:
+    give_back(len(rows))
     return sample._replace(offset=kept(sample.offset + np.interp(sample.knots, rows, move)))
 
 

@@ -117,11 +117,11 @@ def give_way(
             if widening is None:
                 continue
             aside, is_left, responding = widening  # of `own`, by where `other` is
-            share = part_of(is_left == left_hand[own], responding)
-            share = np.where(second.can_move, share, 1.0) * first.can_move
-            share *= ~np.where(is_left, alone[0][own], alone[1][own])
-            np.maximum.at(right[:, stretch], (own, at), np.where(is_left, share * aside, 0.0))
-            np.maximum.at(left[:, stretch], (own, at), np.where(is_left, 0.0, share * aside))
+            known_alone = np.where(is_left, alone[0][own], alone[1][own])
+            aside = aside * own_share(is_left == left_hand[own], responding, second.can_move, known_alone)
+            aside = aside * first.can_move
+            np.maximum.at(right[:, stretch], (own, at), np.where(is_left, aside, 0.0))
+            np.maximum.at(left[:, stretch], (own, at), np.where(is_left, 0.0, aside))
         give_back()
     every = max(1, int(rows[1] - rows[0])) if n > 1 else 1
     smoothed = STEERING / (motion.step * every)
@@ -212,14 +212,16 @@ def widened(
     return weight * np.where(responding, wider(gap, responding=True), wider(gap, responding=False)), is_left, responding
 
 
-def part_of(overtakes: BoolArray, responding: BoolArray) -> FloatArray:
-    """Share of a widening, by whether the vehicle is the overtaking one and responds to the other, shape (n,). [-]
+def own_share(overtakes: BoolArray, responding: BoolArray, other_moves: BoolArray, alone: BoolArray) -> FloatArray:
+    """Share that a vehicle has of a widening, shape (n,). [-]
 
-    By itself `motorway` moves 0.209 m from whom it overtakes and 0.083 m from who overtakes it, where real vehicles
-    move 0.239 and 0.045 m: the second has done more than its part already.
+    By whether it is the overtaking one, responds to the other by its profile, the other can move, and its answer is
+    known of the driver alone, who then has no share. By itself `motorway` moves 0.209 m from whom it overtakes and
+    0.083 m from who overtakes it, where real vehicles move 0.239 and 0.045 m: the second has done more than its part
+    already.
     """
     share = np.where(responding, 1.0, OVERTAKING_SHARE)
-    return np.asarray(np.where(overtakes, share, 1.0 - share))
+    return np.where(other_moves, np.where(overtakes, share, 1.0 - share), 1.0) * ~alone
 
 
 def wider(gap: FloatArray, *, responding: bool) -> FloatArray:

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from xosc_lateral.arrays import FloatArray
-from xosc_lateral.driver.effects import ColumnEffect
+from xosc_lateral.driver.effects import Acts, ColumnEffect
+from xosc_lateral.driver.seeds import generator
 from xosc_lateral.identification.autocorrelation import Problem
 from xosc_lateral.identification.dictionary import (
     CROSS_BASIS,
@@ -194,8 +195,8 @@ class ColumnSearch:
             if rows.any():
                 blocks.append(orthonormal(dictionary.rows[rows].astype(np.float64).T, CROSS_BASIS))
         known = orthonormal(np.concatenate(blocks, axis=1), 1e-6)
-        drive, rng = search.coarse.drive[problem.whitener.valid], search.rng(LoopSeed.COLUMNS)
-        of_mean = kind.component == "mean"
+        drive, rng = search.coarse.drive[problem.whitener.valid], generator(search.seed, LoopSeed.COLUMNS)
+        of_mean = kind.acts is Acts.LOCATION
         scores = score_entries(dictionary, problem.observed, known, barred, drive, rng, draws=draws, of_mean=of_mean)
         return _Scored(problem, dictionary, known, *scores)
 

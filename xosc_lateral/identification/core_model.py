@@ -15,6 +15,7 @@ import numpy as np
 
 from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.seeds import child
 from xosc_lateral.identification.model import Description, Fitted
 from xosc_lateral.identification.residual import simulated_runs
 from xosc_lateral.identification.significance import LEAST, LoopSeed
@@ -62,8 +63,7 @@ def compare_spectrum_shapes(profile: DriverProfile, timeline: Timeline, seed: np
     """Compare a profile's free runs with the drives, block by block."""
     from scipy.stats import f
 
-    own_seed = np.random.SeedSequence(seed.entropy, spawn_key=(LoopSeed.SPECTRUM,))
-    runs = simulated_runs(profile, timeline, own_seed, runs=N_RUNS)
+    runs = simulated_runs(profile, timeline, child(seed, LoopSeed.SPECTRUM), runs=N_RUNS)
     real = _shapes(timeline.offset, timeline)
     own = np.concatenate([_shapes(run, timeline) for run in runs])
     if len(real) < 2 * len(TIMES_S) + 4:

@@ -14,6 +14,7 @@ from xosc_lateral.driver.fitting import fit_population, fit_runs
 from xosc_lateral.driver.models.base import ModelKind
 from xosc_lateral.driver.place import COLUMNS as KNOWN_TO_THE_BASE
 from xosc_lateral.driver.profile import COLUMNS, DriverProfile, Provenance
+from xosc_lateral.driver.seeds import child, generator
 from xosc_lateral.drives.cuts import MIN_RUN
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.filters import filtered
@@ -93,10 +94,6 @@ class Setting:
         """What is held out."""
         return hold_out_blocks(self.coarse.timeline)
 
-    def rng(self, key: LoopSeed) -> np.random.Generator:
-        """Source of chance for one purpose."""
-        return np.random.default_rng(np.random.SeedSequence(self.root.entropy, spawn_key=(key,)))
-
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
@@ -135,7 +132,7 @@ def score_held_out(
     before = expected(statistics, runs_before, timeline.valid)
     after = before if runs_after is runs_before else expected(statistics, runs_after, timeline.valid)
     unmoved = timeline.offset - removal_of(fitted).location
-    halves = half_samples(statistics, unmoved, setting.blocks, setting.rng(LoopSeed.BLOCKS))
+    halves = half_samples(statistics, unmoved, setting.blocks, generator(setting.root, LoopSeed.BLOCKS))
     return HeldOut(statistics, real, before, after, runs_before, runs_after, halves)
 
 
@@ -158,8 +155,7 @@ def _held_out_runs(
             profiles.append(fit_without(fitted, used, setting.refined_kind, "after", None))
         for side, profile in enumerate(profiles):
             # the same luck for both sides and all folds: what differs is the profile, and runs go on from fold to fold
-            seed = np.random.SeedSequence(setting.root.entropy, spawn_key=(LoopSeed.FOLDS,))
-            runs = simulated_runs(profile, coarse.timeline, seed, held=held)
+            runs = simulated_runs(profile, coarse.timeline, child(setting.root, LoopSeed.FOLDS), held=held)
             sides[side] = sides[side] if len(sides[side]) else np.zeros_like(runs)
             sides[side][:, held] = runs[:, held]
     return sides[0], sides[1] if len(sides[1]) else sides[0]

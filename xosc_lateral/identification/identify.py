@@ -13,7 +13,7 @@ from msgspec import structs
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Drift, TimeSmooth, VarianceTrend
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.identification.columns import Assigned, Column, Role, known_columns, roles_of
-from xosc_lateral.identification.cross_validation import Nested, Progress, hold_out_blocks, nest
+from xosc_lateral.identification.cross_validation import Nested, Progress, nest
 from xosc_lateral.identification.feedback import Feedback, find_feedback
 from xosc_lateral.identification.model import Term
 from xosc_lateral.identification.search import Search
@@ -76,16 +76,8 @@ def identify(
 ) -> Identified:
     """Select terms, and keep those that predict blocks on which they were neither selected nor sized.
 
-    Parameters
-    ----------
-    seed : SeedSequence
-        Of the rotations and other nulls.
-    initial : sequence of Term
-        In the model already.
-    excluded : sequence of str
-        Columns that are not to be tested.
-    roles : mapping of str to str
-        What columns are declared to be; see `columns.roles_of`.
+    `initial` terms are in the model already, `excluded` columns are not tested; `roles` are what columns are declared
+    to be, see `columns.roles_of`.
     """
     from threadpoolctl import threadpool_limits
 
@@ -101,12 +93,11 @@ def identify(
         found = {one.term.component for one in selection.accepted} - {StepTerm.component}
         there = Counter(term.component for term in selection.final.terms)
         wanted = {component: there[component] for component in sorted(found)}
-        folds = hold_out_blocks(coarse.timeline)
 
         def done(share: float) -> None:
             progress(0.3 + 0.3 * share, "selecting without a fold")
 
-        return _worst_first(Identified(usable, selection, nest(search, folds, (*initial, *once), wanted, done)))
+        return _worst_first(Identified(usable, selection, nest(search, (*initial, *once), wanted, done)))
 
 
 def usable_columns(

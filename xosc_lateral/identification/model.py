@@ -108,8 +108,8 @@ class Term(ABC):
 
     @property
     def kind_key(self) -> str:
-        """Component, or kind where two kinds share one: names its groups of summary statistics."""
-        return self.kind if self.component == "time_mean" else self.component
+        """Names its groups of summary statistics."""
+        return self.component
 
     def mean_columns(self, coarse: Coarse) -> FloatArray:
         """Columns of the mean, shape (n, k). [any unit]"""

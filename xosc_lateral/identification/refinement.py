@@ -58,12 +58,7 @@ class Refined:
 class Refinement:
     """Scores effects beside everything known, many at once.
 
-    Parameters
-    ----------
-    known : array, shape (seconds, k)
-        Orthonormal; partialled out.
-    costs : mapping of Family to float
-        What a member of each family costs.
+    `known`, shape (seconds, k), is orthonormal, and partialled out; `costs` are those of a member of each family.
     """
 
     def __init__(self, coarse: Coarse, problem: Problem, known: FloatArray, costs: Mapping[Family, float]) -> None:

@@ -74,7 +74,3 @@ class Search:
             response = self.quantities.responses(np.flatnonzero(own), response_s)
             blocks += [response[np.clip(seconds - lag, 0, len(seconds) - 1)] * valid for lag in lags]
         return orthonormal(np.concatenate(blocks, axis=1).astype(np.float64), CROSS_BASIS)
-
-    def rng(self, *key: int) -> np.random.Generator:
-        """Independent stream by purpose."""
-        return np.random.default_rng(np.random.SeedSequence(self.seed.entropy, spawn_key=key))

@@ -154,10 +154,8 @@ class EsminiTraffic:
     def steer(self, dt: float) -> Moves:
         """Say where everybody is sideways after the next step of `dt` seconds; before ``SE_StepDT(dt)``.
 
-        Raises
-        ------
-        SimulationError
-            If what the simulation says can't be used; nothing was reported then, and the simulation can go on.
+        Raises `SimulationError` if what the simulation says can't be used; nothing was reported then, and the
+        simulation can go on.
         """
         seen = [(name, state) for name, state in self._objects() if self._is_sound(name, state)]
         moment = self._moment(seen, dt)
@@ -167,8 +165,7 @@ class EsminiTraffic:
                 direction = self.network.travel_direction(self._road(state), state.lane)
                 t = state.t + direction * float(moves.offset[row] - moment.offset[row])
                 self.player.SE_ReportObjectLateralPosition(state.id, t)
-        steered = zip(moment.names, moves.offset.tolist(), moves.steered.tolist(), strict=True)
-        self.moves = {name: (offset, own) for name, offset, own in steered}
+        self.moves = moves.by_name(moment.names)
         self._rates = dict(zip(moment.names, moves.rate.tolist(), strict=True))
         return moves
 
@@ -216,7 +213,7 @@ class EsminiTraffic:
                 yield (self.player.SE_GetObjectName(number) or b"").decode(), state
 
     def _is_sound(self, name: str, state: ObjectState) -> bool:
-        """Whether it is a vehicle that says where it is; one that doesn't is left alone, and the user told once."""
+        """Whether it is a vehicle that says where it is; one that doesn't is left alone, which is a warning."""
         if state.type != _VEHICLE:
             return False
         numbers = {what: getattr(state, what) for what in ("x", "y", "h", "t", "s", "speed", "offset_t")}

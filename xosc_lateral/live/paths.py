@@ -1,11 +1,12 @@
 """From a driver's curve to where his vehicle is: what leads over to his path, slow driving, moving aside.
 
-A vehicle's path has no kink (`TURN`): where a maneuver has moved it, its path leads over from there to the driver's;
+A vehicle's path has no corner (`TURN`): where a maneuver has moved it, its path leads over from there to the driver's;
 below 40 km/h there is less of the driver's movement.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from xosc_lateral.motion.deviation import SETTLING_TIME, settle
 from xosc_lateral.motion.segments import MINIMUM_SPEED
 
 TURN = 0.03
-"""Change of heading per time that nobody takes for a kink: 0.3 mrad in a step of 0.01 s. [rad/s]"""
+"""Change of heading per time that nobody takes for a corner of the path: 0.3 mrad in a step of 0.01 s. [rad/s]"""
 
 LEADING_OVER = 0.5
 """Part of `TURN` that leading over to the driver's path may take; the driver's own movement has the rest. [-]"""
@@ -59,6 +60,10 @@ class Moves(NamedTuple):
     rate: FloatArray
     heading: FloatArray
     steered: BoolArray
+
+    def by_name(self, names: Sequence[str]) -> dict[str, tuple[float, bool]]:
+        """Offset [m], and whether it is the driver's, of each."""
+        return dict(zip(names, zip(self.offset.tolist(), self.steered.tolist(), strict=True), strict=True))
 
 
 def drive_on(
@@ -130,7 +135,7 @@ def _move_aside(state: NDArray[Any], passed: FloatArray) -> None:
 
 
 def _lead_over(state: NDArray[Any], which: BoolArray, gap: FloatArray, rate: FloatArray, speed: FloatArray) -> None:
-    """Begin to lead over from a gap [m] that changes at a rate [m/s], within what is no kink at this speed. [m/s]"""
+    """Begin to lead over from a gap [m] that changes at a rate [m/s], within what is no corner at this speed. [m/s]"""
     bound = LEADING_OVER * TURN * np.maximum(np.abs(speed), MINIMUM_SPEED)
     over = np.maximum(SETTLING_TIME, np.maximum(np.sqrt(_PEAK * np.abs(gap) / bound), 4.0 * np.abs(rate) / bound))
     for name, values in (("from", gap), ("from_rate", rate), ("share", 0.0), ("over", over)):

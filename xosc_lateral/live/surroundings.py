@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
-from xosc_lateral.enrich.give_way import FADES, Frame, part_of, widened
+from xosc_lateral.enrich.give_way import FADES, Frame, own_share, widened
 from xosc_lateral.motion.around import IN_SIGHT, Around, Extent, Reach, free_space, lane_path, see_along
 from xosc_lateral.motion.context import lanes_beside, road_columns, spread_out
 from xosc_lateral.motion.nearby import pairs_now
@@ -182,8 +182,8 @@ def give_way_now(
     if found is None:
         return left
     aside, is_left, responding = found
-    share = np.where(can_move[other], part_of(is_left == left_hand, responding), 1.0)
-    share *= np.where(is_left, ~known["alone_left"][own], ~known["alone_right"][own])
-    np.maximum.at(right, own, np.where(is_left, share * aside, 0.0))
-    np.maximum.at(left, own, np.where(is_left, 0.0, share * aside))
+    alone = np.where(is_left, known["alone_left"][own], known["alone_right"][own])
+    aside = aside * own_share(is_left == left_hand, responding, can_move[other], alone)
+    np.maximum.at(right, own, np.where(is_left, aside, 0.0))
+    np.maximum.at(left, own, np.where(is_left, 0.0, aside))
     return left - right

@@ -1,4 +1,4 @@
-"""Drivers of the vehicles of a running simulation: told once per step what it knows, they say where they are.
+"""Drivers of the vehicles of a running simulation: once per step they get what it knows, and say where they are.
 
 A driver goes on at the model's step (5 Hz), on what he sees at that moment; in between he follows the curve of
 `driver.upsampling`. What he sees he responds to a little later than in a conversion, which knows what comes
@@ -126,20 +126,11 @@ class Traffic:
         return len(self._names)
 
     def step(self, time: float, moment: Moment) -> Moves:
-        """Where everybody is at `time`.
+        """Where everybody is at a time of the simulation, not earlier than the last one [s].
 
-        Parameters
-        ----------
-        time : float
-            Of the simulation, not earlier than the last one. [s]
-        moment : Moment
-            What is known: how the last step of the simulation has left everybody.
-
-        Raises
-        ------
-        SimulationError
-            If a number is NaN or none that a road has, time runs backwards, or a context column is missing that was
-            there. Nothing has changed then: the next good moment goes on.
+        From what is known then: how the last step of the simulation has left everybody. Raises `SimulationError` if a
+        number is NaN or none that a road has, time runs backwards, or a context column is missing that was there.
+        Nothing has changed then: the next good moment goes on.
         """
         _check(time, self._time, moment)
         context = self._context(moment) if self.is_due(time) else None
@@ -149,8 +140,8 @@ class Traffic:
         self._time = time
         if context is not None:
             self._advance(time, moment, context, there, who)
-        moves = Moves(moment.offset.copy(), np.zeros(len(moment.names)), np.zeros(len(moment.names)),
-                      np.zeros(len(moment.names), dtype=np.bool_))  # fmt: skip
+        rate, heading = np.zeros((2, len(moment.names)))
+        moves = Moves(moment.offset.copy(), rate, heading, np.zeros(len(moment.names), dtype=np.bool_))
         if len(there):
             rows = (moment.speed[there], moment.offset[there], moment.nominal[there], moment.following[there])
             u = min(max(time / self._step - (self._knots - 1), 0.0), 1.0)
@@ -299,10 +290,7 @@ class Traffic:
     def restore(self, state: Mapping[str, Any]) -> None:
         """Go on from what `to_dict` gave; the same profiles, settings and roads were given at the start.
 
-        Raises
-        ------
-        SimulationError
-            If it is no such state, or one of other profiles.
+        Raises `SimulationError` if it is no such state, or one of other profiles.
         """
         if not isinstance(state, Mapping) or state.get("format") != FORMAT or state.get("version") != 1:
             raise SimulationError(f'not a state of live traffic: "format" is not "{FORMAT}", or its version is not 1')

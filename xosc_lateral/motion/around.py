@@ -22,7 +22,7 @@ REACH = 200.0
 """How far a driver looks for others [m]; beyond it there is none (about what a series radar sees)."""
 
 IN_SIGHT = 2.0 * REACH + 100.0
-"""Vehicles never nearer than this in a straight line are not looked for along the lane. Free space is counted along the
+"""Vehicles never nearer than this in a straight line are not searched along the lane. Free space is counted along the
 reference line, which on the tightest ramp is half as long as its outer lane; the rest is for two road trains. [m]"""
 
 ALONGSIDE = 10.0

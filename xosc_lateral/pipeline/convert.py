@@ -17,9 +17,8 @@ from xosc_lateral.formats.context_table import read_context
 from xosc_lateral.formats.openscenario.provenance import PENDING
 from xosc_lateral.formats.openscenario.write.build import named
 from xosc_lateral.formats.openscenario.write.draft import WrittenScenario
-from xosc_lateral.formats.openscenario.write.sampled import motion_unknown_to
 from xosc_lateral.formats.openscenario.write.target import Player
-from xosc_lateral.formats.openscenario.write.trajectory_scenario import write_trajectory_scenario
+from xosc_lateral.formats.openscenario.write.trajectory_scenario import motion_unknown_to, write_trajectory_scenario
 from xosc_lateral.formats.output_paths import refuse_outputs
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.formats.source import edit_in_place, guarding_inputs

@@ -15,6 +15,7 @@ from msgspec.structs import replace
 from xosc_lateral.playback import boxes
 from xosc_lateral.playback.paths.base import nearest_s
 from xosc_lateral.playback.state import NOWHERE, EntityState
+from xosc_lateral.playback.trailers import drawn_by
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.road.positions import RoadPath
 from xosc_lateral.scenario.enums import CoordinateSystem, RelativeDistanceType
@@ -219,11 +220,7 @@ def _train(state: EntityState) -> list[EntityState]:
     """The vehicle in front and what it draws."""
     while state.tow is not None:
         state = state.tow
-    members = [state]
-    while state.trailer is not None:
-        state = state.trailer
-        members.append(state)
-    return members
+    return [state, *(trailer for _, trailer in drawn_by(state))]
 
 
 def _along_trajectory(state: EntityState, spot: Spot, *, lateral: bool) -> float:

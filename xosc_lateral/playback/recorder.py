@@ -64,7 +64,7 @@ class Rows:
     def write(self, time: float) -> None:
         """Write down where the entity is now; raises `PlaybackError` where no entity can be. [s]"""
         state = self.state
-        free = state._free_pose
+        free = state.free_pose
         x, y = (state.s, state.offset_t) if free is None else (free.x, free.y)
         speed = 0.0 if state.activity & _TELEPORTED else state.speed  # that of a leap is none
         if state.active and not (abs(x) <= FARTHEST and abs(y) <= FARTHEST and abs(speed) <= FASTEST):

@@ -130,7 +130,8 @@ class EntityState:
     """Road, s and offset in the frame before; None in the world's coordinates. [m]"""
     stuck: bool = False
     """It has not moved in the frame before: the road had ended."""
-    _free_pose: Pose | None = _ORIGIN
+    free_pose: Pose | None = _ORIGIN
+    """World pose as given; None while the entity follows its lane. z, pitch, roll may be NaN (the road's)."""
     _located: bool = True
     _pose: Pose | None = None
     activity: int = 0
@@ -164,13 +165,13 @@ class EntityState:
     @property
     def place(self) -> Placement:
         """All of it at once; the road coordinates of a free pose as they were last looked up."""
-        return Placement(self.road, self.lane, self.s, self.offset_t, self.relative_heading, self._free_pose)
+        return Placement(self.road, self.lane, self.s, self.offset_t, self.relative_heading, self.free_pose)
 
     @property
     def pose(self) -> Pose:
         """World pose. [m], [rad]"""
         if self._pose is None:
-            if self._free_pose is not None and not _is_whole(self._free_pose):
+            if self.free_pose is not None and not _is_whole(self.free_pose):
                 self.locate()
             self._pose = world_pose(self.network, self.place)
         return self._pose
@@ -178,13 +179,8 @@ class EntityState:
     @property
     def plane(self) -> Pose:
         """World pose whose z, pitch and roll may be NaN (the road's): cheap where nobody needs them. [m], [rad]"""
-        free = self._free_pose
+        free = self.free_pose
         return self.pose if free is None else free
-
-    @property
-    def free_pose(self) -> Pose | None:
-        """World pose as given; None while the entity follows its lane. z, pitch, roll may be NaN (the road's)."""
-        return self._free_pose
 
     @property
     def is_forward(self) -> bool:
@@ -200,14 +196,14 @@ class EntityState:
         """Put the entity there."""
         self.road, self.lane, self.s, self.offset_t = place.road, place.lane, place.s, place.offset_t
         self.relative_heading = wrap(place.relative_heading)
-        self._free_pose = place.pose
+        self.free_pose = place.pose
         self._located = True
         self._pose = None
         self.section = (0.0, -1.0)
 
     def put_in_world(self, pose: Pose) -> None:
         """Put the entity there; its road coordinates are looked up when somebody asks for them."""
-        self._free_pose = pose
+        self.free_pose = pose
         self._located = False
         self._pose = None
 
@@ -215,13 +211,13 @@ class EntityState:
         """From now on, the road coordinates say where the entity is."""
         self.locate()
         if self.road != NOWHERE:
-            self._free_pose = None
+            self.free_pose = None
             self._pose = None
 
     def move_to(self, road: int, lane: int, s: float, offset_t: float) -> None:
         """New road coordinates, same relative heading."""
         self.road, self.lane, self.s, self.offset_t = road, lane, s, offset_t
-        self._free_pose = None
+        self.free_pose = None
         self._located = True
         self._pose = None
 
@@ -232,10 +228,10 @@ class EntityState:
 
     def locate(self) -> None:
         """Look up the road coordinates of a free pose."""
-        if self._located or self._free_pose is None:
+        if self._located or self.free_pose is None:
             return
         near = (self.road, self.s) if self.road != NOWHERE else None
-        self.put(locate(self.network, self._free_pose, near=near))
+        self.put(locate(self.network, self.free_pose, near=near))
 
     def road_heading(self) -> float:
         """Heading of the road's s-direction where the entity is; its own without a road. [rad]"""
@@ -280,9 +276,13 @@ def world_pose(network: RoadNetwork, place: Placement) -> Pose:
         road = _ORIGIN
     else:
         offset = network.offset_from_offset_t(place.road, place.lane, place.offset_t)
-        lane = network.pose_at(place.road, place.lane, place.s, offset)
-        along = wrap(place.relative_heading)
-        road = turned(lane, along if network.travel_direction(place.road, place.lane) > 0 else along - pi)
+        road = network.pose_at(place.road, place.lane, place.s, offset)
+        turn, pitch, roll = wrap(place.relative_heading), road.pitch, road.roll
+        if network.travel_direction(place.road, place.lane) < 0:
+            turn -= pi
+        if turn and (pitch or roll):  # about the normal of the surface
+            turn, pitch, roll = turned_in_surface(turn, pitch, roll)
+        road = Pose(road.x, road.y, road.z, wrap(road.heading + turn) if turn else road.heading, pitch, roll)
     if free is None:
         return road
     z, pitch, roll = (
@@ -294,16 +294,6 @@ def world_pose(network: RoadNetwork, place: Placement) -> Pose:
 
 def _is_whole(free: Pose) -> bool:
     return free.z == free.z and free.pitch == free.pitch and free.roll == free.roll
-
-
-def turned(pose: Pose, angle: float) -> Pose:
-    """A pose on a surface, turned about the surface's normal. [rad]"""
-    if not angle:
-        return pose
-    turn, pitch, roll = angle, pose.pitch, pose.roll
-    if pitch or roll:
-        turn, pitch, roll = turned_in_surface(turn, pitch, roll)
-    return Pose(pose.x, pose.y, pose.z, wrap(pose.heading + turn), pitch, roll)
 
 
 def locate(network: RoadNetwork, pose: Pose, *, near: tuple[int, float] | None = None) -> Placement:

@@ -6,7 +6,7 @@ steps); its length is the drawbar's.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from math import atan2, cos, hypot, nan, pi, sin
 
 from xosc_lateral.playback.angles import wrap
@@ -31,27 +31,29 @@ def disconnect(tow: EntityState) -> None:
         tow.trailer = None
 
 
-def align_trailers(tow: EntityState) -> None:
+def drawn_by(front: EntityState) -> Iterator[tuple[EntityState, EntityState]]:
+    """All that hangs on a vehicle: each with what pulls it, from the front."""
+    while front.trailer is not None:
+        yield front, front.trailer
+        front = front.trailer
+
+
+def align_trailers(front: EntityState) -> None:
     """Put all trailers straight behind their tractor."""
-    front = tow
-    while (trailer := front.trailer) is not None:
-        pose = front.plane
-        reach = _hitch(front) - _coupler(trailer)
+    for tow, trailer in drawn_by(front):
+        pose = tow.plane
+        reach = _hitch(tow) - _coupler(trailer)
         trailer.put_in_world(free(pose.x + reach * cos(pose.heading), pose.y + reach * sin(pose.heading), pose.heading))
-        trailer.set_speed(tow.speed)
-        front = trailer
+        trailer.set_speed(front.speed)
 
 
 def pull_trailers(entities: Iterable[EntityState]) -> None:
     """Draw every trailer to where its hitch has gone: it turns so that its coupler is there."""
     for front in entities:
-        if front.tow is not None or front.trailer is None:
-            continue
-        tow = front
-        while (trailer := tow.trailer) is not None:
-            _pull(tow, trailer)
-            trailer.set_speed(tow.speed)
-            tow = trailer
+        if front.tow is None:
+            for tow, trailer in drawn_by(front):
+                _pull(tow, trailer)
+                trailer.set_speed(tow.speed)
 
 
 def _pull(tow: EntityState, trailer: EntityState) -> None:

@@ -9,6 +9,7 @@ The peaks are those of the derivatives, at p = c / 2: (6 / 4) b / c of the cubic
 
 from __future__ import annotations
 
+from dataclasses import InitVar, dataclass
 from math import copysign, cos, inf, pi, sin, sqrt
 
 from xosc_lateral.scenario.enums import DynamicsDimension, DynamicsShape
@@ -21,24 +22,30 @@ _PEAK_SLOPE = {DynamicsShape.LINEAR: 1.0, DynamicsShape.CUBIC: 1.5, DynamicsShap
 """Peak slope times c / |b|."""
 
 
+@dataclass(slots=True)
 class Transition:
     """A transition under way.
 
-    `dimension`: what the parameter is: seconds (`time`, `rate`) or metres (`distance`); `value`: range of the parameter
+    `dimension`: what the parameter is: seconds (`time`, `rate`) or metres (`distance`); `given`: range of the parameter
     (a step has none), or peak slope for `rate` (its sign does not matter).
     """
 
-    __slots__ = ("dimension", "parameter", "peak_rate", "range", "scale", "shape", "start", "target")
+    shape: DynamicsShape
+    dimension: DynamicsDimension
+    given: InitVar[float]
+    start: float = 0.0
+    target: float = 0.0
+    parameter: float = 0.0
+    scale: float = 1.0
+    peak_rate: float = 0.0
+    range: float = 0.0
 
-    def __init__(self, shape: DynamicsShape, dimension: DynamicsDimension, value: float) -> None:
-        self.shape = shape
-        self.dimension = dimension
-        self.start = 0.0
-        self.target = 0.0
-        self.parameter = 0.0
-        self.scale = 1.0
-        self.peak_rate = abs(value) if dimension is DynamicsDimension.RATE else 0.0
-        self.range = 0.0 if dimension is DynamicsDimension.RATE or shape is DynamicsShape.STEP else value
+    def __post_init__(self, given: float) -> None:
+        """Take the value as the dimension means it."""
+        if self.dimension is DynamicsDimension.RATE:
+            self.peak_rate = abs(given)
+        elif self.shape is not DynamicsShape.STEP:
+            self.range = given
 
     @classmethod
     def of(cls, dynamics: TransitionDynamics) -> Transition:

@@ -8,6 +8,7 @@ trigger was armed never gives an edge; a delayed condition looks at the history 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from math import inf
 
 from xosc_lateral.playback.transition import EPSILON
@@ -16,6 +17,7 @@ from xosc_lateral.scenario.enums import ConditionEdge
 Check = Callable[[], bool]
 
 
+@dataclass(slots=True, eq=False)
 class RunningCondition:
     """One condition: its present value, edge-filtered and delayed.
 
@@ -23,21 +25,16 @@ class RunningCondition:
     happened before its owner waits again.
     """
 
-    __slots__ = ("_armed", "_edge", "_forget", "_history", "_last", "_read", "_time", "_value", "check", "delay")
-
-    def __init__(
-        self, check: Check, edge: ConditionEdge, delay: float, forget: Callable[[], None] | None = None
-    ) -> None:
-        self.check = check
-        self.delay = delay
-        self._forget = forget
-        self._edge = edge
-        self._last = False
-        self._armed = False
-        self._history: list[tuple[float, bool]] = []
-        self._read = 0
-        self._time = -inf
-        self._value = False
+    check: Check
+    edge: ConditionEdge
+    delay: float
+    forget: Callable[[], None] | None = None
+    _last: bool = False
+    _armed: bool = False
+    _history: list[tuple[float, bool]] = field(default_factory=list)
+    _read: int = 0
+    _time: float = -inf
+    _value: bool = False
 
     def evaluate(self, time: float) -> bool:
         """Value at `time` [s]. At the same time again, as at time 0, the new value replaces the old one."""
@@ -61,11 +58,11 @@ class RunningCondition:
         self._history.clear()
         self._read = 0
         self._time = -inf
-        if self._forget is not None:
-            self._forget()
+        if self.forget is not None:
+            self.forget()
 
     def _filter(self, now: bool) -> bool:
-        edge = self._edge
+        edge = self.edge
         if edge is ConditionEdge.NONE:
             return now
         if not self._armed:
@@ -85,17 +82,15 @@ class RunningCondition:
         return any(value for _, value in changes)
 
 
+@dataclass(slots=True, eq=False)
 class RunningTrigger:
     """A trigger.
 
     `when_empty`: value of a trigger without groups: true for start, false for stop triggers.
     """
 
-    __slots__ = ("groups", "when_empty")
-
-    def __init__(self, groups: tuple[tuple[RunningCondition, ...], ...], *, when_empty: bool) -> None:
-        self.groups = groups
-        self.when_empty = when_empty
+    groups: tuple[tuple[RunningCondition, ...], ...]
+    when_empty: bool = field(kw_only=True)
 
     def evaluate(self, time: float) -> bool:
         """Whether it fires at `time`. [s]"""

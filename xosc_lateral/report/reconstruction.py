@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 FRAME = 0.1
 """Rows of the page's player. [s]"""
 VEHICLES = {
-    "entity": "entity", "class": "class", "from": "from [s]", "to": "to [s]", "corners": "changes of acceleration",
-    "lane_changes": "lane changes", "along_rms": "along, rms [m]", "along_largest": "along, largest [m]",
+    "entity": "entity", "recorded_as": "recorded as", "class": "class", "from": "from [s]", "to": "to [s]",
+    "corners": "changes of acceleration", "along_rms": "along, rms [m]", "along_largest": "along, largest [m]",
     "across_in_lane_rms": "across in lane, rms [m]", "across_in_maneuvers_rms": "across in maneuvers, rms [m]",
     "profile": "profile",
 }  # fmt: skip

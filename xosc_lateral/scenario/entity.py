@@ -53,11 +53,6 @@ class Axles(Struct, frozen=True):
     rear: Annotated[Axle | None, called("RearAxle")]
     additional: Annotated[tuple[Axle, ...], called("AdditionalAxle")] = ()
 
-    @property
-    def wheelbase(self) -> float | None:
-        """Distance from the rear to the front axle. [m]"""
-        return None if self.front is None or self.rear is None else self.front.position_x - self.rear.position_x
-
 
 class Controller(Struct, frozen=True):
     """A controller by name. It is named and reported; playback uses the default driver instead."""

@@ -16,7 +16,7 @@ from msgspec import Struct
 
 from xosc_lateral.formats.openscenario.catalogs import Boundary, Catalogs, allowed_roots
 from xosc_lateral.formats.openscenario.context import Context, read_struct
-from xosc_lateral.formats.openscenario.declarations import broken_constraint, declared_values, parameter_name
+from xosc_lateral.formats.openscenario.declarations import broken_constraint, declared_values, parameter_name, value_of
 from xosc_lateral.formats.openscenario.element import XmlElement
 from xosc_lateral.formats.openscenario.read import open_scenario, read_header
 from xosc_lateral.formats.xml import read_xml
@@ -35,7 +35,6 @@ from xosc_lateral.scenario.distribution import (
     ValueSets,
     Weighted,
 )
-from xosc_lateral.scenario.expressions import ExpressionError
 from xosc_lateral.scenario.parameters import Scope
 from xosc_lateral.scenario.place import Place
 
@@ -72,8 +71,7 @@ class LogicalScenario:
     def __post_init__(self) -> None:
         """Find what the scenario declares, and which of it is constrained."""
         self._declared = declared_values(self._scenario)
-        declarations = self._scenario.child("ParameterDeclarations")
-        found = declarations.children("ParameterDeclaration") if declarations else ()
+        found = self._scenario.listed("ParameterDeclarations", "ParameterDeclaration")
         self._constrained = [item for item in found if item.child("ConstraintGroup") is not None]
 
     def parameter_sets(self, seed: int = 0) -> Iterator[ParameterSet]:
@@ -133,21 +131,11 @@ class LogicalScenario:
             return True
         scope = Scope({**self._declared, **values})
         for declaration in self._constrained:
-            name = parameter_name(declaration.raw("name") or "")
-            try:
-                broken = broken_constraint(declaration.within(scope), scope.value(name))
-            except ExpressionError as error:
-                declaration.fail(f"value: {error}")
-            if broken:
+            item = declaration.within(scope)
+            if broken_constraint(item, value_of(item)):
                 self.discarded += 1
                 return False
         return True
-
-
-def is_distribution(path: Path | str) -> bool:
-    """Whether a file is a parameter value distribution."""
-    document, _ = read_xml(Path(path))
-    return open_scenario(document, Path(path)).child("ParameterValueDistribution") is not None
 
 
 def read_distribution(path: Path | str, *, allowed: Iterable[Path] = ()) -> LogicalScenario:

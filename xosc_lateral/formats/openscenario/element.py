@@ -54,6 +54,11 @@ class XmlElement:
             if isinstance(child.tag, str) and (not tags or local_name(child) in tags):
                 yield XmlElement(child, self.path, self.scope)
 
+    def listed(self, holder: str, tag: str) -> Iterator[XmlElement]:
+        """Elements of one tag in a child that holds them; none without it."""
+        owner = self.child(holder)
+        return iter(()) if owner is None else owner.children(tag)
+
     def child(self, *tags: str) -> XmlElement | None:
         """First child of one of these tags."""
         return next(self.children(*tags), None)

@@ -249,7 +249,4 @@ def read_controller(owner: XmlElement, context: Context) -> Controller | None:
 
 def read_properties(owner: XmlElement) -> dict[str, str]:
     """Name and value pairs of a ``Properties`` child."""
-    properties = owner.child("Properties")
-    if properties is None:
-        return {}
-    return {item.text("name", ""): item.text("value", "") for item in properties.children("Property")}
+    return {item.text("name", ""): item.text("value", "") for item in owner.listed("Properties", "Property")}

@@ -147,16 +147,12 @@ def read_scenario(
     if header.is_left_handed:
         remarks.append(Unsupported("FileHeader", root.place(), LEFT_HANDED))
     network = root.child("RoadNetwork")
-    logic, graph, signals = (
-        network.child(*tags) if network else None
-        for tags in (("LogicFile", "Logics"), ("SceneGraphFile",), ("TrafficSignals",))
-    )
+    logic = network.child("LogicFile", "Logics") if network else None
     written = logic.text("filepath", "") if logic else ""
     road_file = roads.file if network else None
     if road_file is None and logic and written.strip():
         road_file = _road_file(logic, written, boundary, remarks, roads)
-    scene_graph = graph.text("filepath", "") if graph else None
-    found = signals.children("TrafficSignalController") if signals else ()
+    found = network.listed("TrafficSignals", "TrafficSignalController") if network else ()
     controllers = tuple(read_struct(TrafficSignalController, one, context) for one in found)
     entities = read_entities(root, context)
     storyboard = read_struct(Storyboard, root.required("Storyboard"), context)
@@ -167,8 +163,6 @@ def read_scenario(
         variables=read_variables(root),
         catalog_locations={kind: path.parent / written for kind, (written, _) in locations.items()},
         road_file=road_file,
-        road_place=logic.place() if logic else None,
-        scene_graph_file=scene_graph,
         traffic_signal_controllers=controllers,
         entities=entities,
         storyboard=storyboard,

@@ -18,6 +18,7 @@ from msgspec import structs
 
 from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect, Linear
+from xosc_lateral.driver.seeds import generator
 from xosc_lateral.identification.dictionary import NULL_DRAWS, beside
 from xosc_lateral.identification.model import Description, Fitted, Outcome, Stage
 from xosc_lateral.identification.search import Search
@@ -44,6 +45,7 @@ class BetweenTerm(ColumnTerm):
     stages: ClassVar[tuple[Stage, ...]] = (Stage.BETWEEN_DRIVES,)
     weight: ClassVar[float] = 5.0
     seen_held_out: ClassVar[bool] = False
+    within_drives: ClassVar[bool] = False
     acts: ClassVar[Acts] = Acts.LOCATION
     what: ClassVar[str] = "place that a drive keeps"
     group: ClassVar[str] = "mean"
@@ -75,7 +77,7 @@ class BetweenTerm(ColumnTerm):
             np.stack(usual, axis=1),
             np.array([candidate.cost for candidate in candidates]),
             [candidate.columns[0] for candidate in candidates],
-            search.rng(LoopSeed.BETWEEN),
+            generator(search.seed, LoopSeed.BETWEEN),
         )
         terms = [cls.of(structs.replace(candidates[index].effect, lag_s=0.0, response_s=USUAL_S)) for index in members]
         return Outcome(terms[0], tuple(term.columns[0] for term in terms), p_value, together=tuple(terms[1:]))

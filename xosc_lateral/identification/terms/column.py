@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
@@ -9,14 +10,13 @@ import numpy as np
 from msgspec import structs
 
 from xosc_lateral.arrays import FloatArray
-from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
+from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect, Linear, Piecewise, Saturating, Threshold
 from xosc_lateral.identification.model import Description, Fitted, Removal, Term
 from xosc_lateral.identification.refinement import Alternatives
 from xosc_lateral.identification.timeline import Coarse
-from xosc_lateral.identification.timing import span
 
 # Responses between which a factor on the movement is believed; the report tells its size between the same. [-]
-FACTOR_QUANTILES = (0.05, 0.95)
+DRIVING_QUANTILES = (0.05, 0.95)
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +26,7 @@ class ColumnTerm(Term):
     acts: ClassVar[Acts]
     what: ClassVar[str]  # What it acts on, in words.
     group: ClassVar[str] = "spread"  # Mean or spread: which summary statistics show it.
+    within_drives: ClassVar[bool] = True  # Whether it acts by what changes within drives.
     effect: ColumnEffect  # Without coefficients.
     alike: Alternatives = ()
 
@@ -81,7 +82,7 @@ class ColumnTerm(Term):
         least, most = response.min(axis=0), response.max(axis=0)
         if self.acts is Acts.LOCATION:
             return least, most
-        low, high = np.quantile(response, FACTOR_QUANTILES, axis=0)
+        low, high = np.quantile(response, DRIVING_QUANTILES, axis=0)
         varies = high > low  # not so for a switch that is hardly ever on
         return np.where(varies, low, least), np.where(varies, high, most)
 
@@ -120,3 +121,43 @@ def columns_on_size(fitted: Fitted) -> frozenset[str]:
     """Columns that act on the movement's size."""
     terms = [one for one in fitted.terms if isinstance(one, ColumnTerm) and one.acts is not Acts.LOCATION]
     return frozenset(name for term in terms for name in term.columns)
+
+
+def driving_range(coarse: Coarse, effect: ColumnEffect) -> tuple[FloatArray, FloatArray]:
+    """Quantity [own unit] at the low and at the high end of what drives the effect, shape (k,) each.
+
+    That is the 5 % and the 95 % quantile while road-following: of the column, where a single number drives it; of the
+    product; of the strength, for angles and levels. The extremes where both quantiles are the same (a switch that is on
+    for less than 5 % of the time).
+    """
+    inside = coarse.timeline.valid
+    if isinstance(effect, Linear | Threshold | Saturating | Piecewise):
+        seen = coarse.context[effect.column][inside]
+        ends = _ends(seen[np.isfinite(seen)])
+        low, high = effect.quantity({effect.column: ends})
+        if np.any(low != high):
+            return low, high
+    quantity = effect.seen({column: coarse.context[column][inside] for column in effect.columns})
+    quantity = quantity[np.isfinite(quantity).all(axis=1)]
+    if quantity.shape[1] == 1:
+        low, high = _ends(quantity[:, 0])
+        return np.array([low]), np.array([high])
+    return _by_strength(quantity, effect.coefficients)
+
+
+def _by_strength(quantity: FloatArray, coefficients: Sequence[float]) -> tuple[FloatArray, FloatArray]:
+    """Rows of the weak and of the strong end, shape (k,) each. [own unit]"""
+    order = np.argsort(quantity @ np.asarray(coefficients))
+    low, high = (min(len(order) - 1, int(share * len(order))) for share in DRIVING_QUANTILES)
+    return quantity[order[low]], quantity[order[high]]
+
+
+def span(coarse: Coarse, effect: ColumnEffect) -> float:
+    """Change of strength between the two ends of the driving range; [m] or natural logarithm."""
+    low, high = driving_range(coarse, effect)
+    return float((high - low) @ np.asarray(effect.coefficients))
+
+
+def _ends(values: FloatArray) -> FloatArray:
+    low, high = np.quantile(values, DRIVING_QUANTILES)
+    return np.array([low, high] if high > low else [values.min(), values.max()])

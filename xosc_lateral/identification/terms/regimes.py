@@ -21,6 +21,7 @@ import numpy as np
 
 from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.driver.effects import Effect, Regimes
+from xosc_lateral.driver.seeds import generator
 from xosc_lateral.identification.dictionary import beside, in_another_order
 from xosc_lateral.identification.model import Description, Fitted, Outcome, Removal, Stage, Term
 from xosc_lateral.identification.search import Search
@@ -135,7 +136,7 @@ class RegimesTerm(Term):
         # what a column does to the size in another shape than the one that was found is no regime
         columns = what_columns_do(search, fitted), what_a_column_may_do(search, fitted)[0]
         known = np.concatenate([known_log_scale(fitted), *columns], axis=1)
-        squares, rng = quick_squares(fitted).standardised, search.rng(LoopSeed.REGIMES)
+        squares, rng = quick_squares(fitted).standardised, generator(search.seed, LoopSeed.REGIMES)
         p_value = probability_of_persistence(squares, coarse.valid, known, rng)
         return Outcome(cls(fit_regimes(fitted.innovations, coarse.valid)), (), p_value)
 

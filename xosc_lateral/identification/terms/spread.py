@@ -155,7 +155,7 @@ class FineNoiseTerm(SearchedTerm):
     @classmethod
     def barred(cls, fitted: Fitted) -> frozenset[str]:
         """What acts within drives already: what its shape leaves of itself looks like noise."""
-        terms = [one for one in fitted.terms if isinstance(one, ColumnTerm) and one.component != "between"]
+        terms = [one for one in fitted.terms if isinstance(one, ColumnTerm) and one.within_drives]
         return frozenset(name for term in terms for name in term.columns)
 
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:

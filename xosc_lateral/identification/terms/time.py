@@ -18,6 +18,7 @@ import numpy as np
 
 from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import Effect, Step, TimeSmooth
+from xosc_lateral.driver.seeds import generator
 from xosc_lateral.identification.low_frequencies import (
     MEAN_SHORTEST_S,
     ORDERS,
@@ -51,6 +52,11 @@ class _MeanByTime(Term):
 
     component: ClassVar[str] = "time_mean"
     weight: ClassVar[float] = 3.0
+
+    @property
+    def kind_key(self) -> str:
+        """Two kinds share the component."""
+        return self.kind
 
     def probability_beside(self, search: Search, fitted: Fitted) -> float:
         """p-value of the mean by time, whichever of the two it looks like beside the terms fitted."""
@@ -89,7 +95,7 @@ class StepTerm(_MeanByTime):
         slow, waves, jumps = (
             low_frequencies(one, coarse, coarse.valid, MEAN_SHORTEST_S) for one in (rows[:, None], waves, jumps)
         )
-        p_value = mean_probability(slow[:, 0], waves, jumps, search.rng(LoopSeed.LOW_FREQUENCY))
+        p_value = mean_probability(slow[:, 0], waves, jumps, generator(search.seed, LoopSeed.LOW_FREQUENCY))
         if not len(moments):
             return Outcome(TimeMeanTerm(), (), p_value)
         unit = jumps / np.maximum(np.linalg.norm(jumps, axis=0), 1e-12)

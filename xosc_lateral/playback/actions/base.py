@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import IntFlag
-from typing import Any
+from functools import partial
+from typing import Any, TypeAlias
 
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.playback.simulation import Simulation
@@ -98,12 +100,36 @@ class RunningAction(StoryboardElement):
 
     def _refuse(self, what: str) -> None:
         """When it begins: say why nothing is done; it ends with its first step."""
-        self._note(what)
+        self.note(what)
         self._is_refused = True
 
-    def _note(self, what: str) -> None:
+    def note(self, what: str) -> None:
         """Say that something was not played, or not as written."""
         self.simulation.note(what, self.content.place)
+
+
+class AtOnce(RunningAction):
+    """All of it is done when it starts; its end is that of its first step, unless it ends itself."""
+
+    def __init__(self, do: Do, domains: Domain, *played: Any) -> None:
+        super().__init__(*played)
+        self.domains = domains
+        self._do = do
+
+    def _begin(self) -> None:
+        self._do(self.content, self)
+
+
+Do: TypeAlias = Callable[[Any, AtOnce], None]
+"""What an action does at once, from its content."""
+
+Maker: TypeAlias = Callable[[Action, EntityState | None, Simulation], RunningAction]
+"""Makes an action ready to run, of what a file says, who acts and where."""
+
+
+def at_once(do: Do, domains: Domain = Domain.NONE) -> Maker:
+    """An action of which all is done when it starts."""
+    return partial(AtOnce, do, domains)
 
 
 class RunningPrivateAction(RunningAction):

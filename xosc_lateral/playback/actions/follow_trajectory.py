@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import copysign, cos, hypot, pi, sin
 
 from xosc_lateral.motion.nominal import Activity
-from xosc_lateral.playback.actions.base import Domain, RunningAction, RunningPrivateAction
+from xosc_lateral.playback.actions.base import Domain, Maker, RunningPrivateAction
 from xosc_lateral.playback.angles import HALF_PI, difference
 from xosc_lateral.playback.paths.base import PathPoint, PathProgress
 from xosc_lateral.playback.paths.registry import duration, path_of
@@ -37,7 +37,7 @@ class RunningFollowTrajectory(RunningPrivateAction):
         path = path_of(content.trajectory, self.simulation, pose_of, follower=state, follow=follow, speed=state.speed)
         self._path = path
         if content.timing is not None and not self._is_timed:
-            self._note(f"trajectory '{content.trajectory.name}' has no times: followed with the entity's own speed")
+            self.note(f"trajectory '{content.trajectory.name}' has no times: followed with the entity's own speed")
         self._s = min(max(content.initial_distance_offset, 0.0), path.length)
         point = path.at(self._s)
         self._time = path.time_at(self._s) if self._is_timed else 0.0
@@ -104,7 +104,7 @@ class RunningFollowTrajectory(RunningPrivateAction):
         before, self._s = self._s, path.s_at(self._clock)
         if self._is_first and timing.domain is ReferenceContext.ABSOLUTE:
             if clock > path.end_time + EPSILON and step > 0.0:
-                self._note(
+                self.note(
                     f"the times of trajectory '{self.content.trajectory.name}' are over when it starts: "
                     f"'{state.name}' is put where its speed would have taken it since"
                 )
@@ -147,4 +147,4 @@ def _way(heading: float, point: PathPoint) -> float:
     return -1.0 if abs(difference(heading, point.tangent)) > HALF_PI + EPSILON else 1.0
 
 
-RUNNING: dict[type, type[RunningAction]] = {FollowTrajectoryAction: RunningFollowTrajectory}
+RUNNING: dict[type, Maker] = {FollowTrajectoryAction: RunningFollowTrajectory}

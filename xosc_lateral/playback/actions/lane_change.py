@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import atan, atan2, copysign, inf, pi, sqrt
 
 from xosc_lateral.motion.nominal import Activity
-from xosc_lateral.playback.actions.base import Domain, RunningAction, RunningPrivateAction
+from xosc_lateral.playback.actions.base import Domain, Maker, RunningPrivateAction
 from xosc_lateral.playback.drive import move_along_lane
 from xosc_lateral.playback.positions.resolve import beside
 from xosc_lateral.playback.state import NOWHERE, EntityState
@@ -139,4 +139,4 @@ class RunningLaneChange(RunningPrivateAction):
         return abs(rest) < EPSILON or (transition.parameter > 0.0 and rest < 0.0)
 
 
-RUNNING: dict[type, type[RunningAction]] = {LaneChangeAction: RunningLaneChange}
+RUNNING: dict[type, Maker] = {LaneChangeAction: RunningLaneChange}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import atan, pi
 
 from xosc_lateral.motion.nominal import Activity
-from xosc_lateral.playback.actions.base import Domain, RunningAction, RunningPrivateAction
+from xosc_lateral.playback.actions.base import Domain, Maker, RunningPrivateAction
 from xosc_lateral.playback.state import NOWHERE
 from xosc_lateral.playback.transition import EPSILON, Transition
 from xosc_lateral.scenario.enums import DynamicsDimension, DynamicsShape
@@ -41,7 +41,7 @@ class RunningLaneOffset(RunningPrivateAction):
         if limit is None:
             limit = DEFAULT_LATERAL_ACCELERATION
             if self.content.shape is not DynamicsShape.STEP:
-                self._note(f"no maxLateralAcc: played with {limit:g} m/s2")
+                self.note(f"no maxLateralAcc: played with {limit:g} m/s2")
         transition.range = transition.range_for_curvature(limit)
         self._forward = state.is_forward
 
@@ -79,4 +79,4 @@ class RunningLaneOffset(RunningPrivateAction):
         return value
 
 
-RUNNING: dict[type, type[RunningAction]] = {LaneOffsetAction: RunningLaneOffset}
+RUNNING: dict[type, Maker] = {LaneOffsetAction: RunningLaneOffset}

@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import acos, atan2, copysign, cos, hypot, inf, pi, sin, sqrt
 
 from xosc_lateral.motion.nominal import Activity
-from xosc_lateral.playback.actions.base import Domain, RunningAction, RunningPrivateAction
+from xosc_lateral.playback.actions.base import Domain, Maker, RunningPrivateAction
 from xosc_lateral.playback.angles import difference
 from xosc_lateral.playback.distances import ahead_and_left, road_gap, spot_of
 from xosc_lateral.playback.drive import move_along_lane
@@ -235,7 +235,7 @@ class RunningLateralDistance(RunningPrivateAction):
         limits = content.constraints or DynamicConstraints()
         self._way = (BesideOnRoad if on_road else BesideEntity)(state, other, self._wanted(), limits)
         if not on_road and limits.max_speed is not None:
-            self._note("maxSpeed of a lateral distance in the entity's frame is not played (maxAcceleration is)")
+            self.note("maxSpeed of a lateral distance in the entity's frame is not played (maxAcceleration is)")
 
     def _act(self, time: float, step: float) -> None:
         state, way = self.actor, self._way
@@ -265,4 +265,4 @@ class RunningLateralDistance(RunningPrivateAction):
         return -abs(wanted) if content.displacement is LateralDisplacement.RIGHT else abs(wanted)
 
 
-RUNNING: dict[type, type[RunningAction]] = {LateralDistanceAction: RunningLateralDistance}
+RUNNING: dict[type, Maker] = {LateralDistanceAction: RunningLateralDistance}

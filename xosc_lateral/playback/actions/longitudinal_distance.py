@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import inf, sqrt
 
-from xosc_lateral.playback.actions.base import Domain, RunningAction, RunningPrivateAction
+from xosc_lateral.playback.actions.base import Domain, Maker, RunningPrivateAction
 from xosc_lateral.playback.actions.speed_profile import limits_of
 from xosc_lateral.playback.distances import Measure, ahead_and_left
 from xosc_lateral.playback.drive import drive
@@ -51,7 +51,7 @@ class RunningLongitudinalDistance(RunningPrivateAction):
         state, other = self.actor, self._other
         distance = self._distance()
         if distance is None:
-            self._note(f"no way from '{state.name}' to '{other.name}': the distance is not kept")
+            self.note(f"no way from '{state.name}' to '{other.name}': the distance is not kept")
             self.end()
             return
         rest = distance - self._wanted()
@@ -104,4 +104,4 @@ def _grown(rate: float, step: float) -> float:
     return 0.0 if step <= 0.0 else rate * step
 
 
-RUNNING: dict[type, type[RunningAction]] = {LongitudinalDistanceAction: RunningLongitudinalDistance}
+RUNNING: dict[type, Maker] = {LongitudinalDistanceAction: RunningLongitudinalDistance}

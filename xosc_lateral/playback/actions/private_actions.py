@@ -1,14 +1,14 @@
-"""Private actions that are done at once: teleport, routes, controllers, trailers, appearance."""
+"""Private actions that are done at once, or only take time: teleport, routes, controllers, trailers, lights."""
 
 from __future__ import annotations
 
 from xosc_lateral.motion.nominal import Activity
-from xosc_lateral.playback.actions.base import Domain, RunningAction, RunningPrivateAction
+from xosc_lateral.playback.actions.base import AtOnce, Domain, Maker, RunningPrivateAction, at_once
+from xosc_lateral.playback.actions.global_actions import recorded
 from xosc_lateral.playback.positions.resolve import resolve, route_guide
 from xosc_lateral.playback.state import guide
 from xosc_lateral.playback.trailers import align_trailers, connect, disconnect
 from xosc_lateral.scenario.enums import RouteStrategy
-from xosc_lateral.scenario.global_actions import SetMonitorAction, UserDefinedAction
 from xosc_lateral.scenario.private_actions import (
     AcquirePositionAction,
     ActivateControllerAction,
@@ -24,91 +24,63 @@ from xosc_lateral.scenario.private_actions import (
 )
 
 
-class RunningTeleport(RunningPrivateAction):
-    """Takes effect when it starts. A towed vehicle stays behind its tractor."""
-
-    domains = Domain.BOTH
-    content: TeleportAction
-
-    def _begin(self) -> None:
-        state = self.actor
-        place = resolve(self.content.position, self.simulation, route=state.route)
-        if state.tow is not None:
-            self._note(f"'{state.name}' is towed by '{state.tow.name}': it is not teleported")
-            return
-        state.put(place)
-        state.teleported = True
-        state.longitudinal_taken = state.speed_taken = True
-        state.activity |= Activity.TELEPORTED
-        align_trailers(state)
+def teleport(content: TeleportAction, action: AtOnce) -> None:
+    """To a place, with all trailers. A towed vehicle stays behind its tractor."""
+    state = action.actor
+    place = resolve(content.position, action.simulation, route=state.route)
+    if state.tow is not None:
+        action.note(f"'{state.name}' is towed by '{state.tow.name}': it is not teleported")
+        return
+    state.put(place)
+    state.teleported = True
+    state.longitudinal_taken = state.speed_taken = True
+    state.activity |= Activity.TELEPORTED
+    align_trailers(state)
 
 
-class RunningAssignRoute(RunningPrivateAction):
-    """The route holds until another one is assigned; the action itself is over at once."""
-
-    content: AssignRouteAction
-
-    def _begin(self) -> None:
-        others = {waypoint.strategy for waypoint in self.content.route.waypoints} - {RouteStrategy.SHORTEST}
-        if others:
-            self._note(f"routeStrategy {', '.join(sorted(others))}: the shortest way is taken")
-        route = route_guide(self.content.route, self.simulation)
-        if route is None:
-            self._note(f"no way leads along route '{self.content.route.name}': it is not followed")
-        self.actor.route = route
+def assign_route(content: AssignRouteAction, action: AtOnce) -> None:
+    """The route holds until another one is assigned."""
+    others = {waypoint.strategy for waypoint in content.route.waypoints} - {RouteStrategy.SHORTEST}
+    if others:
+        action.note(f"routeStrategy {', '.join(sorted(others))}: the shortest way is taken")
+    action.actor.route = route_guide(content.route, action.simulation)
+    if action.actor.route is None:
+        action.note(f"no way leads along route '{content.route.name}': it is not followed")
 
 
-class RunningAcquirePosition(RunningPrivateAction):
+def acquire_position(content: AcquirePositionAction, action: AtOnce) -> None:
     """The shortest way from here to there becomes the route; nothing stops the entity there."""
-
-    domains = Domain.LONGITUDINAL
-    """As in the reference player: an action on speed or distance ends when it begins."""
-    content: AcquirePositionAction
-
-    def _begin(self) -> None:
-        state = self.actor
-        state.locate()
-        route = guide(self.simulation.network, [state.place, resolve(self.content.position, self.simulation)])
-        if route is None:
-            self._note("no way leads to the position: it is not acquired")
-        state.route = route
+    state = action.actor
+    state.locate()
+    state.route = guide(state.network, [state.place, resolve(content.position, action.simulation)])
+    if state.route is None:
+        action.note("no way leads to the position: it is not acquired")
 
 
-class RunningController(RunningPrivateAction):
-    """Assigning, activating or overriding a controller changes nothing here; it is over at once."""
+def controller(
+    content: ActivateControllerAction | AssignControllerAction | OverrideControllerValueAction, action: AtOnce
+) -> None:
+    """Assigning, activating or overriding a controller changes nothing here: the default driver drives."""
+    name = ""
+    if isinstance(content, AssignControllerAction) and content.controller is not None:
+        name = f" '{content.controller.name}'"
+    action.note(f"controller{name} of '{action.actor.name}': the default driver drives instead")
+    action.end()
 
-    def _begin(self) -> None:
-        name = ""
-        if isinstance(self.content, AssignControllerAction) and self.content.controller is not None:
-            name = f" '{self.content.controller.name}'"
-        self._note(f"controller{name} of '{self.actor.name}': the default driver drives instead")
-        self.end()
 
-
-class RunningConnectTrailer(RunningPrivateAction):
+def connect_trailer(content: ConnectTrailerAction, action: AtOnce) -> None:
     """Hitch a trailer; one that hangs on already is left behind."""
-
-    content: ConnectTrailerAction
-
-    def _begin(self) -> None:
-        trailer = self.simulation.entity(self.content.trailer_ref, self.content.place)
-        if trailer is self.actor.trailer:
-            return
-        disconnect(self.actor)
-        connect(self.actor, trailer)
+    trailer = action.simulation.entity(content.trailer_ref, content.place)
+    if trailer is not action.actor.trailer:
+        disconnect(action.actor)
+        connect(action.actor, trailer)
 
 
-class RunningDisconnectTrailer(RunningPrivateAction):
+def disconnect_trailer(content: DisconnectTrailerAction, action: AtOnce) -> None:
     """Leave the trailer where it is."""
-
-    def _begin(self) -> None:
-        if self.actor.trailer is None:
-            self._note(f"'{self.actor.name}' has no trailer")
-        disconnect(self.actor)
-
-
-class RunningAppearance(RunningAction):
-    """Over at once; the start is recorded like that of every action."""
+    if action.actor.trailer is None:
+        action.note(f"'{action.actor.name}' has no trailer")
+    disconnect(action.actor)
 
 
 class RunningForTime(RunningPrivateAction):
@@ -128,18 +100,17 @@ class RunningForTime(RunningPrivateAction):
         self._left -= step
 
 
-RUNNING: dict[type, type[RunningAction]] = {
-    TeleportAction: RunningTeleport,
-    AcquirePositionAction: RunningAcquirePosition,
-    AssignRouteAction: RunningAssignRoute,
-    ActivateControllerAction: RunningController,
-    AssignControllerAction: RunningController,
-    OverrideControllerValueAction: RunningController,
-    ConnectTrailerAction: RunningConnectTrailer,
-    DisconnectTrailerAction: RunningDisconnectTrailer,
+RUNNING: dict[type, Maker] = {
+    TeleportAction: at_once(teleport, Domain.BOTH),
+    # as in the reference player: an action on speed or distance ends when it begins
+    AcquirePositionAction: at_once(acquire_position, Domain.LONGITUDINAL),
+    AssignRouteAction: at_once(assign_route),
+    ActivateControllerAction: at_once(controller),
+    AssignControllerAction: at_once(controller),
+    OverrideControllerValueAction: at_once(controller),
+    ConnectTrailerAction: at_once(connect_trailer),
+    DisconnectTrailerAction: at_once(disconnect_trailer),
     AnimationAction: RunningForTime,
     LightStateAction: RunningForTime,
-    SetMonitorAction: RunningAppearance,
-    UserDefinedAction: RunningAppearance,
-    VisibilityAction: RunningAppearance,
+    VisibilityAction: at_once(recorded),
 }

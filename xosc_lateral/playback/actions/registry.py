@@ -14,12 +14,12 @@ from xosc_lateral.playback.actions import (
     speed_profile,
     synchronize,
 )
-from xosc_lateral.playback.actions.base import RunningAction
+from xosc_lateral.playback.actions.base import Maker, RunningAction
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.scenario import Action
 
-RUNNING: dict[type, type[RunningAction]] = {
+RUNNING: dict[type, Maker] = {
     **follow_trajectory.RUNNING,
     **global_actions.RUNNING,
     **lane_change.RUNNING,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import copysign
 
-from xosc_lateral.playback.actions.base import Domain, RunningAction, RunningPrivateAction
+from xosc_lateral.playback.actions.base import Domain, Maker, RunningPrivateAction
 from xosc_lateral.playback.transition import EPSILON, Transition
 from xosc_lateral.scenario.enums import DynamicsDimension, SpeedTargetValueType
 from xosc_lateral.scenario.private_actions import (
@@ -106,4 +106,4 @@ def duration_of(start: float, target: float, distance: float) -> float:
     return 2.0 * distance / abs(start + target)
 
 
-RUNNING: dict[type, type[RunningAction]] = {SpeedAction: RunningSpeed}
+RUNNING: dict[type, Maker] = {SpeedAction: RunningSpeed}

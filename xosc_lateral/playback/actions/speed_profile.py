@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 from msgspec.structs import asdict
 
-from xosc_lateral.playback.actions.base import Domain, RunningAction, RunningPrivateAction
+from xosc_lateral.playback.actions.base import Domain, Maker, RunningPrivateAction
 from xosc_lateral.playback.transition import EPSILON
 from xosc_lateral.scenario import Performance
 from xosc_lateral.scenario.enums import FollowingMode
@@ -177,7 +177,7 @@ class RunningSpeedProfile(RunningPrivateAction):
         state = self.actor
         offset = 0.0 if self._reference is None else self._reference.speed
         if self._reference is not None:
-            self._note(f"speeds are relative to that of '{self.content.entity_ref}' as it is now: {offset:.2f} m/s")
+            self.note(f"speeds are relative to that of '{self.content.entity_ref}' as it is now: {offset:.2f} m/s")
         limits = limits_of(self.content.constraints, state.entity.performance)
         self._current = 0
         self._pieces = self._targets(offset, limits)
@@ -186,10 +186,10 @@ class RunningSpeedProfile(RunningPrivateAction):
             try:
                 self._pieces, why_straight = follow(self._pieces, acceleration, limits)
             except NoSolutionError as error:
-                self._note(f"{error}: played as straight lines between the speeds")
+                self.note(f"{error}: played as straight lines between the speeds")
                 return
             if why_straight:
-                self._note(f"{why_straight}: played as straight lines between the speeds from there on")
+                self.note(f"{why_straight}: played as straight lines between the speeds from there on")
 
     def _act(self, time: float, step: float) -> None:
         state, pieces = self.actor, self._pieces
@@ -227,4 +227,4 @@ class RunningSpeedProfile(RunningPrivateAction):
         return [Piece(t, v, k) for (t, v), k in zip(points, (*slopes, 0.0), strict=True)]
 
 
-RUNNING: dict[type, type[RunningAction]] = {SpeedProfileAction: RunningSpeedProfile}
+RUNNING: dict[type, Maker] = {SpeedProfileAction: RunningSpeedProfile}

@@ -9,7 +9,7 @@ from __future__ import annotations
 from enum import Enum
 from math import copysign, cos, inf, sin, sqrt
 
-from xosc_lateral.playback.actions.base import Domain, RunningAction, RunningPrivateAction
+from xosc_lateral.playback.actions.base import Domain, Maker, RunningPrivateAction
 from xosc_lateral.playback.actions.speed import relative_to
 from xosc_lateral.playback.angles import is_forward
 from xosc_lateral.playback.distances import FAR, Spot, ahead_and_left, apart, road_gap
@@ -215,4 +215,4 @@ def _two_accelerations(now: float, final: float, s: float, t: float) -> tuple[fl
     return 0.0, 0.0
 
 
-RUNNING: dict[type, type[RunningAction]] = {SynchronizeAction: RunningSynchronize}
+RUNNING: dict[type, Maker] = {SynchronizeAction: RunningSynchronize}

@@ -96,11 +96,8 @@ def prepare_stand_still(content: StandStillCondition, simulation: Simulation) ->
 def prepare_end_of_road(content: EndOfRoadCondition, simulation: Simulation) -> EntityCheck:
     """At the end of its road for at least the duration. [s]"""
     simulation.derives_states = True
-
-    def check_since(since: float | None) -> bool:
-        return since is not None and simulation.time - since >= content.duration - EPSILON
-
-    return lambda state: check_since(state.road_end_since)
+    least = content.duration - EPSILON
+    return lambda state: state.road_end_since is not None and simulation.time - state.road_end_since >= least
 
 
 def prepare_offroad(content: OffroadCondition, simulation: Simulation) -> EntityCheck:

@@ -74,6 +74,8 @@ def write_lane_offset_scenario(
 ) -> WrittenScenario:
     """Write the scenario with its maneuvers as they are and lane offset actions added.
 
+    `output`, `provenance`, `summary`, `save`, `target`, and what is raised: see `write_trajectory_scenario`.
+
     Parameters
     ----------
     scenario : Scenario
@@ -82,28 +84,10 @@ def write_lane_offset_scenario(
         The run: says which lateral action comes before and after each chain.
     chains : sequence of OffsetChain
         In order of time for each entity.
-    output : path
-    provenance : mapping
-        JSON values: goes into the file as it is.
-    summary : str
-        A few words of it for the file header's description.
-    save : bool
-        Write it; else the bytes are only handed back.
-    target : TargetPlayer
-        Player and version that it is made for.
     trajectories : mapping of str to WorldTrajectory, optional
         Entities that follow trajectories in place of their maneuvers: none that a chain is for.
     depends : Dependence, optional
         What depends on vehicles under test.
-
-    Raises
-    ------
-    FormatError
-        The scenario was converted before, or can't be expressed for the target.
-    OSError
-        The output can't be written; nothing is left half-written.
-    ValueError
-        A chain holds NaN.
     """
     draft = Draft(scenario, motion, target)
     moving = moving_entities(draft, trajectories or {})
@@ -177,8 +161,9 @@ class _Acts:
                 self._start_after(act, self._by_path[cause])
             else:
                 self._start_when_faster(act, before)
-            ring = self._go_round(events, chain) if _may_go_round(chain) else False
-            clocked = ring and k + 1 < len(chains) and self._is_clocked(chains[k + 1])
+            if _may_go_round(chain):
+                self._go_round(events, chain)
+            clocked = _may_go_round(chain) and k + 1 < len(chains) and self._is_clocked(chains[k + 1])
             following = f"{CHAIN} {len(self._story) + 1}" if clocked else None
             self._stop(act, {played.path for played in before}, following)
             self._last[cause] = self._last[None] = str(act.get("name"))
@@ -223,12 +208,12 @@ class _Acts:
             elif is_clocked:
                 build.time_trigger(event, "StartTrigger", max(ramp.start, PLACED), self._version)
             else:
-                group = build.sub(build.sub(event, "StartTrigger"), "ConditionGroup")
+                group = build.sub(event, "StartTrigger/ConditionGroup")
                 build.state_condition(group, "act", name, "runningState", max(ramp.start - begin, FIRST))
             events.append(event)
         return act, events
 
-    def _go_round(self, events: Sequence[etree._Element], chain: OffsetChain) -> bool:
+    def _go_round(self, events: Sequence[etree._Element], chain: OffsetChain) -> None:
         """After the last event one leads back to where the first did, unless the car is about to be too slow."""
         first, second, last = ramps(chain)[0], ramps(chain)[1], ramps(chain)[-1]
         name = str(events[0].get("name")).rpartition(".")[0]
@@ -239,7 +224,6 @@ class _Acts:
         _add_link(events[1].findall("StartTrigger")[0], back, second.start - first.end)
         for event in (*events[1:], back):
             event.set("maximumExecutionCount", str(TURNS))
-        return True
 
     def _start_after(self, act: etree._Element, item: LateralAction) -> None:
         """When it ends, not when it is stopped midway: who is keeps his heading."""
@@ -257,7 +241,7 @@ class _Acts:
 
     def _start_when_faster(self, act: etree._Element, before: Sequence[PlayedAction]) -> None:
         """Again, if it was fast enough before."""
-        group = build.sub(build.sub(act, "StartTrigger"), "ConditionGroup")
+        group = build.sub(act, "StartTrigger/ConditionGroup")
         if None in self._last:
             build.state_condition(group, "act", self._last[None], "completeState", 0.0)
         elif before and not (item := self._by_path[before[-1].path]).repeats:

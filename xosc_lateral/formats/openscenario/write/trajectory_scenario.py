@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ from lxml import etree
 from xosc_lateral.formats.openscenario.element import child_of
 from xosc_lateral.formats.openscenario.write import build
 from xosc_lateral.formats.openscenario.write.carla import add_drives, start_of
-from xosc_lateral.formats.openscenario.write.draft import Draft, WrittenScenario
+from xosc_lateral.formats.openscenario.write.draft import Draft, WrittenScenario, source_of
 from xosc_lateral.formats.openscenario.write.entities import remove_controllers, rewrite_init
 from xosc_lateral.formats.openscenario.write.fit import finish
 from xosc_lateral.formats.openscenario.write.moving import Moving, add_trajectories, moving_entities
@@ -22,13 +22,15 @@ from xosc_lateral.formats.openscenario.write.non_motion_actions import (
     note_dropped,
 )
 from xosc_lateral.formats.openscenario.write.target import STANDARD, Player, TargetPlayer
+from xosc_lateral.formats.openscenario.write.versions import newer_than
+from xosc_lateral.formats.xml import parse_xml
 from xosc_lateral.motion.nominal import NominalMotion, PlayedAction
 from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.scenario import Scenario
 from xosc_lateral.scenario.conditions import SimulationTimeCondition
 from xosc_lateral.scenario.dependence import conditions_of
 from xosc_lateral.scenario.global_actions import AddEntityAction
-from xosc_lateral.scenario.private_actions import ConnectTrailerAction
+from xosc_lateral.scenario.private_actions import MOTION, ConnectTrailerAction
 
 STORY = "xosc-lateral"
 TRAILERS_SINCE = (1, 3)
@@ -154,3 +156,34 @@ def _replace_stop_trigger(draft: Draft) -> None:
         draft.storyboard.remove(old)
     trigger = build.time_trigger(etree.Element("holder"), "StopTrigger", draft.motion.end_time, draft.version)
     build.insert_indented(draft.storyboard, len(draft.storyboard), trigger)
+
+
+def motion_unknown_to(
+    version: build.Version, scenario: Scenario, motion: NominalMotion, entities: Collection[str]
+) -> dict[str, str]:
+    """Entities with a maneuver that a version does not know, and which.
+
+    Parameters
+    ----------
+    version : Version
+    scenario : Scenario
+    motion : NominalMotion
+        Its run.
+    entities : collection of str
+        Those to look at.
+    """
+    if version >= scenario.header.version:
+        return {}
+    root = parse_xml(scenario.source, scenario.path)
+    found: dict[str, str] = {}
+    for played in motion.actions:
+        actor, content = played.actor, played.action.content
+        if actor is None or actor not in entities or actor in found or not isinstance(content, MOTION):
+            continue
+        what = newer_than(source_of(played.action, scenario, root), version)
+        if what is not None:
+            found[actor] = f"version {build.named(version)} has no {what}"
+    if version < TRAILERS_SINCE:
+        trailers = sorted(pulled_entities(scenario, motion) & set(entities))
+        found |= dict.fromkeys(trailers, f"version {build.named(version)} has no Trailer")
+    return found
