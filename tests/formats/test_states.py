@@ -14,6 +14,7 @@ from tests.playback.stage import Stage, after, event, lane_change, maneuvers, on
 from xosc_lateral.formats.states import COLUMNS, states_csv, states_frame
 from xosc_lateral.motion.nominal import Activity, NominalMotion
 from xosc_lateral.road import RoadNetwork
+from xosc_lateral.road.surface import HeaderOffset
 
 
 def table(motion: NominalMotion, network: RoadNetwork) -> list[dict[str, str]]:
@@ -69,4 +70,12 @@ def test_the_frame_holds_the_rows_of_the_csv(tmp_path: Path) -> None:
     assert frame["name"].tolist() == [row["name"] for row in rows]
     assert frame["road"].tolist() == [row["road"] for row in rows]
     for column in ("time", "x", "h", "lane", "offset_t", "s"):
+        np.testing.assert_allclose(frame[column], [float(row[column]) for row in rows], atol=6e-4)
+
+
+def test_the_frame_is_inertial_as_the_csv_is(tmp_path: Path) -> None:
+    played = Stage(tmp_path).play(start={"Ego": teleport(on_lane(-1, 10.0)) + speed(20.0)}, last=0.2)
+    moved = replace(played.network, header_offset=HeaderOffset(1000.0, -500.0, 20.0, 0.3))
+    rows, frame = table(played.motion, moved), states_frame(played.motion, moved)
+    for column in ("x", "y", "z", "h"):
         np.testing.assert_allclose(frame[column], [float(row[column]) for row in rows], atol=6e-4)

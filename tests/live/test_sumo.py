@@ -181,6 +181,11 @@ def test_what_is_no_good_is_said_in_a_line(run: Path, tmp_path: Path, capsys: py
         ),
         ("<fcd-export><timestep time='x'/></fcd-export>", "time='x'"),
         ("<fcd-export>", "not XML"),
+        (
+            "<fcd-export><timestep time='0'><vehicle id='a' lane='e_x' pos='1' posLat='0' speed='2'/></timestep>"
+            "</fcd-export>",
+            r"fcd\.xml: can't be imported: .*'x'",
+        ),
     ):
         (tmp_path / "fcd.xml").write_text(text)
         with pytest.raises(FormatError, match=words):

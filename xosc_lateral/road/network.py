@@ -318,14 +318,5 @@ class RoadNetwork:
         )
         return tuple(mark for lane in every for mark in lane.marks if mark.type != "none")
 
-    def mark_line(self, road: int, mark: RoadMark, *, step: float = 2.0) -> tuple[FloatArray, FloatArray]:
-        """Polyline x, y of a marking, the lane's outer edge (of lane 0 itself), for plots. Shape (n,) each. [m]"""
-        s = np.linspace(mark.s_start, mark.s_end, max(2, int(np.ceil((mark.s_end - mark.s_start) / step)) + 1))
-        # the end of a section belongs to the next one, which may not have the lane
-        inside = np.minimum(s, np.nextafter(mark.s_end, -np.inf))
-        profile = self._tables.lane_profile(road, mark.lane, inside)
-        poses = self.road_to_world(road, s, profile.centre + 0.5 * np.sign(mark.lane) * profile.width)
-        return poses.x, poses.y
-
 
 __all__ = ["DRIVING", "Chooser", "RoadNetwork"]

@@ -44,16 +44,8 @@ def _read(path: Path, settings: CutSettings) -> Imported:
     scenario = _opened(path)
     graph, shapes = _graph(scenario)
     tracks = place_in_shapes(_tracks(scenario, path), shapes, graph.left)
-    return import_placed(
-        tracks,
-        graph,
-        settings,
-        keep_cut=True,
-        format="commonroad",
-        sources=[path],
-        version=str(getattr(scenario, "scenario_id", "unknown")),
-        licence=LICENCE,
-    )
+    about = {"format": "commonroad", "version": str(getattr(scenario, "scenario_id", "unknown")), "licence": LICENCE}
+    return import_placed(tracks, graph, settings, keep_cut=True, sources=[path], **about)
 
 
 def _graph(scenario: Any) -> tuple[LaneGraph, list[_Lanelet]]:
@@ -61,9 +53,8 @@ def _graph(scenario: Any) -> tuple[LaneGraph, list[_Lanelet]]:
     lanelets = {lanelet.lanelet_id: lanelet for lanelet in scenario.lanelet_network.lanelets}
     numbers = {name: k for k, name in enumerate(lanelets)}
     shapes = [_Lanelet(lanelet) for lanelet in lanelets.values()]
-    left = np.array(
-        [numbers.get(one.adj_left, -1) if one.adj_left_same_direction else -1 for one in lanelets.values()], dtype=int
-    )
+    beside = [one.adj_left if one.adj_left_same_direction else None for one in lanelets.values()]
+    left = np.array([numbers.get(name, -1) for name in beside], dtype=int)
     following = [[numbers[name] for name in one.successor if name in numbers] for one in lanelets.values()]
     graph = LaneGraph(np.array([shape.length for shape in shapes]), left, following)
     return graph, shapes

@@ -87,17 +87,9 @@ def import_dlr_ht(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cu
     vehicle, frame = tracks["vehicle"].to_numpy(), np.round(tracks["time"].to_numpy() / STEP).astype(np.int64)
     table["state"] = name_states(reasons, placed.lane, vehicle, frame, STEP, settings)
     table[RUN] = number_runs(table["state"].to_numpy(), placed.lane, vehicle, frame)
-    return finished(
-        table,
-        keep_cut=keep_cut,
-        format="dlr-ht",
-        sources=[source],
-        version=_version(source),
-        licence=LICENCE,
-        settings=asdict(settings),
-        step=STEP,
-        lanes=[_describe(name, k, lane) for name, both in lanes.items() for k, lane in enumerate(both)],
-    )
+    described = [_describe(name, k, lane) for name, both in lanes.items() for k, lane in enumerate(both)]
+    about = {"format": "dlr-ht", "version": _version(source), "licence": LICENCE, "lanes": described}
+    return finished(table, keep_cut=keep_cut, sources=[source], settings=asdict(settings), step=STEP, **about)
 
 
 def read_tracks(source: Path) -> pd.DataFrame:

@@ -59,16 +59,8 @@ def import_levelx(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cu
     parts, layouts, steps = zip(*(_read_recording(path, settings) for path in tracks_files), strict=True)
     if len(set(layouts)) > 1 or len(set(steps)) > 1:
         raise FormatError("recordings of different layouts or frame rates: import them one by one", path=source)
-    table = pd.concat(parts, ignore_index=True)
-    return finished(
-        table,
-        keep_cut=keep_cut,
-        format=f"levelx {layouts[0]}",
-        sources=tracks_files,
-        licence=LICENCE,
-        settings=asdict(settings),
-        step=steps[0],
-    )
+    table, about = pd.concat(parts, ignore_index=True), {"format": f"levelx {layouts[0]}", "licence": LICENCE}
+    return finished(table, keep_cut=keep_cut, sources=tracks_files, settings=asdict(settings), step=steps[0], **about)
 
 
 def _read_recording(path: Path, settings: CutSettings) -> tuple[pd.DataFrame, str, float]:

@@ -91,20 +91,14 @@ def import_mf4(
     for file in files:
         with _opened(file) as log:
             read[file] = {name: _read_channel(log, name, wanted, file) for name, wanted in sources_of.items()}
-    tables = [
-        _table(signals, file, name, step)
-        for (file, signals), name in zip(read.items(), _drive_names(files), strict=True)
-    ]
-    table = pd.concat(tables, ignore_index=True)
-    return finished(
-        table,
-        keep_cut=False,
-        format="mf4",
-        sources=files,
-        licence=LICENCE,
-        settings={"step": step, "channels": list(channels), "units": _units(read)},
-        step=step,
-    )
+    named = zip(read.items(), _drive_names(files), strict=True)
+    table = pd.concat([_table(signals, file, name, step) for (file, signals), name in named], ignore_index=True)
+    # column -> unit that it was read in; several where logs differ
+    every = {name: {signals[name].unit for signals in read.values()} for name in sources_of}
+    units = {name: " | ".join(sorted(found)) for name, found in every.items()}
+    settings = {"step": step, "channels": list(channels), "units": units}
+    about = {"format": "mf4", "licence": LICENCE, "settings": settings, "step": step}
+    return finished(table, keep_cut=False, sources=files, **about)
 
 
 def channels_wanted(source: Path) -> str:
@@ -134,12 +128,6 @@ def _drive_names(files: Sequence[Path]) -> list[str]:
     if twice := [file for file in files if files.count(file) > 1]:
         raise FormatError("the log is named twice", path=twice[0])
     return [file.stem if stems.count(file.stem) == 1 else str(file.with_suffix("")) for file in files]
-
-
-def _units(read: dict[Path, dict[str, Channel]]) -> dict[str, str]:
-    """Column -> unit that it was read in; several where logs differ."""
-    columns = next(iter(read.values()))
-    return {name: " | ".join(sorted({signals[name].unit for signals in read.values()})) for name in columns}
 
 
 @contextmanager

@@ -171,16 +171,6 @@ class _Collected:
         heading = np.where(np.isfinite(yaw), yaw, travel_heading(x, y, vehicle, step))
         speed = np.where(np.isfinite(speed), speed, ground_speed(x, y, vehicle, step))
         arm = sum(part[:, None] * axis for part, axis in zip(rear, axes(heading, pitch, roll), strict=True))
-        return Tracks(
-            tuple(names),
-            vehicle,
-            time - float(time.min()),
-            step,
-            x + arm[:, 0],
-            y + arm[:, 1],
-            heading,
-            speed,
-            np.where(np.isfinite(length), length, usual),
-            kinds,
-            rear=-rear[0] if rear[0].any() else None,
-        )
+        length, behind = np.where(np.isfinite(length), length, usual), -rear[0] if rear[0].any() else None
+        when, place = (time - float(time.min()), step), (x + arm[:, 0], y + arm[:, 1], heading)
+        return Tracks(tuple(names), vehicle, *when, *place, speed, length, kinds, rear=behind)
