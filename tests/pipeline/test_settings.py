@@ -15,7 +15,9 @@ from xosc_lateral.enrich.result import Neighbours
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.configuration import SETTINGS
 from xosc_lateral.formats.openscenario.write.target import Player
-from xosc_lateral.pipeline.settings import OPTIONS, ConvertSettings, OutputMode
+from xosc_lateral.pipeline.options import options_of
+from xosc_lateral.pipeline.reconstruct import ReconstructKeywords, ReconstructSettings
+from xosc_lateral.pipeline.settings import OPTIONS, ConvertKeywords, ConvertSettings, OutputMode
 
 
 def test_python_the_command_line_and_the_configuration_have_the_same_options() -> None:
@@ -88,3 +90,8 @@ def test_a_row_says_more_than_the_call_and_paths_are_the_tables() -> None:
     assert row.entity == {"A": "x", "B": str(Path("tables/own.json"))} and row.seed == 1
     assert row.parameters == {"p": "2", "q": "3"}
     assert before.of_row({}, Path("tables")) == before
+
+
+def test_type_checkers_see_every_option() -> None:
+    assert set(ConvertKeywords.__annotations__) == set(OPTIONS)
+    assert set(ReconstructKeywords.__annotations__) == set(options_of(ReconstructSettings))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 from xosc_lateral.api.result import PathLike, Result
 from xosc_lateral.errors import FormatError
@@ -20,7 +20,7 @@ from xosc_lateral.pipeline.manifest import MANIFEST, ManifestRow, read_manifest
 from xosc_lateral.pipeline.options import spelled_out
 from xosc_lateral.pipeline.progress import Display, Summary, follow
 from xosc_lateral.pipeline.request import frame_requests
-from xosc_lateral.pipeline.settings import ConvertSettings
+from xosc_lateral.pipeline.settings import ConvertKeywords, ConvertSettings
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,7 +43,7 @@ def convert_many(
     force: bool = False,
     show: Literal["auto", "quiet", "json", "nothing"] = "nothing",
     on_outcome: Callable[[Mapping[str, Any]], None] | None = None,
-    **options: Any,
+    **options: Unpack[ConvertKeywords],
 ) -> BatchResult:
     """Convert many scenarios into a folder; what is up to date there already is left alone.
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 from xosc_lateral.api.result import PAGE_SUFFIXES, PathLike, Result, write_page
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.output_paths import claim, output_file
 from xosc_lateral.pipeline.convert import convert_scenario
 from xosc_lateral.pipeline.options import spelled_out
-from xosc_lateral.pipeline.settings import ConvertSettings
+from xosc_lateral.pipeline.settings import ConvertKeywords, ConvertSettings
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,7 +29,7 @@ def convert(
     variant: int = 1,
     report: PathLike | None = None,
     force: bool = False,
-    **options: Any,
+    **options: Unpack[ConvertKeywords],
 ) -> Conversion:
     """Give every car in a scenario the lateral movement of a real driver.
 

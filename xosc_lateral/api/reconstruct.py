@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 from xosc_lateral.api.result import PathLike, Result
 from xosc_lateral.formats.mapping import MappingLike
@@ -11,6 +11,7 @@ from xosc_lateral.formats.output_paths import claim, output_folder
 from xosc_lateral.pipeline.options import spelled_out, values_of
 from xosc_lateral.pipeline.reconstruct import (
     Reconstructed,
+    ReconstructKeywords,
     ReconstructSettings,
     drivers_table,
     fitted_profiles,
@@ -30,7 +31,7 @@ def reconstruct(
     road: PathLike | None = None,
     columns: MappingLike | None = None,
     force: bool = False,
-    **options: Any,
+    **options: Unpack[ReconstructKeywords],
 ) -> Reconstruction:
     """Turn a recording into maneuvers, a road and drivers.
 

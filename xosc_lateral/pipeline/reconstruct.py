@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
+from typing import TypedDict
 
 import numpy as np
 
@@ -104,6 +105,23 @@ class ReconstructSettings:
     )
     library: tuple[Path, ...] = option((), say.paths)
     # fmt: on
+
+
+class ReconstructKeywords(TypedDict, total=False):
+    """The same names for type checkers, with what a call may be given."""
+
+    begin: float | None
+    end: float | None
+    vehicles: Collection[str] | None
+    around: str | None
+    window: float
+    host: str | None
+    error: float
+    version: str
+    relative: bool
+    exact: bool
+    fit: bool
+    library: str | Path | Collection[str | Path]
 
 
 @dataclass(frozen=True, eq=False, slots=True)

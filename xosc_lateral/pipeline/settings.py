@@ -7,11 +7,11 @@ configuration file that decide a conversion are all made from the fields of `Con
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
 from xosc_lateral.enrich.result import Neighbours
 from xosc_lateral.errors import FormatError
@@ -221,6 +221,31 @@ class ConvertSettings:
 
 OPTIONS: Mapping[str, Option] = say.options_of(ConvertSettings)
 """What users can set, by name."""
+
+
+class ConvertKeywords(TypedDict, total=False):
+    """The same names for type checkers, with what a call may be given."""
+
+    profile: str | Path | DriverProfile
+    seed: int
+    entity: Mapping[str, str | Path | DriverProfile] | None
+    only: Collection[str] | None
+    ego: Collection[str] | None
+    neighbours: Literal["profile", "borrow", "none"] | None
+    context: str | Path | None
+    parameters: Mapping[str, object] | None
+    library: str | Path | Collection[str | Path]
+    mode: Literal["auto", "trajectory", "lane-offset"]
+    player: Literal["standard", "esmini", "carla"]
+    version: str | None
+    allow: str | Path | Collection[str | Path]
+    road: str | Path | None
+    road_path: str | Path | Collection[str | Path]
+    attempts: int
+    time_limit: float | None
+    with_sensor: bool
+    strict: bool
+
 
 NOT_RECORDED = frozenset({"library", "allow", "road_path", "strict"})
 
