@@ -14,8 +14,8 @@ from msgspec.structs import replace
 from benchmarks.fair_measure import halves
 from xosc_lateral.driver.fitting import fit_profile
 from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.evaluation.profile_comparison import compare
 from xosc_lateral.formats.drives import read_drives
-from xosc_lateral.report.comparison import compare
 
 FIRST_SPLIT = 400
 """Seed of the first random halves of the vehicles."""

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from benchmarks.markers import show
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampled_offsets import sample_context
-from xosc_lateral.enrich.enrich import NEIGHBOURS
 from xosc_lateral.enrich.give_way import wider
+from xosc_lateral.enrich.seen import NEIGHBOURS
 from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.formats.importers import dlr_ht
 from xosc_lateral.formats.importers.road_from_tracks import fit_reference_line

@@ -25,9 +25,8 @@ from benchmarks.identification_oracle import coarse_of, oracle, oracle_between
 from benchmarks.identification_tables import calibration, summary, table
 from benchmarks.outcome_lines import append_outcome, read_outcomes
 from xosc_lateral.identification.identify import VETOED, identify
-from xosc_lateral.identification.regression import Coarse
 from xosc_lateral.identification.selection import ERROR_BUDGET, TERMS
-from xosc_lateral.identification.timeline import coarse_mean
+from xosc_lateral.identification.timeline import Coarse, coarse_mean
 
 
 def run(case: dict[str, Any], protocol: dict[str, Any], seconds: float) -> dict[str, Any]:
@@ -39,7 +38,7 @@ def run(case: dict[str, Any], protocol: dict[str, Any], seconds: float) -> dict[
     outcome = dict(case)
     outcome["cpu_s"] = round(time.process_time() - started, 1)
     outcome["named"] = [
-        [one.term.kind, sorted(one.term.columns), one.p_value, one.term.component, [sorted(x) for x in one.alike]]
+        [one.term.kind, sorted(one.term.columns), one.p_value, one.term.component, [sorted(x) for x in one.term.alike]]
         for one in found.selection.accepted
     ]
     kinds = {term.component: term.kind for term in TERMS}
@@ -52,7 +51,7 @@ def run(case: dict[str, Any], protocol: dict[str, Any], seconds: float) -> dict[
         [one.column, round(one.coherence, 3), round(one.predicted_share, 3), one.doubtful] for one in found.feedback
     ]
     outcome["p_mean"] = found.least("mean")
-    outcome["p"] = {name: p for name in ERROR_BUDGET.weights if (p := found.least(name)) is not None}
+    outcome["p"] = {name: p for name in ERROR_BUDGET if (p := found.least(name)) is not None}
     if case["name"].startswith("slow vehicles"):
         outcome |= oracle_between(case, table)
     elif "size" in case:

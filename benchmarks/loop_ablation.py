@@ -33,11 +33,10 @@ from xosc_lateral.identification import (
     selection,
 )
 from xosc_lateral.identification.identify import usable_columns
-from xosc_lateral.identification.regression import Coarse
-from xosc_lateral.identification.selection import Search
-from xosc_lateral.identification.terms import column
-from xosc_lateral.identification.terms.column import SlowSpreadTerm
-from xosc_lateral.identification.timeline import join_drives
+from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.terms import spread
+from xosc_lateral.identification.terms.spread import SlowSpreadTerm
+from xosc_lateral.identification.timeline import Coarse, join_drives
 
 Named = tuple[frozenset[str], ...]
 Drive = tuple[str, pd.DataFrame, Named, bool]
@@ -89,7 +88,7 @@ PARTS: dict[str, Callable[[], list[Any]]] = {
         patch.object(refinement, "other_centres", lambda effect, coarse: ()),
         patch.object(candidates, "_curves", lambda column, values: []),
     ],
-    "what a column may do, beside time": lambda: [patch.object(column, "MAY_ACT", 0.0)],
+    "what a column may do, beside time": lambda: [patch.object(spread, "MAY_ACT", 0.0)],
     "direction of time": lambda: [patch.object(feedback, "_predicted_share", lambda values, moved, rows: 0.0)],
     "bias of short drives": lambda: [
         patch.object(regression, "unbiased", lambda process, *rest, **more: process),

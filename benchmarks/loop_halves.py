@@ -16,9 +16,9 @@ from scipy.stats import t
 from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.identification.cross_validation import held_out_gain
 from xosc_lateral.identification.identify import identify
-from xosc_lateral.identification.regression import Coarse, fit_model
-from xosc_lateral.identification.terms.base import Term
-from xosc_lateral.identification.timeline import join_drives
+from xosc_lateral.identification.model import Term
+from xosc_lateral.identification.regression import fit_model
+from xosc_lateral.identification.timeline import Coarse, join_drives
 
 
 def main() -> None:

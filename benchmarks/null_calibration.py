@@ -23,7 +23,8 @@ from benchmarks.outcome_lines import append_outcome, read_outcomes
 from xosc_lateral.identification import dictionary
 from xosc_lateral.identification.identify import usable_columns
 from xosc_lateral.identification.regression import fit_model
-from xosc_lateral.identification.selection import ERROR_BUDGET, STAGES, Search
+from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.selection import ERROR_BUDGET, STAGES
 
 FIRST_SEED = 310_000
 """Of drives that serve for nothing else; those from 300,000 on were what the null was mended with."""

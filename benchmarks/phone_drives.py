@@ -39,9 +39,9 @@ from xosc_lateral.drives.cleaning import RUN
 from xosc_lateral.drives.cuts import cut_runs
 from xosc_lateral.drives.drive import Drive, Run
 from xosc_lateral.drives.resampling import STEP
+from xosc_lateral.evaluation.profile_comparison import compare
 from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.identification.close import close_loop
-from xosc_lateral.report.comparison import compare
 from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]

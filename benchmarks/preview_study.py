@@ -19,9 +19,9 @@ from xosc_lateral.drives.drive import Drive
 from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.identification.close import LoopResult, close_loop
 from xosc_lateral.identification.identify import usable_columns
-from xosc_lateral.identification.regression import Coarse
-from xosc_lateral.identification.selection import ERROR_BUDGET, Accepted, Search, select
-from xosc_lateral.identification.timeline import join_drives
+from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.selection import ERROR_BUDGET, Accepted, select
+from xosc_lateral.identification.timeline import Coarse, join_drives
 
 BENDS = {"curvature", "crossfall", "speed"}
 """By which what bends do may be named: crossfall goes along with curvature, and speed changes how the car turns."""

@@ -7,7 +7,8 @@ from functools import lru_cache
 import numpy as np
 
 from examples.driver_simulator.simulator import simulate_drive
-from xosc_lateral.driver.effects import Effect, any_effect
+from xosc_lateral.driver.effects import ColumnEffect, Effect, EffectTerms, HiddenEffect, any_effect
+from xosc_lateral.driver.effects.base import step_of, terms_of
 from xosc_lateral.driver.fitting import fit_profile
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.records import read_as
@@ -18,6 +19,17 @@ def effect_from_dict(values: dict[str, object]) -> Effect:
     """One effect as a profile file holds it."""
     effect: Effect = read_as(any_effect((str(values.get("kind")),)), values)
     return effect
+
+
+def whole_terms(
+    effect: Effect, time: np.ndarray, context: dict[str, np.ndarray], rng: np.random.Generator
+) -> EffectTerms:
+    """What one effect does on a whole drive, on an even grid [s] with context columns."""
+    if isinstance(effect, ColumnEffect):
+        strength = effect.strength(step_of(time), context)
+        return EffectTerms() if strength is None else terms_of(effect.acts, strength)
+    assert isinstance(effect, HiddenEffect)
+    return effect.advance(effect.begin(rng, step_of(time)), time, step_of(time)) if len(time) else EffectTerms()
 
 
 def as_drive(table: object, name: str = "simulated") -> Drive:

@@ -13,7 +13,7 @@ import pytest
 import xosc_lateral.plugins as discovery
 from xosc_lateral.driver import effects
 from xosc_lateral.driver.effects import ColumnEffect, Effect, HiddenEffect
-from xosc_lateral.identification.selection import TERMS, shared_among
+from xosc_lateral.identification.selection import TERMS
 from xosc_lateral.plugins import defined_in
 
 NAME = "made_for_discovery"
@@ -71,4 +71,4 @@ def test_every_file_of_effects_that_names_none_holds_what_effects_are_made_from(
 
 def test_terms_of_one_component_weigh_the_same() -> None:
     for kind in TERMS:
-        assert shared_among(TERMS).weights[kind.component] == kind.weight
+        assert {one.weight for one in TERMS if one.component == kind.component} == {kind.weight}

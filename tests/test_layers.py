@@ -10,9 +10,11 @@ import pytest
 PACKAGE = Path(__file__).resolve().parents[1] / "xosc_lateral"
 
 LAYERS = {
+    "arrays": 0,
     "errors": 0,
     "version": 0,
     "plugins": 0,
+    "lazy": 0,
     "shipped": 0,
     "segment": 0,
     "limits": 0,

@@ -42,7 +42,7 @@ _HOME = {
     "Drive": "drives.drive",
     "Conversion": "api.convert",
     "Reconstruction": "api.reconstruct",
-    "ConvertOptions": "pipeline.settings",
+    "ConvertSettings": "pipeline.settings",
     "BatchResult": "api.batch",
     "Verification": "api.verify",
     "Playback": "api.play",
@@ -93,7 +93,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "Drive",
     "Conversion",
     "Reconstruction",
-    "ConvertOptions",
+    "ConvertSettings",
     "BatchResult",
     "Verification",
     "Playback",
@@ -140,7 +140,7 @@ if TYPE_CHECKING:
     from xosc_lateral.live.fmu import export_fmu
     from xosc_lateral.live.sumo import SumoTraffic
     from xosc_lateral.live.traffic import Moment, Traffic
-    from xosc_lateral.pipeline.settings import ConvertOptions
+    from xosc_lateral.pipeline.settings import ConvertSettings
 
 
 def __getattr__(name: str) -> object:

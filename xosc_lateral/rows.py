@@ -112,10 +112,10 @@ def give_back(rows: int = BLOCK) -> None:
     """After work on so many rows: pages of the file leave memory if they are too many; looked at once a block."""
     global _others, _rows
     _rows += rows
-    if not _chunks or _rows < BLOCK:
+    if _rows < BLOCK:
         return
     _rows = 0
-    if status_bytes(2) - _others > MAPPED:
+    if _chunks and status_bytes(2) - _others > MAPPED:
         for chunk in tuple(_chunks):
             chunk.madvise(mmap.MADV_DONTNEED)
         _others = status_bytes(2)

@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from xosc_lateral.arrays import FloatArray
 
 # Contexts that a scenario can supply by itself (DESIGN, section 4): name -> (unit, what is neutral).
 # `None` as the neutral value: "there is none", written as NaN in the arrays (no vehicle ahead, say).

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 import xosc_lateral as xl
-from xosc_lateral.api.result import as_paths, frame_hash, given_drives, given_profile, naming, road_search
+from xosc_lateral.api.result import as_paths, frame_hash, given_drives, given_profile, naming
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.errors import FormatError, NotEnoughDataError, XoscLateralError
 
@@ -134,11 +134,7 @@ def test_one_path_and_several_are_a_tuple_of_paths(tmp_path: Path) -> None:
 def test_a_road_or_a_folder_of_roads_that_is_not_there_is_refused(tmp_path: Path) -> None:
     for road, folders in ((tmp_path / "no.xodr", ()), (None, tmp_path / "none")):
         with pytest.raises(FormatError, match="no such"):
-            road_search(road, folders)
-    (tmp_path / "r.xodr").write_text("<OpenDRIVE/>")
-    found = road_search(tmp_path / "r.xodr", [tmp_path])
-    assert found == type(found)(tmp_path / "r.xodr", (tmp_path,))
-    assert road_search(None, ()) == type(found)(None, ())
+            xl.play(tmp_path / "any.xosc", road=road, road_path=folders)
 
 
 # ---- verbs that take them --------------------------------------------------------------------------------------------

@@ -18,10 +18,9 @@ from msgspec.structs import replace
 from tests.driver.test_stream import drive, make_contexts, make_profile, rows, segment
 from xosc_lateral.driver import effects
 from xosc_lateral.driver.effects import Acts, ColumnEffect, EffectTerms, HiddenEffect, known_effects
-from xosc_lateral.driver.fitting import fit_core
 from xosc_lateral.driver.models import registry
 from xosc_lateral.driver.models.base import CoreModel, Start
-from xosc_lateral.driver.models.registry import KnownModel, known_models
+from xosc_lateral.driver.models.registry import KnownModel, known_models, model_named
 from xosc_lateral.driver.profile import DriverProfile, file_type
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.stream import OffsetStream
@@ -138,7 +137,7 @@ def plugged() -> DriverProfile:
     slope: Any = squared(
         column="speed", acts=Acts.LOCATION, coefficients=(1e-3,), errors=(1e-4,), reference=(900.0,), lag_s=-0.6
     )
-    model = fit_core([np.random.default_rng(0).normal(0.01, 0.05, 500)], ["a"], model="white")
+    model = model_named("white").fit([np.random.default_rng(0).normal(0.01, 0.05, 500)], ["a"])
     return DriverProfile("plugged", model, (slope, walk(size=0.5)))
 
 
@@ -171,7 +170,7 @@ def test_without_the_plug_in_its_kinds_are_unknown(installed: dict[str, list[Ent
     write_profile(replace(make_profile(), name="x"), tmp_path / "x.json")
     assert read_profile(tmp_path / "x.json").name == "x"
     with pytest.raises(DriverProfileError, match="no core model 'white'; known are two-level, autoregressive"):
-        fit_core([np.zeros(100)], ["a"], model="white")
+        model_named("white").fit([np.zeros(100)], ["a"])
 
 
 @pytest.mark.parametrize(

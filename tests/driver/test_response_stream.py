@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from tests.driver.effects.made_effects import STEP, made
+from tests.profiles import whole_terms
 from xosc_lateral.driver.effects import ColumnEffect, Linear, Product
 from xosc_lateral.driver.effects.product import Factor
+from xosc_lateral.driver.process import ResponseStream, ResponseStreamState
 from xosc_lateral.driver.records import plain, read_as
-from xosc_lateral.driver.stream import ResponseStream, ResponseStreamState
 
 N = 120
 
@@ -53,7 +54,7 @@ def by_rows(effect: ColumnEffect, values: dict[str, np.ndarray], stop: int = N) 
 @pytest.mark.parametrize("name", EFFECTS)
 def test_rows_one_by_one_are_the_drive_as_a_whole(name: str) -> None:
     effect, values = EFFECTS[name], context()
-    whole = effect.terms(STEP * np.arange(N), values, np.random.default_rng(0)).location
+    whole = whole_terms(effect, STEP * np.arange(N), values, np.random.default_rng(0)).location
     np.testing.assert_array_equal(by_rows(effect, values)[0], whole)
 
 
@@ -87,7 +88,7 @@ def test_rows_before_the_drive_are_seen_but_get_no_response(name: str) -> None:
 def test_a_state_that_went_through_json_goes_on_as_if_nothing_had_been(name: str, stop: int) -> None:
     effect, values = EFFECTS[name], context(2)
     begun, stream = by_rows(effect, values, stop)
-    saved = read_as(ResponseStreamState, json.loads(json.dumps(plain(stream.state()))))
+    saved = read_as(ResponseStreamState, json.loads(json.dumps(plain(stream.state))))
     other = ResponseStream(effect, STEP)
     other.restore(saved)
     rest = []

@@ -187,11 +187,7 @@ def test_every_kind_of_effect_is_covered_here() -> None:
     assert {type(effect) for effect in HIDDEN} == {kind for kind in EFFECTS if not issubclass(kind, ColumnEffect)}
     for kind in EFFECTS:
         if issubclass(kind, ColumnEffect):  # the stream knows their quantity, and how they all respond to it
-            assert (kind.response, kind.strength, kind.terms) == (
-                ColumnEffect.response,
-                ColumnEffect.strength,
-                ColumnEffect.terms,
-            )
+            assert (kind.response, kind.strength) == (ColumnEffect.response, ColumnEffect.strength)
 
 
 @pytest.mark.parametrize("effects", [(), PACED, HIDDEN], ids=["bare", "paced", "hidden"])

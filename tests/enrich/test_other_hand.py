@@ -12,7 +12,7 @@ from tests.motion.made_motion import drive, entity, together, two_roads
 from tests.profiles import simulated_profile
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.enrich.enrich import enrich
-from xosc_lateral.enrich.give_way import mirrored
+from xosc_lateral.enrich.seen import mirrored
 from xosc_lateral.formats.profiles import read_profile
 from xosc_lateral.scenario.enums import VehicleCategory
 from xosc_lateral.segment import Segment

@@ -38,7 +38,7 @@ from xosc_lateral.pipeline.manifest import MANIFEST, ManifestRow, read_manifest,
 from xosc_lateral.pipeline.settings import ConvertSettings, OutputMode
 from xosc_lateral.pipeline.verify import reproduce, verify
 from xosc_lateral.report.cards import card_text
-from xosc_lateral.report.scenario import facts
+from xosc_lateral.report.conversion import facts
 
 
 # ---- tables ----------------------------------------------------------------------------------------------------------
@@ -238,7 +238,7 @@ def _use_state(path: Path) -> None:
     said: list[str] = []
     with Journal(path.parent, path.with_name("journal.jsonl"), said.append) as journal:
         for output in journal:
-            if not math.isfinite(journal.seconds(output)) or not isinstance(journal.row(output), ManifestRow):
+            if not math.isfinite(journal.timing(output).seconds) or not isinstance(journal.row(output), ManifestRow):
                 raise NonsenseError(output)
         journal.finish()
     for row in read_manifest(path.with_name(MANIFEST)):

@@ -25,10 +25,12 @@ from xosc_lateral.scenario.position import (
     RoutePosition,
     Trajectory,
     TrajectoryPosition,
+    Vertex,
     WorldPosition,
 )
 
 HERE = Place(str(Path("x.xosc")), 1, "X")
+LINE = Polyline(tuple(Vertex(WorldPosition(x, 0.0, place=HERE), None) for x in (0.0, 9.0)))
 TURN = Orientation(h=0.3, p=0.1, r=0.05)
 TURNED = Orientation(h=-0.3, p=-0.1, r=0.05)
 
@@ -50,8 +52,8 @@ POSITIONS: list[tuple[Position, Position]] = [
     (GeoPosition(48.0, 9.0, orientation=TURN, place=HERE), GeoPosition(48.0, 9.0, orientation=TURNED, place=HERE)),
     (RoutePosition(None, None, TURN, place=HERE), RoutePosition(None, None, TURNED, place=HERE)),
     (
-        TrajectoryPosition(Trajectory("t", Polyline(()), False, place=HERE), 5.0, 2.0, TURN, place=HERE),
-        TrajectoryPosition(Trajectory("t", Polyline(()), False, place=HERE), 5.0, -2.0, TURNED, place=HERE),
+        TrajectoryPosition(Trajectory("t", LINE, False, place=HERE), 5.0, 2.0, TURN, place=HERE),
+        TrajectoryPosition(Trajectory("t", LINE, False, place=HERE), 5.0, -2.0, TURNED, place=HERE),
     ),
 ]
 
@@ -97,5 +99,5 @@ def test_curves_bend_to_the_other_side() -> None:
     turned = ClothoidSpline((ClothoidSplineSegment(-0.01, 0.02, 30.0, -0.1), ClothoidSplineSegment(0.0, -0.03, 20.0)))
     assert mirrored_shape(spline) == turned
     assert mirrored_shape(mirrored_shape(spline)) == spline
-    line = Polyline(())
-    assert mirrored_shape(line) is line
+
+    assert mirrored_shape(LINE) == LINE

@@ -76,7 +76,7 @@ def test_entities_and_init_are_read_as_written(tmp_path: Path) -> None:
     assert ego.performance.max_deceleration == 9.0
     assert ego.performance.max_acceleration_rate == float("inf")
     assert ego.axles is not None
-    assert ego.axles.wheelbase == 2.8
+    assert ego.axles.front is not None and ego.axles.front.position_x == 2.8
     placed, driven = (item.content for item in scenario.storyboard.init.privates[0].actions)
     assert isinstance(placed, TeleportAction)
     assert isinstance(placed.position, LanePosition)

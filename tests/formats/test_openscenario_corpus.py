@@ -11,7 +11,7 @@ import pytest
 from lxml import etree
 
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.openscenario.distribution import is_distribution, read_distribution
+from xosc_lateral.formats.openscenario.distribution import read_distribution
 from xosc_lateral.formats.openscenario.read import read_scenario
 from xosc_lateral.formats.openscenario.write.trajectory_scenario import write_trajectory_scenario
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion, PlayedAction
@@ -41,7 +41,7 @@ def test_every_corpus_file_loads_or_is_refused_with_file_line_and_reason(shared:
 def test_every_corpus_distribution_gives_sets_that_load(shared: Path) -> None:
     found = 0
     for path in sorted((shared / "corpus").rglob("*.xosc")):
-        if is_distribution(path):
+        if b"<ParameterValueDistribution" in path.read_bytes():
             logical = read_distribution(path)
             read_scenario(logical.scenario_file, next(logical.parameter_sets()))
             found += 1

@@ -6,7 +6,7 @@ import pytest
 
 from tests.formats.made_scenario import declarations, parameter, scenario_text, write_scenario
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.openscenario.distribution import LogicalScenario, is_distribution, read_distribution
+from xosc_lateral.formats.openscenario.distribution import LogicalScenario, read_distribution
 from xosc_lateral.formats.openscenario.read import read_scenario
 
 BELOW_60 = '<ConstraintGroup><ValueConstraint rule="lessThan" value="60"/></ConstraintGroup>'
@@ -50,12 +50,6 @@ UNIFORM = '<UniformDistribution><Range lowerLimit="0" upperLimit="100"/></Unifor
 
 def read(path: Path) -> LogicalScenario:
     return read_distribution(path)
-
-
-def test_a_distribution_is_told_from_a_scenario(tmp_path: Path) -> None:
-    path = logical(tmp_path, "<Deterministic/>")
-    assert is_distribution(path)
-    assert not is_distribution(tmp_path / "made.xosc")
 
 
 def test_sets_and_ranges_combine(tmp_path: Path) -> None:

@@ -31,10 +31,10 @@ from xosc_lateral.errors import FormatError, PlaybackError
 from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.formats.openscenario.provenance import provenance_of
 from xosc_lateral.formats.openscenario.read import read_scenario
+from xosc_lateral.formats.openscenario.write.draft import WrittenScenario
 from xosc_lateral.formats.openscenario.write.lane_offset_scenario import write_lane_offset_scenario
 from xosc_lateral.formats.openscenario.write.lateral_actions import lateral_actions
 from xosc_lateral.formats.openscenario.write.offset_chain import MOST_TURNING, TOLERANCE, OffsetChain, ramps
-from xosc_lateral.formats.openscenario.write.result import WrittenScenario
 from xosc_lateral.formats.openscenario.write.trajectory_scenario import write_trajectory_scenario
 from xosc_lateral.motion.nominal import NominalMotion
 from xosc_lateral.motion.trajectory import WorldTrajectory

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import os
 from pathlib import Path
 
@@ -11,7 +12,6 @@ import pytest
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats import source
 from xosc_lateral.formats.source import (
-    check_unpacked,
     edit_in_place,
     guard_input,
     guarding_inputs,
@@ -97,11 +97,12 @@ def test_a_file_above_the_limit_is_refused_with_both_sizes(table: Path) -> None:
 )
 def test_what_unpacks_to_too_much_is_refused(unpacked: int, packed: int, passes: bool, tmp_path: Path) -> None:
     assert PACKING_RATIO.value > 1.0
+    opened = source.Source(tmp_path, io.BytesIO(), int(packed))
     if passes:
-        check_unpacked(int(unpacked), int(packed), tmp_path)
+        opened.unpacked(int(unpacked))
     else:
         with pytest.raises(FormatError):
-            check_unpacked(int(unpacked), int(packed), tmp_path)
+            opened.unpacked(int(unpacked))
 
 
 # ---- inputs are not replaced -----------------------------------------------------------------------------------------

@@ -29,12 +29,12 @@ from tests.formats.made_scenario import (
 from tests.formats.test_openscenario_write import CUSTOM, LIGHT, STOP_AND_GO, VISIBLE, nominal, played
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.openscenario.read import read_scenario
+from xosc_lateral.formats.openscenario.write.draft import WrittenScenario
 from xosc_lateral.formats.openscenario.write.lane_offset_scenario import write_lane_offset_scenario
 from xosc_lateral.formats.openscenario.write.literal import name_literally
-from xosc_lateral.formats.openscenario.write.result import WrittenScenario
 from xosc_lateral.formats.openscenario.write.target import target
 from xosc_lateral.formats.openscenario.write.trajectory_scenario import write_trajectory_scenario
-from xosc_lateral.formats.openscenario.write.versions import ATTRIBUTES, ELEMENTS, VALUES
+from xosc_lateral.formats.openscenario.write.versions import additions as table_of_additions
 from xosc_lateral.scenario.parameters import Scope
 
 XSD = Path(__file__).parents[1] / "data" / "xsd"
@@ -244,35 +244,19 @@ def test_a_reactive_scenario_keeps_its_events_for_others_to_refer_to(tmp_path: P
 
 SPLINE = (
     "<PrivateAction><RoutingAction><FollowTrajectoryAction><TrajectoryRef>"
-    '<Trajectory name="way" closed="false"><Shape><ClothoidSpline>{segments}</ClothoidSpline></Shape></Trajectory>'
+    '<Trajectory name="way" closed="false"><Shape><ClothoidSpline><ClothoidSplineSegment curvatureStart="0" '
+    'curvatureEnd="0.02" length="20"/></ClothoidSpline></Shape></Trajectory>'
     "</TrajectoryRef><TimeReference><None/></TimeReference>"
     '<TrajectoryFollowingMode followingMode="position"/></FollowTrajectoryAction></RoutingAction></PrivateAction>'
 )
-AWAY = '<ClothoidSplineSegment curvatureStart="0" curvatureEnd="0.02" length="20">{start}</ClothoidSplineSegment>'
-BACK = '<ClothoidSplineSegment curvatureStart="0.02" curvatureEnd="-0.01" length="20"/>'
-AT_EGO = '<PositionStart><RelativeObjectPosition entityRef="Ego" dx="1" dy="0"/></PositionStart>'
-IN_WORLD = '<PositionStart><WorldPosition x="60" y="-1.75" h="0.1"/></PositionStart>'
-ON_LANE = '<PositionStart><LanePosition roadId="1" laneId="-1" s="60"/></PositionStart>'
 
 
-@pytest.mark.parametrize("start", ["", AT_EGO, IN_WORLD])
 @pytest.mark.parametrize("minor", range(3))
-def test_a_clothoid_spline_of_a_reactive_scenario_becomes_a_polyline(tmp_path: Path, minor: int, start: str) -> None:
-    follow = SPLINE.format(segments=AWAY.format(start=start) + BACK)
-    source = tree(tmp_path, stories=story(event("follow", action("follow", follow), time=1.0)))
-    found, root = reactive(source, f"1.{minor}")
-    schema_of(minor).assertValid(root)
-    assert any("written as a Polyline" in note for note in found.notes)
-    before = played(read_scenario(source)).entities[0]
-    after = played(read_scenario(source.with_name("reactive.xosc"))).entities[0]
-    assert np.hypot(after.x - before.x, after.y - before.y).max() < 0.02
-
-
-def test_a_clothoid_spline_that_begins_on_a_lane_is_refused(tmp_path: Path) -> None:
-    follow = SPLINE.format(segments=AWAY.format(start=ON_LANE) + BACK)
-    source = tree(tmp_path, stories=story(event("follow", action("follow", follow))))
-    with pytest.raises(FormatError, match="no ClothoidSpline"):
-        reactive(source, "1.2")
+def test_a_clothoid_spline_of_a_reactive_scenario_is_refused_before_1_3(tmp_path: Path, minor: int) -> None:
+    source = tree(tmp_path, stories=story(event("follow", action("follow", SPLINE))))
+    with pytest.raises(FormatError, match=rf"version 1\.{minor} has no ClothoidSpline; use --mode trajectory"):
+        reactive(source, f"1.{minor}")
+    assert "Polyline" in etree.tostring(written(source, f"1.{minor}")[1], encoding="unicode")
 
 
 def test_an_orientation_without_a_type_means_what_it_meant(tmp_path: Path) -> None:
@@ -341,9 +325,9 @@ def own_attributes(item: etree._Element) -> Iterator[etree._Element]:
 
 
 def tables(minor: int) -> Iterator[tuple[tuple[str, ...], ...]]:
-    for table in (ELEMENTS, ATTRIBUTES):
-        yield tuple(sorted((tag, name) for tag, names in table[minor].items() for name in names))
-    yield tuple(sorted((tag, name, value) for (tag, name), values in VALUES[minor].items() for value in values))
+    for kind in ("elements", "attributes", "values"):
+        table = table_of_additions(minor, kind)
+        yield tuple(sorted((*path.split("/"), name) for path, names in table.items() for name in names))
 
 
 @pytest.mark.parametrize("minor", [1, 2, 3])

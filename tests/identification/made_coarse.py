@@ -7,8 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.signal import lfilter
 
-from xosc_lateral.identification.regression import Coarse
-from xosc_lateral.identification.timeline import PAD, Timeline
+from xosc_lateral.identification.timeline import PAD, Coarse, Timeline
 
 STEP = 0.2
 SPREAD = 0.1

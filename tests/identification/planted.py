@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from benchmarks.simulated.movements import ornstein_uhlenbeck, record_movement
 from examples.driver_simulator.motorway import first_order
 from xosc_lateral.formats.drives import drives_of_table
-from xosc_lateral.identification.regression import Coarse
-from xosc_lateral.identification.timeline import join_drives
+from xosc_lateral.identification.timeline import Coarse, join_drives
 
 FloatArray = NDArray[np.float64]
 STEP = 0.1

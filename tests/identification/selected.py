@@ -8,9 +8,9 @@ import numpy as np
 
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.identification.identify import usable_columns
-from xosc_lateral.identification.regression import Coarse
-from xosc_lateral.identification.selection import ERROR_BUDGET, Search, Selection, select
-from xosc_lateral.identification.timeline import join_drives
+from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.selection import ERROR_BUDGET, Selection, select
+from xosc_lateral.identification.timeline import Coarse, join_drives
 
 
 def selected(drives: Sequence[Drive], excluded: Sequence[str] = ()) -> Selection:

@@ -11,11 +11,12 @@ from xosc_lateral.driver.models.base import ModelKind
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.identification.close import close_loop
 from xosc_lateral.identification.identify import usable_columns
-from xosc_lateral.identification.regression import Coarse, fit_model
-from xosc_lateral.identification.selection import ERROR_BUDGET, Search
-from xosc_lateral.identification.terms.base import Outcome
+from xosc_lateral.identification.model import Outcome
+from xosc_lateral.identification.regression import fit_model
+from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.selection import ERROR_BUDGET
 from xosc_lateral.identification.terms.between import USUAL_S, BetweenTerm
-from xosc_lateral.identification.timeline import join_drives
+from xosc_lateral.identification.timeline import Coarse, join_drives
 
 STEP = 0.2
 

@@ -61,4 +61,4 @@ def test_blocks_are_numbered_in_order_and_never_cross_drives(lengths: list[int])
 )
 def test_what_is_held_out_is_said(lengths: tuple[int, ...], words: str) -> None:
     timeline = drives(*lengths)
-    assert words in held_out_words(timeline, hold_out_blocks(timeline))
+    assert words in held_out_words(timeline)

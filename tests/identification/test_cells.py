@@ -5,8 +5,8 @@ import pytest
 
 from tests.identification.made_coarse import timeline_of
 from xosc_lateral.driver.effects import Acts, Linear, Proximity
-from xosc_lateral.identification.regression import Coarse
 from xosc_lateral.identification.residual import statistics_of
+from xosc_lateral.identification.timeline import Coarse
 
 
 def test_what_is_left_of_the_drive_before_is_no_cell_of_its_own() -> None:

@@ -10,12 +10,15 @@ import pytest
 from tests.identification.made_coarse import coarse_of, movement, wander
 from xosc_lateral.driver.effects import Acts, Linear
 from xosc_lateral.driver.effects.response import respond
-from xosc_lateral.identification.column_search import find_column, likely_response
+from xosc_lateral.identification.column_search import ColumnSearch
 from xosc_lateral.identification.columns import Column, Values
-from xosc_lateral.identification.regression import Coarse, fit_model
-from xosc_lateral.identification.selection import ERROR_BUDGET, Search, select
-from xosc_lateral.identification.terms.base import Outcome
-from xosc_lateral.identification.terms.column import MeanTerm, SpreadTerm
+from xosc_lateral.identification.model import Outcome
+from xosc_lateral.identification.regression import fit_model
+from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.selection import ERROR_BUDGET, select
+from xosc_lateral.identification.terms.mean import MeanTerm
+from xosc_lateral.identification.terms.spread import SpreadTerm
+from xosc_lateral.identification.timeline import Coarse
 
 SECONDS = 700.0
 COLUMNS = [Column(name, Values.NUMBER, False) for name in ("idle", "x")]
@@ -32,7 +35,7 @@ def drive(seed: int, shift: float = 0.0, *, lag_s: float = 0.0, log_spread: floa
 
 def outcome(coarse: Coarse, kind: type, columns: list[Column] = COLUMNS, seed: int = 1) -> Outcome | None:
     search = Search.over(coarse, columns, np.random.SeedSequence(seed), ERROR_BUDGET)
-    return find_column(search, kind, fit_model(coarse, ()))
+    return kind.test(search, fit_model(coarse, ()))
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +49,7 @@ def found() -> Outcome:
 def test_a_shift_of_15_centimetres_is_named_with_its_delay(found: Outcome) -> None:
     assert isinstance(found.term, MeanTerm)
     assert found.columns == ("x",)
-    assert found.p_value < ERROR_BUDGET.level_of("mean", 1)
+    assert found.p_value < ERROR_BUDGET["mean"]
     assert found.term.effect.lag_s == pytest.approx(1.0, abs=1.0)
     assert found.after is not None
     assert found.after.terms == (found.term,)
@@ -57,7 +60,7 @@ def test_idle_columns_are_hardly_ever_sure_to_do_anything() -> None:
     told = [outcome(drive(seed), MeanTerm) for seed in (32, 33, 34)]
     values = [one.p_value for one in told if one is not None]
     assert len(values) == 3
-    assert sum(value < ERROR_BUDGET.level_of("mean", 1) for value in values) <= 1
+    assert sum(value < ERROR_BUDGET["mean"] for value in values) <= 1
     assert max(values) > 0.1
 
 
@@ -65,12 +68,12 @@ def test_what_a_column_may_do_is_told_by_the_best_p_value() -> None:
     coarse = drive(36, log_spread=0.5)
     search = Search.over(coarse, COLUMNS, np.random.SeedSequence(1), ERROR_BUDGET)
     fitted = fit_model(coarse, ())
-    response, p_value = likely_response(search, SpreadTerm, fitted, 0.1)
+    response, p_value = ColumnSearch(search, SpreadTerm, fitted).likely_response(0.1)
     assert p_value <= 0.1
     assert response.shape == (len(coarse), 1)
     x = coarse.response(Linear(acts=Acts.LOCATION, column="x"))
     assert abs(np.corrcoef(response[coarse.valid, 0], x[coarse.valid, 0])[0, 1]) > 0.7
-    nothing, unsure = likely_response(search, SpreadTerm, fitted, 0.0)
+    nothing, unsure = ColumnSearch(search, SpreadTerm, fitted).likely_response(0.0)
     assert (nothing.shape, unsure) == ((len(coarse), 0), 1.0)
 
 
@@ -81,7 +84,7 @@ def test_a_part_of_a_table_is_given_as_many_terms_as_the_table_has_and_no_others
     assert select(search).accepted == ()
     one = select(replace(search, wanted={"mean": 1}))
     assert [accepted.term.component for accepted in one.accepted] == ["mean"]
-    assert one.accepted[0].p_value > search.level_of("mean")
+    assert one.accepted[0].p_value > search.levels["mean"]
     assert {rejected.component for rejected in one.rejected} == {"mean"}
     assert select(replace(search, wanted={})).accepted == ()
 
@@ -91,9 +94,9 @@ def test_a_spread_is_found_as_a_spread_and_not_as_a_shift() -> None:
     spread, shift = outcome(coarse, SpreadTerm), outcome(coarse, MeanTerm)
     assert spread is not None
     assert spread.columns == ("x",)
-    assert spread.p_value < ERROR_BUDGET.level_of("spread", 1)
+    assert spread.p_value < ERROR_BUDGET["spread"]
     assert shift is not None
-    assert shift.p_value > ERROR_BUDGET.level_of("mean", 1)
+    assert shift.p_value > ERROR_BUDGET["mean"]
 
 
 def test_a_column_that_is_barred_is_not_taken_up() -> None:
@@ -101,7 +104,7 @@ def test_a_column_that_is_barred_is_not_taken_up() -> None:
     coarse = drive(37, log_spread=0.5)
     search = Search.over(coarse, COLUMNS, np.random.SeedSequence(1), ERROR_BUDGET)
     term = SpreadTerm.of(Linear(acts=Acts.LOCATION, column="x", response_s=2.0))
-    found = find_column(search, SpreadTerm, fit_model(coarse, (term,)))
+    found = SpreadTerm.test(search, fit_model(coarse, (term,)))
     assert found is None or "x" not in found.columns
 
 

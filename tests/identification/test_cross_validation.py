@@ -8,8 +8,9 @@ import pytest
 from tests.identification.made_coarse import coarse_of, movement, wander
 from xosc_lateral.driver.effects import Acts, Linear
 from xosc_lateral.identification.cross_validation import held_out_gain
-from xosc_lateral.identification.regression import Coarse, fit_model
-from xosc_lateral.identification.terms.column import MeanTerm
+from xosc_lateral.identification.regression import fit_model
+from xosc_lateral.identification.terms.mean import MeanTerm
+from xosc_lateral.identification.timeline import Coarse
 
 SECONDS = 1200.0
 

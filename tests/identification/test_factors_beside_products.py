@@ -6,11 +6,12 @@ import pytest
 from tests.identification.planted import planted_drive
 from xosc_lateral.driver.effects import Acts, Product
 from xosc_lateral.driver.effects.product import Factor, Form
-from xosc_lateral.identification.column_search import likely_response, probability_of
+from xosc_lateral.identification.column_search import ColumnSearch
 from xosc_lateral.identification.identify import usable_columns
 from xosc_lateral.identification.regression import fit_model
-from xosc_lateral.identification.selection import ERROR_BUDGET, Search
-from xosc_lateral.identification.terms.column import MeanTerm
+from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.selection import ERROR_BUDGET
+from xosc_lateral.identification.terms.mean import MeanTerm
 
 PRODUCT = MeanTerm.of(
     Product(
@@ -28,8 +29,9 @@ def test_a_factor_stands_beside_its_product_if_it_acts_by_itself(seed: int) -> N
     )
     search = Search.over(coarse, usable_columns(coarse.timeline).columns, np.random.SeedSequence(1), ERROR_BUDGET)
     beside = fit_model(coarse, (PRODUCT,))
-    assert probability_of(search, MeanTerm, beside, ("gust",)) < 1e-3
-    assert probability_of(search, MeanTerm, beside, ("slope",)) > 0.02
+    found = ColumnSearch(search, MeanTerm, beside)
+    assert found.probability_of(("gust",)) < 1e-3
+    assert found.probability_of(("slope",)) > 0.02
     # looked for anew, it can't be found: the whole cross-basis of the product's columns is known
-    assert likely_response(search, MeanTerm, beside, 1.0)[1] > 0.02
-    assert probability_of(search, MeanTerm, fit_model(coarse, ()), ("gust", "slope")) < 1e-3
+    assert found.likely_response(1.0)[1] > 0.02
+    assert ColumnSearch(search, MeanTerm, fit_model(coarse, ())).probability_of(("gust", "slope")) < 1e-3

@@ -11,13 +11,14 @@ from xosc_lateral.driver.models.base import ModelKind
 from xosc_lateral.driver.profile import Provenance
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.identification.columns import Column, Values
-from xosc_lateral.identification.cross_validation import Nested, _over_blocks
+from xosc_lateral.identification.cross_validation import Nested, gain_over
 from xosc_lateral.identification.held_out import _quantities, fit_without
-from xosc_lateral.identification.regression import Coarse, fit_model
+from xosc_lateral.identification.model import Term
+from xosc_lateral.identification.regression import fit_model
 from xosc_lateral.identification.selection import Accepted, Gain, Selection
-from xosc_lateral.identification.terms.base import Term
-from xosc_lateral.identification.terms.column import MeanTerm
+from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.time import StepTerm
+from xosc_lateral.identification.timeline import Coarse
 
 SECONDS = 900.0
 N = round(SECONDS / 0.2)
@@ -75,10 +76,10 @@ def test_terms_together_gain_what_the_start_lacks(nested: Nested) -> None:
     assert nested.together([]) == Gain(0.0, 0.0, 3)
 
 
-def test_a_gain_is_the_mean_over_blocks_with_its_standard_error(coarse: Coarse) -> None:
+def test_a_gain_is_the_meangain_over_with_its_standard_error(coarse: Coarse) -> None:
     blocks = np.arange(len(coarse)) // 60
     rows = np.random.default_rng(1).normal(size=len(coarse))
-    found = _over_blocks(rows, blocks, coarse.valid, 2)
+    found = gain_over(rows, blocks, coarse.valid, 2)
     sums = np.array([rows[blocks == block].sum() for block in np.unique(blocks[coarse.valid])])
     assert found.mean == pytest.approx(sums.mean())
     assert found.error == pytest.approx(sums.std(ddof=1) / np.sqrt(len(sums)))

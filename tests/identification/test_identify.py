@@ -14,11 +14,12 @@ from xosc_lateral.driver.effects import Acts, Cycle, Drift, Effect, Linear, Vari
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.identification.identify import CLOCK, initial_terms, usable_columns
-from xosc_lateral.identification.regression import Coarse, fit_model
+from xosc_lateral.identification.regression import fit_model
 from xosc_lateral.identification.terms.between import BetweenTerm
-from xosc_lateral.identification.terms.column import MeanTerm, SpreadTerm
+from xosc_lateral.identification.terms.mean import MeanTerm
+from xosc_lateral.identification.terms.spread import SpreadTerm
 from xosc_lateral.identification.terms.time import TimeMeanTerm, TimeSpreadTerm
-from xosc_lateral.identification.timeline import Timeline, join_drives
+from xosc_lateral.identification.timeline import Coarse, Timeline, join_drives
 
 SECONDS = 900.0
 N = round(SECONDS / 0.2)

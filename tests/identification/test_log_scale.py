@@ -5,17 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.identification.innovations import (
-    CLIP,
-    MOST_LOG_SCALE,
-    OWN_LEVEL_S,
-    Squares,
-    bounded,
-    covariance_of_log_sizes,
-    log_sizes,
-    own_levels,
-    scoring_step,
-)
+from xosc_lateral.identification.innovations import CLIP, OWN_LEVEL_S, own_levels
+from xosc_lateral.identification.regression import MOST_LOG_SCALE, bounded, covariance_of_log_sizes, scoring_step
+from xosc_lateral.identification.squares import Squares, log_sizes
 
 
 def test_log_sizes_are_those_of_a_gamma_regression() -> None:

@@ -7,9 +7,10 @@ import pytest
 from scipy.signal import lfilter
 
 from tests.identification.made_coarse import coarse_of, movement
-from xosc_lateral.identification.innovations import Squares, of_squares
-from xosc_lateral.identification.regression import Coarse, fit_model
-from xosc_lateral.identification.terms.column import MeanTerm
+from xosc_lateral.identification.regression import fit_model
+from xosc_lateral.identification.squares import Squares, of_squares
+from xosc_lateral.identification.terms.mean import MeanTerm
+from xosc_lateral.identification.timeline import Coarse
 
 SECONDS = 900.0
 

@@ -18,8 +18,8 @@ from xosc_lateral.driver.effects import (
     Saturating,
     Threshold,
 )
-from xosc_lateral.identification.regression import Coarse
-from xosc_lateral.identification.timing import driving_range, span
+from xosc_lateral.identification.terms.column import driving_range, span
+from xosc_lateral.identification.timeline import Coarse
 
 N = 3000
 INSIDE = slice(75, -75)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from xosc_lateral.identification.innovations import Squares
+from xosc_lateral.identification.squares import Squares
 from xosc_lateral.identification.terms.regimes import probability_of_persistence
 
 N = 3000

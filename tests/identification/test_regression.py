@@ -8,8 +8,10 @@ import pytest
 from tests.identification.made_coarse import SPREAD, coarse_of, movement, wander
 from xosc_lateral.driver.effects import Acts, Linear, Magnitude
 from xosc_lateral.identification import regression
-from xosc_lateral.identification.regression import Coarse, fit_model
-from xosc_lateral.identification.terms.column import MeanTerm, SpreadTerm
+from xosc_lateral.identification.regression import fit_model
+from xosc_lateral.identification.terms.mean import MeanTerm
+from xosc_lateral.identification.terms.spread import SpreadTerm
+from xosc_lateral.identification.timeline import Coarse
 
 SECONDS = 900.0
 SIZE = 0.15

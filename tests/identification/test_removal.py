@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from xosc_lateral.identification.held_out import movement_without, runs_without
-from xosc_lateral.identification.terms.base import Removal
+from xosc_lateral.identification.model import Removal
 from xosc_lateral.identification.timeline import Timeline
 
 STEP = 0.2

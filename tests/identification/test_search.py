@@ -8,7 +8,8 @@ import numpy as np
 
 from tests.identification.made_coarse import coarse_of, movement, wander
 from xosc_lateral.identification.columns import Column, Values
-from xosc_lateral.identification.selection import ERROR_BUDGET, KEPT, Search
+from xosc_lateral.identification.search import KEPT, Search
+from xosc_lateral.identification.selection import ERROR_BUDGET
 
 
 def test_what_was_worked_out_last_is_kept_beside_its_fit_and_not_in_a_part() -> None:

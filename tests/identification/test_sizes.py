@@ -13,10 +13,11 @@ from xosc_lateral.driver.effects.response import respond
 from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.identification.candidates import FINE_SCALES, Family, candidates_of, shapes_of
 from xosc_lateral.identification.columns import Column, Values
+from xosc_lateral.identification.model import Fitted
 from xosc_lateral.identification.refinement import Refinement
-from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
-from xosc_lateral.identification.terms.column import MeanTerm
-from xosc_lateral.identification.timeline import join_drives, on_fine_grid
+from xosc_lateral.identification.regression import fit_model
+from xosc_lateral.identification.terms.mean import MeanTerm
+from xosc_lateral.identification.timeline import Coarse, join_drives, on_fine_grid
 
 LAG, RESPONSE, SIZE = -0.6, 1.7, 0.25
 

@@ -6,7 +6,7 @@ import pytest
 from tests.identification.planted import planted_drive
 from xosc_lateral.driver.effects import Acts, Linear
 from xosc_lateral.identification.regression import fit_model
-from xosc_lateral.identification.terms.column import MeanTerm
+from xosc_lateral.identification.terms.mean import MeanTerm
 
 SIZE = 0.15  # [m], per standard deviation of the column
 

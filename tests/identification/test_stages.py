@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from xosc_lateral.identification.selection import ERROR_BUDGET, STAGES, TERMS
-from xosc_lateral.identification.terms.column import MeanTerm, SpreadTerm
 from xosc_lateral.identification.terms.cycle import CycleTerm
+from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.regimes import RegimesTerm
+from xosc_lateral.identification.terms.spread import SpreadTerm
 from xosc_lateral.identification.terms.time import TimeMeanTerm
 
 LISTED = [kind for stage in STAGES for kind in stage]
@@ -31,7 +32,7 @@ def test_the_order_of_the_stages() -> None:
 
 
 def test_every_component_has_a_share_of_the_error_budget_and_none_is_left_over() -> None:
-    assert {kind.component for kind in TERMS} == set(ERROR_BUDGET.weights)
+    assert {kind.component for kind in TERMS} == set(ERROR_BUDGET)
 
 
 def test_the_mean_comes_first_and_again_once_hidden_movement_is_known() -> None:

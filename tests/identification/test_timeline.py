@@ -142,7 +142,7 @@ def test_a_drive_responds_to_nothing_that_another_drive_met(lag_s: float, respon
     made = [_drive(f"drive-{index}", rng.normal(10.0 * index, 1.0, size=500)) for index in range(4)]
     timeline = join_drives(made)
     effect = Linear(acts=Acts.LOCATION, column="speed", lag_s=lag_s, response_s=response_s)
-    joined = timeline.response(effect, timeline.context)
+    joined = timeline.respond(effect.known(timeline.context), lag_s, response_s)
     for span in timeline.spans:
         alone = effect.response(STEP, {"speed": timeline.context["speed"][span]})
         inside = timeline.valid[span]

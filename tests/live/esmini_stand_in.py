@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from xosc_lateral.live.esmini import LATERAL, ObjectState
+from xosc_lateral.live.esmini import LATERAL
+from xosc_lateral.live.esmini_library import ObjectState
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.pipeline.load import play_scenario
 

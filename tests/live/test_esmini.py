@@ -18,8 +18,9 @@ from xosc_lateral.api.profiles import read_profile
 from xosc_lateral.cli import main
 from xosc_lateral.errors import SimulationError
 from xosc_lateral.formats.openscenario.read import read_scenario
-from xosc_lateral.live.esmini import EsminiTraffic, ObjectState, Player, lateral_actions, open_player
-from xosc_lateral.live.traffic import TURN
+from xosc_lateral.live.esmini import EsminiTraffic, lateral_actions
+from xosc_lateral.live.esmini_library import ObjectState, Player, open_player
+from xosc_lateral.live.paths import TURN
 
 CUT_IN = Path(__file__).resolve().parents[2] / "templates" / "cut-in.xosc"
 REAL = os.environ.get("ESMINI_LIBRARY")

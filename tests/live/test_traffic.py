@@ -14,7 +14,8 @@ from xosc_lateral.api.profiles import read_profile
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.errors import SimulationError
-from xosc_lateral.live.traffic import TURN, Moment, Moves, Traffic
+from xosc_lateral.live.paths import TURN, Moves
+from xosc_lateral.live.traffic import Moment, Traffic
 from xosc_lateral.segment import Segment
 
 DT = 0.01

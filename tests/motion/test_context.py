@@ -12,7 +12,8 @@ import pytest
 from tests.motion.made_motion import LANE_WIDTH, RADIUS, drive, entity, together, two_roads
 from tests.profiles import effect_from_dict
 from xosc_lateral.driver.effects import ColumnEffect
-from xosc_lateral.motion.context import NEAR, STEERING, entity_context
+from xosc_lateral.motion.around import NEAR
+from xosc_lateral.motion.context import STEERING, entity_context
 from xosc_lateral.motion.nominal import EntityMotion, PlayedAction
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import Action, Entity, Place

@@ -130,6 +130,13 @@ def test_changed_roads_and_catalogs_are_noticed(database: Path, tmp_path: Path, 
     assert states() == [JobState.WRITTEN]
 
 
+def test_a_context_that_can_not_be_read_costs_one_row(database: Path, tmp_path: Path, profile: str) -> None:
+    scenario, name_too_long = str(database / "cut-in" / "cut-in.xosc"), tmp_path / f"{'n' * 300}.csv"
+    table = pd.DataFrame({"scenario": [scenario] * 2, "name": ["one", "two"], "context": ["", str(name_too_long)]})
+    result = xl.convert_many(table, tmp_path / "out", profile=profile, workers=0)
+    assert result.failed == 1 and (tmp_path / "out" / "one.xosc").is_file()
+
+
 def test_the_log_is_json_and_wrong_usage_is_2(database: Path, tmp_path: Path, run) -> None:
     code, _, errors = run(str(database / "cut-in"), "-o", str(tmp_path / "out"), "--log-json")
     assert code == 0

@@ -7,11 +7,18 @@ from pathlib import Path
 import numpy as np
 
 from tests.motion.made_motion import drive, entity, together, two_roads
-from xosc_lateral.enrich.result import Enriched, EntityResult, SampledSegment
+from xosc_lateral.enrich.result import (
+    ConversionProvenance,
+    ConvertedScenario,
+    Enriched,
+    EntityResult,
+    SampledSegment,
+)
 from xosc_lateral.motion.gaps import BoxPath, Gap, smallest_gaps
 from xosc_lateral.motion.nominal import Activity, EntityMotion, Note
 from xosc_lateral.motion.segments import cut_segments
 from xosc_lateral.motion.trajectory import WorldTrajectory, displace
+from xosc_lateral.pipeline.settings import ConvertSettings
 from xosc_lateral.road import RoadNetwork
 
 DURATION = 30.0
@@ -106,3 +113,12 @@ def _nominal(motion: EntityMotion) -> WorldTrajectory:
 def _gaps(paths: list[tuple[EntityMotion, WorldTrajectory]]) -> tuple[Gap, ...]:
     boxes = [BoxPath(motion.name, path.x[::5], path.y[::5], path.heading[::5], 5.0, 2.0, 1.4) for motion, path in paths]
     return smallest_gaps(paths[0][0].time[::5], boxes)
+
+
+def converted(enriched: Enriched, *warnings: str) -> ConvertedScenario:
+    """The same as a conversion of in.xosc into out.xosc."""
+    options = ConvertSettings(seed=7, parameters={"speed": "30"}).record(Path())
+    made = ConversionProvenance(
+        "0.1", 1, "in.xosc", {"in.xosc": "a" * 64}, {"Ego": ("calm", "b" * 64)}, options, 2, "1.2", (), {}, "d" * 64
+    )
+    return ConvertedScenario(Path("in.xosc"), Path("out.xosc"), "c" * 64, enriched, made, warnings)

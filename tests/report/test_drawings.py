@@ -10,16 +10,15 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from tests.report.made_enriched import made_enriched
+from tests.report.made_enriched import converted, made_enriched
 from tests.road.places import hand_written
-from xosc_lateral.enrich.result import ConversionProvenance, ConvertedScenario
 from xosc_lateral.motion.nominal import Activity
-from xosc_lateral.pipeline.settings import ConvertSettings
 from xosc_lateral.report.chart import BLUE
+from xosc_lateral.report.conversion import as_text, facts
 from xosc_lateral.report.figure import Figure
 from xosc_lateral.report.frames import conversion_frame
-from xosc_lateral.report.scenario import as_text, facts
-from xosc_lateral.report.scenario_figures import edge_lines, thumbnail, view_along
+from xosc_lateral.report.road_lines import lane_surfaces, markings
+from xosc_lateral.report.scenario_figures import thumbnail
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -113,16 +112,6 @@ def test_a_line_breaks_at_nan_and_thousands_of_points_keep_their_extremes():
     assert _points(drawn.get("d"))[:, 1].min() == pytest.approx(150.0 * (1.0 - 19.0 / 20.0), abs=0.06)
 
 
-def test_true_to_scale_means_as_long_along_y_as_along_x():
-    figure = Figure(equal=True, height=80.0)
-    (panel,) = figure.panels
-    panel.line([0.0, 300.0], [0.0, 1.0], BLUE)
-    root = etree.fromstring(figure.svg().encode())
-    (inner,) = root.findall(f"{SVG}svg")
-    origin, along, across = _places(inner, [0.0, 10.0, 0.0], [0.0, 0.0, 10.0])
-    assert along[0] - origin[0] == pytest.approx(origin[1] - across[1], rel=1e-3)
-
-
 def test_nothing_and_a_single_value_can_be_drawn():
     figure = Figure(2, 1, legend=True)
     figure.panels[0].line([], [], BLUE)
@@ -155,40 +144,29 @@ def test_who_never_appears_is_not_drawn_and_a_scenario_of_nobody_is_empty(enrich
         assert "<circle" not in thumbnail(replace(enriched, entities=nobody))
 
 
-@pytest.mark.parametrize("angle", np.linspace(-3.0, 3.0, 7))
-def test_a_view_shows_the_same_shape_however_the_road_lies(angle):
-    """Turning the world turns the view with it: a drawing is about the road, not about north."""
-    t = np.linspace(0.0, 1.0, 40)
-    curve = 400.0 * t + 1j * 30.0 * t * t
-    turned = curve * np.exp(1j * angle) + complex(5e5, -3e6)
-    here = view_along(curve.real, curve.imag)
-    there = view_along(turned.real, turned.imag)
-    a, b = here.turn(curve.real, curve.imag), there.turn(turned.real, turned.imag)
-    np.testing.assert_allclose(np.ptp(a[0]), np.ptp(b[0]), rtol=1e-9)
-    np.testing.assert_allclose(a[0] - a[0][0], b[0] - b[0][0], atol=1e-6)
-    np.testing.assert_allclose(a[1] - a[1][0], b[1] - b[1][0], atol=1e-6)
-
-
 # ---- roads -----------------------------------------------------------------------------------------------------------
-def test_edges_of_a_straight_road_are_drawn_where_its_lanes_end():
-    lines = list(edge_lines(hand_written("straight"), 0, 100.0, 300.0))
-    levels = sorted({float(t) for line in lines for t in np.round(np.broadcast_to(line.t, line.s.shape), 9)})
-    assert levels == [-6.75, -3.5, 0.0, 3.5]
-    for line in lines:
-        assert line.s[0] == 100.0 and line.s[-1] == pytest.approx(300.0, abs=1e-5)
-    dashed = [line for line in lines if line.dashes]
-    assert len(dashed) == 1 and not np.any(dashed[0].t)  # the broken line in the middle of the road
+def test_lanes_and_markings_of_a_straight_road_are_drawn_where_its_lanes_end():
+    road = hand_written("straight")
+    surfaces = [lane for lane in lane_surfaces(road, 0, 100.0, 300.0) if lane[0] == "driving"]
+    edges = sorted({round(float(t[0]), 9) for _, _, *both in surfaces for t in both})
+    assert edges == [-6.75, -3.5, 0.0, 3.5]
+    paint = list(markings(road, 0, 100.0, 300.0))
+    for s in (*(lane[1] for lane in surfaces), *(line[1] for line in paint)):
+        assert s[0] == 100.0 and s[-1] == pytest.approx(300.0, abs=1e-5)
+    (broken,) = (t for mark, _, t in paint if "broken" in mark.type)
+    assert not np.any(broken)  # in the middle of the road
 
 
 def test_lanes_are_drawn_section_by_section_and_not_beyond_them():
     """A lane has other ids, widths and neighbours in each section: no line crosses from one into the next."""
-    for line in edge_lines(hand_written("sections"), 0, 0.0, 1e9):
-        cuts = [cut for cut in (100.0, 200.0, 300.0) if line.s[0] < cut <= line.s[-1]]
-        assert not cuts and line.s[-1] <= 400.0
+    for _, s, _, _ in lane_surfaces(hand_written("sections"), 0, 0.0, 1e9):
+        cuts = [cut for cut in (100.0, 200.0, 300.0) if s[0] < cut <= s[-1]]
+        assert not cuts and s[-1] <= 400.0
 
 
 def test_nothing_is_drawn_of_a_road_beyond_its_ends():
-    assert list(edge_lines(hand_written("straight"), 0, 2000.0, 3000.0)) == []
+    road = hand_written("straight")
+    assert [*lane_surfaces(road, 0, 2000.0, 3000.0), *markings(road, 0, 2000.0, 3000.0)] == []
 
 
 # ---- results as tables and text --------------------------------------------------------------------------------------
@@ -208,16 +186,8 @@ def test_rows_of_one_moment_come_in_the_order_of_the_scenario(enriched):
     assert frame[frame["time"] == 0.0]["name"].tolist() == [one.name for one in enriched.entities]
 
 
-def _converted(enriched, **more) -> ConvertedScenario:
-    options = ConvertSettings(seed=7, parameters={"speed": "30"}).record(Path())
-    made = ConversionProvenance(
-        "0.1", 1, "in.xosc", {"in.xosc": "a" * 64}, {"Ego": ("calm", "b" * 64)}, options, 2, "1.2", (), {}, "d" * 64
-    )
-    return ConvertedScenario(Path("in.xosc"), Path("out.xosc"), "c" * 64, enriched, made, ("mind this",), **more)
-
-
 def test_facts_are_json_and_add_up_to_the_scenario(enriched):
-    found = json.loads(json.dumps(facts(_converted(enriched)), allow_nan=False))
+    found = json.loads(json.dumps(facts(converted(enriched, "mind this")), allow_nan=False))
     assert [one["name"] for one in found["entities"]] == ["Ego", "Van", "Slow"]
     assert found["entities"][2]["why_not"] == "below 40 km/h throughout" and found["entities"][2]["segments"] == []
     (ego,) = found["entities"][0]["segments"]
@@ -228,7 +198,7 @@ def test_facts_are_json_and_add_up_to_the_scenario(enriched):
 
 
 def test_a_conversion_says_of_every_entity_what_was_done_or_why_not(enriched):
-    lines = as_text(_converted(enriched), Path("page.html")).splitlines()
+    lines = as_text(converted(enriched, "mind this"), Path("page.html")).splitlines()
     assert lines[0] == "out.xosc" and lines[-1] == "report: page.html"
     assert "  Slow: as in the scenario (below 40 km/h throughout)" in lines
     assert "  warning: mind this" in lines

@@ -14,9 +14,9 @@ from benchmarks.library import POPULATION, SINGLE_VEHICLES, most_different
 from xosc_lateral.cli import main
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.evaluation.metrics import free_runs, summary_of
+from xosc_lateral.evaluation.profile_comparison import compare
 from xosc_lateral.formats.profiles import list_profiles, read_profile
 from xosc_lateral.report.cards import card_text
-from xosc_lateral.report.comparison import compare
 from xosc_lateral.report.violins import _density
 
 

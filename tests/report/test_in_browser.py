@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from tests.report.browser import open_browser
-from tests.report.made_enriched import made_enriched
+from tests.report.made_enriched import converted, made_enriched
 from xosc_lateral.report.chart import BLUE, GREEN, VERMILLION
-from xosc_lateral.report.scenario import scenario_page
+from xosc_lateral.report.scenario import conversion_page
 
 AHEAD, LANE_WIDTH = 1.4, 3.5  # of the made vehicles and road [m]
 
@@ -27,7 +27,7 @@ def enriched(tmp_path_factory):
 def browser(tmp_path_factory, enriched):
     folder = tmp_path_factory.mktemp("page")
     page = folder / "report.html"
-    page.write_text(scenario_page(enriched, source="a.xosc", output="b.xosc", provenance={"seed": 1}), encoding="utf-8")
+    page.write_text(conversion_page(converted(enriched)), encoding="utf-8")
     with open_browser(folder / "profile") as one:
         one.get(page.as_uri())
         yield one

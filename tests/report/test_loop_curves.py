@@ -11,7 +11,8 @@ import pytest
 from tests.identification.made_coarse import coarse_of, movement, wander
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Linear
 from xosc_lateral.identification.regression import fit_model
-from xosc_lateral.identification.terms.column import MeanTerm, SpreadTerm
+from xosc_lateral.identification.terms.mean import MeanTerm
+from xosc_lateral.identification.terms.spread import SpreadTerm
 from xosc_lateral.report.loop_curves import POINTS, _binned, _ends, curve_of
 
 SECONDS = 2400.0

@@ -108,7 +108,6 @@ def test_names_in_a_figure_are_escaped():
     panel = figure.panels[0]
     panel.title = panel.x.label = panel.y.label = evil
     panel.dots(1.0, 1.0, BLUE, label=evil)
-    panel.note(1.0, 1.0, evil)
     panel.y.ticks, figure.legend = [(0.0, evil)], True
     assert "<script" not in figure.svg()
 

@@ -84,7 +84,7 @@ def test_a_shifted_cubic_is_the_same_function_from_elsewhere(cubic: Cubic, by: f
 
 # ---- lanes -----------------------------------------------------------------------------------------------------------
 def record(number: int, *widths: tuple[float, Cubic], borders: tuple[tuple[float, Cubic], ...] = ()) -> LaneRecord:
-    return LaneRecord(number, "driving", False, widths, borders, (), (), (), (), ())
+    return LaneRecord(number, "driving", widths=widths, borders=borders)
 
 
 def section(*records: LaneRecord, offset: Cubic = (0.0, 0.0, 0.0, 0.0)) -> LaneSection:

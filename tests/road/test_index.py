@@ -10,6 +10,7 @@ import pytest
 from tests.road.places import VALID, hand_written, random_places
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.formats.opendrive import read_opendrive
+from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.road.samples import BRUTE_FORCE
 
 # Elements of these files are far apart on purpose: jumps have no inverse.
@@ -85,7 +86,7 @@ def test_where_roads_lie_on_each_other_a_point_has_gone_onto_the_one_least_bent(
     """At the entry of a junction; whose lane's middle is nearest says nothing there."""
     network = hand_written("junction")
     west, bend, straight_on = (network.index_of(name) for name in ("west", "west-south", "west-east"))
-    assert network.world_to_lane(-18.0, y, near=[bend]).distance <= 1e-6
+    assert network.path_to_lane(-18.0, y, bend, 1.0).road == bend
     assert network.world_to_lane_at(-18.0, y, near=(west, 99.0)).road == straight_on
     assert network.world_to_lane_at(-18.0, y, near=(bend, 1.0)).road == bend
 
@@ -139,20 +140,12 @@ def test_points_far_off_are_found_alike_one_by_one_and_in_crowds():
     assert np.all((crowd.distance > 4800.0) & (crowd.distance < 5200.0))
 
 
-def test_only_the_roads_asked_for_are_searched():
-    network = hand_written("junction")
-    east = network.index_of("east")
-    found = network.world_to_lane([-100.0, 50.0], [1.0, 1.0], near=[east])
-    assert found.road.tolist() == [east, east]
-    assert found.distance.tolist() == pytest.approx([120.0, 0.0])
-
-
 def test_the_inside_of_a_tight_bend_has_a_nearest_place_too():
-    network = hand_written("cubics")
-    bend = network.index_of("bend")
+    every = hand_written("cubics")
+    network, bend = RoadNetwork((every.roads[every.index_of("bend")],)), 0
     rng = np.random.default_rng(12)
     x, y = rng.uniform(-60.0, -30.0, 400), rng.uniform(-55.0, -30.0, 400)
-    found = network.world_to_lane(x, y, near=[bend], lane_types=None)
+    found = network.world_to_lane(x, y, lane_types=None)
     s = np.linspace(0.0, network.roads[bend].length, 4001)
     line = network.road_to_world(bend, s)
     nearest = np.hypot(x[:, None] - line.x, y[:, None] - line.y).min(axis=1)

@@ -63,12 +63,12 @@ def test_what_is_found_leads_back_to_the_point(name: str) -> None:
 
 @pytest.mark.parametrize("shift", [0.1, 0.2, -0.1, -0.2])
 def test_a_car_that_is_decimetres_off_the_middle_is_found_there_on_the_same_lane(shift: float) -> None:
-    network = hand_written("junction")
-    for index, road in enumerate(network.roads):
+    for road in hand_written("junction").roads:
+        network = RoadNetwork((road,))
         for lane in (one.id for one in road.sections[0].lanes if one.type in DRIVING):
             s = np.linspace(0.2, 0.8, 5) * road.sections[0].end
-            pose = network.lane_to_world(index, lane, s, shift)
-            found = network.world_to_lane(pose.x, pose.y, heading=pose.heading, near=[index])
+            pose = network.lane_to_world(0, lane, s, shift)
+            found = network.world_to_lane(pose.x, pose.y, heading=pose.heading)
             assert found.lane.tolist() == [lane] * 5
             np.testing.assert_allclose(found.offset, shift, atol=1e-9)
             np.testing.assert_allclose(found.s, s, atol=1e-8)

@@ -134,12 +134,6 @@ def test_offset_and_t_turn_into_each_other_with_the_sign_of_travel():
     assert network.offset_from_offset_t(0, -2, 0.5) == 0.5
 
 
-def test_the_edges_of_a_lane_are_told_by_travel():
-    network = hand_written("straight")
-    assert network.lane_edges_t(0, 1, 0.0) == (0.0, 3.5)
-    assert network.lane_edges_t(0, -2, 0.0) == (-3.5, -6.75)
-
-
 def test_on_a_straight_road_everything_is_where_a_ruler_would_put_it():
     network = hand_written("straight")
     pose = network.pose_at(0, -2, 200.0, -0.1)
@@ -165,9 +159,9 @@ def test_a_lane_widening_turns_its_heading_by_the_slope_of_its_centre():
 
 def test_borders_count_from_the_centre_lane_and_widths_win_over_them():
     network = hand_written("edges")
-    assert network.lane_edges_t(0, 2, 10.0)[::-1] == pytest.approx((6.0, 3.0))
-    assert network.lane_edges_t(0, 2, 160.0)[::-1] == pytest.approx((7.6, 3.6))
-    assert network.lane_edges_t(0, -1, 250.0) == pytest.approx((1.0, -2.5))
+    for lane, s, outer, inner in ((2, 10.0, 6.0, 3.0), (2, 160.0, 7.6, 3.6), (-1, 250.0, -2.5, 1.0)):
+        assert network.lane_centre_t(0, lane, s) == pytest.approx(0.5 * (outer + inner))
+        assert network.lane_width(0, lane, s) == pytest.approx(abs(outer - inner))
     assert network.lane_width(0, -2, [25.0, 150.0, 299.0]) == pytest.approx([0.0, 3.5, 3.5])
     assert network.lane_width(0, -2, 100.0) == pytest.approx(0.00105 * 50**2 - 7e-6 * 50**3)
     assert network.lane_centre_t(0, 0, 150.0) == pytest.approx(0.5)

@@ -50,7 +50,8 @@ def test_a_level_road_says_so() -> None:
 # ---- kerbs -----------------------------------------------------------------------------------------------------------
 def lane(number: int, *heights: tuple[float, float, float]) -> Lane:
     zero = (0.0, 0.0, 0.0, 0.0)
-    return Lane(number, "driving", 1, True, (0.0,), (zero,), ((3.0, *zero[1:]),), heights, (), (), (), ())
+    width = (3.0, *zero[1:])
+    return Lane(number, "driving", heights=heights, direction=1, starts=(0.0,), centre=(zero,), width=(width,))
 
 
 def height(of: Lane, s: float, from_centre: float, width: float = 3.0) -> float:

@@ -71,8 +71,6 @@ def test_what_a_driver_sees_is_mirrored_with_the_road(name, tmp_path):
         assert there == pytest.approx(-here, abs=1e-9), opposite
     here, there = told.both("lane_curvature", 4)
     assert there == pytest.approx(-here, rel=1e-6, abs=1e-9)
-    (left, right), (other_left, other_right) = told.both("lane_edges_t")
-    assert other_left == pytest.approx(-right, abs=1e-9) and other_right == pytest.approx(-left, abs=1e-9)
     (index, count), (other_index, other_count) = told.both("lane_index")
     assert np.array_equal(other_count, count)
     assert np.array_equal(other_index, np.where(index < 0, -1, count - 1 - index))  # rightmost there is leftmost here

@@ -11,10 +11,13 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from xosc_lateral.scenario.distribution import (
+    Bin,
     Deterministic,
     DistributionError,
     Draw,
+    Element,
     Histogram,
+    Limits,
     LogNormal,
     Normal,
     Poisson,
@@ -28,6 +31,14 @@ from xosc_lateral.scenario.place import Place
 
 PLACE = Place("f.xosc", 1, "e")
 COUNT = 4000
+
+
+def bins(*parts: tuple[float, float, float]) -> Histogram:
+    return Histogram(tuple(Bin(weight, limits=Limits(lower, upper)) for lower, upper, weight in parts))
+
+
+def weighted(**weights: float) -> Weighted:
+    return Weighted(tuple(Element(value, weight) for value, weight in weights.items()))
 
 
 def draws(distribution: Draw, seed: int = 1) -> np.ndarray:
@@ -66,11 +77,11 @@ def test_a_huge_product_is_made_lazily() -> None:
 @pytest.mark.parametrize(
     ("distribution", "mean", "variance"),
     [
-        (Uniform(2.0, 6.0), 4.0, 16.0 / 12.0),
+        (Uniform(limits=Limits(2.0, 6.0)), 4.0, 16.0 / 12.0),
         (Normal(3.0, 4.0), 3.0, 4.0),
         (LogNormal(5.0, 2.0), 5.0, 2.0),
         (Poisson(3.5), 3.5, 3.5),
-        (Histogram(((0.0, 2.0), (2.0, 4.0)), (1.0, 3.0)), 2.5, 1.0 / 3.0 + 0.75),
+        (bins((0.0, 2.0, 1.0), (2.0, 4.0, 3.0)), 2.5, 1.0 / 3.0 + 0.75),
     ],
 )
 def test_draws_have_the_stated_mean_and_variance(distribution: Draw, mean: float, variance: float) -> None:
@@ -80,25 +91,25 @@ def test_draws_have_the_stated_mean_and_variance(distribution: Draw, mean: float
 
 
 def test_truncated_draws_stay_inside() -> None:
-    values = draws(Normal(0.0, 1.0, (0.5, 1.0)))
+    values = draws(Normal(0.0, 1.0, limits=Limits(0.5, 1.0)))
     assert values.min() >= 0.5
     assert values.max() <= 1.0
 
 
 def test_limits_that_nothing_meets_are_an_error() -> None:
     with pytest.raises(DistributionError, match="no value within"):
-        Normal(0.0, 1e-6, (5.0, 6.0)).draw(np.random.default_rng(0))
+        Normal(0.0, 1e-6, limits=Limits(5.0, 6.0)).draw(np.random.default_rng(0))
 
 
 def test_weighted_values_come_as_often_as_weighted() -> None:
     rng = np.random.default_rng(3)
-    values = [Weighted(("car", "truck", "never"), (3.0, 1.0, 0.0)).draw(rng) for _ in range(COUNT)]
+    values = [weighted(car=3.0, truck=1.0, never=0.0).draw(rng) for _ in range(COUNT)]
     assert values.count("never") == 0
     assert values.count("car") / COUNT == pytest.approx(0.75, abs=5.0 * np.sqrt(0.75 * 0.25 / COUNT))
 
 
 def test_stochastic_sets_repeat_for_the_same_seed() -> None:
-    stochastic = Stochastic((("a", Uniform(0.0, 1.0)), ("b", Poisson(2.0))), 3, None)
+    stochastic = Stochastic((("a", Uniform(limits=Limits(0.0, 1.0))), ("b", Poisson(2.0))), 3, None)
     first = [stochastic.sample(np.random.default_rng(7)) for _ in range(2)]
     assert first[0] == first[1]
     assert set(first[0]) == {"a", "b"}
@@ -124,13 +135,13 @@ class _Truncated:
 @pytest.mark.parametrize(
     ("distribution", "law"),
     [
-        (Uniform(-3.0, -1.0), stats.uniform(-3.0, 2.0)),
+        (Uniform(limits=Limits(-3.0, -1.0)), stats.uniform(-3.0, 2.0)),
         (Normal(20.0, 9.0), stats.norm(20.0, 3.0)),
-        (Normal(20.0, 9.0, (19.0, 27.5)), stats.truncnorm(-1.0 / 3.0, 2.5, 20.0, 3.0)),
+        (Normal(20.0, 9.0, limits=Limits(19.0, 27.5)), stats.truncnorm(-1.0 / 3.0, 2.5, 20.0, 3.0)),
         (LogNormal(2.0, 0.5), _log_normal(2.0, 0.5)),
-        (LogNormal(2.0, 0.5, (1.5, 3.0)), _Truncated(_log_normal(2.0, 0.5), 1.5, 3.0)),
+        (LogNormal(2.0, 0.5, limits=Limits(1.5, 3.0)), _Truncated(_log_normal(2.0, 0.5), 1.5, 3.0)),
         (
-            Histogram(((0.0, 1.0), (1.0, 4.0), (4.0, 5.0)), (2.0, 3.0, 5.0)),
+            bins((0.0, 1.0, 2.0), (1.0, 4.0, 3.0), (4.0, 5.0, 5.0)),
             stats.rv_histogram((np.array([2.0, 3.0, 5.0]), np.array([0.0, 1.0, 4.0, 5.0])), density=False),
         ),
     ],
@@ -143,7 +154,7 @@ def test_draws_follow_the_whole_law_and_not_its_moments_alone(distribution: Draw
 
 
 def test_a_truncated_poisson_keeps_the_proportions_of_what_is_left() -> None:
-    counts = np.bincount(draws(Poisson(3.0, (2.0, 5.0)), seed=6).astype(int), minlength=7)
+    counts = np.bincount(draws(Poisson(3.0, limits=Limits(2.0, 5.0)), seed=6).astype(int), minlength=7)
     assert counts[:2].sum() == 0 and counts[6:].sum() == 0
     share = stats.poisson(3.0).pmf(np.arange(2, 6))
     expected = COUNT * share / share.sum()
@@ -154,12 +165,14 @@ def test_weights_are_proportions_whatever_they_sum_to() -> None:
     """The standard lets weights sum to anything: only their ratios count."""
     words, weights = ("a", "b", "c"), (0.2, 0.5, 0.3)
     one, other = (
-        [Weighted(words, tuple(k * w for w in weights)).draw(np.random.default_rng(8)) for _ in range(1)]
+        weighted(**{word: k * weight for word, weight in zip(words, weights, strict=True)}).draw(
+            np.random.default_rng(8)
+        )
         for k in (1.0, 1000.0)
     )
     assert one == other
     rng = np.random.default_rng(9)
-    found = [Weighted(words, weights).draw(rng) for _ in range(COUNT)]
+    found = [weighted(**dict(zip(words, weights, strict=True))).draw(rng) for _ in range(COUNT)]
     assert stats.chisquare([found.count(word) for word in words], COUNT * np.array(weights)).pvalue > 1e-4
 
 
@@ -173,7 +186,7 @@ def test_parameters_of_one_set_are_drawn_independently() -> None:
 def test_a_number_that_was_drawn_is_read_back_to_the_last_bit() -> None:
     """A variant can be made again from the values in its manifest."""
     rng, again = np.random.default_rng(11), np.random.default_rng(11)
-    assert float(Uniform(0.0, 0.1).draw(rng)) == again.uniform(0.0, 0.1)
+    assert float(Uniform(limits=Limits(0.0, 0.1)).draw(rng)) == again.uniform(0.0, 0.1)
     assert Poisson(1000.0).draw(rng).isdecimal()
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from xosc_lateral.scenario.entity import Axle, Axles, BoundingBox, Entity
+from xosc_lateral.scenario.entity import BoundingBox, Entity
 from xosc_lateral.scenario.enums import EntityCategory
 from xosc_lateral.scenario.place import Place
 from xosc_lateral.scenario.scenario import FileHeader, Scenario
@@ -23,22 +23,8 @@ def scenario(*names: str, hashes: dict[Path, str] | None = None) -> Scenario:
     board = Storyboard(Init((), (), ()), (), None, PLACE)
     header = FileHeader(1, 2, "a", "d", "2024-01-01")
     return Scenario(
-        Path("f.xosc"), header, {}, {}, {}, None, None, (), tuple(map(entity, names)), board, input_hashes=hashes or {}
+        Path("f.xosc"), header, {}, {}, {}, None, (), tuple(map(entity, names)), board, input_hashes=hashes or {}
     )
-
-
-@pytest.mark.parametrize("reference", [0.0, -1.3, 1.4])
-def test_the_wheelbase_is_the_distance_of_the_axles_wherever_the_reference_point_lies(reference):
-    """Rear axle, middle or front bumper: files put the reference point where they like."""
-    rear, front = (Axle(0.5, reference + x, 0.3, 1.6, 0.7) for x in (0.0, 2.7))
-    assert Axles(front, rear).wheelbase == pytest.approx(2.7)
-    assert Axles(front, rear, (Axle(0.0, reference - 1.2, 0.3, 1.6, 0.7),)).wheelbase == pytest.approx(2.7)
-
-
-def test_a_trailer_of_one_axle_has_no_wheelbase():
-    axle = Axle(0.0, 0.0, 0.3, 1.6, 0.7)
-    assert Axles(None, axle).wheelbase is None
-    assert Axles(axle, None).wheelbase is None
 
 
 @pytest.mark.parametrize(

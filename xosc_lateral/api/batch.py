@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Unpack
+from typing import TYPE_CHECKING, Any, Literal
 
 from xosc_lateral.api.result import PathLike, Result
 from xosc_lateral.errors import FormatError
@@ -17,9 +17,10 @@ from xosc_lateral.pipeline.convert_job import write_batch_index
 from xosc_lateral.pipeline.guard import JobLimits
 from xosc_lateral.pipeline.jobs import Batch, plan_batch
 from xosc_lateral.pipeline.manifest import MANIFEST, ManifestRow, read_manifest
+from xosc_lateral.pipeline.options import spelled_out
 from xosc_lateral.pipeline.progress import Display, Summary, follow
 from xosc_lateral.pipeline.request import frame_requests
-from xosc_lateral.pipeline.settings import ConvertOptions, ConvertSettings, spelled_out
+from xosc_lateral.pipeline.settings import ConvertSettings
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     ScenariosLike = PathLike | pd.DataFrame | Sequence[PathLike]
 
 
-@spelled_out
+@spelled_out(ConvertSettings)
 def convert_many(
     scenarios: ScenariosLike,
     output: PathLike,
@@ -42,7 +43,7 @@ def convert_many(
     force: bool = False,
     show: Literal["auto", "quiet", "json", "nothing"] = "nothing",
     on_outcome: Callable[[Mapping[str, Any]], None] | None = None,
-    **options: Unpack[ConvertOptions],
+    **options: Any,
 ) -> BatchResult:
     """Convert many scenarios into a folder; what is up to date there already is left alone.
 
@@ -72,7 +73,7 @@ def convert_many(
     on_outcome : callable, optional
         Called with each output's row of the manifest as it comes, with `state` and `seconds`.
     options
-        `ConvertOptions`, for all of them.
+        `ConvertSettings`, for all of them.
 
     Raises
     ------

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Any
 
-from xosc_lateral.api.result import PathLike, Result
+from xosc_lateral.api.result import PAGE_SUFFIXES, PathLike, Result, write_page
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.output_paths import claim, output_file
 from xosc_lateral.pipeline.convert import convert_scenario
-from xosc_lateral.pipeline.settings import ConvertOptions, ConvertSettings, spelled_out
+from xosc_lateral.pipeline.options import spelled_out
+from xosc_lateral.pipeline.settings import ConvertSettings
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -18,10 +19,9 @@ if TYPE_CHECKING:
     from xosc_lateral.report.figure import Figure
 
 SCENARIO_SUFFIXES = (".xosc",)
-REPORT_SUFFIXES = (".html", ".htm")
 
 
-@spelled_out
+@spelled_out(ConvertSettings)
 def convert(
     scenario: PathLike,
     output: PathLike | None = None,
@@ -29,7 +29,7 @@ def convert(
     variant: int = 1,
     report: PathLike | None = None,
     force: bool = False,
-    **options: Unpack[ConvertOptions],
+    **options: Any,
 ) -> Conversion:
     """Give every car in a scenario the lateral movement of a real driver.
 
@@ -47,7 +47,7 @@ def convert(
     force : bool
         Replace an output that this package did not write.
     options
-        `ConvertOptions`.
+        `ConvertSettings`.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def convert(
     settings = ConvertSettings.of(**options)
     source = Path(scenario)
     written = source if output is None else output_scenario(output, source)
-    page = None if report is None else output_file(report, f"{written.stem}.html", REPORT_SUFFIXES)
+    page = None if report is None else output_file(report, f"{written.stem}.html", PAGE_SUFFIXES)
     claim([None if output is None else written, page], [source], force=force)
     made = convert_scenario(source, written, settings, variant=variant - 1, report=page, save=output is not None)
     result = Conversion(made)
@@ -175,7 +175,7 @@ class Conversion(Result):
         return f"{where}: {len(self.enriched)} of {len(self.entities)} entities enriched{warned}"
 
     def __str__(self) -> str:
-        from xosc_lateral.report.scenario import as_text
+        from xosc_lateral.report.conversion import as_text
 
         return as_text(self._made, self.report)
 
@@ -192,7 +192,7 @@ class Conversion(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them."""
-        from xosc_lateral.report.scenario import facts
+        from xosc_lateral.report.conversion import facts
 
         return facts(self._made, self.report)
 
@@ -225,10 +225,8 @@ class Conversion(Result):
 
     def write_report(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the HTML page about what was changed."""
-        from xosc_lateral.formats.atomic import write_atomically
         from xosc_lateral.report.scenario import conversion_page
 
-        page = output_file(path, f"{self._made.output.stem}.html", REPORT_SUFFIXES)
-        claim([page], [self.source], force=force)
-        self.report = write_atomically(page, conversion_page(self._made))
-        return page
+        name, inputs = f"{self._made.output.stem}.html", [self.source]
+        self.report = write_page(path, name, lambda: conversion_page(self._made), inputs=inputs, force=force)
+        return self.report

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xosc_lateral.api.convert import REPORT_SUFFIXES
 from xosc_lateral.api.result import (
     DrivesLike,
     GivenDrives,
@@ -16,9 +16,9 @@ from xosc_lateral.api.result import (
     given_drives,
     given_profile,
     naming,
+    write_page,
 )
 from xosc_lateral.formats.mapping import MappingLike
-from xosc_lateral.formats.output_paths import claim, output_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -132,10 +132,8 @@ class Evaluation(Result):
 
     def write_report(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the HTML page."""
-        from xosc_lateral.formats.atomic import write_atomically
         from xosc_lateral.report.evaluation import evaluation_page
 
-        output = output_file(path, f"{self.profile.name}_evaluation.html", REPORT_SUFFIXES)
-        claim([output], self._given.files, force=force)
-        write_atomically(output, evaluation_page(self._scores, self.profile, self._given.inputs))
-        return output
+        name, given = f"{self.profile.name}_evaluation.html", self._given
+        made = partial(evaluation_page, self._scores, self.profile, given.inputs)
+        return write_page(path, name, made, inputs=given.files, force=force)

@@ -62,7 +62,8 @@ def live_esmini(
     SimulationError, FormatError
         In one line.
     """
-    from xosc_lateral.live.esmini import EsminiTraffic, open_player
+    from xosc_lateral.live.esmini import EsminiTraffic
+    from xosc_lateral.live.esmini_library import open_player
     from xosc_lateral.live.scene import Scene
 
     chosen = given_profile(profile, folders)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from msgspec import structs
 
-from xosc_lateral.api.result import PathLike, Paths, Result, as_paths, road_search
+from xosc_lateral.api.result import PathLike, Paths, Result, as_paths, write_page
 from xosc_lateral.formats.hashes import parsed_hashes
+from xosc_lateral.formats.openscenario.read import RoadSearch
 from xosc_lateral.formats.output_paths import claim, output_file
 from xosc_lateral.motion.segments import SegmentRow, cut_segments
 from xosc_lateral.pipeline.load import Played, play_scenario
@@ -19,9 +20,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from xosc_lateral.report.figure import Figure
-
-
-PAGE_SUFFIXES = (".html", ".htm")
 
 
 def play(
@@ -69,7 +67,7 @@ def play(
             step=step,
             time_limit=time_limit,
             allowed=as_paths(allow),
-            roads=road_search(road, road_path),
+            roads=RoadSearch(None if road is None else Path(road), as_paths(road_path)),
             strict=strict,
         )
     )
@@ -190,20 +188,8 @@ class Playback(Result):
         return view_page(motion, network, source=self.scenario.name, provenance=self._provenance())
 
     def write_page(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write the page that plays the scenario.
-
-        Parameters
-        ----------
-        path : str or Path
-            ``.html``; into a folder as ``NAME_view.html``.
-        force : bool
-            Replace a file that this package did not write.
-        """
-        from xosc_lateral.formats.atomic import write_atomically
-
-        output = output_file(path, f"{self.scenario.stem}_view.html", PAGE_SUFFIXES)
-        claim([output], self._inputs(), force=force)
-        return write_atomically(output, self.page())
+        """Write the page that plays the scenario; into a folder as ``NAME_view.html``."""
+        return write_page(path, f"{self.scenario.stem}_view.html", self.page, inputs=self._inputs(), force=force)
 
     def write_osi(self, path: PathLike, *, force: bool = False) -> Path:
         """Write an ASAM OSI trace (extra `osi`): ``.mcap`` or ``.osi``, one `GroundTruth` per step."""
@@ -244,9 +230,12 @@ class Segments(Result):
         return f"{len(following)} road-following segments of {entities} entities, {seconds:.1f} s"
 
     def __str__(self) -> str:
-        from xosc_lateral.report.played import as_text
-
-        return as_text(self._rows)
+        width = max((len(row.entity) for row in self._rows), default=0)
+        return "\n".join(
+            f"{row.entity:<{width}}  {row.start:8.2f} - {row.end:8.2f} s  "
+            + (f"road {row.road} lane {row.lane}: road-following" if row.road_following else f"no: {row.why}")
+            for row in self._rows
+        )
 
     def to_frame(self) -> pd.DataFrame:
         """One row per segment: `entity`, `start`, `end` [s], `road_following`, `why`, `road`, `lane`."""

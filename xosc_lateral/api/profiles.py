@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xosc_lateral.api.result import PathLike, Paths, ProfileLike, Result, as_paths, given_profile
+from xosc_lateral.api.result import PathLike, Paths, ProfileLike, Result, as_paths, given_profile, write_page
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.output_paths import claim, output_file, output_folder
 
@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from xosc_lateral.driver.profile import DriverProfile
+    from xosc_lateral.evaluation.profile_comparison import Compared
     from xosc_lateral.formats.profiles import Entry
-    from xosc_lateral.pipeline.derive import Derived
-    from xosc_lateral.report.comparison import Compared
+    from xosc_lateral.identification.derive import Derived
     from xosc_lateral.report.figure import Figure
 
 PROFILE_SUFFIXES = (".json",)
@@ -61,12 +61,9 @@ def write_profile(profile: DriverProfile, path: PathLike, *, force: bool = False
 
 def write_card(profile: DriverProfile, path: PathLike, *, force: bool = False) -> Path:
     """Write a profile's card as a page: what it does, where it comes from, how true it is."""
-    from xosc_lateral.formats.atomic import write_atomically
     from xosc_lateral.report.cards import card_page
 
-    output = output_file(path, f"{profile.name}.html", (".html", ".htm"))
-    claim([output], force=force)
-    return write_atomically(output, card_page(profile))
+    return write_page(path, f"{profile.name}.html", lambda: card_page(profile), force=force)
 
 
 def derive_profile(
@@ -86,11 +83,11 @@ def derive_profile(
     name : str
         Id of the new profile; else the preset's or the base's name with ``-derived``.
     preset : str, optional
-        One of `pipeline.derive.PRESETS`: figures with a source.
+        One of `identification.stated_figures.PRESETS`: figures with a source.
     library : path or paths
         Folders with further profiles.
     **asked
-        Fields of `pipeline.derive.Asked`: ``sdlp=0.25``.
+        Fields of `identification.stated_figures.Asked`: ``sdlp=0.25``.
 
     Raises
     ------
@@ -99,13 +96,20 @@ def derive_profile(
     """
     from dataclasses import replace
 
-    from xosc_lateral.pipeline.derive import Asked, derive, preset_called
+    from msgspec import structs
+
+    from xosc_lateral.formats.profiles import profile_hash
+    from xosc_lateral.identification.derive import derive
+    from xosc_lateral.identification.stated_figures import Asked, preset_called
 
     known = given_profile(base, library)
     chosen = None if preset is None else preset_called(preset)
     stated = {key: value for key, value in asked.items() if value is not None}
     figures = Asked(**stated) if chosen is None else replace(chosen.asked, **stated)  # type: ignore[arg-type]
-    return derive(known, figures, name or preset or f"{known.name}-derived", preset=chosen)
+    made = derive(known, figures, name or preset or f"{known.name}-derived", preset=chosen)
+    origin = made.profile.provenance
+    origin = structs.replace(origin, fit={"derived_from": known.name, "sha256": profile_hash(known), **origin.fit})
+    return made._replace(profile=structs.replace(made.profile, provenance=origin))
 
 
 def list_profiles(
@@ -210,7 +214,7 @@ def compare_profiles(*profiles: ProfileLike, seed: int = 0, library: Paths = ())
     library : path or paths
         Folders with further profiles.
     """
-    from xosc_lateral.report.comparison import compare
+    from xosc_lateral.evaluation.profile_comparison import compare
 
     if len(profiles) < 2:
         raise ValueError(f"{len(profiles)} profile to compare, two are needed")
@@ -269,7 +273,7 @@ class ProfileComparison(Result):
 
     def headline(self) -> str:
         """One line."""
-        return ", ".join(profile.name for profile in self._compared.profiles)
+        return ", ".join(self._compared.names)
 
     def __str__(self) -> str:
         from xosc_lateral.report.comparison import comparison_text
@@ -280,7 +284,7 @@ class ProfileComparison(Result):
         """Mean distance of the ten metrics of each profile (row) from each (column), in standard deviations."""
         import pandas as pd
 
-        names = [profile.name for profile in self._compared.profiles]
+        names = self._compared.names
         return pd.DataFrame(self._compared.distance, index=names, columns=names)
 
     def to_dict(self) -> dict[str, Any]:
@@ -297,9 +301,6 @@ class ProfileComparison(Result):
 
     def write_report(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the HTML page."""
-        from xosc_lateral.formats.atomic import write_atomically
         from xosc_lateral.report.comparison import comparison_page
 
-        output = output_file(path, "profiles.html", (".html", ".htm"))
-        claim([output], force=force)
-        return write_atomically(output, comparison_page(self._compared))
+        return write_page(path, "profiles.html", lambda: comparison_page(self._compared), force=force)

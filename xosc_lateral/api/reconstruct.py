@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xosc_lateral.api.result import PathLike, Paths, Result, as_paths
+from xosc_lateral.api.result import PathLike, Result
 from xosc_lateral.formats.mapping import MappingLike
 from xosc_lateral.formats.output_paths import claim, output_folder
+from xosc_lateral.pipeline.options import spelled_out, values_of
 from xosc_lateral.pipeline.reconstruct import (
     Reconstructed,
     ReconstructSettings,
     drivers_table,
     fitted_profiles,
     reconstruct_recording,
-    version_named,
 )
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
+@spelled_out(ReconstructSettings)
 def reconstruct(
     recording: PathLike,
     output: PathLike | None = None,
@@ -29,19 +29,8 @@ def reconstruct(
     format: str | None = None,  # noqa: A002 (as in `import_drives`)
     road: PathLike | None = None,
     columns: MappingLike | None = None,
-    begin: float | None = None,
-    end: float | None = None,
-    vehicles: Collection[str] | None = None,
-    around: str | None = None,
-    window: float = 60.0,
-    host: str | None = None,
-    error: float = 0.5,
-    version: str = "1.2",
-    relative: bool = False,
-    exact: bool = False,
-    fit: bool = False,
-    library: Paths = (),
     force: bool = False,
+    **options: Any,
 ) -> Reconstruction:
     """Turn a recording into maneuvers, a road and drivers.
 
@@ -57,28 +46,10 @@ def reconstruct(
         OpenDRIVE file, for recordings that come without their lanes.
     columns : dict, path or TableMapping, optional
         Name -> ``COLUMN[:UNIT]`` for tables of tracks, or a saved mapping's file.
-    begin, end : float, optional
-        Part of the recording. [s]
-    vehicles : collection of str, optional
-        These alone.
-    around, window
-        A vehicle and those who come near it, for so many seconds in the middle of its passage.
-    host : str, optional
-        The vehicle under test: `convert` leaves it to the system that drives it.
-    error : float
-        Positions along the road are within this; smaller: more corners in the speeds. [m]
-    version : str
-        Of OpenSCENARIO, "1.0" to "1.3".
-    relative : bool
-        Lane changes and braking begin at a distance to another vehicle, where the recording bears it out.
-    exact : bool
-        Recorded paths as trajectories, instead of maneuvers.
-    fit : bool
-        A driver profile of its own for every vehicle that drove long enough.
-    library : path or paths
-        Folders with further profiles to choose from.
     force : bool
         Replace files that this package did not write.
+    options
+        `pipeline.reconstruct.ReconstructSettings`: which part and which vehicles, and what is written of them.
 
     Raises
     ------
@@ -86,22 +57,8 @@ def reconstruct(
     """
     from xosc_lateral.formats.recordings import read_recording
 
-    settings = ReconstructSettings(
-        begin=begin,
-        end=end,
-        vehicles=None if vehicles is None else frozenset(vehicles),
-        around=around,
-        window=window,
-        host=host,
-        error=error,
-        version=version_named(version),
-        relative=relative,
-        exact=exact,
-        fit=fit,
-        libraries=as_paths(library),
-    )
-    source = Path(recording)
-    traffic = read_recording(source, kind=format, road=None if road is None else Path(road), columns=columns)
+    settings = ReconstructSettings(**values_of(ReconstructSettings, options))
+    traffic = read_recording(Path(recording), kind=format, road=None if road is None else Path(road), columns=columns)
     result = Reconstruction(reconstruct_recording(traffic, settings))
     if output is not None:
         result.write(output, force=force)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +16,6 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.formats.hashes import parsed_hashes
-from xosc_lateral.formats.openscenario.read import RoadSearch
 from xosc_lateral.pipeline.options import PathLike, Paths, ProfileLike
 from xosc_lateral.pipeline.options import paths as as_paths
 
@@ -50,7 +49,22 @@ class Result(ABC):
         """Plain values, as ``--json`` prints them."""
 
 
-__all__ = ["DrivesLike", "PathLike", "Paths", "ProfileLike", "as_paths", "given_drives", "given_profile", "road_search"]
+PAGE_SUFFIXES = (".html", ".htm")
+
+
+def write_page(
+    path: PathLike, usual_name: str, html: Callable[[], str], *, inputs: Iterable[Path] = (), force: bool = False
+) -> Path:
+    """Write an HTML page, if need be into a folder; made only if it may be written there."""
+    from xosc_lateral.formats.atomic import write_atomically
+    from xosc_lateral.formats.output_paths import claim, output_file
+
+    output = output_file(path, usual_name, PAGE_SUFFIXES)
+    claim([output], inputs, force=force)
+    return write_atomically(output, html())
+
+
+__all__ = ["DrivesLike", "PathLike", "Paths", "ProfileLike", "as_paths", "given_drives", "given_profile"]
 
 DrivesLike: TypeAlias = "PathLike | pd.DataFrame | Drive | Sequence[PathLike | pd.DataFrame | Drive]"
 """A table's path, a frame, a `Drive`, or several of them."""
@@ -153,14 +167,3 @@ def _listed(drives: DrivesLike) -> list[PathLike | pd.DataFrame | Drive]:
     if isinstance(drives, str | Path | Drive) or not isinstance(drives, Sequence):
         return [drives]
     return list(drives)
-
-
-def road_search(road: PathLike | None, folders: Paths) -> RoadSearch:
-    """Where a road may lie, from what a user says.
-
-    Raises
-    ------
-    FormatError
-        No such file, no such folder.
-    """
-    return RoadSearch(None if road is None else Path(road), as_paths(folders))

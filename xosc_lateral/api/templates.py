@@ -8,11 +8,13 @@ from xosc_lateral.api.result import PathLike, Result
 from xosc_lateral.formats.output_paths import claim, output_folder, template_mark
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     import pandas as pd
 
     from xosc_lateral.templates import AnyTemplate
+    from xosc_lateral.templates.parameter import Parameter
 
 
 def list_templates(name: str | None = None) -> TemplateList:
@@ -82,30 +84,39 @@ class TemplateList(Result):
         return ", ".join(self.names)
 
     def __str__(self) -> str:
-        from xosc_lateral.report.templates import as_text
-
-        return as_text(self._templates, with_settings=self._detailed)
+        width = max(map(len, self.names))
+        lines = []
+        for template in self._templates:
+            lines.append(f"{template.name:<{width}}  {template.summary}")
+            lines += ["", *_settings(template.parameters)] if self._detailed else []
+        return "\n".join(lines)
 
     def to_frame(self) -> pd.DataFrame:
         """One row per template and setting: `template`, `name`, `default`, `unit`, `allowed`, `what`."""
         import pandas as pd
 
+        names = ("name", "shown_default", "unit", "allowed", "what")
         rows = [
-            {
-                "template": template.name,
-                "name": one.name,
-                "default": one.shown_default,
-                "unit": one.unit,
-                "allowed": one.allowed,
-                "what": one.what,
-            }
+            [template.name, *(getattr(one, name) for name in names)]
             for template in self._templates
             for one in template.parameters
         ]
-        return pd.DataFrame(rows)
+        return pd.DataFrame(rows, columns=["template", "name", "default", "unit", "allowed", "what"])
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them."""
-        from xosc_lateral.report.templates import templates_record
+        listed = [
+            {"name": one.name, "summary": one.summary, "settings": [each.to_dict() for each in one.parameters]}
+            for one in self._templates
+        ]
+        return {"templates": listed}
 
-        return {"templates": templates_record(self._templates)}
+
+def _settings(parameters: Sequence[Parameter]) -> list[str]:
+    """A line each, in columns."""
+    rows = [
+        (one.name, one.shown_default, "" if one.unit == "-" else one.unit, f"({one.allowed})", one.what)
+        for one in parameters
+    ]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  " + "  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]

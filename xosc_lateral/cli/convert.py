@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
-from inspect import Parameter
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_args
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperCommand
 
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import SHARED, Osi, Written, command, say_json, warn, write_stdout
+from xosc_lateral.cli.words import Osi, Written, command, say_json, warn, write_stdout
 from xosc_lateral.formats.openscenario.write.target import Player
 from xosc_lateral.limits import JOB_MEMORY, JOB_TIMEOUT
-from xosc_lateral.pipeline.settings import OPTIONS, ConvertSettings, OutputMode
+from xosc_lateral.pipeline.settings import ConvertSettings, OutputMode
 
 if TYPE_CHECKING:
     from xosc_lateral.api.convert import Conversion
@@ -40,28 +38,12 @@ class _WithPanels(TyperCommand):
                 formatter.write_dl(records)
 
 
-def _settings() -> list[Parameter]:
-    """An option for each setting."""
-    found = []
-    for item in fields(ConvertSettings):
-        if item.name in OPTIONS:
-            option = OPTIONS[item.name]
-            kind = SHARED.get(item.name) or Annotated[option.kind, typer.Option(*_flags(item.name), **option.words)]
-            default = None if type(None) in get_args(get_args(kind)[0]) else item.default
-            found.append(Parameter(item.name, Parameter.KEYWORD_ONLY, default=default, annotation=kind))
-    return found
-
-
-def _flags(name: str) -> tuple[str, ...]:
-    return OPTIONS[name].flags or (f"--{name.replace('_', '-')}",)
-
-
 @command(
     app, "convert", VERBS["convert"],
     "convert cut-in.xosc -o lifelike.xosc --seed 1 --report report.html",
     "convert scenarios/ -o enriched/ --variants 3 --jobs 2",
     "convert cut-in.xosc -o - --entity Truck=motorway-vehicle-3 | grep Vertex",
-    cls=_WithPanels, more=_settings(), after=2,
+    cls=_WithPanels,
 )  # fmt: skip
 def convert(
     scenario: Annotated[
@@ -78,6 +60,7 @@ def convert(
             "-o", "--output", help="File, folder/, or - for stdout; default NAME_lifelike.xosc. Batch: a folder."
         ),
     ] = None,
+    settings: Annotated[dict[str, Any], ConvertSettings],
     variants: Annotated[int, typer.Option(help="Number of outputs, each with different offsets.", min=1)] = 1,
     report: Annotated[
         str | None,
@@ -101,15 +84,14 @@ def convert(
         bool, typer.Option("--log-json", help="Progress as JSON lines on stderr.", rich_help_panel=BATCH)
     ] = False,
     said: Written,
-    **settings: Any,
 ) -> None:
     """Give every car in a scenario the lateral movement of a real driver."""
     from xosc_lateral.pipeline.request import is_single
 
-    options = {**_options(settings), "force": said.force}
-    strict = settings["strict"]
+    _refuse_together(settings)
+    options = {**settings, "force": said.force}
     if len(scenario) == 1 and is_single(scenario[0]):
-        _convert_one(Path(scenario[0]), output, options, variants, report, osi, strict, said)
+        _convert_one(Path(scenario[0]), output, options, variants, report, osi, said)
         return
     if osi is not None:
         raise typer.BadParameter("traces are written for a single scenario", param_hint="--osi")
@@ -120,7 +102,7 @@ def convert(
     options |= {"variants": variants, "report": report, "workers": jobs, "cluster": cluster, "keep_old": keep_old}
     options |= {"job_timeout": job_timeout, "job_memory": job_memory}
     options["show"] = "json" if log_json else "quiet" if said.quiet else "auto"
-    _convert_batch(scenario, output, options, strict, said)
+    _convert_batch(scenario, output, options, said)
 
 
 def _warn_if_cut_off(result: Conversion, unsaid: bool) -> None:
@@ -129,21 +111,14 @@ def _warn_if_cut_off(result: Conversion, unsaid: bool) -> None:
         warn([result.cut_off])
 
 
-def _options(said: Mapping[str, Any]) -> dict[str, Any]:
-    """What was said of the settings; wrong usage, with the option's name, if it can't be."""
-    given = {name: value for name, value in said.items() if value not in (None, [])}
-    for name, value in given.items():
-        try:
-            OPTIONS[name].read(value)
-        except ValueError as error:
-            raise typer.BadParameter(str(error), param_hint=_flags(name)[0]) from error
+def _refuse_together(given: Mapping[str, Any]) -> None:
+    """Settings that can be had alone, but not with each other."""
     try:
         ConvertSettings(player=given["player"], version=given.get("version"))
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--version") from error
     if given["player"] is Player.CARLA and given["mode"] is OutputMode.LANE_OFFSET:
         raise typer.BadParameter("CARLA's lane offsets have no shape; use --mode trajectory", param_hint="--for")
-    return given
 
 
 def _convert_one(
@@ -153,10 +128,10 @@ def _convert_one(
     variants: int,
     report: str | None,
     osi: str | None,
-    strict: bool,
     said: Written,
 ) -> None:
-    from xosc_lateral.api.convert import REPORT_SUFFIXES, convert, lifelike, osi_files, output_scenario
+    from xosc_lateral.api.convert import convert, lifelike, osi_files, output_scenario
+    from xosc_lateral.api.result import PAGE_SUFFIXES
     from xosc_lateral.formats.osi.extra import osi_wanted
     from xosc_lateral.formats.output_paths import STDOUT, claim, output_file
     from xosc_lateral.pipeline.convert import numbered
@@ -171,30 +146,30 @@ def _convert_one(
         unclean = bool(result.warnings) or not result.enriched
     else:
         written = lifelike(source) if output is None else output_scenario(output, source)
-        page = None if report is None else output_file(report, f"{written.stem}.html", REPORT_SUFFIXES)
-        outputs = [numbered(written, variant, variants) for variant in range(variants)]
-        pages = [None if page is None else numbered(page, variant, variants) for variant in range(variants)]
+        page = None if report is None else output_file(report, f"{written.stem}.html", PAGE_SUFFIXES)
         trace = None if osi is None else osi_files(osi, source)[0]
-        traces = [None if trace is None else numbered(trace, variant, variants) for variant in range(variants)]
-        both = [path for one in traces if one is not None for path in osi_files(one, source)]
+        files = [
+            [None if path is None else numbered(path, variant, variants) for path in (written, page, trace)]
+            for variant in range(variants)
+        ]
         osi_wanted(trace)
-        claim([*outputs, *pages, *both], [source], force=options["force"])
+        outputs, pages, traces = zip(*files, strict=True)
+        both = [path for one in traces if one is not None for path in osi_files(one, source)]
+        claim([*outputs, *pages, *both], [source], force=said.force)
         unclean = False
-        for variant, (path, its_page, trace) in enumerate(zip(outputs, pages, traces, strict=True)):
-            result = convert(source, path, variant=variant + 1, report=its_page, **options)
-            if trace is not None:
-                result.write_osi(trace, force=True)
+        for variant, (path, its_page, its_trace) in enumerate(files, start=1):
+            result = convert(source, path, variant=variant, report=its_page, **options)
+            if its_trace is not None:
+                result.write_osi(its_trace, force=True)
             said.say(result)
             _warn_if_cut_off(result, said.quiet or said.as_json)
             unclean |= bool(result.warnings) or not result.enriched
-    if strict and unclean:
+    if options["strict"] and unclean:
         raise typer.Exit(1)
 
 
-def _convert_batch(
-    inputs: Sequence[str], output: str | None, options: Mapping[str, Any], strict: bool, said: Written
-) -> None:
-    """Convert all of them; exit code 1 if any failed, or with `strict` if anything is to be said of any."""
+def _convert_batch(inputs: Sequence[str], output: str | None, options: Mapping[str, Any], said: Written) -> None:
+    """Convert all of them; exit code 1 if any failed, or with `--strict` if anything is to be said of any."""
     from xosc_lateral.api.batch import convert_many
 
     if output is None or output == "-":
@@ -218,5 +193,5 @@ def _convert_batch(
     said.say_words(str(result), {"kind": "summary", **result.totals()}, err=False)
     if result.cut_off and (said.quiet or said.as_json):
         warn([f"{len(result.cut_off)} runs end at the time limit, not by themselves: {result.cut_off[0]} is one"])
-    if result.failed or (strict and (result.with_warnings or result.nobody_enriched)):
+    if result.failed or (options["strict"] and (result.with_warnings or result.nobody_enriched)):
         raise typer.Exit(1)

@@ -26,10 +26,10 @@ def evaluate(
 ) -> None:
     """Score a profile on measured drives, beside other real drivers: metrics, spectrum, classifiers."""
     from xosc_lateral import evaluate
-    from xosc_lateral.api.convert import REPORT_SUFFIXES
+    from xosc_lateral.api.result import PAGE_SUFFIXES
     from xosc_lateral.formats.output_paths import claim, output_file
 
-    page = None if report is None else output_file(report, "evaluation.html", REPORT_SUFFIXES)
+    page = None if report is None else output_file(report, "evaluation.html", PAGE_SUFFIXES)
     claim([page], tables, force=said.force)
     result = evaluate(profile, tables, seed=seed, classify=classify, columns=mapped.mapping(), library=library or ())
     if page is not None:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import wraps
-from inspect import Parameter, Signature, signature
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -23,13 +21,8 @@ KeepCut = Annotated[
 Source = Annotated[Path, typer.Argument(metavar="SOURCE", help="File or folder to read.", show_default=False)]
 
 
-def _import(
-    name: str,
-    sources: Sequence[Path],
-    output: str,
-    options: dict[str, Any],
-    said: Written,
-) -> None:
+def _import(name: str, sources: Sequence[Path], output: str, said: Written, /, **options: Any) -> None:
+    """Read recordings of a format, write them as a table, and say what they are."""
     from xosc_lateral import import_drives
     from xosc_lateral.formats.output_paths import STDOUT, claim, output_file
     from xosc_lateral.formats.output_tables import harmless_frame, output_suffixes
@@ -44,37 +37,6 @@ def _import(
     else:
         written = imported.write(output, force=said.force)
         said.say_words(str(imported), {"output": str(written), **imported.to_dict()})
-
-
-def _importing(name: str, options: Callable[..., dict[str, Any]]) -> Callable[..., None]:
-    """The command of a format, from a function that gives the importer's options of those of the command line.
-
-    Its first parameter is the source or the sources; `--output` and how it is said are those of all formats.
-    """
-    parameters = list(signature(options, eval_str=True).parameters.values())
-
-    @wraps(options)
-    def run(*, output: str, said: Written, **given: Any) -> None:
-        source = given[parameters[0].name]
-        _import(name, [source] if isinstance(source, Path) else source, output, options(**given), said)
-
-    own = [
-        parameters[0],
-        Parameter("output", Parameter.KEYWORD_ONLY, annotation=Output),
-        *(one.replace(kind=Parameter.KEYWORD_ONLY) for one in parameters[1:]),
-        Parameter("said", Parameter.KEYWORD_ONLY, annotation=Written),
-    ]
-    run.__signature__ = Signature(own)  # type: ignore[attr-defined]
-    return run
-
-
-def _format(name: str, short: str, *examples: str) -> Callable[[Callable[..., dict[str, Any]]], None]:
-    """Add a format to the group; see `_importing`."""
-
-    def add(options: Callable[..., dict[str, Any]]) -> None:
-        command(group, name, short, *examples)(_importing(name, options))
-
-    return add
 
 
 class _WithPlugins(TyperGroup):
@@ -101,14 +63,17 @@ def _plain_command(name: str) -> Any:
 
     one = typer.Typer(context_settings=LOOKS["context_settings"], rich_markup_mode=None)
 
-    def options(
+    def run(
         sources: Annotated[list[Path], typer.Argument(metavar="SOURCE...", show_default=False)],
+        *,
+        output: Output,
         settings: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE")] = None,
-    ) -> dict[str, Any]:
-        return dict(pairs(settings, "--set"))
+        said: Written,
+    ) -> None:
+        _import(name, sources, output, said, **pairs(settings, "--set"))
 
     help_text = (find_importer(name).__doc__ or "Another format.").strip()
-    one.command(name, help=help_text, short_help=help_text.splitlines()[0])(spelled_out(_importing(name, options)))
+    one.command(name, help=help_text, short_help=help_text.splitlines()[0])(spelled_out(run))
     return typer.main.get_command(one)
 
 
@@ -117,33 +82,47 @@ group = typer.Typer(cls=_WithPlugins, help="Convert recordings in other formats 
 app.add_typer(group, name="import", short_help=VERBS["import"], no_args_is_help=True)
 
 
-@_format("dlr-ht", "DLR Highway Traffic.", "import dlr-ht tasi-0.15.4-py3-none-any.whl -o drives.parquet")
+@command(group, "dlr-ht", "DLR Highway Traffic.", "import dlr-ht tasi-0.15.4-py3-none-any.whl -o drives.parquet")
 def dlr_ht(
     source: Source,
+    *,
+    output: Output,
     max_gap: Annotated[
         float, typer.Option(help="Longest gap between two cameras that is kept [s].", min=0, max=60)
     ] = 1.0,
     keep_cut: KeepCut = False,
-) -> dict[str, Any]:
+    said: Written,
+) -> None:
     """DLR Highway Traffic: the wheel of tasi 0.15.4, the data set's zip, or its trajectory CSV."""
     from xosc_lateral.formats.importers.cuts import CutSettings
 
-    return {"settings": CutSettings(max_gap=max_gap), "keep_cut": keep_cut}
+    _import("dlr-ht", [source], output, said, settings=CutSettings(max_gap=max_gap), keep_cut=keep_cut)
 
 
-@_format("levelx", "highD and exiD.", "import levelx highD/ -o highd.parquet")
-def levelx(source: Source, keep_cut: KeepCut = False) -> dict[str, Any]:
+@command(group, "levelx", "highD and exiD.", "import levelx highD/ -o highd.parquet")
+def levelx(
+    source: Source,
+    *,
+    output: Output,
+    keep_cut: KeepCut = False,
+    said: Written,
+) -> None:
     """Recordings of highD or exiD: a folder, or one XX_tracks.csv with its two meta files beside it."""
-    return {"keep_cut": keep_cut}
+    _import("levelx", [source], output, said, keep_cut=keep_cut)
 
 
-@_format(
-    "mf4", "ASAM MDF bus logs.", "import mf4 log.mf4 -o drive.parquet --map offset=Lane_Lat --map lane_width=Lane_Width"
+@command(
+    group,
+    "mf4",
+    "ASAM MDF bus logs.",
+    "import mf4 log.mf4 -o drive.parquet --map offset=Lane_Lat --map lane_width=Lane_Width",
 )
 def mf4(
     sources: Annotated[
         list[Path], typer.Argument(metavar="SOURCE...", help="Logs; each is a drive of its own.", show_default=False)
     ],
+    *,
+    output: Output,
     channels: Annotated[
         list[str] | None,
         typer.Option(
@@ -156,21 +135,24 @@ def mf4(
     step: Annotated[
         float, typer.Option(help="Time step of the table, to which channels are interpolated [s].", min=0.001, max=1)
     ] = 0.04,
-) -> dict[str, Any]:
+    said: Written,
+) -> None:
     """ASAM MDF bus logs (extra `mdf`). They need a channel map, since signal names differ from car to car."""
     from xosc_lateral.formats.importers.mf4 import channels_wanted
 
     if not channels and mapping_file is None:
         raise typer.BadParameter(channels_wanted(sources[0]), param_hint="--map")
-    return {"channels": channels or (), "step": step, "mapping": mapping_file}
+    _import("mf4", sources, output, said, channels=channels or (), step=step, mapping=mapping_file)
 
 
-@_format(
-    "tracks", "Tracks on an OpenDRIVE road.",
+@command(
+    group, "tracks", "Tracks on an OpenDRIVE road.",
     "import tracks tracks.csv --road road.xodr -o drives.parquet --map vehicle=obj",
 )  # fmt: skip
 def tracks(
     source: Source,
+    *,
+    output: Output,
     road: Annotated[Path, typer.Option("--road", metavar="FILE.xodr", help="Road on which the tracks lie.")],
     columns: Annotated[
         list[str] | None,
@@ -182,38 +164,47 @@ def tracks(
     ] = None,
     mapping_file: MappingFile = None,
     keep_cut: KeepCut = False,
-) -> dict[str, Any]:
+    said: Written,
+) -> None:
     """A table of tracks (x, y and heading of any recording) on a known road: lanes, offsets, neighbours."""
-    return {"road": road, "columns": columns or (), "mapping": mapping_file, "keep_cut": keep_cut}
+    _import("tracks", [source], output, said, road=road, columns=columns or (), mapping=mapping_file, keep_cut=keep_cut)
 
 
-@_format("fcd", "SUMO's FCD output.", "import fcd fcd.xml --net run.net.xml -o drives.parquet")
+@command(group, "fcd", "SUMO's FCD output.", "import fcd fcd.xml --net run.net.xml -o drives.parquet")
 def fcd(
     source: Annotated[Path, typer.Argument(help="What --fcd-output wrote (.xml).", show_default=False)],
+    *,
+    output: Output,
     net: Annotated[Path | None, typer.Option(help="Road network (.net.xml): widths and counts of lanes.")] = None,
     lane_width: Annotated[float, typer.Option(help="Without a network. [m]", min=1, max=10)] = 3.2,
-) -> dict[str, Any]:
+    said: Written,
+) -> None:
     """SUMO's FCD output of a run with the sublane model: a drive for every vehicle."""
-    return {"net": net, "lane_width": lane_width}
+    _import("fcd", [source], output, said, net=net, lane_width=lane_width)
 
 
-@_format("commonroad", "CommonRoad scenarios.", "import commonroad DEU_A9-1_1_T-1.xml -o drives.parquet")
+@command(group, "commonroad", "CommonRoad scenarios.", "import commonroad DEU_A9-1_1_T-1.xml -o drives.parquet")
 def commonroad(
     sources: Annotated[list[Path], typer.Argument(metavar="SOURCE...", help="Scenarios (.xml).", show_default=False)],
+    *,
+    output: Output,
     keep_cut: KeepCut = False,
-) -> dict[str, Any]:
+    said: Written,
+) -> None:
     """CommonRoad scenarios (extra `commonroad`): recorded obstacles between the bounds of their lanelets."""
-    return {"keep_cut": keep_cut}
+    _import("commonroad", sources, output, said, keep_cut=keep_cut)
 
 
-@_format(
-    "osi", "ASAM OSI traces.",
+@command(
+    group, "osi", "ASAM OSI traces.",
     "import osi cut-in_gt.mcap -o drives.parquet", "import osi a.mcap b.mcap --host host -o ego.csv",
 )  # fmt: skip
 def osi(
     sources: Annotated[
         list[Path], typer.Argument(metavar="TRACE...", help="Traces (.mcap, .osi).", show_default=False)
     ],
+    *,
+    output: Output,
     host: Annotated[
         str | None,
         typer.Option("--host", metavar="ID", help="Keep this vehicle alone: its id or name; host: the host vehicle."),
@@ -223,9 +214,10 @@ def osi(
     ] = None,
     channel: Annotated[str | None, typer.Option("--channel", metavar="TOPIC", help="Of an MCAP file.")] = None,
     keep_cut: KeepCut = False,
-) -> dict[str, Any]:
+    said: Written,
+) -> None:
     """ASAM OSI traces of ground truth or sensor views (extra `osi`): vehicles between the boundaries of their lanes."""
-    return {"host": host, "road": road, "channel": channel, "keep_cut": keep_cut}
+    _import("osi", sources, output, said, host=host, road=road, channel=channel, keep_cut=keep_cut)
 
 
 @command(
@@ -245,7 +237,7 @@ def table(
 ) -> None:
     """Tables of drives under a company's own names, units and words, by a saved mapping."""
     if not propose:
-        _import("table", sources, output, {"mapping": Mapped(columns, mapping_file).mapping()}, said)
+        _import("table", sources, output, said, mapping=Mapped(columns, mapping_file).mapping())
         return
     from xosc_lateral.formats.atomic import write_atomically
     from xosc_lateral.formats.importers.foreign_table import propose_mapping

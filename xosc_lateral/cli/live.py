@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from enum import StrEnum
-from inspect import Parameter, signature
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Force, Library, Osi, Profile, Quiet, Seed, Written, command, pairs, spelled_out, warn
+from xosc_lateral.cli.words import Force, Library, Osi, Profile, Quiet, Seed, Written, command, pairs, warn
+
+if TYPE_CHECKING:
+    from xosc_lateral.api.live import LiveRun
 
 app = group_of_verbs()
 group = typer.Typer(help="Drivers in a simulation that runs.", no_args_is_help=True)
@@ -22,52 +26,50 @@ FCD = "x,y,angle,type,speed,pos,posLat,lane"
 """What `import fcd` reads; SUMO leaves `posLat` out unless told."""
 
 
-def _run(
-    live: Any,
-    source: Path,
-    *,
-    profile: Profile = "motorway",
+@dataclass(frozen=True, slots=True)
+class Driven:
+    """Options of both simulators: who drives, and what is written of the run."""
+
+    profile: Profile = "motorway"
     vehicle: Annotated[
         list[str] | None,
         typer.Option("--vehicle", metavar="NAME=PROFILE", help="Another profile for one vehicle; may be repeated."),
-    ] = None,
+    ] = None
     ego: Annotated[
         list[str] | None, typer.Option(metavar="NAME", help="Vehicle under test: not driven; may be repeated.")
-    ] = None,
-    seed: Seed = 0,
+    ] = None
+    seed: Seed = 0
     states: Annotated[
         str | None,
         typer.Option("--states", metavar="OUT", help="Table of where everybody was: .csv, .csv.gz, .parquet."),
-    ] = None,
-    osi: Osi = None,
-    library: Library = None,
-    said: Written,
-) -> None:
-    """Options of both simulators, and what is done with what `live` gives."""
-    from xosc_lateral.formats.osi.extra import SUFFIXES, osi_wanted
-    from xosc_lateral.formats.output_paths import claim, output_file
-    from xosc_lateral.formats.tables import TABLE_SUFFIXES
+    ] = None
+    osi: Osi = None
+    library: Library = None
 
-    table = None if states is None else output_file(states, "states.csv", TABLE_SUFFIXES)
-    trace = None if osi is None else output_file(osi, f"{source.stem}_gt.mcap", SUFFIXES)
-    claim([table, trace], [source], force=said.force)
-    osi_wanted(trace)
-    run = live(profile=profile, profiles=pairs(vehicle, "--vehicle"), ego=ego or (), seed=seed, folders=library or ())
-    if table is not None:
-        run.write(table, force=said.force)
-    if trace is not None:
-        run.write_osi(trace, force=said.force)
-    warn(run.warnings)
-    said.say(run)
+    def run(self, live: Callable[..., LiveRun], source: Path, said: Written, **settings: Any) -> None:
+        """Run a simulation of that source, and write and say what came out."""
+        from xosc_lateral.formats.osi.extra import SUFFIXES, osi_wanted
+        from xosc_lateral.formats.output_paths import claim, output_file
+        from xosc_lateral.formats.tables import TABLE_SUFFIXES
 
-
-_with_driver = spelled_out(_run)
-_SHARED: list[Parameter] = list(signature(_with_driver).parameters.values())[2:]
+        table = None if self.states is None else output_file(self.states, "states.csv", TABLE_SUFFIXES)
+        trace = None if self.osi is None else output_file(self.osi, f"{source.stem}_gt.mcap", SUFFIXES)
+        claim([table, trace], [source], force=said.force)
+        osi_wanted(trace)
+        others = pairs(self.vehicle, "--vehicle")
+        who = {"profile": self.profile, "profiles": others, "ego": self.ego or (), "folders": self.library or ()}
+        run = live(source, seed=self.seed, **who, **settings)
+        if table is not None:
+            run.write(table, force=said.force)
+        if trace is not None:
+            run.write_osi(trace, force=said.force)
+        warn(run.warnings)
+        said.say(run)
 
 
 @command(
     group, "esmini", "Play a scenario in esmini, through your library of it.",
-    "live esmini cut-in.xosc --player-library libesminiLib.so --ego Ego --states states.csv", more=_SHARED,
+    "live esmini cut-in.xosc --player-library libesminiLib.so --ego Ego --states states.csv",
 )  # fmt: skip
 def esmini(
     scenario: Annotated[Path, typer.Argument(help="Scenario (.xosc).", show_default=False)],
@@ -77,20 +79,20 @@ def esmini(
     duration: Annotated[float, typer.Option(help="Ends here, if not before. [s]", min=0.01, max=86_400)] = 3600.0,
     step: Annotated[float, typer.Option(help="Length of a step. [s]", min=0.001, max=0.2)] = 0.01,
     window: Annotated[bool, typer.Option("--window", help="Open esmini's window.")] = False,
-    **shared: Any,
+    *,
+    driven: Driven,
+    said: Written,
 ) -> None:
     """Play a scenario in esmini with drivers in its vehicles; its triggers and maneuvers stay as written."""
     from xosc_lateral.api.live import live_esmini
 
-    _with_driver(
-        live=lambda **who: live_esmini(scenario, player_library, duration=duration, step=step, window=window, **who),
-        source=scenario, **shared,
-    )  # fmt: skip
+    settings = {"duration": duration, "step": step, "window": window}
+    driven.run(live_esmini, scenario, said, library=player_library, **settings)
 
 
 @command(
     group, "sumo", "Run a SUMO simulation (extra sumo).",
-    "live sumo run.sumocfg -p motorway --seed 1 --lateral-resolution 4 --states states.parquet", more=_SHARED,
+    "live sumo run.sumocfg -p motorway --seed 1 --lateral-resolution 4 --states states.parquet",
 )  # fmt: skip
 def sumo(
     config: Annotated[Path, typer.Argument(help="Configuration (.sumocfg).", show_default=False)],
@@ -104,18 +106,16 @@ def sumo(
     fcd_output: Annotated[
         Path | None, typer.Option(metavar="FCD.xml", help="SUMO's own output of where everybody was.")
     ] = None,
-    **shared: Any,
+    *,
+    driven: Driven,
+    said: Written,
 ) -> None:
     """Run a SUMO simulation with the sublane model and drivers in its vehicles; lane changes stay SUMO's."""
     from xosc_lateral.api.live import live_sumo
 
     options = () if fcd_output is None else ("--fcd-output", str(fcd_output), "--fcd-output.attributes", FCD)
-    _with_driver(
-        live=lambda **who: live_sumo(
-            config, duration=duration, lateral_resolution=lateral_resolution, options=options, **who
-        ),
-        source=config, **shared,
-    )  # fmt: skip
+    settings = {"duration": duration, "lateral_resolution": lateral_resolution, "options": options}
+    driven.run(live_sumo, config, said, **settings)
 
 
 @command(

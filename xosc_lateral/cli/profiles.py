@@ -57,7 +57,7 @@ def show(
     """A profile's card: what it does, where it comes from, how realistic it is."""
     from xosc_lateral import read_profile
     from xosc_lateral.api.profiles import write_card
-    from xosc_lateral.enrich.enrich import NEIGHBOURS
+    from xosc_lateral.enrich.seen import NEIGHBOURS
     from xosc_lateral.pipeline.proof import proofs_of
     from xosc_lateral.report.cards import card, card_text
 

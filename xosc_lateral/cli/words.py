@@ -6,12 +6,12 @@ import json
 import math
 import sys
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from enum import StrEnum
-from functools import wraps
+from functools import partial, wraps
 from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args
 
 import typer
 
@@ -187,34 +187,63 @@ class Written(Said):
     force: Force = False
 
 
-TOGETHER = (Mapped, Said, Written)
-"""Options that go together; a verb has them as one parameter."""
+def flags_of(settings: type, name: str) -> tuple[str, ...]:
+    """How a setting is called on the command line."""
+    from xosc_lateral.pipeline.options import options_of
+
+    return options_of(settings)[name].flags or (f"--{name.replace('_', '-')}",)
 
 
-def spelled_out(
-    verb: Callable[..., Any], more: Sequence[Parameter] = (), after: int | None = None
-) -> Callable[..., None]:
-    """The verb with each option that it has in a parameter of `TOGETHER`.
+def _parameters(settings: type) -> list[Parameter]:
+    """An option for each setting."""
+    found = []
+    for item in fields(settings):
+        if (option := item.metadata.get("option")) is not None:
+            words = typer.Option(*flags_of(settings, item.name), **option.words)
+            kind = SHARED.get(item.name) or Annotated[option.kind, words]
+            default = None if type(None) in get_args(get_args(kind)[0]) else item.default
+            found.append(Parameter(item.name, Parameter.KEYWORD_ONLY, default=default, annotation=kind))
+    return found
 
-    Parameters
-    ----------
-    more : sequence of Parameter
-        What the verb takes as ``**others``, and behind how many of its own they stand (all of them).
+
+def _read(settings: type, /, **said: Any) -> dict[str, Any]:
+    """What was said of the settings; wrong usage, with the option's name, if it can't be."""
+    from xosc_lateral.pipeline.options import options_of
+
+    options = options_of(settings)
+    given = {name: value for name, value in said.items() if value not in (None, [])}
+    for name, value in given.items():
+        try:
+            options[name].read(value)
+        except ValueError as error:
+            raise typer.BadParameter(str(error), param_hint=flags_of(settings, name)[0]) from error
+    return given
+
+
+def _is_settings(kind: Any) -> bool:
+    return isinstance(kind, type) and is_dataclass(kind)
+
+
+def spelled_out(verb: Callable[..., Any]) -> Callable[..., None]:
+    """The verb with options of its own for those that it has together in one parameter.
+
+    Such a parameter is a dataclass as `Said`, or a mapping that is annotated with a class of settings.
     """
-    kinds, own = dict[str, Any](), list[Parameter]()
+    own = list[Parameter]()
+    groups = dict[str, tuple[Callable[..., Any], list[Parameter]]]()
     for one in signature(verb, eval_str=True).parameters.values():
-        if one.annotation in TOGETHER:
-            kinds[one.name] = one.annotation
-            options = signature(one.annotation, eval_str=True).parameters.values()
-            own += sorted(options, key=lambda option: option.name != "force")
-        elif one.kind is not one.VAR_KEYWORD:
-            own.append(one)
-    own[len(own) if after is None else after : after] = more
+        settings = next(filter(_is_settings, getattr(one.annotation, "__metadata__", ())), None)
+        if settings is not None:
+            groups[one.name] = partial(_read, settings), _parameters(settings)
+        elif _is_settings(one.annotation):
+            options = list(signature(one.annotation, eval_str=True).parameters.values())
+            groups[one.name] = one.annotation, sorted(options, key=lambda option: option.name != "force")
+        own += groups[one.name][1] if one.name in groups else [one]
 
     @wraps(verb)
     def run(**given: Any) -> None:
-        for name, kind in kinds.items():
-            given[name] = kind(**{option: given.pop(option) for option in signature(kind).parameters})
+        for name, (made_of, options) in groups.items():
+            given[name] = made_of(**{option.name: given.pop(option.name) for option in options})
         verb(**given)
 
     parameters = [one.replace(kind=one.KEYWORD_ONLY) for one in own]
@@ -222,20 +251,12 @@ def spelled_out(
     return run
 
 
-def command(
-    group: typer.Typer,
-    name: str,
-    short: str,
-    *examples: str,
-    cls: Any = None,
-    more: Sequence[Parameter] = (),
-    after: int | None = None,
-) -> Callable[[Verb], Verb]:
-    """Add a verb to a group, with examples at the end of its help; `more` and `after`: see `spelled_out`."""
+def command(group: typer.Typer, name: str, short: str, *examples: str, cls: Any = None) -> Callable[[Verb], Verb]:
+    """Add a verb to a group, with examples at the end of its help."""
     epilog = "\b\nExamples:\n" + "\n".join(f"  xosc-lateral {line}" for line in examples)
 
     def add(verb: Verb) -> Verb:
-        group.command(name, cls=cls, short_help=short, epilog=epilog)(spelled_out(verb, more, after))
+        group.command(name, cls=cls, short_help=short, epilog=epilog)(spelled_out(verb))
         return verb
 
     return add

@@ -11,20 +11,15 @@ that is not too quick, and without a corner.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Linear, Proximity
-from xosc_lateral.driver.profile import COLUMNS, SIDES, Basis, Beside
+from xosc_lateral.driver.profile import COLUMNS, SIDES, Basis, Beside, DriverProfile
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
-
-if TYPE_CHECKING:
-    from xosc_lateral.driver.profile import DriverProfile
-
-FloatArray = NDArray[np.float64]
 
 NEIGHBOURS = ("left_distance", "right_distance")
 """Free space lengthwise to the nearest vehicle in the lane to the left and to the right [m]; NaN or infinite: none."""
@@ -123,15 +118,18 @@ def answer_effects(runs: Sequence[Run], known: Mapping[str, Beside]) -> list[Col
 def _shape(runs: Sequence[Run], side: str) -> ColumnEffect | None:
     """By the distance, else by the flag for trucks or cars: of which there is somebody, without a coefficient."""
     for column in (f"{side}_distance", f"truck_{side}", f"car_{side}"):
-        shared = {"acts": Acts.LOCATION, "column": column, "lag_s": LAG, "response_s": RESPONSE}
-        shape: ColumnEffect
-        if column.endswith("distance"):
-            shape = Proximity(scale=SCALE, response_order=ORDER, **shared)  # type: ignore[arg-type]
-        else:
-            shape = Linear(response_order=ORDER, **shared)  # type: ignore[arg-type]
+        shape = _response_to(column)
         if any(column in run.context and (_near(run, shape) > np.exp(-1.0)).any() for run in runs):
             return shape
     return None
+
+
+def _response_to(column: str) -> ColumnEffect:
+    """To a neighbour's distance, or to a flag that there is one; without coefficients."""
+    response: dict[str, Any] = {"lag_s": LAG, "response_s": RESPONSE, "response_order": ORDER}
+    if column.endswith("distance"):
+        return Proximity(acts=Acts.LOCATION, column=column, scale=SCALE, **response)
+    return Linear(acts=Acts.LOCATION, column=column, **response)
 
 
 def _near(run: Run, shape: ColumnEffect) -> FloatArray:
@@ -173,20 +171,30 @@ def _within_drives(runs: Sequence[Run], near: Mapping[str, Sequence[FloatArray]]
     table, groups, number = table[follows] - keep * table[follows - 1], groups[follows], number[follows]
     table = _centred(table, groups)
     observed, design = table[:, 0], table[:, 1:]
-    inverse = np.linalg.pinv(design.T @ design)
-    slopes = inverse @ design.T @ observed
-    _, cluster = np.unique(number, axis=0, return_inverse=True)
-    scores = design * (observed - design @ slopes)[:, None]
-    by_block = np.column_stack([np.bincount(cluster.ravel(), column) for column in scores.T])
-    blocks, free = len(by_block), max(len(observed) - len(numbers) - design.shape[1], 1)
-    covariance = inverse @ (by_block.T @ by_block) @ inverse
+    distinct, cluster = np.unique(number, axis=0, return_inverse=True)
+    slopes, covariance = clustered_least_squares(design, observed, cluster.ravel())
+    blocks, free = len(distinct), max(len(observed) - len(numbers) - design.shape[1], 1)
     covariance *= blocks / max(blocks - 1, 1) * len(observed) / free
     known = np.diag(design.T @ design)[:sides] > 1e-6
     errors = np.where(known & (blocks > 2), CLUSTERED * np.sqrt(np.maximum(np.diag(covariance)[:sides], 0.0)), np.inf)
     return np.where(known, slopes[:sides], 0.0), errors
 
 
-def _centred(table: FloatArray, groups: NDArray[np.int64]) -> FloatArray:
+def clustered_least_squares(
+    design: FloatArray, observed: FloatArray, cluster: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Slopes, shape (k,), of observations, shape (n,), by a design, shape (n, k), and their covariance, shape (k, k).
+
+    The covariance is robust against whatever the observations of one cluster, 0, 1, 2 ..., share.
+    """
+    inverse = np.linalg.pinv(design.T @ design)
+    slopes = inverse @ design.T @ observed
+    scores = design * (observed - design @ slopes)[:, None]
+    by_cluster = np.column_stack([np.bincount(cluster, column) for column in scores.T])
+    return slopes, inverse @ (by_cluster.T @ by_cluster) @ inverse
+
+
+def _centred(table: FloatArray, groups: IntArray) -> FloatArray:
     """Columns without their mean within each group."""
     counts = np.maximum(np.bincount(groups), 1)
     return np.stack([column - (np.bincount(groups, column) / counts)[groups] for column in table.T], axis=1)
@@ -210,13 +218,9 @@ def beside_line(profile: DriverProfile, side: str) -> str:
     )
 
 
-def neighbour_shapes(runs: Sequence[Run], least: int) -> list[Proximity]:
+def neighbour_shapes(runs: Sequence[Run], least: int) -> list[ColumnEffect]:
     """Effects without coefficients, of each side on which so many drives have somebody within `SCALE`."""
-    return [
-        Proximity(acts=Acts.LOCATION, column=name, scale=SCALE, lag_s=LAG, response_s=RESPONSE, response_order=ORDER)
-        for name in NEIGHBOURS
-        if len(_drives_beside(runs, name)) >= least
-    ]
+    return [_response_to(name) for name in NEIGHBOURS if len(_drives_beside(runs, name)) >= least]
 
 
 def most_beside(runs: Sequence[Run]) -> int:

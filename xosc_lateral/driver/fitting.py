@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from msgspec.structs import replace
-from numpy.typing import NDArray
 
 from xosc_lateral.driver.answers import answer_effects, measure_beside
 from xosc_lateral.driver.effects import ColumnEffect
@@ -20,8 +19,6 @@ from xosc_lateral.drives.cuts import PAPER_RULES, CutRules, all_runs
 from xosc_lateral.drives.drive import Drive, Run
 from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.version import __version__
-
-FloatArray = NDArray[np.float64]
 
 
 def fit_profile(
@@ -109,7 +106,7 @@ def fit_runs(
     provenance: Provenance | None = None,
 ) -> DriverProfile:
     """Fit a profile to runs that are cut already."""
-    core = fit_core([run.rel_offset for run in runs], [run.drive for run in runs], model=model)
+    core = model_named(model).fit([run.rel_offset for run in runs], [run.drive for run in runs])
     return DriverProfile(
         name=name,
         model=core,
@@ -129,13 +126,3 @@ def _fitted_on(runs: Sequence[Run], core: CoreModel, known: Provenance) -> Prove
         fit={**known.fit, "model": core.kind, "step_s": core.step},
         package_version=__version__,
     )
-
-
-def fit_core(
-    rel_offsets: Sequence[FloatArray], drives: Sequence[str], *, model: ModelKind | str = ModelKind.AUTOREGRESSIVE
-) -> CoreModel:
-    """Fit a core model to relative offsets [-], one array of shape (n_i,) per run, evenly at 5 Hz, finite.
-
-    They may be what is left once effects were taken out. Runs of one of the `drives` are of one driver.
-    """
-    return model_named(model).fit(rel_offsets, drives)

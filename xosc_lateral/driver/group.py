@@ -10,8 +10,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.driver.effects import Acts, EffectTerms
 from xosc_lateral.driver.effects.base import terms_of
 from xosc_lateral.driver.effects.response import Response, ResponseState
@@ -20,8 +20,6 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.records import plain, read_as
 from xosc_lateral.driver.upsampling import extrapolate, piece
 from xosc_lateral.segment import FADES
-
-FloatArray = NDArray[np.float64]
 
 BLOCK = 64
 """Model steps drawn at once for a driver. [-]"""
@@ -33,6 +31,13 @@ _PARTS = ("coarse", "fine", *(f"hidden_{name}" for name in ("location", "spread"
 """What is drawn ahead: of the movement [lane widths], then factors of hidden effects (location: [m])."""
 
 _NO_FACTORS = (0.0, 0.0, 0.0, 1.0, 1.0, 1.0)
+
+_DRIVER = np.dtype(
+    [("mean", float), ("at", np.int64), ("left", np.int64), ("row", np.int64), ("samples", float, 4),
+     ("drawn", float, (2 * BLOCK, len(_PARTS)))]
+)  # fmt: skip
+"""Of one driver: what his coarse part moves about [-], which drawn row is next and how many are left, his next model
+step, his last samples [m], rows drawn ahead."""
 
 
 class OffsetGroup:
@@ -58,10 +63,7 @@ class OffsetGroup:
         self._rated = any(effect.acts is Acts.RATE for effect in self._effects)
         self._drives: list[DriveProcess] = []
         self._slopes: list[FloatArray] = [np.empty((0, len(effect.reference))) for effect in self._effects]
-        self._mean = np.empty(0)
-        self._drawn = np.empty((0, 2 * BLOCK, len(_PARTS)))
-        self._at, self._left, self._row = (np.empty(0, dtype=np.int64) for _ in range(3))
-        self._samples = np.empty((0, 4))
+        self._state = np.empty(0, dtype=_DRIVER)
 
     def _response(self, k: int, state: ResponseState | None = None) -> Response:
         return self._effects[k].response_in_blocks(self.profile.model.step, state, delay=self._ahead)
@@ -76,26 +78,20 @@ class OffsetGroup:
 
     def add(self, seeds: Sequence[np.random.SeedSequence]) -> None:
         """More drivers, whose drives begin with the next `advance`, at 0 s of their own clocks."""
-        new = [DriveProcess(self.profile, seed) for seed in seeds]
-        for drive in new:
+        for drive in self._join(seeds):
             drive.begin_at(0.0)
-        self._join(new, np.zeros((len(new), 2 * BLOCK, len(_PARTS))), np.zeros((len(new), 4)))
 
-    def _join(self, new: Sequence[DriveProcess], drawn: FloatArray, samples: FloatArray) -> None:
+    def _join(self, seeds: Sequence[np.random.SeedSequence]) -> list[DriveProcess]:
+        new = [DriveProcess(self.profile, seed) for seed in seeds]
         self._drives += new
         for k, which in enumerate(self._which):
             slopes = [drive.columned[which].coefficients for drive in new]
-            self._slopes[k] = np.concatenate(
-                [self._slopes[k], np.reshape(slopes, (len(new), self._slopes[k].shape[1]))]
-            )
-        self._mean = np.append(self._mean, np.zeros(len(new)))
-        self._drawn = np.concatenate([self._drawn, drawn])
-        self._samples = np.concatenate([self._samples, samples])
-        self._at, self._left, self._row = (
-            np.append(old, np.zeros(len(new), dtype=np.int64)) for old in (self._at, self._left, self._row)
-        )
+            own = np.reshape(slopes, (len(new), self._slopes[k].shape[1]))
+            self._slopes[k] = np.concatenate([self._slopes[k], own])
+        self._state = np.concatenate([self._state, np.zeros(len(new), dtype=_DRIVER)])
+        return new
 
-    def keep(self, there: NDArray[np.bool_]) -> None:
+    def keep(self, there: BoolArray) -> None:
         """Drop the drivers that are not there, shape (n,)."""
         if there.all():
             return
@@ -108,8 +104,7 @@ class OffsetGroup:
                 if state.settled is not None:
                     state.settled = state.settled.reshape(-1, len(wide))[:, wide].ravel()
         self._slopes = [slopes[there] for slopes in self._slopes]
-        self._mean, self._drawn, self._samples = self._mean[there], self._drawn[there], self._samples[there]
-        self._at, self._left, self._row = self._at[there], self._left[there], self._row[there]
+        self._state = self._state[there]
 
     @staticmethod
     def _known(response: Response, components: int) -> int:
@@ -132,14 +127,14 @@ class OffsetGroup:
         array, shape (n, 6)
             Coefficients in u, from 0 at this moment to 1 at the next, lowest power first, of the offset. [m]
         """
-        effects = self._terms(context)
-        fresh = np.flatnonzero(self._row == 0)
+        effects, samples = self._terms(context), self._state["samples"]
+        fresh = np.flatnonzero(self._state["row"] == 0)
         if len(fresh):
             first, second = (self._next(fresh, effects.rows(fresh), width[fresh]) for _ in range(2))
-            self._samples[fresh] = np.stack([np.zeros(len(fresh)), extrapolate(second, first), first, second], axis=1)
+            samples[fresh] = np.stack([np.zeros(len(fresh)), extrapolate(second, first), first, second], axis=1)
         sample = self._next(np.arange(len(self)), effects, width)
-        self._samples = np.concatenate([self._samples[:, 1:], sample[:, None]], axis=1)
-        return np.stack(np.broadcast_arrays(*piece(*self._samples.T)), axis=1)
+        samples[:] = np.concatenate([samples[:, 1:], sample[:, None]], axis=1)
+        return np.stack(np.broadcast_arrays(*piece(*samples.T)), axis=1)
 
     def _terms(self, context: Mapping[str, FloatArray]) -> EffectTerms:
         """What the effects of columns do to each driver at the sample that is next, shape (n,) each."""
@@ -159,52 +154,53 @@ class OffsetGroup:
             found.append(terms_of(effect.acts, effect.weighed(due, slopes.T)))
         return combine(found)
 
-    def _next(self, who: NDArray[np.int64], effects: EffectTerms, width: FloatArray) -> FloatArray:
+    def _next(self, who: IntArray, effects: EffectTerms, width: FloatArray) -> FloatArray:
         """The next sample of some drivers, shape (m,). [m]"""
         if self._rated:
             return self._next_rated(who, effects, width)
         self._draw(who)
-        parts = self._drawn[who, self._at[who]].T
-        self._at[who] += 1
-        self._left[who] -= 1
-        self._row[who] += 1
-        movement = Movement(self._mean[who], parts[0], parts[1])
+        state = self._state
+        parts = state["drawn"][who, state["at"][who]].T
+        state["at"][who] += 1
+        state["left"][who] -= 1
+        state["row"][who] += 1
+        movement = Movement(state["mean"][who], parts[0], parts[1])
         hidden = EffectTerms(*parts[2:]) if self._hidden else EffectTerms()
         terms = combine([hidden, effects])
         return offsets_of(movement, EffectTerms(terms.location, terms.spread, None, terms.fine), width)
 
-    def _next_rated(self, who: NDArray[np.int64], effects: EffectTerms, width: FloatArray) -> FloatArray:
+    def _next_rated(self, who: IntArray, effects: EffectTerms, width: FloatArray) -> FloatArray:
         """The same where effects act on the rate of mean reversion: nothing can be drawn ahead."""
-        found = np.empty(len(who))
+        found, row = np.empty(len(who)), self._state["row"]
         for k, index in enumerate(who):
             drive, one = self._drives[index], slice(k, k + 1)
-            terms = combine([drive.hidden_terms_at(self._row[index : index + 1]), effects.rows(one)])
+            terms = combine([drive.hidden_terms_at(row[index : index + 1]), effects.rows(one)])
             found[k] = drive.take(terms, width[one])[0]
-        self._row[who] += 1
+        row[who] += 1
         return found
 
-    def _draw(self, who: NDArray[np.int64]) -> None:
+    def _draw(self, who: IntArray) -> None:
         """Have at least one row drawn of each; a few of those with few left, so that not all are due at once."""
-        due = set(who[self._left[who] == 0].tolist())
-        spare = who[self._left[who] <= BLOCK]
-        few = spare[np.argsort(self._left[spare], kind="stable")[: 1 + 2 * len(self) // BLOCK]]
+        remaining = self._state["left"]
+        due = set(who[remaining[who] == 0].tolist())
+        spare = who[remaining[who] <= BLOCK]
+        few = spare[np.argsort(remaining[spare], kind="stable")[: 1 + 2 * len(self) // BLOCK]]
         for k in sorted(due | set(few.tolist())):
-            left = self._left[k]
-            self._drawn[k, :left] = self._drawn[k, self._at[k] : self._at[k] + left]
-            self._drawn[k, left : left + BLOCK] = self._block(k, int(self._row[k] + left))
-            self._at[k], self._left[k] = 0, left + BLOCK
+            own, left = self._state[k], remaining[k]
+            own["drawn"][:left] = own["drawn"][own["at"] : own["at"] + left]
+            own["mean"], own["drawn"][left : left + BLOCK] = self._block(self._drives[k], int(own["row"] + left))
+            own["at"], own["left"] = 0, left + BLOCK
 
-    def _block(self, k: int, row: int) -> FloatArray:
-        """`BLOCK` rows of a drive from `row` on, shape (BLOCK, parts)."""
-        drive = self._drives[k]
+    @staticmethod
+    def _block(drive: DriveProcess, row: int) -> tuple[float, FloatArray]:
+        """Mean, and `BLOCK` rows of a drive from `row` on, shape (BLOCK, parts)."""
         hidden = drive.hidden_terms_at(np.arange(row, row + BLOCK))
         movement = drive.movement(BLOCK, hidden.rate)
-        self._mean[k] = float(movement.mean)
         rows = np.tile(_NO_FACTORS, (BLOCK, 1))
         for column, values in enumerate((movement.coarse, movement.fine, *hidden.parts)):
             if values is not None:
                 rows[:, column] = values
-        return rows
+        return float(movement.mean), rows
 
     # ---- state -------------------------------------------------------------------------------------------------------
     def to_dict(self) -> dict[str, Any]:
@@ -212,12 +208,12 @@ class OffsetGroup:
         drives = [
             {
                 "process": drive.state,
-                "mean": float(self._mean[k]),
-                "drawn": self._drawn[k, self._at[k] : self._at[k] + self._left[k]].tolist(),
-                "row": int(self._row[k]),
-                "samples": self._samples[k].tolist(),
+                "mean": float(own["mean"]),
+                "drawn": own["drawn"][own["at"] : own["at"] + own["left"]].tolist(),
+                "row": int(own["row"]),
+                "samples": own["samples"].tolist(),
             }
-            for k, drive in enumerate(self._drives)
+            for drive, own in zip(self._drives, self._state, strict=True)
         ]
         values: dict[str, Any] = plain(
             {"responses": [response.state for response in self._responses], "drives": drives, "columns": self.columns}
@@ -226,15 +222,11 @@ class OffsetGroup:
 
     def restore(self, state: Mapping[str, Any], seeds: Sequence[np.random.SeedSequence]) -> None:
         """Go on from a state; the group is empty and of the same profile and columns, the seeds are the drivers'."""
-        new = [DriveProcess(self.profile, seed) for seed in seeds]
-        drawn, samples = np.zeros((len(new), 2 * BLOCK, len(_PARTS))), np.zeros((len(new), 4))
-        self._join(new, drawn, samples)
-        for k, (drive, own) in enumerate(zip(new, state["drives"], strict=True)):
-            drive.restore(own["process"], f"drives[{k}]")
-            rows = np.reshape(own["drawn"], (-1, len(_PARTS)))
-            self._drawn[k, : len(rows)] = rows
-            self._left[k], self._row[k], self._mean[k] = len(rows), int(own["row"]), float(own["mean"])
-            self._samples[k] = own["samples"]
+        for k, (drive, saved) in enumerate(zip(self._join(seeds), state["drives"], strict=True)):
+            drive.restore(saved["process"], f"drives[{k}]")
+            own, rows = self._state[k], np.reshape(saved["drawn"], (-1, len(_PARTS)))
+            own["drawn"][: len(rows)], own["left"] = rows, len(rows)
+            own["mean"], own["row"], own["samples"] = float(saved["mean"]), int(saved["row"]), saved["samples"]
         self._responses = [
             self._response(k, read_as(ResponseState, own, f"responses[{k}]"))
             for k, own in enumerate(state["responses"])

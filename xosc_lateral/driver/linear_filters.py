@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.jit_kernel import JitKernel, worth_compiling
-
-FloatArray = NDArray[np.float64]
 
 WORTH_VECTORISING = 16
 """Recursions side by side from which on a step of all of them is one operation of numpy. [-]"""

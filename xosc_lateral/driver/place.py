@@ -11,17 +11,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from msgspec.structs import replace as with_fields
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.digits import all_significant
-from xosc_lateral.driver.answers import NEIGHBOURS, SCALE, most_beside, neighbour_shapes
+from xosc_lateral.driver.answers import NEIGHBOURS, SCALE, clustered_least_squares, most_beside, neighbour_shapes
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Levels, Linear, Piecewise, Proximity
 from xosc_lateral.driver.models.autoregressive.coarse import split_bands
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import NotEnoughDataError
-
-FloatArray = NDArray[np.float64]
 
 COLUMNS = ("is_truck", "lane_index", "speed")
 """What a population's drivers are distinguished by: class, lane and speed."""
@@ -55,7 +54,7 @@ class _Pieces:
     fine: FloatArray
     quantities: FloatArray
     """Mean of each quantity, shape (n, k)."""
-    drive: NDArray[np.int64]
+    drive: IntArray
 
 
 def fit_place(runs: Sequence[Run], *, neighbours: bool | None = None) -> tuple[ColumnEffect, ...]:
@@ -168,12 +167,8 @@ def _effects(shapes: Sequence[ColumnEffect], acts: Acts, response: FloatArray, p
     slopes, covariance = _regressed(response, quantities, pieces.drive)
     errors, reference = np.sqrt(np.maximum(np.diag(covariance), 1e-30)), quantities.mean(axis=0)
     shrunk = _shrunk(slopes, covariance)
-    if not shrunk.any():
-        return []
-    return [
-        _effect(shape, acts, float(slope), float(error), float(middle))
-        for shape, slope, error, middle in zip(shapes, shrunk, errors, reference, strict=True)
-    ]
+    numbers = zip(shrunk.tolist(), errors.tolist(), reference.tolist(), strict=True)
+    return [_effect(shape, acts, *own) for shape, own in zip(shapes, numbers, strict=True)] if shrunk.any() else []
 
 
 def _shrunk(slopes: FloatArray, covariance: FloatArray) -> FloatArray:
@@ -185,7 +180,7 @@ def _shrunk(slopes: FloatArray, covariance: FloatArray) -> FloatArray:
     return np.asarray(slopes * max(0.0, 1.0 - len(slopes) / max(size, 1e-30)))
 
 
-def _regressed(observed: FloatArray, quantities: FloatArray, drive: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+def _regressed(observed: FloatArray, quantities: FloatArray, drive: IntArray) -> tuple[FloatArray, FloatArray]:
     """Slopes, shape (k,), and their covariance, shape (k, k)."""
     design = np.column_stack([np.ones(len(observed)), quantities])
     counts = np.bincount(drive).astype(np.float64)
@@ -196,27 +191,16 @@ def _regressed(observed: FloatArray, quantities: FloatArray, drive: NDArray[np.i
     theta = (1.0 - np.sqrt(within / (within + counts * between + 1e-30)))[drive]
     columns = [column - theta * (np.bincount(drive, column) / counts)[drive] for column in (*design.T, observed)]
     x, y = np.column_stack(columns[:-1]), columns[-1]
-    inverse = np.linalg.pinv(x.T @ x)
-    slopes = inverse @ x.T @ y
-    scores = x * (y - x @ slopes)[:, None]
-    by_drive = np.column_stack([np.bincount(drive, column) for column in scores.T])
-    covariance = inverse @ (by_drive.T @ by_drive) @ inverse
+    slopes, covariance = clustered_least_squares(x, y, drive)
     return slopes[1:], covariance[1:, 1:]
 
 
 def _effect(shape: ColumnEffect, acts: Acts, slope: float, error: float, reference: float) -> ColumnEffect:
-    from msgspec.structs import replace as with_fields
-
     slope, error, reference = all_significant((slope, error, reference), DIGITS)
-    if isinstance(shape, Proximity):
-        reference = 0.0  # nobody there
-    if not isinstance(shape, Piecewise):
-        return with_fields(shape, acts=acts, coefficients=(slope,), errors=(error,), reference=(reference,))
-    # Flat, then a straight line between the knots, then flat; the reference is one place on it.
+    if isinstance(shape, Piecewise):  # flat, a straight line between the knots, flat; the reference is one place on it
+        coefficients, errors, middle = (0.0, slope, -slope), (0.0, error, error), (0.0, reference, 0.0)
+        return with_fields(shape, acts=acts, coefficients=coefficients, errors=errors, reference=middle)
+    nobody = isinstance(shape, Proximity)
     return with_fields(
-        shape,
-        acts=acts,
-        coefficients=(0.0, slope, -slope),
-        errors=(0.0, error, error),
-        reference=(0.0, reference, 0.0),
+        shape, acts=acts, coefficients=(slope,), errors=(error,), reference=(0.0 if nobody else reference,)
     )

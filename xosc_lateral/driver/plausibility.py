@@ -6,16 +6,14 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.limits import DISTANCES, OFFSET_LANES, Range, context_range
 from xosc_lateral.segment import Segment
 
 if TYPE_CHECKING:
     from xosc_lateral.driver.profile import DriverProfile
-
-FloatArray = NDArray[np.float64]
 
 NARROW = 2.5
 """Where a lane is narrower than this (it opens or closes), an offset is held against a lane of this width. [m]"""
@@ -74,7 +72,7 @@ def first_implausible(name: str, values: FloatArray) -> int | None:
     return int(wrong[0]) if len(wrong) else None
 
 
-def implausible_rows(name: str, values: FloatArray, believed: Range | None = None) -> NDArray[np.bool_]:
+def implausible_rows(name: str, values: FloatArray, believed: Range | None = None) -> BoolArray:
     """Which values can't be, shape (n,) as `values` [unit of the column]; NaN ("there is none") can.
 
     By what a context column of that name is believed to be, or by the range given.
@@ -83,7 +81,7 @@ def implausible_rows(name: str, values: FloatArray, believed: Range | None = Non
     return (values < believed.low) | ((values > believed.high) & ~nobody(name, values))
 
 
-def nobody(name: str, values: FloatArray) -> NDArray[np.bool_]:
+def nobody(name: str, values: FloatArray) -> BoolArray:
     """Where the distance to somebody says that nobody is within reach: it is infinite. Shape as `values`."""
     return np.isposinf(values) & (name in DISTANCES)
 

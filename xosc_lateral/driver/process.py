@@ -6,20 +6,19 @@ same however a drive is cut into blocks.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.driver.effects import ColumnEffect, EffectTerms, HiddenEffect
+from xosc_lateral.driver.effects.response import ResponseState
 from xosc_lateral.driver.models.base import CoreStream, Start
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.records import read_as
 from xosc_lateral.driver.seeds import DriveSeed, child, generator
-
-FloatArray = NDArray[np.float64]
 
 
 class DriveState(msgspec.Struct, kw_only=True):
@@ -108,7 +107,7 @@ class DriveProcess:
         rows = np.round((time - (self.state.begun_at or 0.0)) / self._model.step).astype(np.int64)
         return self.hidden_terms_at(rows)
 
-    def hidden_terms_at(self, rows: NDArray[np.int64]) -> EffectTerms:
+    def hidden_terms_at(self, rows: IntArray) -> EffectTerms:
         """The same at rows, counted in model steps from the drive's start; shape (n,), n >= 1."""
         if not self.hidden:
             return EffectTerms()
@@ -188,6 +187,41 @@ class DriveProcess:
             self._core = self._model.resume(read_as(self._model.State, state.core, f"{where}.core"))
             state.core = self._core.state
         self.state = state
+
+
+class ResponseStreamState(msgspec.Struct, forbid_unknown_fields=True):
+    """The response to one effect's columns: where it is, rows that are ready, and how many of these are dropped."""
+
+    response: ResponseState
+    ready: list[FloatArray]
+    drop: int
+
+
+class ResponseStream:
+    """A driver's response to one effect's columns, row by row; `ahead` are the rows of its preview."""
+
+    def __init__(self, effect: ColumnEffect, step: float) -> None:
+        self.effect = effect
+        self._response = effect.response_in_blocks(step)
+        self.ahead = self._response.ahead
+        self.state = ResponseStreamState(self._response.state, [], 0)
+
+    def take(self, row: Mapping[str, FloatArray], *, before: bool) -> None:
+        """One more row of context, each column of shape (1,); what responds to a row before the drive is not given."""
+        state = self.state
+        state.drop += before
+        state.ready.extend(self._response.take(self.effect.known(row)))
+        dropped = min(state.drop, len(state.ready))
+        del state.ready[:dropped]
+        state.drop -= dropped
+
+    def next(self) -> EffectTerms:
+        """Terms at the next row, each of shape (1,)."""
+        return self.effect.acting(self.state.ready.pop(0)[None, :])
+
+    def restore(self, state: ResponseStreamState) -> None:
+        """Back to a state."""
+        self.state, self._response.state = state, state.response
 
 
 def combine(terms: Sequence[EffectTerms]) -> EffectTerms:

@@ -15,7 +15,7 @@ from msgspec import Meta, defstruct, field, structs
 from xosc_lateral.driver.effects import Effect, any_effect
 from xosc_lateral.driver.models.base import CoreModel
 from xosc_lateral.driver.models.registry import CORE_MODELS, any_model
-from xosc_lateral.driver.records import Record, plain, read_as, schema_hook, set_once
+from xosc_lateral.driver.records import Record, read_as, schema_hook, set_once
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.errors import DriverProfileError
 
@@ -66,11 +66,6 @@ class Provenance(Record, frozen=True):
     )
     package_version: str = ""
     notes: str = ""
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain JSON values."""
-        values: dict[str, Any] = plain(self)
-        return values
 
 
 class Metadata(Record, frozen=True):
@@ -124,6 +119,8 @@ class DriverProfile(Record, frozen=True):
         By side, "left" and "right": whether its answer to neighbours there is known, and how.
     """
 
+    later = ("left_hand", "beside")
+
     name: str = field(name="id")
     model: CoreModel
     effects: tuple[Effect, ...] = ()
@@ -162,13 +159,11 @@ class DriverProfile(Record, frozen=True):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values, as the profile file holds them."""
-        values = plain(self)
+        values = super().to_dict()
         values["effects"] = [effect.to_dict() for effect in self.effects]
         values["sensor"] = None if self.sensor is None else self.sensor.to_dict()
-        hand = ("left_hand",) if self.left_hand else ()
-        beside = ("beside",) if self.beside else ()
-        order = ("id", "metadata", "lane_width", *hand, "model", "effects", *beside, "sensor", "provenance")
-        return {"format": FORMAT, "version": VERSION, **{name: values[name] for name in order}}
+        order = ("id", "metadata", "lane_width", "left_hand", "model", "effects", "beside", "sensor", "provenance")
+        return {"format": FORMAT, "version": VERSION, **{name: values[name] for name in order if name in values}}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> DriverProfile:

@@ -7,7 +7,7 @@ none of, are lists and the generator's own state there.
 from __future__ import annotations
 
 import re
-from typing import Any, Self, TypeVar, get_args, get_origin
+from typing import Any, ClassVar, Self, TypeVar, get_args, get_origin
 
 import msgspec
 import numpy as np
@@ -22,8 +22,20 @@ T = TypeVar("T")
 class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Parameters: set once, checked in `__post_init__`; `msgspec.structs.replace` makes a changed copy."""
 
+    later: ClassVar[tuple[str, ...]] = ()
+    """Fields that came later: files are without them where they have their defaults, as they were before."""
+
     def __deepcopy__(self, memo: object) -> Self:
         return self
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain JSON values, as a file holds them."""
+        values: dict[str, Any] = plain(self)
+        for one in structs.fields(self) if self.later else ():
+            default = one.default if one.default_factory is msgspec.NODEFAULT else one.default_factory()
+            if one.name in self.later and getattr(self, one.name) == default:
+                del values[one.encode_name]
+        return values
 
 
 def kebab(name: str) -> str:

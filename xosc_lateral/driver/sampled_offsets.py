@@ -7,12 +7,12 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.plausibility import check_offsets
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
@@ -23,8 +23,6 @@ from xosc_lateral.drives.drive import Drive, Run
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import DriverProfileError, NotEnoughDataError
 from xosc_lateral.segment import Segment
-
-FloatArray = NDArray[np.float64]
 
 MEAN_SPEED = 30.0
 """Of a free run whose speed nobody named: about 108 km/h. [m/s]"""
@@ -58,15 +56,11 @@ def sample_like(
     numbers = {drive.name: number for number, drive in enumerate(drives)}
     root = np.random.SeedSequence(seed)
     for snippet in cut_snippets(all_runs(drives, rules), seconds):
-        own = child(root, numbers[snippet.run.drive], snippet.index)
+        name, own = snippet.run.drive, child(root, numbers[snippet.run.drive], snippet.index)
         segment = segment_of(snippet.run, snippet.rows)
-
-        def draw(start: float, segment: Segment = segment, own: np.random.SeedSequence = own) -> FloatArray:
-            return sample_offsets(profile, segment, own, start=start)
-
-        offset = recorded(sensor, draw, len(snippet.time), float(snippet.offset[0]), STEP, own)
-        _check(offset, segment, profile, snippet.run.drive)
-        yield SampledOffsets(snippet.run.drive, snippet.index, snippet.time, offset, snippet.offset)
+        offset = recorded_offsets(profile, segment, own, sensor, float(snippet.offset[0]))
+        _check(offset, segment, profile, name)
+        yield SampledOffsets(name, snippet.index, snippet.time, offset, snippet.offset)
 
 
 def sample_context(
@@ -76,12 +70,10 @@ def sample_context(
     sensor = known_sensor(profile) if with_sensor else None
     root = np.random.SeedSequence(seed)
     for number, drive in enumerate(drives):
-        run = whole_run(drive)
-        own, segment = child(root, number), segment_of(run)
-        offset = sample_offsets(profile, segment, own)
-        offset = offset + sensor_error(sensor, offset, STEP, own)
+        segment = segment_of(whole_run(drive))
+        offset = recorded_offsets(profile, segment, child(root, number), sensor)
         _check(offset, segment, profile, drive.name)
-        yield SampledOffsets(drive.name, 0, run.time, offset, None)
+        yield SampledOffsets(drive.name, 0, segment.time, offset, None)
 
 
 def _check(offset: FloatArray, segment: Segment, profile: DriverProfile, drive: str) -> None:
@@ -107,9 +99,8 @@ def sample_free(
         raise ValueError(f"a free run of {duration} s, expected more than 0 and less than {MAX_DURATION:g} s")
     width = profile.lane_width if lane_width is None else lane_width
     segment = Segment.even(duration, profile.model.step, width, speed)
-    own = child(np.random.SeedSequence(seed), 0)
-    offset = sample_offsets(profile, segment, own)
-    offset = offset + sensor_error(known_sensor(profile) if with_sensor else None, offset, STEP, own)
+    sensor = known_sensor(profile) if with_sensor else None
+    offset = recorded_offsets(profile, segment, child(np.random.SeedSequence(seed), 0), sensor)
     yield SampledOffsets(profile.name, 0, segment.time, offset, None)
 
 
@@ -139,23 +130,19 @@ def sensor_error(
     return sensor.sample(len(path), step, generator(seed, DriveSeed.SENSOR, part))
 
 
-def recorded(
-    sensor: SensorModel | None,
-    draw: Callable[[float], FloatArray],
-    n: int,
-    start: float,
-    step: float,
+def recorded_offsets(
+    profile: DriverProfile,
+    segment: Segment,
     seed: np.random.SeedSequence,
+    sensor: SensorModel | None = None,
+    start: float | None = None,
 ) -> FloatArray:
-    """A sampled path of n offsets with the sensor's error on it, the sum of which begins at `start`. [m]
-
-    `draw` samples the path from a given start [m].
-    """
+    """A sampled path with the sensor's error on it, shape (n,), the sum of which begins at `start`. [m]"""
     if sensor is None:
-        return draw(start)
-    rng = generator(seed, DriveSeed.SENSOR, 0)
-    noise = sensor.sample(n, step, rng)
-    return draw(start - float(noise[0])) + noise
+        return sample_offsets(profile, segment, seed, start=start)
+    error = sensor_error(sensor, segment.lane_width[segment.inside], profile.model.step, seed)
+    begin = None if start is None else start - float(error[0])
+    return sample_offsets(profile, segment, seed, start=begin) + error
 
 
 PAST, FUTURE = 30.0, 10.0

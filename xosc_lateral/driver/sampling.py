@@ -7,8 +7,8 @@ from copy import deepcopy
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import ColumnEffect, EffectTerms
 from xosc_lateral.driver.effects.base import step_of
 from xosc_lateral.driver.jit_kernel import prepare
@@ -16,7 +16,6 @@ from xosc_lateral.driver.process import DriveProcess, combine
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.segment import Segment
 
-FloatArray = NDArray[np.float64]
 Responses = Sequence[FloatArray | None]
 
 STEP_TOLERANCE = 0.1

@@ -12,10 +12,7 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
+from xosc_lateral.arrays import FloatArray
 
 Number = TypeVar("Number", float, FloatArray)
 

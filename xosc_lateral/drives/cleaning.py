@@ -7,14 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.drives.markings import both_markings
 from xosc_lateral.errors import FormatError
 from xosc_lateral.limits import DRIVE_SPAN, TIME
-
-FloatArray = NDArray[np.float64]
 
 MAX_STEP = 0.25
 """Median step of a table that can give 5 Hz. [s]"""
@@ -47,13 +45,13 @@ def clean_drive(
     levels: frozenset[str],
     path: Path,
 ) -> Drive | None:
-    """Rows of one drive, from whatever source, as a `Drive`.
+    """Rows of one drive, from whatever source, sorted by time, without repeated times and rows without a place in the
+    lane; None when nothing is left.
 
     Raises `FormatError` if a column can't be in the unit meant, or the rows are too far apart.
 
     Parameters
     ----------
-    name : str
     columns : mapping of str to array, shape (n,)
         `time` [s], and `offset` and `lane_width` or `distance_left` and `distance_right` [m]; `speed` [m/s] if known;
         `RUN` where an import has cut the drive; all others are context. NaN: missing, or "there is none".
@@ -61,11 +59,6 @@ def clean_drive(
         Columns that hold levels.
     path : Path
         What messages call the source.
-
-    Returns
-    -------
-    Drive or None
-        Sorted by time, repeated times and rows without a place in the lane left out; None when nothing is left.
     """
     columns = _in_order(columns, name, path)
     offset, lane_width = _position(columns)
@@ -80,23 +73,14 @@ def clean_drive(
         good &= np.isfinite(speed)
     if good.sum() < 2:
         return None
-    context = {key: values[good] for key, values in columns.items() if key not in OWN}
-    empty = frozenset(key for key, values in context.items() if np.isnan(values).all())
-    context = {key: values for key, values in context.items() if key not in empty}
-    context["lane_width"] = lane_width[good]
-    held = frozenset(levels & context.keys())
+    every = {key: values[good] for key, values in columns.items() if key not in OWN}
+    empty = frozenset(key for key, values in every.items() if np.isnan(values).all())
+    context = {key: values for key, values in every.items() if key not in empty} | {"lane_width": lane_width[good]}
     run = columns[RUN][good].astype(np.int64) if RUN in columns else None
     drive = Drive(
-        name,
-        columns["time"][good],
-        offset[good],
-        lane_width[good],
-        context,
-        held,
-        str(path),
-        run,
-        empty=empty,
-    )
+        name, columns["time"][good], offset[good], lane_width[good],
+        context, frozenset(levels & context.keys()), str(path), run, empty=empty,
+    )  # fmt: skip
     return drive if run is not None else _seen_through(drive)
 
 
@@ -129,44 +113,27 @@ def _in_order(columns: dict[str, FloatArray], name: str, path: Path) -> dict[str
     time = columns["time"]
     if len(time) < 2:
         return columns
-    _check_time(time, name, path)
-    repeated = np.concatenate([[False], np.diff(time) <= 0])
-    _check_repeats(columns, repeated, name, path)
-    columns = {key: values[~repeated] for key, values in columns.items()}
-    _check_steps(columns["time"], name, path)
-    return columns
 
+    def refuse(what: str) -> None:
+        raise FormatError(f"drive {name}: {what}", path=path, element="column 'time'")
 
-def _check_steps(time: FloatArray, name: str, path: Path) -> None:
-    steps = np.diff(time)
-    if len(steps) and np.median(steps) > MAX_STEP:
-        raise FormatError(
-            f"drive {name}: rows are {np.median(steps):.4g} s apart (median), 5 Hz needs at most {MAX_STEP} s; "
-            "if the clock is in milliseconds: --map time=COLUMN:ms",
-            path=path,
-            element="column 'time'",
-        )
-
-
-def _check_time(time: FloatArray, name: str, path: Path) -> None:
+    clock = "if the clock is in milliseconds: --map time=COLUMN:ms"
     latest, span = float(np.abs(time[[0, -1]]).max()), float(time[-1] - time[0])
     for limit, found in ((TIME, latest), (DRIVE_SPAN, span)):
         if found > limit.value:
-            what = f"drive {name}: {limit.refusal(found)}; if the clock is in milliseconds: --map time=COLUMN:ms"
-            raise FormatError(what, path=path, element="column 'time'")
-
-
-def _check_repeats(columns: Mapping[str, FloatArray], repeated: NDArray[np.bool_], name: str, path: Path) -> None:
-    offset, _ = _position(columns)
-    later = np.flatnonzero(repeated)
-    apart = np.abs(offset[later] - offset[later - 1]) > CONTRADICTION
-    if apart.sum() > max(5, MAX_CONTRADICTIONS * len(repeated)):
-        raise FormatError(
-            f"drive {name}: {int(apart.sum())} of {len(repeated)} rows repeat a time with another offset; if the table "
-            "holds several drives it needs a column 'drive'",
-            path=path,
-            element="column 'time'",
+            refuse(f"{limit.refusal(found)}; {clock}")
+    repeated = np.concatenate([[False], np.diff(time) <= 0])
+    offset, later = _position(columns)[0], np.flatnonzero(repeated)
+    apart = int((np.abs(offset[later] - offset[later - 1]) > CONTRADICTION).sum())
+    if apart > max(5, MAX_CONTRADICTIONS * len(time)):
+        refuse(
+            f"{apart} of {len(time)} rows repeat a time with another offset; if the table holds several drives it "
+            "needs a column 'drive'"
         )
+    steps = np.diff(time[~repeated])
+    if len(steps) and np.median(steps) > MAX_STEP:
+        refuse(f"rows are {np.median(steps):.4g} s apart (median), 5 Hz needs at most {MAX_STEP} s; {clock}")
+    return {key: values[~repeated] for key, values in columns.items()}
 
 
 def _position(columns: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
@@ -183,30 +150,23 @@ def _check_units(
     known = np.isfinite(offset) & np.isfinite(width)
     if not known.any():
         return
-    median_width = float(np.median(width[known]))
+    offset, width = offset[known], width[known]
+    median_width = float(np.median(width))
     if not LANE_WIDTHS[0] <= median_width <= LANE_WIDTHS[1]:
         raise FormatError(
             f"drive {name}: the lane is {median_width:.4g} m wide (median), expected {LANE_WIDTHS[0]:g} to "
             f"{LANE_WIDTHS[1]:g} m; name the unit with --map, as in lane_width=COLUMN:cm",
             path=path,
         )
-    _check_offsets(name, offset[known], width[known], path)
-    _check_speed(name, columns.get("speed"), path)
-
-
-def _check_offsets(name: str, offset: FloatArray, width: FloatArray, path: Path) -> None:
     outside = np.abs(offset) > np.maximum(width, LANE_WIDTHS[0])
     if outside.mean() > MAX_OUTSIDE:
-        worst = float(np.max(np.abs(offset)))
         raise FormatError(
-            f"drive {name}: offsets of up to {worst:.4g} m in a lane of {float(np.median(width)):.3g} m, "
+            f"drive {name}: offsets of up to {float(np.max(np.abs(offset))):.4g} m in a lane of {median_width:.3g} m, "
             f"{100 * outside.mean():.0f} % of the rows beyond a whole lane width; name the unit with --map, "
             "as in offset=COLUMN:cm",
             path=path,
         )
-
-
-def _check_speed(name: str, speed: FloatArray | None, path: Path) -> None:
+    speed = columns.get("speed")
     if speed is not None and np.isfinite(speed).any() and float(np.nanmedian(speed)) > MAX_MEDIAN_SPEED:
         raise FormatError(
             f"drive {name}: speed is {float(np.nanmedian(speed)):.4g} m/s (median), more than {MAX_MEDIAN_SPEED:g}; "

@@ -6,14 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.drives.drive import Drive, Run
-from xosc_lateral.drives.resampling import STEP, column_on_grid, resample
+from xosc_lateral.drives.resampling import STEP, average, nearest, resample
 from xosc_lateral.errors import NotEnoughDataError
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 MIN_SPEED = 40.0 / 3.6
 """Slower driving is cut out (arXiv:2405.17080, section III). [m/s]"""
@@ -39,27 +36,18 @@ MIN_RUN = 10.0
 
 @dataclass(frozen=True, slots=True)
 class CutRules:
-    """What is cut out of a drive; the defaults are the paper's where it gives one.
-
-    Parameters
-    ----------
-    min_speed : float
-        [m/s]
-    lane_change_margin : float
-        Cut on each side of a lane change. [s]
-    max_gap : float
-        Longest gap that is bridged. [s]
-    min_run : float
-        Shortest run that is kept. [s]
-    step : float
-        Of the runs. [s]
-    """
+    """What is cut out of a drive; the defaults are the paper's where it gives one."""
 
     min_speed: float = MIN_SPEED
+    """[m/s]"""
     lane_change_margin: float = LANE_CHANGE_MARGIN
+    """Cut on each side of a lane change. [s]"""
     max_gap: float = MAX_GAP
+    """Longest gap that is bridged. [s]"""
     min_run: float = MIN_RUN
+    """Shortest run that is kept. [s]"""
     step: float = STEP
+    """Of the runs. [s]"""
 
 
 PAPER_RULES = CutRules()
@@ -100,15 +88,11 @@ def grid_of(drive: Drive, rows: slice, step: float) -> FloatArray:
 
 
 def lane_change_rows(drive: Drive, rules: CutRules = PAPER_RULES) -> BoolArray:
-    """Rows within the margin of a lane change.
+    """Rows within the margin of a lane change, shape (n,).
 
     A lane has changed where `lane_index` does, where the offset jumps by half a lane width and more, and where rows are
     missing while a wheel is on a marking: a camera that loses the lane there has another when it is back. None where an
     import has cut them already.
-
-    Returns
-    -------
-    array of bool, shape (n,)
     """
     if drive.run is not None:
         return np.zeros(len(drive), dtype=np.bool_)
@@ -149,11 +133,10 @@ def slow_rows(drive: Drive, rules: CutRules = PAPER_RULES) -> BoolArray:
 def _run(drive: Drive, index: int, rows: slice, grid: FloatArray) -> Run:
     time = drive.time[rows]
     context = {
-        name: column_on_grid(time, values[rows], grid, held=name in drive.levels)
+        name: (nearest if name in drive.levels else average)(time, values[rows], grid)
         for name, values in drive.context.items()
     }
-    lane_width = column_on_grid(time, drive.lane_width[rows], grid, held=False)
-    offset = resample(time, drive.offset[rows], grid)
+    lane_width, offset = average(time, drive.lane_width[rows], grid), resample(time, drive.offset[rows], grid)
     return Run(drive.name, index, grid, offset, lane_width, context, drive.levels, drive.empty)
 
 

@@ -10,22 +10,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-FloatArray = NDArray[np.float64]
+from xosc_lateral.arrays import FloatArray, IntArray
 
 
 @dataclass(frozen=True, slots=True)
 class MarkingShares:
-    """Rows in which a camera had misjudged a lane marking.
-
-    Parameters
-    ----------
-    one_marking, no_marking : float
-        Shares of a drive's rows that follow one marking because the other was misjudged (by 5 cm of offset and more),
-        and that were left out because both were. [-]
-    """
+    """Rows in which a camera had misjudged a lane marking."""
 
     one_marking: float
     no_marking: float
+    """Shares of a drive's rows that follow one marking because the other was misjudged (by 5 cm of offset and more),
+    and that were left out because both were. [-]"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -68,14 +63,14 @@ class Drive:
     context: Mapping[str, FloatArray] = field(default_factory=dict)
     levels: frozenset[str] = frozenset()
     source: str = ""
-    run: NDArray[np.int64] | None = None
+    run: IntArray | None = None
     mended: MarkingShares | None = None
     empty: frozenset[str] = frozenset()
     half_width: FloatArray | None = None
 
     def __post_init__(self) -> None:
         """Copy and freeze; refuse unequal lengths and what readers must have taken out."""
-        _freeze(self)
+        _freeze(self, self.name)
         if np.any(np.diff(self.time) <= 0):
             raise ValueError(f"drive {self.name}: time does not increase")
 
@@ -90,38 +85,27 @@ class Drive:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Run:
-    """A stretch of road-following driving on an even grid; nothing may be counted across two runs.
-
-    Parameters
-    ----------
-    drive : str
-        Name of the drive that it comes from.
-    index : int
-        Number of the run in its drive, from 0.
-    time : array, shape (n,)
-        Even, in the drive's own clock. [s]
-    offset : array, shape (n,)
-        Positive to the LEFT of travel. [m]
-    lane_width : array, shape (n,)
-        [m]
-    context : mapping of str to array, shape (n,)
-        As in `Drive`.
-    levels, empty : frozenset of str
-        As in `Drive`.
-    """
+    """Road-following driving on an even grid, arrays of shape (n,); nothing may be counted across two runs."""
 
     drive: str
+    """Name of the drive that it comes from."""
     index: int
+    """Number of the run in its drive, from 0."""
     time: FloatArray
+    """Even, in the drive's own clock. [s]"""
     offset: FloatArray
+    """Positive to the LEFT of travel. [m]"""
     lane_width: FloatArray
+    """[m]"""
     context: Mapping[str, FloatArray] = field(default_factory=dict)
+    """As in `Drive`."""
     levels: frozenset[str] = frozenset()
     empty: frozenset[str] = frozenset()
+    """As in `Drive`."""
 
     def __post_init__(self) -> None:
         """Copy and freeze; refuse unequal lengths and missing values."""
-        _freeze(self)
+        _freeze(self, self.drive)
 
     def part(self, rows: slice, drive: str | None = None) -> Run:
         """Some of its rows, under its drive's name or another."""
@@ -148,24 +132,23 @@ class Run:
         return self.context.get("speed")
 
 
-def _freeze(series: Drive | Run) -> None:
-    if isinstance(series, Drive) and series.run is not None:
-        object.__setattr__(series, "run", _frozen(series.run, len(series.time), f"drive {series.name}: run", np.int64))
-    name = series.name if isinstance(series, Drive) else series.drive
+def _freeze(series: Drive | Run, name: str) -> None:
+    """Copies that nobody can write to in place of its arrays; all but context and the run's number are finite."""
     n = len(series.time)
-    half_width = ("half_width",) if isinstance(series, Drive) and series.half_width is not None else ()
-    for label in ("time", "offset", "lane_width", *half_width):
-        values = _frozen(getattr(series, label), n, f"drive {name}: {label}")
-        if not np.isfinite(values).all():
-            raise ValueError(f"drive {name}: {label} is not finite")
-        object.__setattr__(series, label, values)
-    context = {key: _frozen(values, n, f"drive {name}: {key}") for key, values in series.context.items()}
+
+    def frozen(label: str, values: NDArray[Any], kind: DTypeLike = np.float64) -> NDArray[Any]:
+        array = np.array(values, dtype=kind)
+        if array.shape != (n,):
+            raise ValueError(f"drive {name}: {label}: shape {array.shape}, expected ({n},)")
+        array.flags.writeable = False
+        return array
+
+    if (number := getattr(series, "run", None)) is not None:
+        object.__setattr__(series, "run", frozen("run", number, np.int64))
+    for label in ("time", "offset", "lane_width", "half_width"):
+        if (values := getattr(series, label, None)) is not None:
+            object.__setattr__(series, label, frozen(label, values))
+            if not np.isfinite(values).all():
+                raise ValueError(f"drive {name}: {label} is not finite")
+    context = {key: frozen(key, values) for key, values in series.context.items()}
     object.__setattr__(series, "context", MappingProxyType(context))
-
-
-def _frozen(values: NDArray[Any], n: int, what: str, kind: DTypeLike = np.float64) -> NDArray[Any]:
-    array = np.array(values, dtype=kind)
-    if array.shape != (n,):
-        raise ValueError(f"{what}: shape {array.shape}, expected ({n},)")
-    array.flags.writeable = False
-    return array

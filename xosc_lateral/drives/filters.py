@@ -14,9 +14,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from xosc_lateral.arrays import FloatArray
 
 LEAST_ATTENUATION = 21.0
 """Of a rectangular window, shape 0: Kaiser's formulas begin there, and change at `GREAT_ATTENUATION`. [dB]"""
@@ -33,23 +32,10 @@ SHAPE_POWER_FACTOR, SHAPE_POWER, SHAPE_SLOPE = 0.5842, 0.4, 0.07886
 
 
 def kaiser_design(attenuation: float, width: float) -> tuple[int, float]:
-    """Size and shape of a Kaiser window.
+    """Taps to each side of the middle one, and shape of a Kaiser window. [-]
 
-    Raises `ValueError` if the attenuation is outside the range of the formula.
-
-    Parameters
-    ----------
-    attenuation : float
-        In the stop band, 21 to 50 dB.
-    width : float
-        From the end of the pass band to the beginning of the stop band, as a share of half the sampling rate, > 0. [-]
-
-    Returns
-    -------
-    half : int
-        Taps to each side of the middle one.
-    beta : float
-        Shape of the window. [-]
+    For an attenuation in the stop band [dB] and a width from the end of the pass band to the beginning of the stop
+    band, as a share of half the sampling rate, > 0 [-]. Raises `ValueError` outside 21 to 50 dB, the formula's range.
     """
     if not LEAST_ATTENUATION <= attenuation <= GREAT_ATTENUATION:
         raise ValueError(f"attenuation {attenuation} dB, expected {LEAST_ATTENUATION:g} to {GREAT_ATTENUATION:g}")
@@ -59,21 +45,10 @@ def kaiser_design(attenuation: float, width: float) -> tuple[int, float]:
 
 
 def low_pass(half: int, cutoff: float, beta: float) -> FloatArray:
-    """Symmetric kernel of gain 1.
+    """Symmetric kernel of gain 1, shape (2 * half + 1,). [-]
 
-    Parameters
-    ----------
-    half : int
-        Taps to each side of the middle one.
-    cutoff : float
-        Where the gain is one half, as a share of half the sampling rate, 0 to 1. [-]
-    beta : float
-        Shape of the Kaiser window, >= 0. [-]
-
-    Returns
-    -------
-    array, shape (2 * half + 1,)
-        [-]
+    `cutoff`: where the gain is one half, as a share of half the sampling rate, 0 to 1; `beta` >= 0: shape of the Kaiser
+    window. [-]
     """
     kernel = np.sinc(cutoff * np.arange(-half, half + 1)) * np.kaiser(2 * half + 1, beta)
     return np.asarray(kernel / kernel.sum())
@@ -82,19 +57,7 @@ def low_pass(half: int, cutoff: float, beta: float) -> FloatArray:
 def low_pass_between(passed: float, stopped: float, step: float, attenuation: float) -> FloatArray:
     """Symmetric kernel of gain 1 that passes what is slower than one frequency, and stops what is faster than another.
 
-    Parameters
-    ----------
-    passed, stopped : float
-        Below half the sampling rate. [Hz]
-    step : float
-        Of the rows. [s]
-    attenuation : float
-        In the stop band, 21 to 50 dB.
-
-    Returns
-    -------
-    array, shape (2 * half + 1,)
-        [-]
+    Both below half the sampling rate [Hz]; `step` of the rows [s]; attenuation in the stop band, 21 to 50 dB.
     """
     nyquist = 0.5 / step
     half, beta = kaiser_design(attenuation, (stopped - passed) / nyquist)
@@ -119,18 +82,8 @@ def mirrored(values: FloatArray, rows: int) -> FloatArray:
 
 
 def scale_frequencies(values: FloatArray, gain: FloatArray) -> FloatArray:
-    """A series with every frequency scaled; it goes round: its end runs into its beginning.
+    """A series, shape (n,), with every frequency scaled; it goes round: its end runs into its beginning. [any unit]
 
-    Parameters
-    ----------
-    values : array, shape (n,)
-        [any unit]
-    gain : array, shape (n // 2 + 1,)
-        At ``numpy.fft.rfftfreq(n)`` cycles per sample. [-]
-
-    Returns
-    -------
-    array, shape (n,)
-        In the same unit.
+    `gain` [-] at ``numpy.fft.rfftfreq(n)`` cycles per sample, shape (n // 2 + 1,).
     """
     return np.asarray(np.fft.irfft(np.fft.rfft(values) * gain, len(values)), dtype=np.float64)

@@ -6,29 +6,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.drives.cuts import CutRules, cut_runs, grid_of
 from xosc_lateral.drives.drive import Drive, Run
-from xosc_lateral.drives.resampling import STEP, column_on_grid, in_digits
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
+from xosc_lateral.drives.resampling import STEP, average, in_digits, nearest
 
 FEW = 8
 """A column with no more different values than this holds levels. [-]"""
 
 
 def circular_period(drives: Sequence[FloatArray]) -> float:
-    """Full circle of a column that wraps around, else 0. [unit of the column]
+    """Full circle of a column, given for every drive, that wraps around, else 0. [unit of the column]
 
     It has a value everywhere; it jumps across its whole range again and again, hardly ever by a part of it, and mostly
     moves in small steps. The range is the circle, rounded to 360 or 2 pi when that is within 2 %.
-
-    Parameters
-    ----------
-    drives : sequence of array
-        The column in every drive.
     """
     values = np.concatenate(list(drives))
     if len(values) < 100 or not np.isfinite(values).all():
@@ -36,11 +28,6 @@ def circular_period(drives: Sequence[FloatArray]) -> float:
     extent = float(values.max() - values.min())
     if extent <= 0.0 or len(np.unique(values)) <= FEW:
         return 0.0
-    return _circle(drives, extent)
-
-
-def _circle(drives: Sequence[FloatArray], extent: float) -> float:
-    """That whole range, rounded, if the drives jump across it as a circle makes them, else 0."""
     jump = np.concatenate([np.abs(np.diff(own)) for own in drives]) / extent
     wraps, between = int((jump > 0.9).sum()), int(((jump > 0.25) & (jump <= 0.9)).sum())
     if wraps < 2 or between > 0.3 * wraps or wraps > 0.05 * len(jump):
@@ -53,32 +40,21 @@ def _circle(drives: Sequence[FloatArray], extent: float) -> float:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class GriddedDrive:
-    """One drive on the 0.2 s grid, its context held at its outermost values in the pads before and after it.
-
-    Parameters
-    ----------
-    name : str
-    time : array, shape (n,)
-        The drive's own clock. [s]
-    offset : array, shape (n,)
-        Positive to the LEFT of travel; 0 outside `valid`. [m]
-    valid : bool array, shape (n,)
-        Road-following, not cut out.
-    lane_width : array, shape (n,)
-        [m]
-    context : mapping of str to array, shape (n,)
-        NaN: there is none.
-    levels : frozenset of str
-        Columns of whole numbers.
-    """
+    """One drive on the 0.2 s grid, arrays of shape (n,); context holds its outermost values in the pads around it."""
 
     name: str
     time: FloatArray
+    """The drive's own clock. [s]"""
     offset: FloatArray
+    """Positive to the LEFT of travel; 0 outside `valid`. [m]"""
     valid: BoolArray
+    """Road-following, not cut out."""
     lane_width: FloatArray
+    """[m]"""
     context: Mapping[str, FloatArray]
+    """NaN: there is none."""
     levels: frozenset[str]
+    """Columns of whole numbers."""
 
     def __len__(self) -> int:
         return len(self.time)
@@ -101,15 +77,8 @@ def grid_drives(
 ) -> tuple[list[GriddedDrive], dict[str, float]]:
     """Every drive that has road-following in it, gridded, and the full circle of the columns that wrap around.
 
-    Parameters
-    ----------
-    drives : sequence of Drive
-    rules : CutRules
-        What is not road-following.
-    pad : int
-        Rows before and after each drive, at least. [-]
-    multiple : int
-        Each one's rows are a multiple of it, and all of them together a number whose Fourier transform is quick. [-]
+    With at least `pad` rows before and after each drive; each one's rows are a multiple of `multiple`, and all of them
+    together a number whose Fourier transform is quick.
     """
     periods = circular_columns(drives)
     cut = [(drive, cut_runs(drive, rules)) for drive in drives]
@@ -129,26 +98,18 @@ def circular_columns(drives: Sequence[Drive]) -> dict[str, float]:
 
 def _gridded(drive: Drive, runs: Sequence[Run], circular: frozenset[str]) -> GriddedDrive:
     grid = grid_of(drive, slice(0, len(drive)), STEP)
-    offset, valid = _offsets(drive, runs, grid)
-    held = drive.levels | circular
-    context = {name: _column(drive.time, values, grid, held=name in held) for name, values in drive.context.items()}
-    lane_width = _column(drive.time, drive.lane_width, grid, held=False)
-    return GriddedDrive(drive.name, grid, offset, valid, lane_width, context, drive.levels)
-
-
-def _column(time: FloatArray, values: FloatArray, grid: FloatArray, *, held: bool) -> FloatArray:
-    on_grid = column_on_grid(time, values, grid, held=held)
-    return on_grid if held else in_digits(on_grid)
-
-
-def _offsets(drive: Drive, runs: Sequence[Run], grid: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """Offsets within the runs, 0 elsewhere; and where that is."""
     offset, valid = np.zeros(len(grid)), np.zeros(len(grid), dtype=np.bool_)
     for run in runs:
         first = round((run.time[0] - grid[0]) / STEP)
         rows = slice(first, first + len(run))
         offset[rows], valid[rows] = run.offset, True
-    return offset, valid
+    held = drive.levels | circular
+    context = {
+        name: nearest(drive.time, values, grid) if name in held else in_digits(average(drive.time, values, grid))
+        for name, values in drive.context.items()
+    }
+    lane_width = in_digits(average(drive.time, drive.lane_width, grid))
+    return GriddedDrive(drive.name, grid, offset, valid, lane_width, context, drive.levels)
 
 
 def _with_room(part: GriddedDrive, pad: int, multiple: int) -> GriddedDrive:

@@ -22,15 +22,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.drives.cuts import MAX_GAP, lane_steps
 from xosc_lateral.drives.drive import MarkingShares
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.normal import MAD_TO_SD
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 DEGREES = 4.0
 """Of freedom of the views' errors. [-]"""
@@ -69,73 +66,74 @@ SINGULAR = 1e-9
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Mended:
-    """Rows with a misjudged marking seen through.
-
-    Parameters
-    ----------
-    offset, lane_width : array, shape (n,)
-        The lane width smoothed. [m]
-    kept : bool array, shape (n,)
-        Rows with a view to trust.
-    shares : MarkingShares
-    """
+    """Rows with a misjudged marking seen through."""
 
     offset: FloatArray
     lane_width: FloatArray
+    """Shape (n,). The lane width smoothed. [m]"""
     kept: BoolArray
+    """Shape (n,). Rows with a view to trust."""
     shares: MarkingShares
 
 
 def both_markings(time: FloatArray, offset: FloatArray, lane_width: FloatArray) -> BothMarkings | None:
-    """What a camera saw of both lane markings.
+    """What a camera saw of both lane markings, from rows as recorded at increasing times [s], shape (n,). [m]
 
-    Parameters
-    ----------
-    time : array, shape (n,)
-        Increasing. [s]
-    offset, lane_width : array, shape (n,)
-        As recorded. [m]
-
-    Returns
-    -------
-    BothMarkings or None
-        None where the lane width wasn't measured, or not by what measured the offset.
+    None where the lane width wasn't measured, or not by what measured the offset.
     """
     if np.ptp(lane_width) == 0.0:  # before anything is imported or computed: from a map, as most tables have it
         return None
+    from scipy.ndimage import median, median_filter
+
     breaks = (np.diff(time) > MAX_GAP) | lane_steps(offset, lane_width)
     block, moment = _blocks(time, breaks)
-    views = _Views.of(block, offset, lane_width, np.flatnonzero(breaks))
-    return None if views is None else BothMarkings(offset, lane_width, moment, np.diff(time)[breaks], views)
+    count = int(block[-1]) + 1
+    if count < 3:
+        return None
+    seen = np.bincount(block, minlength=count) > 0
+    left, right = np.zeros(count), np.zeros(count)
+    left[seen] = median(0.5 * lane_width - offset, block, np.flatnonzero(seen))
+    right[seen] = median(0.5 * lane_width + offset, block, np.flatnonzero(seen))
+    width = (left + right)[seen]
+    if not _jump_together(0.5 * (right - left)[seen], width):
+        return None
+    about = np.abs(width - median_filter(width, size=WAVERS_WITHIN, mode="nearest"))
+    noise = MAD_TO_SD * float(np.median(about)) / np.sqrt(2.0)
+    if noise < MEASURED:
+        return None
+    borders = block[np.flatnonzero(breaks)]
+    return BothMarkings(
+        offset, lane_width, moment, left, right, seen, borders, np.diff(time)[breaks], max(noise, LEAST_NOISE)
+    )
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class BothMarkings:
-    """What a camera saw of both lane markings.
-
-    Parameters
-    ----------
-    offset, lane_width : array, shape (n,)
-        As recorded. [m]
-    moment : array, shape (n,)
-        Of the rows, see `_blocks`. [s]
-    gaps : array
-        Times between the rows on both sides of the breaks. [s]
-    views : _Views
-    """
+    """What a camera saw of both lane markings: rows, and medians of blocks of `STEP`."""
 
     offset: FloatArray
     lane_width: FloatArray
+    """As recorded, shape (n,). [m]"""
     moment: FloatArray
+    """Of the rows, see `_blocks`. [s]"""
+    left: FloatArray
+    right: FloatArray
+    """Distances of blocks to both markings. [m]"""
+    seen: BoolArray
+    """Blocks that have rows."""
+    breaks: IntArray
+    """Blocks after which the next is not joined."""
     gaps: FloatArray
-    views: _Views
+    """Times between the rows on both sides of these. [s]"""
+    noise: float
+    """Of a marking, standard deviation. [m]"""
 
     def mended(self) -> Mended | None:
         """With the other marking followed where one was misjudged; None where nothing is impossible."""
-        smoothed = self.views.smoothed(self.gaps)
+        smoothed = self._smoothed()
         if smoothed is None:
             return None
-        centres = STEP * (np.arange(len(smoothed[0])) + 0.5)
+        centres = STEP * (np.arange(len(self.left)) + 0.5)
         place, lane = (np.interp(self.moment, centres, values) for values in smoothed)
         wider = self.lane_width - lane
         left, right = _trust(self.offset - place, wider)
@@ -144,74 +142,10 @@ class BothMarkings:
         shares = MarkingShares(float(np.mean(kept & (np.abs(change) > MOVED))), float(np.mean(~kept)))
         return Mended(self.offset + change, lane, kept, shares)
 
-
-def _trust(offset: FloatArray, width: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Weights of the rows' views of the left and the right marking, from their errors in offset and lane width. [m]"""
-    errors = (0.5 * width - offset, 0.5 * width + offset)
-    noise = max(MAD_TO_SD * float(np.median(np.abs(np.concatenate(errors)))), MEASURED)
-    return _weights(errors[0] / noise), _weights(errors[1] / noise)
-
-
-def _weights(scaled: FloatArray) -> FloatArray:
-    """Of errors in standard deviations, as Student's t distribution has them; 1 for no error. [-]"""
-    return DEGREES / (DEGREES + scaled**2)
-
-
-def _blocks(time: FloatArray, breaks: BoolArray) -> tuple[NDArray[np.int64], FloatArray]:
-    """Number of each row's block, and its moment on a clock on which every break takes as long as a block. [s]"""
-    steps = np.where(breaks, STEP, np.diff(time))
-    moment = np.concatenate([[0.0], np.cumsum(steps)])
-    return (moment / STEP).astype(np.int64), moment
-
-
-def _jump_together(offset: FloatArray, width: FloatArray) -> bool:
-    """Whether the offset of blocks ever jumps as the lane width does, as it must where one marking is misjudged. [m]
-
-    By half as much, that is; an offset from elsewhere, a satellite say, never does.
-    """
-    jumps = np.abs(np.diff(width)) > IMPOSSIBLE * LEAST_NOISE
-    follows = np.abs(np.diff(offset)) > 0.5 * IMPOSSIBLE * LEAST_NOISE
-    return not jumps.any() or bool(follows[jumps].any())
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class _Views:
-    """Medians of blocks of `STEP`: distances to both markings, where there are rows, and what is not joined."""
-
-    left: FloatArray
-    right: FloatArray
-    seen: BoolArray
-    breaks: NDArray[np.int64]
-    noise: float
-
-    @classmethod
-    def of(
-        cls, block: NDArray[np.int64], offset: FloatArray, lane_width: FloatArray, breaks: NDArray[np.int64]
-    ) -> _Views | None:
-        """None where a marking's noise is below what a camera has, or offset and width are not from one camera."""
-        from scipy.ndimage import median, median_filter
-
-        count = int(block[-1]) + 1
-        seen = np.bincount(block, minlength=count) > 0
-        if count < 3:
-            return None
-        left, right = np.zeros(count), np.zeros(count)
-        left[seen] = median(0.5 * lane_width - offset, block, np.flatnonzero(seen))
-        right[seen] = median(0.5 * lane_width + offset, block, np.flatnonzero(seen))
-        if not _jump_together(0.5 * (right - left)[seen], (left + right)[seen]):
-            return None
-        width = (left + right)[seen]
-        about = np.abs(width - median_filter(width, size=WAVERS_WITHIN, mode="nearest"))
-        noise = MAD_TO_SD * float(np.median(about)) / np.sqrt(2.0)
-        return None if noise < MEASURED else cls(left, right, seen, block[breaks], max(noise, LEAST_NOISE))
-
-    def smoothed(self, gaps: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-        """Offset and lane width of each block [m]; None where no error is impossible.
-
-        `gaps` are the times between the rows on both sides of the breaks. [s]
-        """
+    def _smoothed(self) -> tuple[FloatArray, FloatArray] | None:
+        """Offset and lane width of each block [m]; None where no error is impossible."""
         scaled = (np.zeros(len(self.left)), np.zeros(len(self.left)))
-        prior = self._prior(gaps)
+        prior = self._prior()
         for _ in range(ROUNDS):
             offset, width = self._most_likely(prior, scaled)
             found = (self.left - 0.5 * width + offset, self.right - 0.5 * width - offset)
@@ -221,7 +155,7 @@ class _Views:
         worst = max(float(np.abs(one).max()) for one in scaled)
         return (offset, width) if worst > IMPOSSIBLE else None
 
-    def _prior(self, gaps: FloatArray) -> FloatArray:
+    def _prior(self) -> FloatArray:
         """Lower bands of the prior's precision; unknowns are offset and width of each block in turn, shape (5, 2 n)."""
         count = len(self.left)
         bands = np.zeros((5, 2 * count))
@@ -235,7 +169,7 @@ class _Views:
                 at = slice(2 * earlier, 2 * (earlier + count - 2), 2)
                 bands[2 * (later - earlier), at] += joined * bend[later] * bend[earlier] / (ACCELERATION * STEP**3)
         steps = np.full(count - 1, STEP)
-        steps[self.breaks] = np.maximum(gaps, STEP)
+        steps[self.breaks] = np.maximum(self.gaps, STEP)
         walk = 1.0 / (WIDENING * steps)
         bands[0, 1:-2:2] += walk
         bands[0, 3::2] += walk
@@ -257,3 +191,32 @@ class _Views:
         wanted[1::2] = 0.5 * (right * self.right + left * self.left)
         found = solveh_banded(bands, wanted, lower=True)
         return found[::2], found[1::2]
+
+
+def _trust(offset: FloatArray, width: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Weights of the rows' views of the left and the right marking, from their errors in offset and lane width. [m]"""
+    errors = (0.5 * width - offset, 0.5 * width + offset)
+    noise = max(MAD_TO_SD * float(np.median(np.abs(np.concatenate(errors)))), MEASURED)
+    return _weights(errors[0] / noise), _weights(errors[1] / noise)
+
+
+def _weights(scaled: FloatArray) -> FloatArray:
+    """Of errors in standard deviations, as Student's t distribution has them; 1 for no error. [-]"""
+    return DEGREES / (DEGREES + scaled**2)
+
+
+def _blocks(time: FloatArray, breaks: BoolArray) -> tuple[IntArray, FloatArray]:
+    """Number of each row's block, and its moment on a clock on which every break takes as long as a block. [s]"""
+    steps = np.where(breaks, STEP, np.diff(time))
+    moment = np.concatenate([[0.0], np.cumsum(steps)])
+    return (moment / STEP).astype(np.int64), moment
+
+
+def _jump_together(offset: FloatArray, width: FloatArray) -> bool:
+    """Whether the offset of blocks ever jumps as the lane width does, as it must where one marking is misjudged. [m]
+
+    By half as much, that is; an offset from elsewhere, a satellite say, never does.
+    """
+    jumps = np.abs(np.diff(width)) > IMPOSSIBLE * LEAST_NOISE
+    follows = np.abs(np.diff(offset)) > 0.5 * IMPOSSIBLE * LEAST_NOISE
+    return not jumps.any() or bool(follows[jumps].any())

@@ -14,9 +14,8 @@ from __future__ import annotations
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from xosc_lateral.arrays import FloatArray
 
 
 class Detrend(Enum):
@@ -35,21 +34,10 @@ def hann(size: int) -> FloatArray:
 
 
 def periodograms(values: FloatArray, size: int, *, detrend: Detrend = Detrend.NOTHING) -> FloatArray:
-    """Power of half-overlapping Hann windows of one run, or of several that are equally long.
+    """Power of half-overlapping Hann windows of one run, shape (n,), or of several equally long, shape (runs, n).
 
-    Parameters
-    ----------
-    values : array, shape (n,) or (runs, n)
-        Evenly sampled.
-    size : int
-        Samples of a window, >= 2.
-    detrend : Detrend
-
-    Returns
-    -------
-    array, shape (k, size // 2 + 1)
-        At `numpy.fft.rfftfreq(size)` cycles per sample; white noise of variance 1 gives 1 everywhere. No rows where the
-        run is shorter than a window. [square of the values' unit]
+    Of shape (k, size // 2 + 1), at `numpy.fft.rfftfreq(size)` cycles per sample, size >= 2; white noise of variance 1
+    gives 1 everywhere. No rows where the run is shorter than a window. [square of the values' unit]
     """
     if values.shape[-1] < size:
         return np.empty((0, size // 2 + 1))
@@ -69,21 +57,9 @@ def window_powers(pieces: FloatArray, *, detrend: Detrend = Detrend.NOTHING) -> 
 
 
 def tapered_powers(rows: FloatArray, taper: FloatArray | float, *, size: int | None = None) -> FloatArray:
-    """Squared moduli of the transforms of rows seen through any window, padded with zeros to `size`.
+    """Squared moduli of the transforms of rows, shape (k, n), seen through any window, shape (n,), or 1. [-]
 
-    Parameters
-    ----------
-    rows : array, shape (k, n)
-        [any unit]
-    taper : array, shape (n,), or 1
-        [-]
-    size : int, optional
-        n unless given.
-
-    Returns
-    -------
-    array, shape (k, size // 2 + 1)
-        [square of the rows' unit]
+    Padded with zeros to `size`, n unless given; shape (k, size // 2 + 1). [square of the rows' unit]
     """
     return np.asarray(np.abs(np.fft.rfft(rows * taper, n=size, axis=1)) ** 2)
 

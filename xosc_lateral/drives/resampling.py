@@ -15,9 +15,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.drives.filters import kaiser_design, low_pass, mirrored
-
-FloatArray = NDArray[np.float64]
+from xosc_lateral.arrays import BoolArray, FloatArray
+from xosc_lateral.drives.filters import low_pass_between, mirrored
 
 STEP = 0.2
 """Step of the model. [s]"""
@@ -31,36 +30,27 @@ PASS_STEP = 0.18
 ATTENUATION = 50.0
 """Of what would fold back: a movement of 1 m leaves 3 mm. [dB]"""
 
-CUTOFF, TRANSITION = 0.8, 0.4
-"""Middle and width of the low-pass's transition, as shares of half the final rate: from 1.5 Hz to 2.5 Hz. [-]"""
+PASSED, STOPPED = 1.5, 2.5
+"""Of the low-pass, for rows at `STEP`. [Hz]"""
 
 
-def resample(time: FloatArray, values: FloatArray, grid: FloatArray, *, oversampling: int = OVERSAMPLING) -> FloatArray:
-    """Bring a measured series to an even grid without aliasing.
+def resample(time: FloatArray, values: FloatArray, grid: FloatArray) -> FloatArray:
+    """Bring a measured series, finite, at increasing times [s] of shape (n,), to an even grid [s] without aliasing.
 
-    Parameters
-    ----------
-    time, values : array, shape (n,)
-        Increasing times [s] and finite values.
-    grid : array, shape (m,)
-        Even times. [s]
-    oversampling : int
-        Points of the inner grid per step of `grid`.
-
-    Returns
-    -------
-    array, shape (m,)
-        Just interpolated when the rows are as sparse as the grid already.
+    Shape (m,) of the grid; just interpolated when the rows are as sparse as that already.
     """
-    if len(grid) < 2 or np.median(np.diff(time)) >= PASS_STEP / STEP * (grid[1] - grid[0]):
+    if _is_sparse(time, grid):
         return np.interp(grid, time, values)
-    kernel = _low_pass(oversampling)
-    half = len(kernel) // 2
-    fine = np.interp(_fine_grid(grid, oversampling), time, values)
-    return _decimate(mirrored(fine, half), kernel, oversampling, len(grid))
+    kernel = low_pass_between(PASSED, STOPPED, STEP / OVERSAMPLING, ATTENUATION)
+    fine = np.interp(_fine_grid(grid), time, values)
+    return _decimate(mirrored(fine, len(kernel) // 2), kernel, len(grid))
 
 
-def average(time: FloatArray, values: FloatArray, grid: FloatArray, *, oversampling: int = OVERSAMPLING) -> FloatArray:
+def _is_sparse(time: FloatArray, grid: FloatArray) -> bool:
+    return len(grid) < 2 or bool(np.median(np.diff(time)) >= PASS_STEP / STEP * (grid[1] - grid[0]))
+
+
+def average(time: FloatArray, values: FloatArray, grid: FloatArray) -> FloatArray:
     """Average a context column, shape (n,), over one step to each side (Hann weights).
 
     NaN ("there is none") or infinite ("nobody within reach") where the nearest row is, and in no average. `time` and
@@ -69,26 +59,21 @@ def average(time: FloatArray, values: FloatArray, grid: FloatArray, *, oversampl
     missing = ~np.isfinite(values)
     if missing.all():
         return nearest(time, values, grid)
-    if len(grid) < 2 or np.median(np.diff(time)) >= PASS_STEP / STEP * (grid[1] - grid[0]):
+    if _is_sparse(time, grid):
         result = np.interp(grid, time[~missing], values[~missing])
     else:
-        result = _hann_average(time, values, missing, grid, oversampling)
+        result = _hann_average(time, values, missing, grid)
     closest = nearest(time, values, grid)
     return np.where(np.isfinite(closest), result, closest)
 
 
-def _hann_average(
-    time: FloatArray, values: FloatArray, missing: NDArray[np.bool_], grid: FloatArray, oversampling: int
-) -> FloatArray:
+def _hann_average(time: FloatArray, values: FloatArray, missing: BoolArray, grid: FloatArray) -> FloatArray:
     """Over one step to each side, shape of `grid`, of what is there; 0 where nothing is."""
-    kernel = np.hanning(2 * oversampling + 1)
-    fine_grid = _fine_grid(grid, oversampling)
+    kernel, fine_grid = np.hanning(2 * OVERSAMPLING + 1), _fine_grid(grid)
     weight = (nearest(time, missing.astype(np.float64), fine_grid) == 0).astype(np.float64)
     fine = np.interp(fine_grid, time[~missing], values[~missing]) * weight
-    sums = _decimate(np.pad(fine, len(kernel) // 2), kernel, oversampling, len(grid))
-    weights = _decimate(np.pad(weight, len(kernel) // 2), kernel, oversampling, len(grid))
-    result = sums / np.where(weights > 0, weights, 1.0)
-    return np.asarray(result)
+    sums, weights = (_decimate(np.pad(part, OVERSAMPLING), kernel, len(grid)) for part in (fine, weight))
+    return np.asarray(sums / np.where(weights > 0, weights, 1.0))
 
 
 def nearest(time: FloatArray, values: FloatArray, grid: FloatArray) -> FloatArray:
@@ -103,27 +88,16 @@ def nearest_rows(time: FloatArray, grid: FloatArray) -> NDArray[np.intp]:
     return np.where(grid - time[left] <= time[right] - grid, left, right)
 
 
-def column_on_grid(time: FloatArray, values: FloatArray, grid: FloatArray, *, held: bool) -> FloatArray:
-    """A context column, shape (n,), at `grid` [s], shape (m,), in its unit: averaged, or `held` to what is there."""
-    return (nearest if held else average)(time, values, grid)
-
-
 def in_digits(values: FloatArray) -> FloatArray:
     """Twelve digits of the largest: averages of equal numbers are equal, whatever their errors."""
     largest = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
     return np.round(values, 12 - int(np.ceil(np.log10(largest)))) if largest > 0.0 else values
 
 
-def _fine_grid(grid: FloatArray, oversampling: int) -> FloatArray:
-    return np.linspace(grid[0], grid[-1], (len(grid) - 1) * oversampling + 1)
+def _fine_grid(grid: FloatArray) -> FloatArray:
+    return np.linspace(grid[0], grid[-1], (len(grid) - 1) * OVERSAMPLING + 1)
 
 
-def _decimate(extended: FloatArray, kernel: FloatArray, every: int, n: int) -> FloatArray:
-    windows = np.lib.stride_tricks.sliding_window_view(extended, len(kernel))[::every]
+def _decimate(extended: FloatArray, kernel: FloatArray, n: int) -> FloatArray:
+    windows = np.lib.stride_tricks.sliding_window_view(extended, len(kernel))[::OVERSAMPLING]
     return np.asarray(windows[:n] @ kernel)
-
-
-def _low_pass(oversampling: int) -> FloatArray:
-    """Kernel on the inner grid, gain 1."""
-    half, beta = kaiser_design(ATTENUATION, TRANSITION / oversampling)
-    return low_pass(half, CUTOFF / oversampling, beta)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.enrich.result import EntityResult, LaneDeparture
 from xosc_lateral.motion.gaps import BoxPath, Gap, smallest_gaps
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
@@ -14,10 +14,8 @@ from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.rows import blocks, give_back, kept, slices_where
 
-FloatArray = NDArray[np.float64]
-
 GAP_STEP = 0.1
-"""Rows that gaps are looked for on. [s]"""
+"""Between rows that gaps are measured on. [s]"""
 
 
 HalfWidths = dict[tuple[str, int], FloatArray]
@@ -58,7 +56,7 @@ def _lateral_within_a_lane(motion: EntityMotion) -> list[tuple[int, int]]:
     Lane changes cross markings anyway.
     """
 
-    def lateral(rows: slice) -> NDArray[np.bool_]:
+    def lateral(rows: slice) -> BoolArray:
         activity = motion.activity[rows]
         at_work = ((activity & Activity.LATERAL) != 0) & ((activity & Activity.ACTIVE) != 0)
         return np.asarray(at_work & (motion.road[rows] >= 0))

@@ -9,66 +9,25 @@ space lengthwise. Of what profiles leave, all is the overtaking one's: the other
 itself. All displacements follow from the paths as first sampled, so nobody's depends on the order of entities, and a
 vehicle far away changes nobody's.
 
-A driver of right-hand traffic does to the left, in left-hand traffic, what he does to the right at home: the overtaking
-lane, the hard shoulder and the seat have changed sides. So his context is mirrored, the profile sampled in it, and its
-offsets are mirrored back.
-
 Our own rule: quantile mapping to gaps that were measured in DLR Highway Traffic v1.1.0 (benchmarks/give_way.py).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.motion.context import CELLS, STEERING, smooth_step
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.motion.around import smooth_step
+from xosc_lateral.motion.context import CELLS, STEERING
 from xosc_lateral.motion.nearby import stretches_within
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.rows import empty, give_back, kept, put
-from xosc_lateral.segment import Segment
-
-FloatArray = NDArray[np.float64]
-
-OTHER_SIGN = ("curvature", "crossfall")
-"""Positive to the one side, negative to the other."""
-
-_SIDES = {"left": "right", "right": "left"}
-
-
-def mirrored(segment: Segment) -> Segment:
-    """The segment with left and right exchanged.
-
-    Columns change places whose names differ in the word `left` or `right` alone (`left_distance`, `truck_right`);
-    curvature and crossfall change their sign, the wind its side; lanes are counted from the other edge. A column of
-    another name stays.
-    """
-    return replace(segment, context=mirrored_context(segment.context))
-
-
-def mirrored_context(context: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Context columns with left and right exchanged; shapes and units as they are."""
-    found = {other_side(name): values for name, values in context.items()}
-    for name in OTHER_SIGN:
-        if name in found:
-            found[name] = -found[name]
-    if "wind_direction" in found:
-        found["wind_direction"] = -found["wind_direction"] % 360.0
-    if "lane_index" in found and "lane_count" in found:
-        found["lane_index"] = found["lane_count"] - 1.0 - found["lane_index"]
-    return found
-
-
-def other_side(name: str) -> str:
-    """The name with the words `left` and `right` exchanged."""
-    return "_".join(_SIDES.get(word, word) for word in name.split("_"))
-
-
-IntArray = NDArray[np.int64]
 
 GAPS = (
     np.array([-0.68, -0.05, 0.37, 0.76, 1.29, 1.65, 3.0]),
@@ -102,7 +61,7 @@ class SampledVehicle:
 
     motion: EntityMotion  # nominal
     deviation: FloatArray  # from it on the rows that are looked at, positive left, shape (n,) [m]
-    can_move: NDArray[np.bool_]  # on which of them its path is sampled and may be moved, shape (n,)
+    can_move: BoolArray  # on which of them its path is sampled and may be moved, shape (n,)
     # responds: sides, "left" and "right", on which its profile responds to neighbours by itself: there, gaps are
     # widened by what that leaves to be widened
     responds: frozenset[str] = frozenset()
@@ -158,11 +117,11 @@ def give_way(
             if widening is None:
                 continue
             aside, is_left, responding = widening  # of `own`, by where `other` is
-            share = part_of(is_left == left_hand[own], responding)
-            share = np.where(second.can_move, share, 1.0) * first.can_move
-            share *= ~np.where(is_left, alone[0][own], alone[1][own])
-            np.maximum.at(right[:, stretch], (own, at), np.where(is_left, share * aside, 0.0))
-            np.maximum.at(left[:, stretch], (own, at), np.where(is_left, 0.0, share * aside))
+            known_alone = np.where(is_left, alone[0][own], alone[1][own])
+            aside = aside * own_share(is_left == left_hand[own], responding, second.can_move, known_alone)
+            aside = aside * first.can_move
+            np.maximum.at(right[:, stretch], (own, at), np.where(is_left, aside, 0.0))
+            np.maximum.at(left[:, stretch], (own, at), np.where(is_left, 0.0, aside))
         give_back()
     every = max(1, int(rows[1] - rows[0])) if n > 1 else 1
     smoothed = STEERING / (motion.step * every)
@@ -181,7 +140,7 @@ def _together(meeting: Sequence[tuple[int, int]], n: int) -> Iterator[tuple[IntA
         yield pairs[begin : begin + step, 0], pairs[begin : begin + step, 1]
 
 
-def _near(tables: Sequence[NDArray[Any]], length: FloatArray, own: IntArray, other: IntArray) -> NDArray[np.bool_]:
+def _near(tables: Sequence[NDArray[Any]], length: FloatArray, own: IntArray, other: IntArray) -> BoolArray:
     """Where pairs of vehicles are near enough for `widened`, shape (pairs, n); `tables`: x, y ... of all vehicles."""
     x, y, present = tables[0], tables[1], tables[-1]
     reach = (FADES + 0.5 * (length[own] + length[other]) + MARGIN)[:, None]
@@ -203,8 +162,8 @@ class Frame(NamedTuple):
     y: FloatArray
     heading: FloatArray
     deviation: FloatArray
-    can_move: NDArray[np.bool_]
-    present: NDArray[np.bool_]
+    can_move: BoolArray
+    present: BoolArray
     length: float | FloatArray
     width: float | FloatArray
 
@@ -228,8 +187,8 @@ class Frame(NamedTuple):
 
 
 def widened(
-    own: Frame, other: Frame, responds_left: bool | NDArray[np.bool_], responds_right: bool | NDArray[np.bool_]
-) -> tuple[FloatArray, NDArray[np.bool_], NDArray[np.bool_]] | None:
+    own: Frame, other: Frame, responds_left: bool | BoolArray, responds_right: bool | BoolArray
+) -> tuple[FloatArray, BoolArray, BoolArray] | None:
     """By how much the gap to the other is widened, whether it is to the left, and whether the profile responds to it.
 
     None if the other never is near.
@@ -253,14 +212,16 @@ def widened(
     return weight * np.where(responding, wider(gap, responding=True), wider(gap, responding=False)), is_left, responding
 
 
-def part_of(overtakes: NDArray[np.bool_], responding: NDArray[np.bool_]) -> FloatArray:
-    """Share of a widening, by whether the vehicle is the overtaking one and responds to the other, shape (n,). [-]
+def own_share(overtakes: BoolArray, responding: BoolArray, other_moves: BoolArray, alone: BoolArray) -> FloatArray:
+    """Share that a vehicle has of a widening, shape (n,). [-]
 
-    By itself `motorway` moves 0.209 m from whom it overtakes and 0.083 m from who overtakes it, where real vehicles
-    move 0.239 and 0.045 m: the second has done more than its part already.
+    By whether it is the overtaking one, responds to the other by its profile, the other can move, and its answer is
+    known of the driver alone, who then has no share. By itself `motorway` moves 0.209 m from whom it overtakes and
+    0.083 m from who overtakes it, where real vehicles move 0.239 and 0.045 m: the second has done more than its part
+    already.
     """
     share = np.where(responding, 1.0, OVERTAKING_SHARE)
-    return np.asarray(np.where(overtakes, share, 1.0 - share))
+    return np.where(other_moves, np.where(overtakes, share, 1.0 - share), 1.0) * ~alone
 
 
 def wider(gap: FloatArray, *, responding: bool) -> FloatArray:

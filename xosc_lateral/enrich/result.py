@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.drivability import Bound
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.motion.gaps import Gap
@@ -26,9 +26,6 @@ class Neighbours(StrEnum):
     PROFILE = "profile"
     BORROW = "borrow"
     NONE = "none"
-
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, slots=True)

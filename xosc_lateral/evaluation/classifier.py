@@ -14,57 +14,37 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.drives.periodogram import tapered_powers, without_line
 from xosc_lateral.evaluation.metrics import DIFFERENCE_SCALE, snippet_metrics
 from xosc_lateral.evaluation.shape import shape_features, turns
 from xosc_lateral.evaluation.snippets import Snippets
 
-FloatArray = NDArray[np.float64]
-
 AUTOCORRELATION_LAGS = (1, 2, 3, 5, 8, 12)  # steps; of the first difference's autocorrelation
 FOLDS = 5
-BANDS = 16
-"""Of the log spectrum, from one period a snippet to the highest frequency, evenly on a logarithmic scale."""
+BANDS = 16  # Of the log spectrum, from one period a snippet to the highest frequency, evenly on a logarithmic scale.
+# Of the log spectrum once more, evenly: what is smoothed piece by piece has its lines and holes at fast movement.
 EVEN_BANDS = 25
-"""Of the log spectrum once more, evenly: what is smoothed piece by piece has its lines and holes at fast movement."""
+# Values of a snippet, and differences over as much, that are shown: more slow a tree down and add nothing. [-]
 VALUES = 20
-"""Values of a snippet, and differences over as much, that are shown: more slow a tree down and add nothing. [-]"""
-MOST = 1500
-"""Snippets of either kind that a classifier sees, spread evenly: an error of 0.01 in the area. [-]"""
-RESAMPLES = 200
-"""Of the drives, for the interval."""
+MOST = 1500  # Snippets of either kind that a classifier sees, spread evenly: an error of 0.01 in the area. [-]
+RESAMPLES = 200  # Of the drives, for the interval.
 
 
 @dataclass(frozen=True)
 class TwoSampleResult:
-    """How well two sets of snippets are separated.
+    """How well two sets of snippets are separated."""
 
-    Parameters
-    ----------
-    auc : float
-        Area under the ROC curve, cross-validated: 0.5 by chance, 1 always. [-]
-    low, high : float
-        95 % interval, drives resampled. [-]
-    """
-
-    auc: float
-    low: float
+    auc: float  # Area under the ROC curve, cross-validated: 0.5 by chance, 1 always. [-]
+    low: float  # Ends of its 95 % interval, drives resampled. [-]
     high: float
 
 
 def snippet_features(snippets: FloatArray, *, fast: bool = False) -> FloatArray:
     """Everything that gives a model away: values, differences, log spectrum, ten metrics, roughness, memory, shape.
 
-    Parameters
-    ----------
-    snippets : array, shape (n, m)
-        [m]
-    fast : bool
-        Also what second and third differences and an even spectrum show: fast movement, with its sensor, as recorded.
-
-    Returns
-    -------
-    array, shape (n, k)
+    `snippets`, shape (n, m) [m]; `fast`: also what second and third differences and an even spectrum show: fast
+    movement, with its sensor, as recorded. Returns shape (n, k).
     """
     difference = np.diff(snippets, axis=1)
     every = max(1, snippets.shape[1] // VALUES)

@@ -13,10 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.evaluation.metrics import METRICS, snippet_metrics
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -49,29 +48,28 @@ def wasserstein(a: FloatArray, b: FloatArray) -> float:
     return float(np.abs(below_a - below_b) @ steps)
 
 
+def column_distances(real: FloatArray, other: FloatArray) -> list[float]:
+    """Wasserstein distance of each column, in standard deviations of the real one. [sd] Shapes (n, k) and (m, k)."""
+    spread = real.std(axis=0)
+    # a column that never varies has no scale of its own; any difference then counts in its own unit
+    spread = np.where(spread > 0.0, spread, 1.0)
+    return [wasserstein(real[:, k], other[:, k]) / float(spread[k]) for k in range(real.shape[1])]
+
+
 def metric_distances(real: FloatArray, other: FloatArray) -> Distances:
     """Distance of two sets of metrics.
 
     Raises `NotEnoughDataError` if `real` has fewer than two snippets, so no standard deviation.
 
-    Parameters
-    ----------
-    real, other : array, shape (n, 10) and (m, 10)
-        Results of `snippet_metrics`; `real` sets the scale.
+    `real` and `other`, shape (n, 10) and (m, 10): results of `snippet_metrics`; `real` sets the scale.
     """
     if len(real) < 2 or len(other) < 1:
         raise NotEnoughDataError(f"{len(real)} real and {len(other)} other snippets; two and one are needed")
-    spread = real.std(axis=0)
-    # A metric that never varies has no scale of its own; any difference then counts in its own unit.
-    spread = np.where(spread > 0.0, spread, 1.0)
-    return Distances({name: wasserstein(real[:, k], other[:, k]) / float(spread[k]) for k, name in enumerate(METRICS)})
+    return Distances(dict(zip(METRICS, column_distances(real, other), strict=True)))
 
 
 def snippet_distances(real: FloatArray, other: FloatArray) -> Distances:
-    """Distance of two sets of snippets, shape (n, length) and (m, length).
-
-    In standard deviations of the real ones. [-]
-    """
+    """Distance of two sets of snippets, shape (n, length) and (m, length), in deviations of the real ones. [-]"""
     return metric_distances(snippet_metrics(real), snippet_metrics(other))
 
 
@@ -95,28 +93,16 @@ def split_groups(groups: NDArray[np.generic], rng: np.random.Generator) -> NDArr
     return np.isin(groups, names[chosen])
 
 
-PROPER = {"energy_score": "m", "variogram_score": "m"}
-"""Proper scores and their units."""
-
-ORDER = 0.5
-"""Of the variogram score: the power that its authors found most sensitive to dependence. [-]"""
+PROPER = {"energy_score": "m", "variogram_score": "m"}  # Proper scores and their units.
+ORDER = 0.5  # Of the variogram score: the power that its authors found most sensitive to dependence. [-]
 
 
 def energy_score(real: FloatArray, ensemble: FloatArray) -> FloatArray:
     """Energy score of each window: a proper score, lowest on average for the truth.
 
-    Parameters
-    ----------
-    real : array, shape (n, m)
-        What was driven. [m]
-    ensemble : array, shape (n, k, m)
-        k sampled windows for each, k >= 2. [m]
-
-    Returns
-    -------
-    array, shape (n,)
-        Mean distance to the real window minus half the mean distance among the sampled ones; unbiased for small
-        ensembles. [m]
+    `real`, shape (n, m): what was driven; `ensemble`, shape (n, k, m): k sampled windows for each, k >= 2. [m] Returns
+    shape (n,): mean distance to the real window minus half the mean distance among the sampled ones; unbiased for small
+    ensembles. [m]
 
     References
     ----------
@@ -132,17 +118,8 @@ def energy_score(real: FloatArray, ensemble: FloatArray) -> FloatArray:
 def variogram_score(real: FloatArray, ensemble: FloatArray, *, every: int = 5) -> FloatArray:
     """Variogram score of each window: sees how values depend on one another, where the energy score is dull.
 
-    Parameters
-    ----------
-    real, ensemble : array, shape (n, m) and (n, k, m)
-        As in `energy_score`. [m]
-    every : int
-        Steps between the values that are paired: all pairs of a window of 51 values would be 2601.
-
-    Returns
-    -------
-    array, shape (n,)
-        Mean over the pairs. [m]
+    `real` and `ensemble`, shape (n, m) and (n, k, m): as in `energy_score`. [m]; `every`: steps between the values that
+    are paired: all pairs of a window of 51 values would be 2601. Returns shape (n,): mean over the pairs. [m]
 
     References
     ----------

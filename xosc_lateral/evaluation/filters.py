@@ -11,39 +11,23 @@ References
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.drives.filters import filtered, low_pass_between
 
-FloatArray = NDArray[np.float64]
-
-HIGHEST = 0.5
-"""Where the stop band begins. Drivers steer against what they see below it; beyond it cameras show. [Hz]"""
-
-PASSED = 0.4
-"""Where the pass band ends: the filter sees 11 s to each side, a quarter of most runs. [Hz]"""
-
+HIGHEST = 0.5  # Where the stop band begins. Drivers steer against what they see below it; beyond it cameras show. [Hz]
+PASSED = 0.4  # Where the pass band ends: the filter sees 11 s to each side, a quarter of most runs. [Hz]
+# Of the stop band: noise of 1 cm becomes 0.1 mm, far less than a difference between two models. [dB]
 ATTENUATION = 40.0
-"""Of the stop band: noise of 1 cm becomes 0.1 mm, far less than a difference between two models. [dB]"""
-
+# Seconds between values that say all about what is left: half that rate is the beginning of the stop band. [s]
 THINNED = 0.5 / HIGHEST
-"""Seconds between values that say all about what is left: half that rate is the beginning of the stop band. [s]"""
 
 
 def below_half_hertz(path: FloatArray, step: float) -> FloatArray:
     """A path without its movement above 0.5 Hz.
 
-    Parameters
-    ----------
-    path : array, shape (n,)
-        Evenly in time; continued beyond its ends by its mirror image through the end point. [m]
-    step : float
-        At rates that show nothing above 0.5 Hz, the path stays as it is. [s]
-
-    Returns
-    -------
-    array, shape (n,)
-        [m]
+    `path`, shape (n,) [m], is evenly in time, and continued beyond its ends by its mirror image through the end point.
+    With a `step` [s] that shows nothing above 0.5 Hz it stays as it is.
     """
     if len(path) < 2 or 0.5 / step <= HIGHEST:
         return np.array(path)

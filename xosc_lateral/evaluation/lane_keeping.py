@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.jit_kernel import prepare
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
@@ -15,29 +15,16 @@ from xosc_lateral.driver.seeds import child
 from xosc_lateral.drives.cuts import HALF_WIDTH
 from xosc_lateral.segment import Segment
 
-FloatArray = NDArray[np.float64]
-
-NEAR_MARKING = 1.2
-"""A reference point this close to a marking counts as near: half a car (0.9 m) and 0.3 m of air. [m]"""
+NEAR_MARKING = 1.2  # A reference point this close to a marking counts as near: half a car (0.9 m) and 0.3 m of air. [m]
 
 
 @dataclass(frozen=True)
 class Margins:
-    """How a driver uses the lane's margins.
+    """How a driver uses the lane's margins."""
 
-    Parameters
-    ----------
-    share_near : float
-        Share of time with the reference point within `NEAR_MARKING` of a marking. [-]
-    excursions_per_hour : float
-        How often that zone is entered. [1/h]
-    largest : float
-        Largest |offset|. [m]
-    """
-
-    share_near: float
-    excursions_per_hour: float
-    largest: float
+    share_near: float  # Share of time with the reference point within `NEAR_MARKING` of a marking. [-]
+    excursions_per_hour: float  # How often that zone is entered. [1/h]
+    largest: float  # Largest |offset|. [m]
 
 
 def margins(offsets: Sequence[FloatArray], lane_widths: Sequence[FloatArray], step: float) -> Margins:
@@ -55,8 +42,7 @@ def margins(offsets: Sequence[FloatArray], lane_widths: Sequence[FloatArray], st
     )
 
 
-LONGEST_TLC = 20.0
-"""Times to line crossing beyond it count as it: far above the 2 s that warning systems look at. [s]"""
+LONGEST_TLC = 20.0  # Times to line crossing beyond it count as it: far above the 2 s that warning systems look at. [s]
 
 
 def time_to_line_crossing(
@@ -64,15 +50,8 @@ def time_to_line_crossing(
 ) -> FloatArray:
     """Time until the side that the vehicle moves towards reaches its marking, at constant lateral speed.
 
-    Parameters
-    ----------
-    offset, lane_width : array, shape (..., m)
-        [m]
-
-    Returns
-    -------
-    array, shape (..., m - 1)
-        0 where the side is beyond the marking already, at most `LONGEST_TLC`. [s]
+    `offset` and `lane_width`, shape (..., m). [m] Returns shape (..., m - 1): 0 where the side is beyond the marking
+    already, at most `LONGEST_TLC`. [s]
     """
     speed = np.diff(offset, axis=-1) / step
     towards = np.sign(speed) * offset[..., 1:]
@@ -82,6 +61,7 @@ def time_to_line_crossing(
     return np.minimum(time, LONGEST_TLC)
 
 
+# Columns of `lane_keeping_indicators`.
 INDICATORS = (
     "sdlp",
     "tlc_min",
@@ -91,12 +71,10 @@ INDICATORS = (
     "lateral_acceleration",
     "lateral_jerk",
 )
-"""Columns of `lane_keeping_indicators`."""
 
 UNITS = ("m", "s", "s", "-", "-", "m/s2", "m/s3")
-
+# UN R157, guidance on performance models: a neighbour this far from its lane's centre is no longer wandering. [m]
 WANDERING_ZONE = 0.375
-"""UN R157, guidance on performance models: a neighbour this far from its lane's centre is no longer wandering. [m]"""
 
 
 def lane_keeping_indicators(
@@ -145,46 +123,17 @@ def lane_keeping_indicators(
 
 
 # ---- the highway driving test ----------------------------------------------------------------------------------------
+# The test's speed [m/s] and the length of its drive [s]: 100 km at 95 km/h [4]_.
 HIGHWAY_SPEED, HIGHWAY_DRIVE = 95.0 / 3.6, 3600.0
-"""The test's speed [m/s] and the length of its drive [s]: 100 km at 95 km/h [4]_."""
-
-HIGHWAY_DRIVES = 60
-"""Sampled drives: the standard error of an SDLP is below 0.5 % then."""
-
-SHOWN_DRIVES = 20
-"""For a card: enough for two digits."""
-
-NEAR_LINE = 0.2
-"""A side of the vehicle so near to a marking is near the line. [m]"""
-
-DRIFT, DRIFT_LASTS = 1.0, 8.0
-"""A lane drift is so far from the drive's mean [m] for so long [s] [5]_."""
+HIGHWAY_DRIVES = 60  # Sampled drives: the standard error of an SDLP is below 0.5 % then.
+SHOWN_DRIVES = 20  # For a card: enough for two digits.
+NEAR_LINE = 0.2  # A side of the vehicle so near to a marking is near the line. [m]
+DRIFT, DRIFT_LASTS = 1.0, 8.0  # A lane drift is so far from the drive's mean [m] for so long [s] [5]_.
 
 
 @dataclass(frozen=True, slots=True)
 class LaneKeeping:
     """How a driver keeps the lane in drives of an hour.
-
-    Parameters
-    ----------
-    sdlp : float
-        Standard deviation of lateral position within a drive, its mean over drives quadratic [4]_. [m]
-    mean : float
-        Mean offset, positive left. [m]
-    restlessness : float
-        Root mean square of lateral speed. [m/s]
-    memory : float
-        After which the autocorrelation within a drive is 1/e. [s]
-    near_line : float
-        Share of time with a side within `NEAR_LINE` of a marking or beyond. [-]
-    drifts : float
-        Lane drifts. [1/h]
-    line_crossing : float
-        Time to line crossing that is undercut in 5 % of the time. [s]
-    errors : mapping of str to float
-        Standard errors, from drive to drive, by field.
-    limit_near_line : float
-        |offset| from which on a side is near the line. [m]
 
     References
     ----------
@@ -195,15 +144,15 @@ class LaneKeeping:
        Psychopharmacology, 2020: deviations of more than 100 cm from the mean for 8 s.
     """
 
-    sdlp: float
-    mean: float
-    restlessness: float
-    memory: float
-    near_line: float
-    drifts: float
-    line_crossing: float
-    errors: Mapping[str, float] = field(default_factory=dict)
-    limit_near_line: float = 0.0
+    sdlp: float  # Standard deviation of lateral position within a drive, its mean over drives quadratic [4]_. [m]
+    mean: float  # Mean offset, positive left. [m]
+    restlessness: float  # Root mean square of lateral speed. [m/s]
+    memory: float  # After which the autocorrelation within a drive is 1/e. [s]
+    near_line: float  # Share of time with a side within `NEAR_LINE` of a marking or beyond. [-]
+    drifts: float  # Lane drifts. [1/h]
+    line_crossing: float  # Time to line crossing that is undercut in 5 % of the time. [s]
+    errors: Mapping[str, float] = field(default_factory=dict)  # Standard errors, from drive to drive, by field.
+    limit_near_line: float = 0.0  # |offset| from which on a side is near the line. [m]
 
     def line(self, name: str, unit: str, digits: int = 3) -> str:
         """A figure with its 95 % interval."""

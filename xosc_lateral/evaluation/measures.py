@@ -20,44 +20,26 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.drives.periodogram import tapered_powers, without_line
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.evaluation.distances import wasserstein
+from xosc_lateral.evaluation.distances import column_distances
 from xosc_lateral.evaluation.lane_keeping import INDICATORS, lane_keeping_indicators
 from xosc_lateral.evaluation.metrics import METRICS, snippet_metrics
 
-FloatArray = NDArray[np.float64]
-
-IntArray = NDArray[np.int64]
-
-LAGS = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0)
-"""Of the autocorrelation; those that fit into half a window are used. [s]"""
-
-BANDS = np.geomspace(0.03, 1.0, 13)
-"""Edges of the spectrum's bands, eight a decade. [Hz]"""
+LAGS = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0)  # Of the autocorrelation; those that fit into half a window are used. [s]
+BANDS = np.geomspace(0.03, 1.0, 13)  # Edges of the spectrum's bands, eight a decade. [Hz]
 
 
 @dataclass(frozen=True, eq=False)
 class Features:
-    """Of n windows.
+    """Of n windows."""
 
-    Parameters
-    ----------
-    metrics : array, shape (n, 10)
-    indicators : array, shape (n, 7)
-    power : array, shape (n, bands)
-        Power density in bands. [m2/Hz]
-    products : array, shape (n, lags)
-        Mean product of offsets that far apart. [m2]
-    moments : array, shape (n, 2)
-        Mean offset and mean square. [m], [m2]
-    """
-
-    metrics: FloatArray
-    indicators: FloatArray
-    power: FloatArray
-    products: FloatArray
-    moments: FloatArray
+    metrics: FloatArray  # shape (n, 10)
+    indicators: FloatArray  # shape (n, 7)
+    power: FloatArray  # shape (n, bands): Power density in bands. [m2/Hz]
+    products: FloatArray  # shape (n, lags): Mean product of offsets that far apart. [m2]
+    moments: FloatArray  # shape (n, 2): Mean offset and mean square. [m], [m2]
 
     def __len__(self) -> int:
         return len(self.metrics)
@@ -104,23 +86,15 @@ def resolved_bands(seconds: float, highest: float = float(BANDS[-1])) -> list[tu
     return [(low, high) for low, high in bands if low * seconds >= 1.0 and high <= highest]
 
 
-SILENCE = 1e-9
-"""Added to power densities, so that no movement is a number too: 0.03 mm in 1 Hz. [m2/Hz]"""
-
-FAMILIES = ("metrics", "lane_keeping", "spectrum", "memory")
-"""Kinds of difference."""
-
+SILENCE = 1e-9  # Added to power densities, so that no movement is a number too: 0.03 mm in 1 Hz. [m2/Hz]
+FAMILIES = ("metrics", "lane_keeping", "spectrum", "memory")  # Kinds of difference.
 UNITS = {"metrics": "sd", "lane_keeping": "sd", "spectrum": "dB", "memory": "-"}
 
 
 def differences(real: Features, other: Features, rows: IntArray, other_rows: IntArray) -> dict[str, float]:
     """How far apart two sets of windows are, by family.
 
-    Parameters
-    ----------
-    real, other : Features
-    rows, other_rows : array of int
-        Windows that count, and how often (a bootstrap repeats them).
+    `rows` and `other_rows`: windows that count, and how often (a bootstrap repeats them).
 
     Returns
     -------
@@ -129,21 +103,14 @@ def differences(real: Features, other: Features, rows: IntArray, other_rows: Int
         rms difference over the bands [dB]; `memory`: rms difference of the autocorrelation [-].
     """
     found = {
-        "metrics": float(np.mean(list(column_distances(real.metrics[rows], other.metrics[other_rows])))),
-        "lane_keeping": float(np.mean(list(column_distances(real.indicators[rows], other.indicators[other_rows])))),
+        "metrics": float(np.mean(column_distances(real.metrics[rows], other.metrics[other_rows]))),
+        "lane_keeping": float(np.mean(column_distances(real.indicators[rows], other.indicators[other_rows]))),
     }
     level, beside = real.power[rows].mean(axis=0) + SILENCE, other.power[other_rows].mean(axis=0) + SILENCE
     found["spectrum"] = float(np.sqrt(np.mean((10.0 * np.log10(beside / level)) ** 2)))
     own, others = autocorrelation_of(real, rows), autocorrelation_of(other, other_rows)
     found["memory"] = float(np.sqrt(np.mean((own - others) ** 2)))
     return found
-
-
-def column_distances(real: FloatArray, other: FloatArray) -> list[float]:
-    """Wasserstein distance of each column, in standard deviations of the real one. [sd] Shapes (n, k) and (m, k)."""
-    spread = real.std(axis=0)
-    spread = np.where(spread > 0.0, spread, 1.0)
-    return [wasserstein(real[:, k], other[:, k]) / float(spread[k]) for k in range(real.shape[1])]
 
 
 def autocorrelation_of(features: Features, rows: IntArray) -> FloatArray:
@@ -168,11 +135,8 @@ def named_means(real: Features, other: Features) -> Mapping[str, tuple[float, fl
     return {name: (means[0][k], means[1][k]) for k, name in enumerate(INDICATORS)}
 
 
-NEAREST = 20
-"""A stand-in is drawn among so many windows of other drivers whose starts are nearest."""
-
-FLOOR_DRAWS = 4
-"""Sets of stand-ins with the same start that are averaged over."""
+NEAREST = 20  # A stand-in is drawn among so many windows of other drivers whose starts are nearest.
+FLOOR_DRAWS = 4  # Sets of stand-ins with the same start that are averaged over.
 
 
 def windows_with_the_same_start(
@@ -223,13 +187,8 @@ def real_against_real(
 ) -> dict[str, float]:
     """`differences` of real windows of other drivers.
 
-    Parameters
-    ----------
-    real, donors : Features
-    rows, donor_rows : array of int, shape (n,) and (k,)
-        Windows that count.
-    stand_ins : array of int, shape (n, draws), optional
-        Rows of the donors with the same starts, averaged over the draws; without, all of `donor_rows` at once.
+    `rows` and `donor_rows`, shape (n,) and (k,): windows that count; `stand_ins`, shape (n, draws), optional: rows of
+    the donors with the same starts, averaged over the draws; without, all of `donor_rows` at once.
     """
     if stand_ins is None:
         return differences(real, donors, rows, donor_rows)

@@ -11,20 +11,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.seeds import child
 from xosc_lateral.segment import Segment
 
-FloatArray = NDArray[np.float64]
-
+# Columns of `snippet_metrics`, in the order of arXiv:2405.17080, section IV.
 METRICS = ("max", "min", "mean", "std", "median", "q25", "q75", "range", "diff_mean", "diff_std")
-"""Columns of `snippet_metrics`, in the order of arXiv:2405.17080, section IV."""
-
-DIFFERENCE_SCALE = 10.0
-"""First differences count ten times, as in the paper. [-]"""
+DIFFERENCE_SCALE = 10.0  # First differences count ten times, as in the paper. [-]
 
 
 def snippet_metrics(snippets: FloatArray) -> FloatArray:
@@ -82,37 +78,21 @@ def cut_snippets(series: FloatArray, length: int) -> FloatArray:
     return np.asarray(series[: count * length].reshape(count, length))
 
 
-SPEED = 30.0
-"""Of the free runs: about 108 km/h. [m/s]"""
-
+SPEED = 30.0  # Of the free runs: about 108 km/h. [m/s]
+# Free runs of a profile and their length [s]: 5 h, so that drivers who differ are all met.
 DRIVERS, DURATION = 60, 300.0
-"""Free runs of a profile and their length [s]: 5 h, so that drivers who differ are all met."""
 
 
 @dataclass(frozen=True)
 class MovementSummary:
-    """What a profile does in even traffic, in figures that a person can picture.
+    """What a profile does in even traffic, in figures that a person can picture."""
 
-    Parameters
-    ----------
-    mean_offset : float
-        Positive: left of the lane centre. [m]
-    spread : float
-        Standard deviation over all drivers and times. [m]
-    spread_within : float
-        Mean standard deviation of one driver over 5 min. [m]
-    low, high : float
-        5 % and 95 % quantile. [m]
-    lateral_speed : float
-        Root mean square. [m/s]
-    """
-
-    mean_offset: float
-    spread: float
-    spread_within: float
-    low: float
-    high: float
-    lateral_speed: float
+    mean_offset: float  # Positive: left of the lane centre. [m]
+    spread: float  # Standard deviation over all drivers and times. [m]
+    spread_within: float  # Mean standard deviation of one driver over 5 min. [m]
+    low: float  # 5 % and 95 % quantile. [m]
+    high: float  # 5 % and 95 % quantile. [m]
+    lateral_speed: float  # Root mean square. [m/s]
 
 
 def free_runs(profile: DriverProfile, seed: int, *, drivers: int = DRIVERS, duration: float = DURATION) -> FloatArray:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.models.two_level.fit import split_levels
 from xosc_lateral.driver.models.two_level.model import PAPER_SETTINGS
 from xosc_lateral.driver.profile import DriverProfile
@@ -14,28 +14,18 @@ from xosc_lateral.evaluation.distances import Distances, metric_distances
 from xosc_lateral.evaluation.metrics import snippet_metrics
 from xosc_lateral.evaluation.snippets import Snippets, sample_parts
 
-LENGTHS = (10.0, 30.0, 60.0)
-"""The paper's; long enough to see drivers come back; a minute. [s]"""
+LENGTHS = (10.0, 30.0, 60.0)  # The paper's; long enough to see drivers come back; a minute. [s]
 
 
 @dataclass(frozen=True)
 class SnippetCondition:
-    """What snippets that are compared have in common.
+    """What snippets that are compared have in common."""
 
-    Parameters
-    ----------
-    seconds : float
-        Their length. [s]
-    same_start : bool
-        A sampled snippet starts where its real one starts, and stands beside other drivers' snippets that start
-        there too. Else neither knows the start: sampled ones are cut from free runs.
-    slow : bool
-        Movement below 0.5 Hz alone, see `filters`; else everything that was recorded.
-    """
-
-    seconds: float
+    seconds: float  # Their length. [s]
+    # A sampled snippet starts where its real one starts, and stands beside other drivers' snippets that start there
+    # too. Else neither knows the start: sampled ones are cut from free runs.
     same_start: bool
-    slow: bool = False
+    slow: bool = False  # Movement below 0.5 Hz alone, see `filters`; else everything that was recorded.
 
     @property
     def name(self) -> str:
@@ -44,34 +34,20 @@ class SnippetCondition:
         return f"{self.seconds:g} s, {start}" + (", below 0.5 Hz" if self.slow else "")
 
 
-FloatArray = NDArray[np.float64]
-
-FINE_SHIFT = 5.0
-"""Real fine parts are shifted round by this, to part them from their coarse parts. [s]"""
+FINE_SHIFT = 5.0  # Real fine parts are shifted round by this, to part them from their coarse parts. [s]
 
 
 @dataclass(frozen=True, eq=False)
 class PartEvaluation:
-    """One of the paper's four evaluations.
+    """One of the paper's four evaluations."""
 
-    Parameters
-    ----------
-    number : int
-        1 real coarse + shifted real fine, 2 sampled coarse + real fine, 3 real coarse + sampled fine, 4 both sampled.
-    coarse, fine : str
-        Where each part comes from.
-    real, artificial : array, shape (n, 10)
-        Metrics of the snippets. [m]
-    distances : Distances
-        Between the two, all snippets.
-    """
-
+    # 1 real coarse + shifted real fine, 2 sampled coarse + real fine, 3 real coarse + sampled fine, 4 both sampled.
     number: int
-    coarse: str
+    coarse: str  # Where each part comes from.
     fine: str
-    real: FloatArray
-    artificial: FloatArray
-    distances: Distances
+    real: FloatArray  # shape (n, 10): Metrics of the snippets. [m]
+    artificial: FloatArray  # shape (n, 10)
+    distances: Distances  # Between the two, all snippets.
 
 
 def evaluate_parts(

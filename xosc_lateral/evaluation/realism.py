@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.evaluation.classifier import TwoSampleResult, classifier_two_sample_test, context_features
@@ -33,26 +34,14 @@ from xosc_lateral.evaluation.measures import (
 from xosc_lateral.evaluation.parts import LENGTHS, SnippetCondition
 from xosc_lateral.evaluation.snippets import Snippets, sample_runs, sample_snippets, sensor_noise, snippets_of
 
-FloatArray = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class VarianceParts:
-    """Where the variance of the offset lies.
+    """Where the variance of the offset lies."""
 
-    Parameters
-    ----------
-    between : float
-        Of the drivers' own means. [m²]
-    within : float
-        Of a driver's windows about that mean. [m²]
-    inside : float
-        About a window's own mean. [m²]
-    """
-
-    between: float
-    within: float
-    inside: float
+    between: float  # Of the drivers' own means. [m²]
+    within: float  # Of a driver's windows about that mean. [m²]
+    inside: float  # About a window's own mean. [m²]
 
 
 def variance_parts(windows: FloatArray, drivers: NDArray[np.generic]) -> VarianceParts:
@@ -61,11 +50,7 @@ def variance_parts(windows: FloatArray, drivers: NDArray[np.generic]) -> Varianc
     One-way random effects on the windows' means, by the method of moments for unequal counts [1]_. Neighbouring
     windows of a driver are alike, so `between` holds what changes more slowly than a drive is long.
 
-    Parameters
-    ----------
-    windows : array, shape (n, m)
-        [m]
-    drivers : array, shape (n,)
+    `windows`, shape (n, m) [m]; `drivers`, shape (n,).
 
     References
     ----------
@@ -84,16 +69,10 @@ def variance_parts(windows: FloatArray, drivers: NDArray[np.generic]) -> Varianc
     return VarianceParts(max((among - within) / float(effective), 0.0), within, inside)
 
 
-IntArray = NDArray[np.int64]
-
-SPLITS = 8
-"""Random halves of the drives that both are averaged over."""
-
-LEAST = 20
-"""Fewer snippets of a length: it is left out."""
-
+SPLITS = 8  # Random halves of the drives that both are averaged over.
+LEAST = 20  # Fewer snippets of a length: it is left out.
+# Sampled snippets for each of so many real ones of 10 s, spread evenly: proper scores need several of each.
 ENSEMBLE, SCORED = 8, 200
-"""Sampled snippets for each of so many real ones of 10 s, spread evenly: proper scores need several of each."""
 
 
 @dataclass(frozen=True)
@@ -112,54 +91,31 @@ class Beside:
 
 @dataclass(frozen=True, eq=False)
 class ConditionScores:
-    """What was found under one condition.
-
-    Parameters
-    ----------
-    condition : SnippetCondition
-    with_sensor : bool
-        Whether what was sampled holds the profile's sensor.
-    count : int
-        Snippets.
-    families : mapping of str to Beside
-        `metrics`, `lane_keeping` [sd], `spectrum` [dB], `memory` [-]; see `measures.differences`. With the same start,
-        10 s, also the proper scores [m].
-    named : mapping of str to Beside
-        Distance of each of the ten metrics and of each lane-keeping indicator. [sd]
-    means : mapping of str to (float, float)
-        Mean of each lane-keeping indicator, real and sampled; units in `lane_keeping.UNITS`.
-    alone, jointly : TwoSampleResult or None
-        Classifier on movement, and on context and movement jointly (below 0.5 Hz). None: not trained.
-    floor : TwoSampleResult or None
-        A classifier between two halves of the real drivers, by movement. Jointly it is 0.5: both kinds have the same
-        context. With the same start it is as with any: both halves start alike.
-    """
+    """What was found under one condition."""
 
     condition: SnippetCondition
-    with_sensor: bool
-    count: int
+    with_sensor: bool  # Whether what was sampled holds the profile's sensor.
+    count: int  # Snippets.
+    # `metrics`, `lane_keeping` [sd], `spectrum` [dB], `memory` [-]; see `measures.differences`. With the same start and
+    # 10 s, also the proper scores [m].
     families: Mapping[str, Beside]
-    named: Mapping[str, Beside]
+    named: Mapping[str, Beside]  # Distance of each of the ten metrics and of each lane-keeping indicator. [sd]
+    # Mean of each lane-keeping indicator, real and sampled; units in `lane_keeping.UNITS`.
     means: Mapping[str, tuple[float, float]]
+    # Classifier on movement, and on context and movement jointly (below 0.5 Hz). None: not trained.
     alone: TwoSampleResult | None
     jointly: TwoSampleResult | None
+    # A classifier between two halves of the real drivers, by movement. Jointly it is 0.5: both kinds have the same
+    # context. With the same start it is as with any: both halves start alike.
     floor: TwoSampleResult | None
 
 
 @dataclass(frozen=True, eq=False)
 class Realism:
-    """The fair measure of a profile.
+    """The fair measure of a profile."""
 
-    Parameters
-    ----------
-    conditions : tuple of ConditionScores
-        Those with enough snippets.
-    variance_real, variance_sampled : VarianceParts
-        Between drivers, within drivers and inside snippets of 10 s, of free runs. [m2]
-    """
-
-    conditions: tuple[ConditionScores, ...]
-    variance_real: VarianceParts
+    conditions: tuple[ConditionScores, ...]  # Those with enough snippets.
+    variance_real: VarianceParts  # Between drivers, within drivers and inside snippets of 10 s, of free runs. [m2]
     variance_sampled: VarianceParts
 
     def of(self, condition: SnippetCondition) -> ConditionScores | None:
@@ -170,12 +126,7 @@ class Realism:
 def score_realism(profile: DriverProfile, runs: Sequence[Run], *, seed: int, classify: bool = True) -> Realism:
     """Compare a profile's snippets with real ones under every condition that has enough of them.
 
-    Parameters
-    ----------
-    runs : sequence of Run
-        Measured, at the profile's step.
-    classify : bool
-        Train classifiers too: most of the work.
+    `runs`: measured, at the profile's step; `classify`: whether to train classifiers too, most of the work.
     """
     step = profile.model.step
     driver = sample_runs(profile, runs, seed, same_start=False)
@@ -195,9 +146,7 @@ def score_realism(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
             (SnippetCondition(seconds, False), cut.offset, cut.cut_from(recorded)),
             (SnippetCondition(seconds, False, slow=True), *slow),
         ):
-            with_sensor = profile.sensor is not None and not condition.slow
-            asked = _Asked(seed, classify, with_sensor)
-            found.append(_under(condition, cut, real, sampled, step, asked))
+            found.append(_under(condition, cut, real, sampled, profile, seed, classify))
     short = snippets_of(runs, LENGTHS[0], step)
     whose = np.array([str(number) for number, _ in short.place])
     if found and found[0].condition == SnippetCondition(LENGTHS[0], True):
@@ -205,33 +154,35 @@ def score_realism(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
     return Realism(tuple(found), variance_parts(short.offset, whose), variance_parts(short.cut_from(recorded), whose))
 
 
-@dataclass(frozen=True)
-class _Asked:
-    seed: int
-    classify: bool
-    with_sensor: bool
-
-
 def _under(
-    condition: SnippetCondition, cut: Snippets, real: FloatArray, sampled: FloatArray, step: float, asked: _Asked
+    condition: SnippetCondition,
+    cut: Snippets,
+    real: FloatArray,
+    sampled: FloatArray,
+    profile: DriverProfile,
+    seed: int,
+    classify: bool,
 ) -> ConditionScores:
-    seed = asked.seed
+    """Scores of one condition; `real` and `sampled` of shape (n, m). [m]"""
+    step = profile.model.step
     highest = PASSED if condition.slow else np.inf
     own = features_of(real, cut.lane_width, step, highest=highest)
     made = features_of(sampled, cut.lane_width, step, highest=highest)
     families, named = _distances(condition, own, made, real, cut.group, seed)
     alone = jointly = floor = None
     shown = (thinned(real, step), thinned(sampled, step)) if condition.slow else (real, sampled)
-    if asked.classify:
-        fast = not condition.slow
-        alone = classifier_two_sample_test(*shown, cut.group, cut.group, fast=fast, seed=seed)
+    if classify:
+        fast, group = not condition.slow, cut.group
+        alone = classifier_two_sample_test(*shown, group, group, fast=fast, seed=seed)
         if not condition.same_start:
-            floor = _separated_drivers(shown[0], cut.group, seed, fast=fast)
+            half = split_groups(group, np.random.default_rng(seed))
+            sides, drivers = (shown[0][half], shown[0][~half]), (group[half], group[~half])
+            floor = classifier_two_sample_test(*sides, *drivers, fast=fast, seed=seed)
         if condition.slow:
             context = context_features(cut, real), context_features(cut, sampled)
-            jointly = classifier_two_sample_test(*shown, cut.group, cut.group, context=context, seed=seed)
-    means = named_means(own, made)
-    return ConditionScores(condition, asked.with_sensor, len(cut), families, named, means, alone, jointly, floor)
+            jointly = classifier_two_sample_test(*shown, group, group, context=context, seed=seed)
+    with_sensor, means = profile.sensor is not None and not condition.slow, named_means(own, made)
+    return ConditionScores(condition, with_sensor, len(cut), families, named, means, alone, jointly, floor)
 
 
 def _distances(
@@ -265,17 +216,9 @@ def _stand_ins(
     real: FloatArray, group: NDArray[np.str_], rows: IntArray, others: IntArray, rng: np.random.Generator
 ) -> IntArray:
     """Other drivers' snippets with the same start, shape (rows, draws)."""
-    count = min(FLOOR_DRAWS, len(others))
-    starts = real[:, 0]
-    return others[
-        windows_with_the_same_start(starts[rows], group[rows], starts[others], group[others], rng, count=count)
-    ]
-
-
-def _separated_drivers(real: FloatArray, group: NDArray[np.str_], seed: int, *, fast: bool) -> TwoSampleResult | None:
-    """A classifier between one random half of the drivers and the other."""
-    half = split_groups(group, np.random.default_rng(seed))
-    return classifier_two_sample_test(real[half], real[~half], group[half], group[~half], fast=fast, seed=seed)
+    count, first = min(FLOOR_DRAWS, len(others)), real[:, 0]
+    own = windows_with_the_same_start(first[rows], group[rows], first[others], group[others], rng, count=count)
+    return others[own]
 
 
 def _with_proper_scores(scores: ConditionScores, profile: DriverProfile, cut: Snippets, seed: int) -> ConditionScores:
@@ -283,14 +226,8 @@ def _with_proper_scores(scores: ConditionScores, profile: DriverProfile, cut: Sn
     chosen = np.unique(np.linspace(0, len(cut) - 1, min(len(cut), SCORED)).astype(np.int64))
     some = cut.take(chosen)
     members = [sample_snippets(profile, some, seed + 10 + k, with_sensor=True) for k in range(ENSEMBLE)]
-    drivers = windows_with_the_same_start(
-        some.offset[:, 0],
-        some.group,
-        cut.offset[:, 0],
-        cut.group,
-        np.random.default_rng(seed),
-        count=ENSEMBLE,
-    )
+    rng, starts = np.random.default_rng(seed), (some.offset[:, 0], some.group, cut.offset[:, 0], cut.group)
+    drivers = windows_with_the_same_start(*starts, rng, count=ENSEMBLE)
     sampled = proper_scores(some.offset, np.stack(members, axis=1))
     real = proper_scores(some.offset, cut.offset[drivers])
     added = {name: Beside(sampled[name], real[name], PROPER[name]) for name in sampled}

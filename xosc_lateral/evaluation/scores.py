@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.errors import NotEnoughDataError
@@ -24,31 +25,17 @@ from xosc_lateral.evaluation.realism import Realism, score_realism
 from xosc_lateral.evaluation.snippets import Snippets, sample_runs, sample_snippets, snippets_of
 from xosc_lateral.evaluation.spectra import Spectrum, autocorrelation, spectrum
 
-FloatArray = NDArray[np.float64]
-
-SNIPPET = 10.0
-"""The paper's. [s]"""
-
-SPLITS = 8
-"""Random halves of the drives that both are averaged over."""
+SNIPPET = 10.0  # The paper's. [s]
+SPLITS = 8  # Random halves of the drives that both are averaged over.
 
 
 @dataclass(frozen=True, eq=False)
 class SnippetScores:
-    """Distances for snippets of one length.
+    """Distances for snippets of one length."""
 
-    Parameters
-    ----------
-    seconds : float
-        Length. [s]
-    count : int
-    distances, floor : Distances
-        Real to sampled and real to real, averaged over the same random halves of the drives.
-    """
-
-    seconds: float
+    seconds: float  # Length. [s]
     count: int
-    distances: Distances
+    distances: Distances  # Real to sampled and real to real, averaged over the same random halves of the drives.
     floor: Distances
 
     @property
@@ -72,12 +59,8 @@ def score_snippets(
     A half of real snippets is compared with its own sampled ones, and with the other real half: both distances rest on
     as many snippets, so that their ratio is fair.
 
-    Parameters
-    ----------
-    real, sampled : array, shape (n, m)
-        Row k of both starts at the same offset under the same context. [m]
-    group : array, shape (n,)
-        Never split between halves.
+    `real` and `sampled`, shape (n, m): row k of both starts at the same offset under the same context. [m]; `group`,
+    shape (n,): never split between halves.
     """
     rng = np.random.default_rng(seed)
     metrics, artificial = snippet_metrics(real), snippet_metrics(sampled)
@@ -89,80 +72,42 @@ def score_snippets(
     return SnippetScores(seconds, len(real), mean_distances(model), mean_distances(floor))
 
 
-LONG_SNIPPET = 60.0
-"""[s]"""
-
-LAGS = (0.2, 0.4, 0.6, 1.0, 1.4, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)
-"""Of the autocorrelation. [s]"""
-
-TRACES, TRACE = 6, 120.0
-"""Drives of which a trace is kept for the eye, and its length. [s]"""
-
-MIN_SNIPPETS = 20
-"""Fewer say nothing about a distribution."""
+LONG_SNIPPET = 60.0  # [s]
+LAGS = (0.2, 0.4, 0.6, 1.0, 1.4, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)  # Of the autocorrelation. [s]
+TRACES, TRACE = 6, 120.0  # Drives of which a trace is kept for the eye, and its length. [s]
+MIN_SNIPPETS = 20  # Fewer say nothing about a distribution.
 
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """A measured stretch of one drive, and what the profile does from the same start under the same context.
-
-    Parameters
-    ----------
-    drive : str
-    step : float
-        [s]
-    real, sampled : array, shape (n,)
-        Offsets. [m]
-    """
+    """A measured stretch of one drive, and what the profile does from the same start under the same context."""
 
     drive: str
-    step: float
-    real: FloatArray
-    sampled: FloatArray
+    step: float  # [s]
+    real: FloatArray  # shape (n,): Offsets. [m]
+    sampled: FloatArray  # shape (n,). [m]
 
 
 @dataclass(frozen=True, eq=False)
 class ProfileScores:
-    """Everything that `evaluate` finds.
+    """Everything that `evaluate` finds."""
 
-    Parameters
-    ----------
-    profile : str
-        Its name.
-    drives, runs, hours : int, int, float
-        What was measured.
-    realism : Realism
-        The headline: free runs and shared starts beside other real drivers.
-    snippets : SnippetScores
-        10 s.
-    long_snippets : SnippetScores or None
-        60 s; None with fewer than `MIN_SNIPPETS`.
-    evaluations : tuple of four PartEvaluation
-    spectrum_real, spectrum_sampled : Spectrum
-    lags, autocorrelation_real, autocorrelation_sampled : array, shape (k,)
-        [s], [-], [-]
-    margins_real, margins_sampled : Margins
-    traces : tuple of Trace
-        The longest run of each of the first `TRACES` drives, for the eye.
-    seed : int
-    """
-
-    profile: str
-    drives: int
+    profile: str  # Its name.
+    drives: int  # What was measured, and how many hours of it.
     runs: int
     hours: float
-    realism: Realism
-    snippets: SnippetScores
-    long_snippets: SnippetScores | None
+    realism: Realism  # The headline: free runs and shared starts beside other real drivers.
+    snippets: SnippetScores  # 10 s.
+    long_snippets: SnippetScores | None  # 60 s; None with fewer than `MIN_SNIPPETS`.
     evaluations: tuple[PartEvaluation, ...]
     spectrum_real: Spectrum
     spectrum_sampled: Spectrum
-    lags: FloatArray
-    autocorrelation_real: FloatArray
-    autocorrelation_sampled: FloatArray
+    lags: FloatArray  # shape (k,). [s]
+    autocorrelation_real: FloatArray  # shape (k,). [-]
+    autocorrelation_sampled: FloatArray  # shape (k,). [-]
     margins_real: Margins
     margins_sampled: Margins
-    traces: tuple[Trace, ...]
+    traces: tuple[Trace, ...]  # The longest run of each of the first `TRACES` drives, for the eye.
     seed: int
 
     @property
@@ -187,12 +132,8 @@ def score_profile(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
 
     Raises `NotEnoughDataError` with fewer than `MIN_SNIPPETS` snippets of 10 s.
 
-    Parameters
-    ----------
-    runs : sequence of Run
-        At the profile's step.
-    classify : bool
-        Whether to train the classifiers (a minute or two for some hours of driving).
+    `runs`: at the profile's step; `classify`: whether to train the classifiers (a minute or two for some hours of
+    driving).
     """
     step = profile.model.step
     short = _enough(snippets_of(runs, SNIPPET, step))

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.drives.periodogram import tapered_powers
 
-FloatArray = NDArray[np.float64]
-
+# Columns of `shape_features`; most are features of catch22.
 SHAPES = (
     "mode_5",
     "mode_10",
@@ -28,13 +28,9 @@ SHAPES = (
     "change_kurtosis",
     "sign_changes",
 )
-"""Columns of `shape_features`; most are features of catch22."""
 
-LARGE_CHANGE = 0.04
-"""Of a change from row to row, in standard deviations (pNN40 of catch22). [-]"""
-
-EXTREME = 1.0
-"""Beyond it a value counts as extreme, in standard deviations. [-]"""
+LARGE_CHANGE = 0.04  # Of a change from row to row, in standard deviations (pNN40 of catch22). [-]
+EXTREME = 1.0  # Beyond it a value counts as extreme, in standard deviations. [-]
 
 
 def shape_features(snippets: FloatArray) -> FloatArray:

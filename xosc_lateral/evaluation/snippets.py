@@ -13,46 +13,30 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.sampled_offsets import Snippet, cut_snippets, recorded, segment_of, sensor_error
+from xosc_lateral.driver.sampled_offsets import Snippet, cut_snippets, recorded_offsets, segment_of, sensor_error
 from xosc_lateral.driver.sampling import OffsetSampler, sample_offsets
 from xosc_lateral.driver.seeds import child
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.segment import Segment
 
-FloatArray = NDArray[np.float64]
-
-BLOCK = 120.0
-"""Where there are too few drives to split between them, blocks of this length are split instead. [s]"""
-
+BLOCK = 120.0  # Where there are too few drives to split between them, blocks of this length are split instead. [s]
 FEW_DRIVES = 6
 
 
 @dataclass(frozen=True, eq=False)
 class Snippets:
-    """Snippets of measured driving.
+    """Snippets of measured driving."""
 
-    Parameters
-    ----------
-    seconds : float
-        Their length. [s]
-    items : tuple of Snippet
-        Where each comes from.
-    offset, lane_width : array, shape (n, m)
-        [m]
-    group : array of str, shape (n,)
-        Drive, or block of a drive: what is split between halves, and resampled, as a whole.
-    place : tuple of (int, slice)
-        Number of the run, and rows in it.
-    """
-
-    seconds: float
-    items: tuple[Snippet, ...]
-    offset: FloatArray
-    lane_width: FloatArray
+    seconds: float  # Their length. [s]
+    items: tuple[Snippet, ...]  # Where each comes from.
+    offset: FloatArray  # shape (n, m). [m]
+    lane_width: FloatArray  # shape (n, m). [m]
+    # shape (n,): Drive, or block of a drive: what is split between halves, and resampled, as a whole.
     group: NDArray[np.str_]
-    place: tuple[tuple[int, slice], ...]
+    place: tuple[tuple[int, slice], ...]  # Number of the run, and rows in it.
 
     def __len__(self) -> int:
         return len(self.items)
@@ -82,10 +66,7 @@ class Snippets:
 def snippets_of(runs: Sequence[Run], seconds: float, step: float, *, by_block: bool | None = None) -> Snippets:
     """All whole snippets, one after the other in each run, both ends counted (51 values for 10 s at 5 Hz).
 
-    Parameters
-    ----------
-    by_block : bool, optional
-        Whether groups are blocks of a drive; without, where there are fewer than `FEW_DRIVES` drives.
+    `by_block`: whether groups are blocks of a drive; without, where there are fewer than `FEW_DRIVES` drives.
     """
     length = round(seconds / step) + 1
     items = tuple(cut_snippets(runs, seconds, step)) if any(len(run) >= length for run in runs) else ()
@@ -127,16 +108,10 @@ def sample_recorded(
     `starts` of the sums, shape (segments,) [m].
     """
     root, sensor = np.random.SeedSequence(seed), profile.sensor if with_sensor else None
-    rows = []
-    for k, (segment, start) in enumerate(zip(segments, starts.tolist(), strict=True)):
-        own = child(root, k)
-
-        def draw(begin: float, segment: Segment = segment, own: np.random.SeedSequence = own) -> FloatArray:
-            return sample_offsets(profile, segment, own, start=begin)
-
-        n = segment.lane_width[segment.inside].size
-        rows.append(recorded(sensor, draw, n, start, profile.model.step, own))
-    return rows
+    return [
+        recorded_offsets(profile, segment, child(root, k), sensor, start)
+        for k, (segment, start) in enumerate(zip(segments, starts.tolist(), strict=True))
+    ]
 
 
 def sample_parts(profile: DriverProfile, snippets: Snippets, seed: int) -> tuple[FloatArray, FloatArray]:

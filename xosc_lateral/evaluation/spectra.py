@@ -15,14 +15,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.drives.periodogram import tapered_powers
 
-FloatArray = NDArray[np.float64]
-
-BoolArray = NDArray[np.bool_]
-
-MANY_SEGMENTS = 8
-"""With so many segments without a gap, spectra are taken from these only."""
+MANY_SEGMENTS = 8  # With so many segments without a gap, spectra are taken from these only.
 
 
 def gapped_spectrum(
@@ -64,47 +60,26 @@ def gapped_spectrum(
     return frequency[1:], density[1:], number
 
 
-BANDS = np.geomspace(0.01, 1.0, 21)
-"""Edges of the frequency bands, ten a decade. [Hz]"""
-
+BANDS = np.geomspace(0.01, 1.0, 21)  # Edges of the frequency bands, ten a decade. [Hz]
+# Window lengths at 5 Hz, 102 s to 13 s: each band takes the shortest one that holds `PERIODS`.
 SEGMENTS = (1024, 512, 256, 128, 64)
-"""Window lengths at 5 Hz, 102 s to 13 s: each band takes the shortest one that holds `PERIODS`."""
-
-PERIODS = 1.0
-"""Periods of a band's centre that a window must hold. [-]"""
-
-PADDING = 8
-"""Windows are padded with zeros to so many times their length: every band then holds a frequency. [-]"""
+PERIODS = 1.0  # Periods of a band's centre that a window must hold. [-]
+PADDING = 8  # Windows are padded with zeros to so many times their length: every band then holds a frequency. [-]
 
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """One-sided power density of the offset in logarithmic bands; bands that no run is long enough for are left out.
+    """One-sided power density of the offset in logarithmic bands; bands that no run is long enough for are left out."""
 
-    Parameters
-    ----------
-    frequency : array, shape (n,)
-        Geometric centres. [Hz]
-    density : array, shape (n,)
-        [m²/Hz]
-    windows : array of int, shape (n,)
-        How many windows each band rests on.
-    """
-
-    frequency: FloatArray
-    density: FloatArray
-    windows: NDArray[np.int64]
+    frequency: FloatArray  # shape (n,): Geometric centres. [Hz]
+    density: FloatArray  # shape (n,): [m²/Hz]
+    windows: NDArray[np.int64]  # shape (n,): How many windows each band rests on.
 
 
 def spectrum(runs: Sequence[FloatArray], step: float) -> Spectrum:
     """Power density by Welch's method (Hann windows, half overlapping, mean removed), pooled over runs.
 
-    Parameters
-    ----------
-    runs : sequence of array, shape (n_i,)
-        Offsets of uninterrupted driving at an even step. [m]
-    step : float
-        [s]
+    `runs`, shape (n_i,) each: offsets [m] of uninterrupted driving at an even `step` [s].
     """
     by_length = {length: _periodogram(runs, length, step) for length in SEGMENTS}
     centres, densities, windows = [], [], []
@@ -141,10 +116,7 @@ def autocorrelation(runs: Sequence[FloatArray], lags: Sequence[int]) -> FloatArr
 
     Differences between drivers count: they don't decay.
 
-    Returns
-    -------
-    array, shape (len(lags),)
-        Lags that no run reaches get 0.
+    Returns shape (len(lags),): lags that no run reaches get 0.
     """
     everything = np.concatenate(list(runs))
     mean, variance = everything.mean(), everything.var()

@@ -8,6 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.source import read_toml
 
 SETTINGS = frozenset({"ego", "neighbours"})
 """Of a conversion (`pipeline.settings.ConvertSettings`), that may stand there."""
@@ -41,10 +42,7 @@ def configuration() -> tuple[Path | None, Mapping[str, list[str]]]:
 
 
 def configured_libraries() -> list[Path]:
-    """Folders of profiles that the configuration names.
-
-    Raises `FormatError`: see `configuration`.
-    """
+    """Folders of profiles that the configuration names. Raises `FormatError`: see `configuration`."""
     path, found = configuration()
     library = found.get("library", [])
     try:
@@ -59,14 +57,8 @@ def configured_libraries() -> list[Path]:
 
 @lru_cache(maxsize=8)
 def _read(path: Path, *_state: int) -> Mapping[str, list[str]]:
-    import tomllib
-
-    try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise FormatError(f"not TOML: {error}", path=path) from error
     found = {}
-    for key, value in values.items():
+    for key, value in read_toml(path, "not TOML").items():
         if key not in KEYS:
             raise FormatError(f"unknown key {key!r}; there are {', '.join(KEYS)}", path=path)
         found[key] = [value] if isinstance(value, str) else value

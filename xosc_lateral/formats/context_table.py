@@ -2,40 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.plausibility import first_implausible, implausible
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.tables import plain_cells, read_table
+from xosc_lateral.lazy import pd
 from xosc_lateral.limits import TIME
 
-if TYPE_CHECKING:
-    import pandas as pd
 
-FloatArray = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class ContextTable(Mapping[str, tuple[FloatArray, FloatArray]]):
+class ContextTable(dict[str, tuple[FloatArray, FloatArray]]):
     """Context over time: name -> (time, values), shape (n,) each."""
 
-    columns: Mapping[str, tuple[FloatArray, FloatArray]]
-    sha256: str  # of the file's bytes
-
-    def __getitem__(self, name: str) -> tuple[FloatArray, FloatArray]:
-        return self.columns[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.columns)
-
-    def __len__(self) -> int:
-        return len(self.columns)
+    sha256: str = ""  # of the file's bytes
 
 
 def read_context(path: Path) -> ContextTable:
@@ -48,31 +30,16 @@ def read_context(path: Path) -> ContextTable:
     """
     table, sha256 = read_table(path)
     time = _time_of(table, path)
-    context = {}
-    for name in table.columns:
-        if name == "time":
-            continue
-        values = _values_of(table, name, time, path)
+    context = ContextTable()
+    context.sha256 = sha256
+    for name in map(str, table.columns.drop("time")):
+        values = _values_of(table[name], name, time, path)
         known = np.isfinite(values)
         if known.any():
-            context[str(name)] = (time[known], values[known])
+            context[name] = (time[known], values[known])
     if not context:
         raise FormatError("no column with values besides 'time'", path=path)
-    return ContextTable(context, sha256)
-
-
-def _values_of(table: pd.DataFrame, name: str, time: FloatArray, path: Path) -> FloatArray:
-    """A column's numbers, shape (n,) [own unit]; NaN: not stated."""
-    if table[name].dtype.kind not in "fiub":
-        raise FormatError(_no_number(table[name], time), path=path, element=f"column {str(name)!r}")
-    values = table[name].to_numpy(dtype=np.float64)
-    if (endless := np.flatnonzero(np.isinf(values))).size:
-        what = f"{values[endless[0]]} at {time[endless[0]]:g} s is not finite"
-        raise FormatError(what, path=path, element=f"column {str(name)!r}")
-    if (row := first_implausible(str(name), values)) is not None:
-        what = f"{implausible(str(name), float(values[row]))} at {time[row]:g} s"
-        raise FormatError(what, path=path, element=f"column {str(name)!r}")
-    return values
+    return context
 
 
 def _time_of(table: pd.DataFrame, path: Path) -> FloatArray:
@@ -89,10 +56,20 @@ def _time_of(table: pd.DataFrame, path: Path) -> FloatArray:
     return time
 
 
-def _no_number(column: pd.Series, time: FloatArray) -> str:
-    import pandas as pd
-
-    column = plain_cells(column)
-    wrong = np.flatnonzero((pd.to_numeric(column.astype("string"), errors="coerce").isna() & column.notna()).to_numpy())
-    row = int(wrong[0]) if len(wrong) else 0
-    return f"{str(column.iloc[row])!r} at {time[row]:g} s is not a number; leave the column out if it is no context"
+def _values_of(column: pd.Series, name: str, time: FloatArray, path: Path) -> FloatArray:
+    """A column's numbers, shape (n,) [own unit]; NaN: not stated."""
+    if column.dtype.kind not in "fiub":
+        column = plain_cells(column)
+        is_number = pd.to_numeric(column.astype("string"), errors="coerce").notna() | column.isna()
+        row = int(np.argmin(is_number))
+        cell = f"{str(column.iloc[row])!r} at {time[row]:g} s"
+        what = f"{cell} is not a number; leave the column out if it is no context"
+        raise FormatError(what, path=path, element=f"column {name!r}")
+    values = column.to_numpy(dtype=np.float64)
+    if (endless := np.flatnonzero(np.isinf(values))).size:
+        what = f"{values[endless[0]]} at {time[endless[0]]:g} s is not finite"
+        raise FormatError(what, path=path, element=f"column {name!r}")
+    if (found := first_implausible(name, values)) is not None:
+        what = f"{implausible(name, float(values[found]))} at {time[found]:g} s"
+        raise FormatError(what, path=path, element=f"column {name!r}")
+    return values

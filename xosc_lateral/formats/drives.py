@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.plausibility import first_implausible, implausible, implausible_rows, nobody
 from xosc_lateral.drives.cleaning import MAX_MEDIAN_SPEED, MAX_OUTSIDE, OWN, clean_drive
 from xosc_lateral.drives.cuts import MIN_RUN
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping
-from xosc_lateral.formats.tables import comma_numbers, indicators, numbers_of, plain_cells, read_table
+from xosc_lateral.formats.tables import comma_numbers, indicators, listed, numbers_of, plain_cells, read_table
+from xosc_lateral.lazy import pd
 from xosc_lateral.segment import CONTEXT_UNITS
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-FloatArray = NDArray[np.float64]
 
 MAX_LEVELS = 12
 """A column of whole numbers with at most so many values holds levels, not a quantity."""
@@ -64,7 +60,7 @@ def drives_of_table(table: pd.DataFrame, mapping: MappingLike, path: Path | str 
     if not len(table):
         raise NotEnoughDataError(f"{path}: the table has no rows; {MIN_RUN:g} s of driving are needed")
     columns = _numeric_columns(table, path)
-    levels = frozenset(name for name, values in columns.items() if _may_hold_levels(name) and _holds_levels(values))
+    levels = frozenset(name for name, values in columns.items() if _holds_levels(name, values))
     _require_columns(columns, path)
     names, every = _drive_names(table, path)
     drives = [
@@ -73,16 +69,13 @@ def drives_of_table(table: pd.DataFrame, mapping: MappingLike, path: Path | str 
     ]
     found = [drive for drive in drives if drive is not None]
     if not found:
-        raise NotEnoughDataError(
-            f"{path}: no drive has two rows with time, offset and lane width; {MIN_RUN:g} s are needed"
-        )
+        what = f"no drive has two rows with time, offset and lane width; {MIN_RUN:g} s are needed"
+        raise NotEnoughDataError(f"{path}: {what}")
     return found
 
 
 def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.DataFrame:
     """The table under standard names and in standard units; what is not mapped stays as it is."""
-    import pandas as pd
-
     table = table.rename(columns=lambda name: str(name).strip())
     if not table.columns.is_unique:
         twice = sorted(set(table.columns[table.columns.duplicated()]))
@@ -90,9 +83,8 @@ def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.Dat
     taken = {source.column for source in mapping.columns.values()}
     for name, source in mapping.columns.items():
         if source.column not in table.columns:
-            raise FormatError(
-                f"no column {source.column!r} for {name}; there are {_listed(table.columns)}", path=path, line=1
-            )
+            what = f"no column {source.column!r} for {name}; there are {listed(table.columns)}"
+            raise FormatError(what, path=path, line=1)
     own = [name for name in table.columns if name not in taken and name not in mapping.columns]
     kept = {name: mapping.numbers(name, plain_cells(table[name]), path) for name in own}
     for name, source in mapping.columns.items():
@@ -106,13 +98,12 @@ def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.Dat
 def _numeric_columns(table: pd.DataFrame, path: Path) -> dict[str, FloatArray]:
     """Columns that hold numbers or categories, as float64; infinite values count as missing, but for those of distances
     to others: nobody is within reach."""
-    from pandas.api import types
 
     columns: dict[str, FloatArray] = {}
     for name in table.columns:
         if name == "drive":
             continue
-        if name in OWN or name == "speed" or types.is_numeric_dtype(table[name]) or types.is_bool_dtype(table[name]):
+        if name in (*OWN, "speed") or pd.api.types.is_numeric_dtype(table[name]):
             columns[name] = _cleaned(table, name, path)
         elif table[name].isna().all():
             columns[name] = np.full(len(table), np.nan)
@@ -144,29 +135,23 @@ def _leave_out_nonsense(values: FloatArray, name: str, path: Path) -> None:
     values[wrong] = np.nan
 
 
-def _may_hold_levels(name: str) -> bool:
+def _holds_levels(name: str, values: FloatArray) -> bool:
     """Counts, indices and flags do; a speed that happens to be constant doesn't."""
-    return name not in OWN and CONTEXT_UNITS.get(name, "-") == "-"
-
-
-def _holds_levels(values: FloatArray) -> bool:
+    if name in OWN or CONTEXT_UNITS.get(name, "-") != "-":
+        return False
     known = values[~np.isnan(values)]
     return bool(np.all(known == np.round(known)) and len(np.unique(known)) <= MAX_LEVELS)
 
 
 def _require_columns(columns: Mapping[str, FloatArray], path: Path) -> None:
+    what = ""
     if "time" not in columns:
-        raise FormatError(
-            f"no column 'time'; there are {_listed(columns)} (translate with --map time=COLUMN)", path=path, line=1
-        )
-    if {"offset", "lane_width"} <= columns.keys() or {"distance_left", "distance_right"} <= columns.keys():
-        return
-    raise FormatError(
-        "needs distance_left and distance_right, or offset and lane_width; "
-        f"there are {_listed(columns)} (translate with --map NAME=COLUMN)",
-        path=path,
-        line=1,
-    )
+        what = f"no column 'time'; there are {listed(columns)} (translate with --map time=COLUMN)"
+    elif not ({"offset", "lane_width"} <= columns.keys() or {"distance_left", "distance_right"} <= columns.keys()):
+        needed = "needs distance_left and distance_right, or offset and lane_width"
+        what = f"{needed}; there are {listed(columns)} (translate with --map NAME=COLUMN)"
+    if what:
+        raise FormatError(what, path=path, line=1)
 
 
 def _drive_names(table: pd.DataFrame, path: Path) -> tuple[list[str], list[NDArray[np.intp]]]:
@@ -178,8 +163,3 @@ def _drive_names(table: pd.DataFrame, path: Path) -> tuple[list[str], list[NDArr
     order = np.argsort(codes, kind="stable")
     bounds = np.searchsorted(codes[order], np.arange(1, len(names)))
     return [str(name) for name in names], list(np.split(order, bounds))
-
-
-def _listed(columns: Iterable[object]) -> str:
-    names = [str(name) for name in columns]
-    return ", ".join(names[:20]) + (f" and {len(names) - 20} more" if len(names) > 20 else "")

@@ -26,7 +26,12 @@ def parse_json(data: bytes, path: Path) -> Any:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise FormatError(f"not JSON in UTF-8 ({error}): save it as UTF-8", path=path) from error
-    _check_depth(text, path)
+    depth = deepest = 0
+    for bracket in _BRACKETS.finditer(_STRINGS.sub("", text)):
+        depth += 1 if bracket[0] in "[{" else -1
+        deepest = max(deepest, depth)
+    if deepest > JSON_DEPTH.value:
+        raise FormatError(JSON_DEPTH.refusal(deepest), path=path)
     try:
         return json.loads(text, parse_constant=_refuse_constant, parse_float=_finite)
     except json.JSONDecodeError as error:
@@ -42,15 +47,6 @@ def _finite(text: str) -> float:
     return number
 
 
-def _check_depth(text: str, path: Path) -> None:
-    depth = deepest = 0
-    for bracket in _BRACKETS.finditer(_STRINGS.sub("", text)):
-        depth += 1 if bracket[0] in "[{" else -1
-        deepest = max(deepest, depth)
-    if deepest > JSON_DEPTH.value:
-        raise FormatError(JSON_DEPTH.refusal(deepest), path=path)
-
-
 def canonical_json(value: Any, indent: int = 0) -> str:
     """JSON text of plain values: keys as they come, one item a line, lists of numbers on one line.
 
@@ -61,16 +57,12 @@ def canonical_json(value: Any, indent: int = 0) -> str:
         items = [f"{pad}{json.dumps(str(key))}: {canonical_json(item, indent + 1)}" for key, item in value.items()]
         return "{\n" + ",\n".join(items) + "\n" + " " * indent + "}" if items else "{}"
     if isinstance(value, Sequence) and not isinstance(value, str):
-        if all(_is_scalar(item) for item in value):
+        if all(item is None or isinstance(item, str | int | float) for item in value):
             return "[" + ", ".join(canonical_json(item) for item in value) + "]"
         return "[\n" + ",\n".join(pad + canonical_json(item, indent + 1) for item in value) + "\n" + " " * indent + "]"
     if isinstance(value, float) and not math.isfinite(value):
         raise ValueError(f"{value} can't be written as JSON")
     return json.dumps(value, ensure_ascii=False)
-
-
-def _is_scalar(value: Any) -> bool:
-    return isinstance(value, str | int | float) or value is None
 
 
 def _refuse_constant(name: str) -> float:

@@ -11,16 +11,14 @@ from dataclasses import dataclass, field, replace
 from math import pi
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.source import read_toml
+from xosc_lateral.lazy import pd
 from xosc_lateral.segment import CONTEXT_UNITS
-
-if TYPE_CHECKING:
-    import pandas as pd
-
 
 # Factors to SI. Degrees stay apart from radians only by their factor.
 _BY_QUANTITY = {
@@ -112,26 +110,14 @@ class ColumnSource:
 
 @dataclass(frozen=True, slots=True)
 class TableMapping:
-    """How to read foreign tables.
+    """How to read foreign tables."""
 
-    Parameters
-    ----------
-    columns : mapping of str to ColumnSource
-        By standard name.
-    values : mapping of str to mapping of str to float
-        By standard name, the number that a text stands for, in the standard unit.
-    roles : mapping of str to str
-        By standard name, where a column comes from ("road", say), for who asks what may be a cause.
-    encoding, separator : str, optional
-        Of text files; None: found out.
-    decimal : str
-        Decimal mark, "." or ",".
-    """
-
-    columns: Mapping[str, ColumnSource] = field(default_factory=dict)
+    columns: Mapping[str, ColumnSource] = field(default_factory=dict)  # by standard name
+    # values: by standard name, the number that a text stands for, in the standard unit
     values: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    # roles: by standard name, where a column comes from ("road", say), for who asks what may be a cause
     roles: Mapping[str, str] = field(default_factory=dict)
-    encoding: str | None = None
+    encoding: str | None = None  # encoding, separator: of text files; None: found out
     separator: str | None = None
     decimal: str = "."
 
@@ -145,20 +131,14 @@ class TableMapping:
 
         Raises `FormatError`: for a text that stands for none.
         """
-        import pandas as pd
-
         if name not in self.values:
             return column
         known = {text.strip().lower(): number for text, number in self.values[name].items()}
         texts = column.map(lambda cell: "" if pd.isna(cell) else _as_word(cell))
         strange = texts[(texts != "") & ~texts.isin(list(known))]
         if len(strange):
-            raise FormatError(
-                f"{strange.iloc[0]!r} is not in [values.{name}] of the mapping: {', '.join(self.values[name])}",
-                path=path,
-                line=int(strange.index[0]) + 2,
-                element=f"column {name!r}",
-            )
+            what = f"{strange.iloc[0]!r} is not in [values.{name}] of the mapping: {', '.join(self.values[name])}"
+            raise FormatError(what, path=path, line=int(strange.index[0]) + 2, element=f"column {name!r}")
         return texts.map({**known, "": np.nan}).astype(np.float64)
 
 
@@ -207,19 +187,8 @@ def _source(name: str, words: str) -> ColumnSource:
 
 
 def read_mapping(path: Path) -> TableMapping:
-    """Read a mapping's file.
-
-    Raises `FormatError`: it is no TOML, or holds what no mapping has; names the entry.
-    """
-    import tomllib
-
-    from xosc_lateral.formats.source import open_source
-
-    with open_source(path) as source:
-        try:
-            values = tomllib.loads(source.file.read().decode("utf-8-sig"))
-        except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-            raise FormatError(f"no mapping in TOML and UTF-8: {error}", path=path) from error
+    """Read a mapping's file. Raises `FormatError`: it is no TOML, or holds what no mapping has; names the entry."""
+    values = read_toml(path, "no mapping in TOML and UTF-8")
     if unknown := values.keys() - set(KEYS):
         raise FormatError(f"unknown entry {min(unknown)!r}; there are {', '.join(KEYS)}", path=path)
     for key in ("columns", "values", "roles"):

@@ -38,20 +38,14 @@ def file_name(name: str, what: str) -> str:
 
 
 def path_below(folder: Path, name: str, what: str) -> Path:
-    """A path below a folder from names that others gave, with forward slashes.
-
-    Raises `FormatError`: it leads elsewhere.
-    """
+    """A path below a folder from names that others gave, with slashes. Raises `FormatError`: it leads elsewhere."""
     return folder.joinpath(*(file_name(part, what) for part in name.split("/")))
 
 
 def output_file(output: str | Path, usual_name: str, suffixes: Sequence[str]) -> Path:
-    """Path of an output file.
+    """Path of an output file, which in a folder has its usual name. Raises `FormatError` for another suffix.
 
-    Raises `FormatError` for another suffix.
-
-    `output`: as the user gave it. Ends in a slash, or is a folder: `usual_name` in that folder. `usual_name`: file name
-    in a folder. `suffixes`: formats that can be written, lower case with their dot.
+    `output`: as the user gave it. `suffixes`: formats that can be written, lower case with their dot.
     """
     path = output_folder(output) / file_name(usual_name, "name") if is_folder(output) else Path(output)
     if not path.name.lower().endswith(tuple(suffixes)):
@@ -67,10 +61,7 @@ def is_folder(output: str | Path) -> bool:
 
 
 def output_folder(output: str | Path) -> Path:
-    """Path of an output folder, which need not be there yet.
-
-    Raises `FormatError` if a file is there.
-    """
+    """Path of an output folder, which need not be there yet. Raises `FormatError` if a file is there."""
     path = Path(output)
     if path.is_file():
         raise FormatError("is a file, expected a folder", path=path)
@@ -80,10 +71,8 @@ def output_folder(output: str | Path) -> Path:
 def claim(outputs: Iterable[Path | None], inputs: Iterable[Path] = (), *, force: bool = False) -> None:
     """Refuse outputs that can't be meant, or that would replace somebody else's file, before any work is done.
 
-    Raises `FormatError`: see `refuse_outputs`; or a file is there that this package did not write.
-
-    `outputs`: files to be written; None: not wanted. `inputs`: files that are read. `force`: replace whatever is there,
-    apart from inputs.
+    Raises `FormatError`: see `refuse_outputs`; or a file is there that this package did not write, unless `force` is
+    given.
     """
     wanted = [output for output in outputs if output is not None]
     refuse_outputs(wanted, inputs)
@@ -95,10 +84,8 @@ def claim(outputs: Iterable[Path | None], inputs: Iterable[Path] = (), *, force:
 def refuse_outputs(outputs: Iterable[Path | None], inputs: Iterable[Path] = ()) -> None:
     """Refuse outputs that can't be meant, before any work is done and anything is written.
 
-    Raises `FormatError` if an output is a folder, an input (links resolved), or named twice, or its folder can't be
-    made or written to.
-
-    `outputs`: files to be written; None: not wanted. `inputs`: files that are read.
+    Raises `FormatError` if an output (None: not wanted) is a folder, an input (links resolved), or named twice, or its
+    folder can't be made or written to.
     """
     folders: dict[Path, str] = {}
     taken = {real_path(path, folders): "is an input; choose another output" for path in inputs}
@@ -192,12 +179,11 @@ def _own_parquet(path: Path) -> bool:
         return PACKAGE in file.read() or b"xosc_lateral" in _head(path)
 
 
+# of other tables than Parquet the file beside them says so
 _CHECKS: dict[str, Callable[[Path], bool]] = {
     ".xosc": _own_xml,
     ".xodr": _own_xml,
     ".json": _own_json,
-    ".csv": _own_table,
-    ".csv.gz": _own_table,
     ".parquet": _own_parquet,
     ".html": lambda path: b'content="xosc-lateral ' in _head(path),
     ".mcap": lambda path: PACKAGE in _head(path),  # its header and metadata are not compressed

@@ -7,16 +7,13 @@ import hashlib
 import io
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 from xosc_lateral.formats.atomic import write_atomically
 from xosc_lateral.formats.json_text import canonical_json
 from xosc_lateral.formats.output_paths import SIDECAR_SUFFIX
+from xosc_lateral.lazy import pd
 from xosc_lateral.version import __version__
-
-if TYPE_CHECKING:
-    import pandas as pd
-
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
@@ -49,15 +46,13 @@ def output_suffixes() -> tuple[str, ...]:
     return (*ENCODERS, PARQUET)
 
 
-def write_frame(
-    frame: pd.DataFrame, path: Path, provenance: Mapping[str, Any], *, decimals: Mapping[str, int] | int = 6
-) -> None:
+def write_frame(frame: pd.DataFrame, path: Path, provenance: Mapping[str, Any]) -> None:
     """Write a table; the same frame and provenance give the same bytes.
 
     `path`: its suffix, one of `output_suffixes`, decides the format. `provenance`: JSON values; the package's version
-    is added. `decimals`: of the numbers in a CSV, per column or of all; Parquet keeps every bit.
+    is added. A CSV has six decimals, Parquet every bit.
     """
-    write_table(path, provenance, frame=lambda: frame, text=lambda: csv_text(frame, decimals))
+    write_table(path, provenance, frame=lambda: frame, text=lambda: csv_text(frame))
 
 
 def write_table(
@@ -77,13 +72,9 @@ def write_table(
     write_atomically(path, data)
 
 
-def csv_text(frame: pd.DataFrame, decimals: Mapping[str, int] | int = 6) -> str:
-    """The table as CSV; words that look like a formula are made harmless."""
-    frame = harmless_frame(frame)
-    if isinstance(decimals, Mapping):
-        frame = frame.assign(**{name: frame[name].map(f"{{:.{places}f}}".format) for name, places in decimals.items()})
-        return str(frame.to_csv(index=False, lineterminator="\n"))
-    return str(frame.to_csv(index=False, float_format=f"%.{decimals}f", lineterminator="\n"))
+def csv_text(frame: pd.DataFrame) -> str:
+    """The table as CSV with six decimals; words that look like a formula are made harmless."""
+    return str(harmless_frame(frame).to_csv(index=False, float_format="%.6f", lineterminator="\n"))
 
 
 def harmless_frame(frame: pd.DataFrame) -> pd.DataFrame:

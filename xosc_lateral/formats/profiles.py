@@ -231,20 +231,17 @@ def read_library(folders: Iterable[Path] = ()) -> list[Entry]:
     first: dict[str, Path] = {}
     entries = []
     for path in list_profiles(folders):
-        entries.append(_entry(path, first.get(path.stem)))
+        profile, problem = None, ""
+        try:
+            profile = read_profile(path)
+            if profile.name != path.stem:
+                what = f"holds the profile {profile.name!r}, but is looked up as {path.stem!r}"
+                problem = f"{path}: {what}: rename one of them"
+        except (XoscLateralError, OSError) as error:
+            problem = " ".join(str(error).split())
+        entries.append(Entry(path, profile, problem, first.get(path.stem)))
         first.setdefault(path.stem, path)
     return entries
-
-
-def _entry(path: Path, hidden_by: Path | None) -> Entry:
-    try:
-        profile = read_profile(path)
-    except (XoscLateralError, OSError) as error:
-        return Entry(path, None, " ".join(str(error).split()), hidden_by)
-    problem = ""
-    if profile.name != path.stem:
-        problem = f"{path}: holds the profile {profile.name!r}, but is looked up as {path.stem!r}: rename one of them"
-    return Entry(path, profile, problem, hidden_by)
 
 
 def matching(entries: Iterable[Entry], tags: Collection[str], where: Mapping[str, str]) -> list[Entry]:
@@ -255,14 +252,13 @@ def matching(entries: Iterable[Entry], tags: Collection[str], where: Mapping[str
     for field in where:
         if field not in (*FIELDS, "id", "model"):
             raise XoscLateralError(f"profiles have no field {field!r}; there are id, model, {', '.join(FIELDS)}")
-    wanted = {tag.casefold() for tag in tags}
-    return [entry for entry in entries if entry.profile is not None and _matches(entry.profile, wanted, where)]
-
-
-def _matches(profile: DriverProfile, tags: set[str], where: Mapping[str, str]) -> bool:
-    facts = facts_of(profile)
-    carried = {tag.casefold() for tag in profile.metadata.tags}
-    return tags <= carried and all(facts[field].casefold() == value.casefold() for field, value in where.items())
+    wanted, found = {tag.casefold() for tag in tags}, []
+    for entry in entries:
+        if entry.profile is not None and wanted <= {tag.casefold() for tag in entry.profile.metadata.tags}:
+            facts = facts_of(entry.profile)
+            if all(facts[field].casefold() == value.casefold() for field, value in where.items()):
+                found.append(entry)
+    return found
 
 
 def facts_of(profile: DriverProfile) -> dict[str, str]:
@@ -293,10 +289,7 @@ def described(
 
 
 def own_path(name: str, folders: Iterable[Path]) -> Path:
-    """Path of a profile that may be changed.
-
-    Raises `FormatError` if it comes with the package.
-    """
+    """Path of a profile that may be changed. Raises `FormatError` if it comes with the package."""
     path = find_profile(name, folders)
     if path.parent == SHIPPED:
         what = f"comes with the package: profiles add {path.stem} --library FOLDER copies it to where it can be changed"

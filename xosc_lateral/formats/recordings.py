@@ -9,17 +9,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.importers import dlr_ht, levelx
 from xosc_lateral.formats.importers.track_table import USUAL_LENGTH, Tracks, read_tracks, tracks_of
 from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping
-from xosc_lateral.formats.opendrive import read_opendrive
+from xosc_lateral.formats.opendrive import read_opendrive, read_road
 from xosc_lateral.formats.opendrive.write import SHOULDER, WIDTH_PIECE, WrittenLane, WrittenRoad, curved_plan
 from xosc_lateral.formats.tables import foreign_errors
 from xosc_lateral.reconstruction.recorded import Track
 from xosc_lateral.road.network import RoadNetwork
-
-FloatArray = NDArray[np.float64]
 
 STEP = 0.1
 """Rows are thinned to this: lane changes and braking last seconds. [s]"""
@@ -56,11 +55,7 @@ class RecordedTraffic:
 
 
 def read_recording(
-    source: Path,
-    *,
-    kind: str | None = None,
-    road: Path | None = None,
-    columns: MappingLike | None = None,
+    source: Path, *, kind: str | None = None, road: Path | None = None, columns: MappingLike | None = None
 ) -> RecordedTraffic:
     """Read a recording.
 
@@ -150,15 +145,9 @@ def _thinned(time: FloatArray) -> NDArray[np.bool_]:
 
 # ---- recordings whose road is made -----------------------------------------------------------------------------------
 def _made(road: WrittenRoad, tracks: Sequence[Track], sources: Sequence[Path], notes: Sequence[str]) -> RecordedTraffic:
-    import tempfile
-
-    text = road.to_xml()
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / f"{road.name}.xodr"
-        path.write_text(text, encoding="utf-8")
-        network = read_opendrive(path)
-    road_file = text.encode(), f"{road.name}.xodr"
-    return RecordedTraffic(road.name, tuple(tracks), network, *road_file, tuple(sources), tuple(notes))
+    data = road.to_xml().encode()
+    about = data, f"{road.name}.xodr", tuple(sources), tuple(notes)
+    return RecordedTraffic(road.name, tuple(tracks), read_road(data, road.name), *about)
 
 
 def _dlr(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
@@ -192,7 +181,7 @@ def _levelx(source: Path, road: Path | None, columns: TableMapping) -> RecordedT
     if len(files) != 1:
         raise FormatError(f"{len(files)} recordings (XX_tracks.csv); name one", path=source)
     table, meta, about = levelx.read_recording_files(files[0])
-    rate = float(levelx.cell(about, "frameRate", files[0]))
+    rate = levelx.frame_rate(about, files[0])
     if "latLaneCenterOffset" in table.columns:
         kinds = meta.set_index("trackId").reindex(table["trackId"])["class"].astype(str).to_numpy()
         named = table.assign(time=table["frame"] / rate, heading=np.radians(table["heading"]), vehicle_class=kinds)

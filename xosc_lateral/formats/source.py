@@ -20,7 +20,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.limits import FILE_SIZE, PACKING_RATIO, UNPACKED_SIZE, UNPACKED_UNASKED, Limit
@@ -52,11 +52,16 @@ class Source:
     size: int  # [byte]
 
     def unpacked(self, size: int) -> None:
-        """Refuse what unpacks to more than its size can hold.
+        """Refuse a packed file that would take all memory; `size`: unpacked so far. [byte]
 
-        Raises `FormatError`: see `check_unpacked`.
+        Raises `FormatError`: above `limits.UNPACKED_SIZE`, or above `UNPACKED_UNASKED` and `PACKING_RATIO`.
         """
-        check_unpacked(size, self.size, self.path)
+        if size > UNPACKED_SIZE.bytes:
+            raise FormatError(UNPACKED_SIZE.refusal(size / 1e6), path=self.path)
+        ratio = size / max(self.size, 1)
+        if size > UNPACKED_UNASKED.bytes and ratio > PACKING_RATIO.value:
+            what = f"{PACKING_RATIO.refusal(ratio)} above {UNPACKED_UNASKED}; it looks like a decompression bomb"
+            raise FormatError(what, path=self.path)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,15 +73,22 @@ class Content:
 
 
 def read_source(path: Path | str, limit: Limit = FILE_SIZE) -> Content:
-    """Bytes of an input file.
-
-    Raises `FormatError`: see `open_source`.
-    """
+    """Bytes of an input file. Raises `FormatError`: see `open_source`."""
     with open_source(path, limit) as source:
         data = source.file.read(limit.bytes + 1)
     if len(data) > limit.bytes:
         raise FormatError(limit.refusal(len(data) / 1e6), path=path)
     return Content(data, last_read(Path(path)))
+
+
+def read_toml(path: Path, otherwise: str) -> dict[str, Any]:
+    """What a file in TOML says. Raises `FormatError`, beginning with `otherwise`, if it is none; see `open_source`."""
+    import tomllib
+
+    try:
+        return tomllib.loads(read_source(path).data.decode("utf-8-sig"))
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise FormatError(f"{otherwise}: {error}", path=path) from error
 
 
 @contextmanager
@@ -113,10 +125,7 @@ def last_read(path: Path) -> str:
 
 
 def check_regular(path: Path) -> os.stat_result:
-    """State of a regular file.
-
-    Raises `FormatError`: It is not there, or something else.
-    """
+    """State of a regular file. Raises `FormatError`: It is not there, or something else."""
     try:
         state = path.stat()
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
@@ -130,22 +139,6 @@ def check_regular(path: Path) -> os.stat_result:
 def state_key(state: os.stat_result) -> tuple[int, ...]:
     """Changes whenever a file is replaced or written to, also by tools that put its time of change back."""
     return state.st_ino, state.st_ctime_ns, state.st_mtime_ns, state.st_size
-
-
-def check_unpacked(unpacked: int, packed: int, path: Path) -> None:
-    """Refuse a packed file that would take all memory.
-
-    Raises `FormatError`: Above `limits.UNPACKED_SIZE`, or above `limits.UNPACKED_UNASKED` and `limits.PACKING_RATIO`.
-
-    `unpacked`, `packed`: [byte]
-    """
-    if unpacked > UNPACKED_SIZE.bytes:
-        raise FormatError(UNPACKED_SIZE.refusal(unpacked / 1e6), path=path)
-    ratio = unpacked / max(packed, 1)
-    if unpacked > UNPACKED_UNASKED.bytes and ratio > PACKING_RATIO.value:
-        raise FormatError(
-            f"{PACKING_RATIO.refusal(ratio)} above {UNPACKED_UNASKED}; it looks like a decompression bomb", path=path
-        )
 
 
 @contextmanager

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.formats.output_tables import harmless
+from xosc_lateral.lazy import pd
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.road import RoadNetwork
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 COLUMNS = ("time", "name", "x", "y", "z", "h", "speed", "road", "lane", "offset_t", "s")
 """[s], -, [m], [m], [m], [rad], [m/s], road id, lane id, [m] from the lane centre along +t, [m]."""
@@ -26,78 +24,41 @@ def states_csv(motion: NominalMotion, network: RoadNetwork) -> str:
 
     Poses are inertial: the offset of the road's header counts. `network`: that it was played on.
     """
-    columns = [list(_rows(entity, network)) for entity in motion.entities]
     lines = [",".join(COLUMNS)]
-    for rows in zip(*columns, strict=True):
+    for rows in zip(*(_lines(entity, network) for entity in motion.entities), strict=True):
         lines += [row for row in rows if row]
     return "\n".join(lines) + "\n"
 
 
+def _lines(motion: EntityMotion, network: RoadNetwork) -> Iterator[str]:
+    """One per row, empty where the entity does not exist."""
+    columns = [values.tolist() for values in _columns(motion, network, _quoted).values()]
+    for row, activity in zip(zip(*columns, strict=True), motion.activity.tolist(), strict=True):
+        yield _NUMBERS % row if activity & Activity.ACTIVE else ""
+
+
 def states_frame(motion: NominalMotion, network: RoadNetwork) -> pd.DataFrame:
     """The same rows as a frame, every digit kept."""
-    import pandas as pd
-
-    frames = [_frame(entity, network, number) for number, entity in enumerate(motion.entities)]
+    frames = [
+        pd.DataFrame(_columns(entity, network, str) | {"entity": number}).loc[(entity.activity & Activity.ACTIVE) != 0]
+        for number, entity in enumerate(motion.entities)
+    ]
     if not frames:
         return pd.DataFrame(columns=list(COLUMNS))
-    rows = pd.concat(frames, ignore_index=True).sort_values(["time", "entity"], kind="stable", ignore_index=True)
-    return rows[list(COLUMNS)]
+    rows: pd.DataFrame = pd.concat(frames, ignore_index=True)
+    return rows.sort_values(["time", "entity"], kind="stable", ignore_index=True)[list(COLUMNS)]
 
 
-def _frame(motion: EntityMotion, network: RoadNetwork, number: int) -> pd.DataFrame:
-    import pandas as pd
-
-    frame = pd.DataFrame(_columns(motion, network) | {"entity": number})
-    there: pd.DataFrame = frame.loc[(motion.activity & Activity.ACTIVE) != 0]
-    return there
-
-
-def _offset_t(motion: EntityMotion, network: RoadNetwork) -> NDArray[np.float64]:
+def _columns(motion: EntityMotion, network: RoadNetwork, text: Callable[[str], str]) -> dict[str, NDArray[Any]]:
+    """By their names in the table, shape (n,) each; `text`: how names are written."""
     on_road = motion.road >= 0
     offset_t = np.zeros(len(motion.time))
     offset_t[on_road] = network.travel_directions(motion.road[on_road], motion.lane[on_road]) * motion.offset[on_road]
-    return offset_t
-
-
-def _columns(motion: EntityMotion, network: RoadNetwork) -> dict[str, Any]:
-    """By their names in the table, shape (n,) each."""
-    ids = np.array([*network.road_ids, ""], dtype=object)
-    return {
-        "time": motion.time,
-        "name": motion.name,
-        "x": motion.x,
-        "y": motion.y,
-        "z": motion.z,
-        "h": motion.heading,
-        "speed": motion.speed,
-        "road": ids[motion.road],
-        "lane": motion.lane,
-        "offset_t": _offset_t(motion, network),
-        "s": motion.s,
-    }
-
-
-def _rows(motion: EntityMotion, network: RoadNetwork) -> Iterator[str]:
-    """One line per row, empty where the entity does not exist."""
-    name = _quoted(motion.name)
-    ids = [_quoted(road_id) for road_id in network.road_ids]
+    ids = np.array([*map(text, network.road_ids), ""], dtype=object)
+    name = np.full(len(motion.time), text(motion.name), dtype=object)
     pose = network.header_offset.apply(motion.x, motion.y, motion.z, motion.heading)
-    columns = zip(
-        motion.time.tolist(),
-        *(values.tolist() for values in pose),
-        motion.speed.tolist(),
-        motion.road.tolist(),
-        motion.lane.tolist(),
-        _offset_t(motion, network).tolist(),
-        motion.s.tolist(),
-        motion.activity.tolist(),
-        strict=True,
-    )
-    for time, x, y, z, heading, speed, road, lane, offset, s, activity in columns:
-        if activity & Activity.ACTIVE:
-            yield _NUMBERS % (time, name, x, y, z, heading, speed, ids[road] if road >= 0 else "", lane, offset, s)
-        else:
-            yield ""
+    columns = motion.time, name, *pose, motion.speed, ids[motion.road], motion.lane, offset_t, motion.s
+    return dict(zip(COLUMNS, columns, strict=True))
 
 
 def _quoted(text: str) -> str:

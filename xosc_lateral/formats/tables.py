@@ -5,26 +5,21 @@ from __future__ import annotations
 import codecs
 import gzip
 import io
-from collections.abc import Iterator
+import json
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import IO, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.hashes import parsed_hash
+from xosc_lateral.formats.mapping import TableMapping
 from xosc_lateral.formats.source import Source, open_source
+from xosc_lateral.lazy import pd
 from xosc_lateral.limits import TABLE_CELLS, TABLE_COLUMNS
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from xosc_lateral.formats.mapping import TableMapping
-
-
-FloatArray = NDArray[np.float64]
 
 _COMMA_NUMBER = r"\s*[+-]?(?:\d{1,3}(?:\.\d{3})+|\d*)(?:,\d+)?(?:[eE][+-]?\d+)?\s*"
 
@@ -43,8 +38,6 @@ def plain_cells(column: pd.Series) -> pd.Series:
 
 def comma_numbers(column: pd.Series) -> pd.Series | None:
     """Numbers such as ``3,75`` or ``1.234,5``; None if a value is no such number or none has a comma."""
-    import pandas as pd
-
     known = column.dropna().astype(str)
     if known.empty or not known.str.contains(",", regex=False).any() or not known.str.fullmatch(_COMMA_NUMBER).all():
         return None
@@ -58,37 +51,25 @@ def seconds_of_text(column: pd.Series) -> FloatArray | None:
     Counted from the earliest, or from midnight for clock times, which may run past it; NaN where there is none.
     None if a value is neither.
     """
-    import pandas as pd
-
     known = column.dropna().astype(str).str.strip()
     if known.empty:
         return None
-    seconds = _clock_seconds(known) if known.str.fullmatch(_CLOCK).all() else _since_the_earliest(known)
-    if seconds is None:
-        return None
-    found = pd.Series(seconds, index=known.index).reindex(column.index)
-    return np.array(found, dtype=np.float64)
-
-
-def _since_the_earliest(known: pd.Series) -> FloatArray | None:
-    """Seconds of dates with times; None where one is none."""
-    stamps = _stamps(known.str.replace(r"(?<=\d),(?=\d)", ".", regex=True))
-    if stamps is None:
-        return None
-    return np.asarray((stamps - stamps.min()).dt.total_seconds().to_numpy())
-
-
-def _clock_seconds(clock: pd.Series) -> FloatArray:
-    parts = clock.str.replace(",", ".", regex=False).str.split(":", expand=True).astype(float).fillna(0.0).to_numpy()
-    seconds = parts @ np.array([3600.0, 60.0, 1.0])[: parts.shape[1]]
-    past_midnight = np.cumsum(np.diff(seconds, prepend=seconds[0]) < -0.5 * _DAY)
-    return np.asarray(seconds + _DAY * past_midnight)
+    if known.str.fullmatch(_CLOCK).all():
+        clock = known.str.replace(",", ".", regex=False).str.split(":", expand=True)
+        parts = clock.astype(float).fillna(0.0).to_numpy()
+        seconds = parts @ np.array([3600.0, 60.0, 1.0])[: parts.shape[1]]
+        past_midnight = np.cumsum(np.diff(seconds, prepend=seconds[0]) < -0.5 * _DAY)
+        seconds = seconds + _DAY * past_midnight
+    else:
+        stamps = _stamps(known.str.replace(r"(?<=\d),(?=\d)", ".", regex=True))
+        if stamps is None:
+            return None
+        seconds = (stamps - stamps.min()).dt.total_seconds().to_numpy()
+    return np.array(pd.Series(seconds, index=known.index).reindex(column.index), dtype=np.float64)
 
 
 def _stamps(text: pd.Series) -> pd.Series | None:
     """Times in UTC. Days come first where dots part them; slashes are read the American way where that can be."""
-    import pandas as pd
-
     dotted = bool(text.str.match(r"\d{1,2}\.\d{1,2}\.\d{4}").all())
     for form, day_first in (("ISO8601", False), ("mixed", dotted), ("mixed", not dotted)):
         try:
@@ -98,20 +79,24 @@ def _stamps(text: pd.Series) -> pd.Series | None:
     return None
 
 
+def listed(columns: Iterable[object]) -> str:
+    """The first twenty names, and how many more there are."""
+    names = [str(name) for name in columns]
+    return ", ".join(names[:20]) + (f" and {len(names) - 20} more" if len(names) > 20 else "")
+
+
 def numbers_of(column: pd.Series, path: Path, name: str) -> FloatArray:
     """Numbers, also with decimal commas, and of `time` seconds, shape (n,); NaN where a cell is empty.
 
     Raises `FormatError` for a cell that is no number.
     """
-    import pandas as pd
-    from pandas.api import types
-
-    if types.is_datetime64_any_dtype(column):
+    if pd.api.types.is_datetime64_any_dtype(column):
         return np.array((column - column.min()).dt.total_seconds(), dtype=np.float64)
-    if not types.is_numeric_dtype(column) and name == "time" and (seconds := seconds_of_text(column)) is not None:
+    is_text = not pd.api.types.is_numeric_dtype(column)
+    if is_text and name == "time" and (seconds := seconds_of_text(column)) is not None:
         return seconds
     numbers = pd.to_numeric(column, errors="coerce")
-    if numbers.isna().any() and not types.is_numeric_dtype(column):
+    if is_text and numbers.isna().any():
         commas = comma_numbers(column)
         numbers = numbers if commas is None else commas
     strange = numbers.isna() & column.notna()
@@ -127,21 +112,20 @@ def indicators(name: str, column: pd.Series, drives: pd.Series | None, most: int
     Empty if it has more than `most` values, or changes in no drive: then it is a label, not a context.
     """
     codes, values = column.factorize()
-    if not 2 <= len(values) <= most or not _changes(codes, drives):
+    if not 2 <= len(values) <= most:
         return {}
+    if drives is not None:
+        by_drive = pd.Series(codes).groupby(drives.to_numpy())
+        if not (by_drive.max() > by_drive.min()).any():
+            return {}
     return {f"{name}={value}": (codes == k).astype(np.float64) for k, value in enumerate(values)}
 
 
-def _changes(codes: NDArray[np.intp], drives: pd.Series | None) -> bool:
-    import pandas as pd
+PARQUET = ".parquet"
+TABLE_SUFFIXES = (".csv", ".csv.gz", PARQUET)
 
-    if drives is None:
-        return True
-    by_drive = pd.Series(codes).groupby(drives.to_numpy())
-    return bool((by_drive.max() > by_drive.min()).any())
-
-
-TABLE_SUFFIXES = (".csv", ".csv.gz", ".parquet")
+AS_IT_IS = TableMapping()
+"""Nothing is known of how a table is written."""
 
 LONGEST_MESSAGE = 300
 """Of what a library says about a file; some quote half of it."""
@@ -151,52 +135,38 @@ _CHUNK = 1 << 20
 _DOUBLE = 8
 
 
-def read_table(path: Path, mapping: TableMapping | None = None) -> tuple[pd.DataFrame, str]:
+def read_table(path: Path, mapping: TableMapping = AS_IT_IS) -> tuple[pd.DataFrame, str]:
     """Read a CSV, CSV.gz or Parquet file as it is; a mapping may say how text is written.
 
     Raises `FormatError` when it isn't one, or is beyond the limits.
 
     Returns DataFrame, str: the table, and the SHA-256 of the bytes that it was parsed from.
     """
-    import pandas as pd
-
     name = path.name.lower()
     if not name.endswith(TABLE_SUFFIXES):
         raise FormatError(f"not a drive table: expected a name ending in {', '.join(TABLE_SUFFIXES)}", path=path)
-    with open_source(path) as source, foreign_errors(path, "can't be read as a table"):
-        if name.endswith(".parquet"):
-            table = _read_parquet(source)
-        else:
-            encoding, separator, decimal = None, None, "."
-            if mapping is not None:
-                encoding, separator, decimal = mapping.encoding, mapping.separator, mapping.decimal
-            text = _in_utf8(unpacked_text(source), path, encoding)
-            separator = separator or _separator(text, path)
-            table = pd.read_csv(
-                text, sep=separator, decimal=decimal, encoding="utf-8-sig", low_memory=False, index_col=False
-            )
+    table = _read(path, mapping.encoding, mapping.separator, decimal=mapping.decimal, low_memory=False)
     return table, parsed_hash(path)
 
 
 def read_text_table(path: Path) -> pd.DataFrame:
-    """A table with all cells as text, missing ones empty.
+    """A table with all cells as text, missing ones empty. Raises `FormatError`: see `read_table`."""
+    table = _read(path, dtype=str, keep_default_na=False)
+    return as_text(table) if path.name.lower().endswith(PARQUET) else table
 
-    Raises `FormatError`: see `read_table`.
-    """
-    import pandas as pd
 
+def _read(path: Path, encoding: str | None = None, separator: str | None = None, **csv: Any) -> pd.DataFrame:
     with open_source(path) as source, foreign_errors(path, "can't be read as a table"):
-        if path.name.lower().endswith(".parquet"):
-            return as_text(_read_parquet(source))
-        text = _in_utf8(unpacked_text(source), path)
-        separator = _separator(text, path)
-        return pd.read_csv(text, dtype=str, keep_default_na=False, encoding="utf-8-sig", sep=separator, index_col=False)
+        if path.name.lower().endswith(PARQUET):
+            return _read_parquet(source)
+        text = _in_utf8(unpacked_text(source), path, encoding)
+        separator = separator or _separator(text, path)
+        table: pd.DataFrame = pd.read_csv(text, sep=separator, encoding="utf-8-sig", index_col=False, **csv)
+        return table
 
 
 def as_text(table: pd.DataFrame) -> pd.DataFrame:
     """The table with all cells as text, missing ones empty."""
-    import pandas as pd
-
     return pd.DataFrame({str(name): [_as_text(value) for value in table[name]] for name in table.columns})
 
 
@@ -258,19 +228,15 @@ def _encoding(text: IO[bytes]) -> str:
 
 
 def _in_utf8(text: IO[bytes], path: Path, encoding: str | None = None) -> IO[bytes]:
-    """The text in UTF-8.
-
-    Raises `FormatError`: it is not in the encoding that is given or found.
-    """
+    """The text in UTF-8. Raises `FormatError`: it is not in the encoding that is given or found."""
     given = encoding or _encoding(text)
     if given.lower().replace("_", "-") in ("utf-8", "utf8", "utf-8-sig"):
         return text
     try:
         return io.BytesIO(text.read().decode(given).encode())
     except (UnicodeDecodeError, LookupError) as error:
-        raise FormatError(
-            f'not in UTF-8 nor in {given}: {error}; `encoding = "..."` in the file of --mapping names it', path=path
-        ) from error
+        what = f'not in UTF-8 nor in {given}: {error}; `encoding = "..."` in the file of --mapping names it'
+        raise FormatError(what, path=path) from error
 
 
 def _read_parquet(source: Source) -> pd.DataFrame:
@@ -280,21 +246,17 @@ def _read_parquet(source: Source) -> pd.DataFrame:
         about = file.metadata
         groups = range(about.num_row_groups)
         source.unpacked(max(0, sum(about.row_group(group).total_byte_size for group in groups)))
-        _check_size(about.num_rows, about.num_columns, source)
+        rows, columns = about.num_rows, about.num_columns
+        if columns > TABLE_COLUMNS.value:
+            raise FormatError(TABLE_COLUMNS.refusal(columns), path=source.path)
+        if rows * columns > TABLE_CELLS.value:
+            raise FormatError(TABLE_CELLS.refusal(rows * columns), path=source.path)
+        source.unpacked(rows * columns * _DOUBLE)  # a thousand million equal values take a few bytes in the file
         table: pd.DataFrame = file.read().to_pandas()
     if not table.columns.is_unique:
-        raise FormatError(
-            f"column {str(table.columns[table.columns.duplicated()][0])!r} appears twice", path=source.path
-        )
+        twice = str(table.columns[table.columns.duplicated()][0])
+        raise FormatError(f"column {twice!r} appears twice", path=source.path)
     return table
-
-
-def _check_size(rows: int, columns: int, source: Source) -> None:
-    if columns > TABLE_COLUMNS.value:
-        raise FormatError(TABLE_COLUMNS.refusal(columns), path=source.path)
-    if rows * columns > TABLE_CELLS.value:
-        raise FormatError(TABLE_CELLS.refusal(rows * columns), path=source.path)
-    source.unpacked(rows * columns * _DOUBLE)  # a thousand million equal values take a few bytes in the file
 
 
 def _separator(text: IO[bytes], path: Path) -> str:
@@ -305,18 +267,13 @@ def _separator(text: IO[bytes], path: Path) -> str:
     if header.count(separator) >= TABLE_COLUMNS.value:
         raise FormatError(TABLE_COLUMNS.refusal(header.count(separator) + 1), path=path, line=1)
     if separator == "," and '"' not in first and first.rstrip(",").count(",") > header.count(","):
-        raise FormatError(
-            f"{first.count(',') + 1} values under {header.count(',') + 1} headers; if numbers have a decimal comma, "
-            "separate them by semicolons or tabs",
-            path=path,
-            line=2,
-        )
+        what = f"{first.count(',') + 1} values under {header.count(',') + 1} headers"
+        advice = "if numbers have a decimal comma, separate them by semicolons or tabs"
+        raise FormatError(f"{what}; {advice}", path=path, line=2)
     return separator
 
 
 def _as_text(value: object) -> str:
-    import json
-
     if value is None or type(value).__name__ in ("NAType", "NaTType") or (isinstance(value, float) and value != value):
         return ""
     return json.dumps(value) if isinstance(value, dict | list) else str(value)

@@ -20,7 +20,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from xosc_lateral.identification.timeline import BoolArray, FloatArray, IntArray
+from xosc_lateral.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.rows import true_slices
 
 MAX_REFLECTION = 0.999  # Reflection coefficients are kept inside the unit circle: the process is stationary. [-]
@@ -69,7 +69,7 @@ class MovementProcess:
         return np.asarray(lfilter([1.0], self.polynomial, noise, axis=1)[:, warm:])
 
 
-def positions_in_run(valid: BoolArray) -> IntArray:
+def positions_in_run(valid: BoolArray) -> IndexArray:
     """How many valid rows in a row came before each row, shape (n,); -1 where invalid. [-]"""
     rows = np.arange(len(valid))
     start = np.where(valid & ~np.concatenate([[False], valid[:-1]]), rows, 0)
@@ -171,11 +171,7 @@ def start_factors(rows: FloatArray, valid: BoolArray, order: int) -> FloatArray:
     The process says how well a row is predicted from the few before it, if the run is a piece of a stationary movement.
     Runs begin where something ended, a lane change for one: their first rows may be off by more.
 
-    Parameters
-    ----------
-    rows : array, shape (n,)
-        Whitened.
-    valid : bool array, shape (n,)
+    `rows`, shape (n,): whitened; `valid`, shape (n,).
     """
     position = positions_in_run(valid)
     early, late = (position >= 0) & (position < order), position >= order
@@ -193,7 +189,7 @@ def start_factors(rows: FloatArray, valid: BoolArray, order: int) -> FloatArray:
 
 
 def unbiased(
-    process: MovementProcess, valid: BoolArray, drive: IntArray, order: int, *, longest: int | None = None
+    process: MovementProcess, valid: BoolArray, drive: IndexArray, order: int, *, longest: int | None = None
 ) -> MovementProcess:
     """A process fitted to `valid` rows less each drive's level, freed of what those levels do to it in short drives.
 
@@ -227,7 +223,7 @@ class Whitener:
 
     process: MovementProcess  # Of the movement divided by `scale`.
     valid: BoolArray  # shape (n,)
-    drive: IntArray  # shape (n,): Which level a row has; increasing.
+    drive: IndexArray  # shape (n,): Which level a row has; increasing.
     scale: FloatArray  # shape (n,): Factor on the movement at each row.
     runs: tuple[slice, ...] = ()  # Rows of each run, where they stand side by side without anything invalid in between.
 
@@ -249,7 +245,7 @@ class Whitener:
         return true_slices(self.valid)
 
     @cached_property
-    def _edges(self) -> IntArray:
+    def _edges(self) -> IndexArray:
         return np.searchsorted(self.drive, np.arange(int(self.drive.max()) + 1)).astype(np.intp)
 
     def by_position(self, values: FloatArray) -> FloatArray:

@@ -19,6 +19,7 @@ from itertools import combinations, product
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import (
     EFFECTS,
     Acts,
@@ -38,7 +39,6 @@ from xosc_lateral.driver.effects import (
     known_effects,
 )
 from xosc_lateral.identification.columns import Column, Role, Values
-from xosc_lateral.identification.timeline import FloatArray
 
 LIMITS = (0.1, 0.25, 0.5, 0.75, 0.9)  # Quantiles at which limits are tried first; refined later. [-]
 FINE_LIMITS = tuple(np.linspace(0.05, 0.95, 37).tolist())  # The quantiles at which they are refined. [-]

@@ -12,6 +12,7 @@ import numpy as np
 from xosc_lateral.driver.effects import Effect
 from xosc_lateral.driver.models.base import ModelKind
 from xosc_lateral.driver.profile import DriverProfile, Provenance
+from xosc_lateral.driver.seeds import generator
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.identification.core_model import (
     DriverVariance,
@@ -19,24 +20,17 @@ from xosc_lateral.identification.core_model import (
     compare_spectrum_shapes,
     test_population,
 )
-from xosc_lateral.identification.cross_validation import Progress, held_out_words, hold_out_blocks
-from xosc_lateral.identification.held_out import (
-    HeldOut,
-    Scorecard,
-    Setting,
-    fit_without,
-    score_held_out,
-    score_runs,
-)
+from xosc_lateral.identification.cross_validation import Progress, held_out_words
+from xosc_lateral.identification.held_out import HeldOut, Scorecard, Setting, fit_without, score_held_out, score_runs
 from xosc_lateral.identification.identify import Identified, identify, initial_terms
+from xosc_lateral.identification.model import Description, Fitted, Term
 from xosc_lateral.identification.refinement import Alternatives
-from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
+from xosc_lateral.identification.regression import fit_model
 from xosc_lateral.identification.residual import LackOfFit, lack_of_fit_of, size_of
 from xosc_lateral.identification.selection import Accepted, Gain, Selection
 from xosc_lateral.identification.significance import LoopSeed
-from xosc_lateral.identification.terms.base import Description, Term
 from xosc_lateral.identification.terms.between import between_shift
-from xosc_lateral.identification.timeline import join_drives
+from xosc_lateral.identification.timeline import Coarse, join_drives
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -63,7 +57,7 @@ def _finding(size: Description, scored: HeldOut, **about: Any) -> Finding:
 def describe_finding(one: Accepted, key: str, effects: tuple[Effect, ...], fitted: Fitted, scored: HeldOut) -> Finding:
     """Put sizes and errors to what was accepted."""
     term = one.term
-    about = {"kind": term.kind, "columns": term.columns, "alike": one.alike, "p_value": one.p_value, "gain": one.gain}
+    about = {"kind": term.kind, "columns": term.columns, "alike": term.alike, "p_value": one.p_value, "gain": one.gain}
     return _finding(term.describe(fitted, effects, key), scored, effects=effects, **about)
 
 
@@ -116,8 +110,7 @@ class LoopResult:
     @property
     def held_out(self) -> str:
         """What was held out, in words."""
-        timeline = self.coarse.timeline
-        return held_out_words(timeline, hold_out_blocks(timeline))
+        return held_out_words(self.coarse.timeline)
 
 
 def close_loop(
@@ -185,7 +178,7 @@ def close_loop(
         refined = fit_without(selection.final, everything, setting.refined_kind, name, provenance)
     findings = [describe_finding(*one, selection.final, scored) for one in _accepted(selection)]
     findings += [_finding(lack.described(), scored, kind=lack.KIND, p_value=lack.p_value) for lack in lacks]
-    rng = setting.rng(LoopSeed.SNIPPETS)
+    rng = generator(root, LoopSeed.SNIPPETS)
     progress(1.0, "done")
     return LoopResult(
         base=base,

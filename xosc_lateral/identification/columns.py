@@ -14,8 +14,9 @@ from enum import Enum, StrEnum
 
 import numpy as np
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import FormatError
-from xosc_lateral.identification.timeline import FloatArray, Timeline
+from xosc_lateral.identification.timeline import Timeline
 
 # A clock goes on in at least half of so many minutes, and hardly ever back: share of its way that is the way from end
 # to end. A random walk's is below a half. [-]
@@ -89,15 +90,7 @@ def proposed_role(column: str) -> Role:
 def roles_of(timeline: Timeline, names: Iterable[str], declared: Mapping[str, str]) -> dict[str, Assigned]:
     """Role of each column of a table.
 
-    Parameters
-    ----------
-    declared : mapping of str to str
-        Column -> role.
-
-    Raises
-    ------
-    FormatError
-        A role that there is not, or a column that the table lacks.
+    `declared`: column -> role. Raises `FormatError` for a role that there is not, or a column that the table lacks.
     """
     names = list(names)
     for column, word in declared.items():

@@ -13,12 +13,13 @@ from typing import ClassVar
 
 import numpy as np
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.identification.regression import Fitted
+from xosc_lateral.driver.seeds import child
+from xosc_lateral.identification.model import Description, Fitted
 from xosc_lateral.identification.residual import simulated_runs
 from xosc_lateral.identification.significance import LEAST, LoopSeed
-from xosc_lateral.identification.terms.base import Description
-from xosc_lateral.identification.timeline import FloatArray, Timeline, local_mean
+from xosc_lateral.identification.timeline import Timeline, smoothed
 
 TIMES_S = (0.4, 1.0, 2.0, 4.0, 8.0)  # Averaging times between which the bands lie. [s]
 BLOCK = 300  # Samples that one value per band is taken from: 60 s. [-]
@@ -62,8 +63,7 @@ def compare_spectrum_shapes(profile: DriverProfile, timeline: Timeline, seed: np
     """Compare a profile's free runs with the drives, block by block."""
     from scipy.stats import f
 
-    own_seed = np.random.SeedSequence(seed.entropy, spawn_key=(LoopSeed.SPECTRUM,))
-    runs = simulated_runs(profile, timeline, own_seed, runs=N_RUNS)
+    runs = simulated_runs(profile, timeline, child(seed, LoopSeed.SPECTRUM), runs=N_RUNS)
     real = _shapes(timeline.offset, timeline)
     own = np.concatenate([_shapes(run, timeline) for run in runs])
     if len(real) < 2 * len(TIMES_S) + 4:
@@ -78,12 +78,9 @@ def compare_spectrum_shapes(profile: DriverProfile, timeline: Timeline, seed: np
 
 def _shapes(offset: FloatArray, timeline: Timeline) -> FloatArray:
     """Logarithm of each band's size over the whole movement's, per block, shape (blocks, bands)."""
-    valid = timeline.valid
-    levels = [offset, *(local_mean(offset, valid, seconds, timeline.step) for seconds in TIMES_S)]
-    bands = [finer - coarser for finer, coarser in pairwise(levels)]
-    slow = offset - local_mean(offset, valid, 30.0, timeline.step)
-    rows = []
-    inside = np.flatnonzero(valid)
+    *levels, usual = smoothed(offset, timeline, (*TIMES_S, 30.0))
+    bands = [finer - coarser for finer, coarser in pairwise([offset, *levels])]
+    slow, rows, inside = offset - usual, [], np.flatnonzero(timeline.valid)
     for first in range(0, len(inside) - BLOCK + 1, BLOCK):
         at = inside[first : first + BLOCK]
         whole = float(np.std(slow[at]))

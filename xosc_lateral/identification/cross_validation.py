@@ -14,12 +14,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.identification.autocorrelation import Whitener
 from xosc_lateral.identification.innovations import CLIP, own_levels
-from xosc_lateral.identification.regression import Coarse, Fitted, design_of, fit_model
-from xosc_lateral.identification.selection import Gain, Search, Selection, select
-from xosc_lateral.identification.terms.base import Term
-from xosc_lateral.identification.timeline import BoolArray, FloatArray, IntArray, Timeline, coarse_middle
+from xosc_lateral.identification.model import Fitted, Term
+from xosc_lateral.identification.regression import design_of, fit_model
+from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.selection import Gain, Selection, select
+from xosc_lateral.identification.timeline import Coarse, Timeline, coarse_middle
 
 Progress = Callable[[float, str], None]  # Gets the share that is done and what is being done.
 FOLDS = 4  # Every part of the drives is held out once, and predicted from the other three.
@@ -45,8 +47,9 @@ def folds_of(blocks: IntArray) -> int:
     return min(FOLDS, int(blocks.max()) + 1)
 
 
-def held_out_words(timeline: Timeline, blocks: IntArray) -> str:
+def held_out_words(timeline: Timeline) -> str:
     """What is held out, for the record."""
+    blocks = hold_out_blocks(timeline)
     number, folds = int(blocks.max()) + 1, folds_of(blocks)
     if folds == 1:
         return "nothing: the table is too short to hold a block out"
@@ -65,13 +68,7 @@ def held_out_gain(fitted: Fitted, rest: Fitted, coarse: Coarse, held: BoolArray)
     held-out row, also where the term does nothing: on the motorway recording it cost 0.3 to 0.5 nat a vehicle, as much
     as the neighbour on the right gains. The held-out rows' own levels of place and spread are taken from themselves.
 
-    Parameters
-    ----------
-    fitted, rest : Fitted
-        Without the held-out rows.
-    coarse : Coarse
-        With the held-out rows valid.
-    held : bool array, shape (n,)
+    `fitted` and `rest`: without the held-out rows; `coarse`: with the held-out rows valid; `held`, shape (n,).
     """
     return _log_likelihood(fitted, fitted, coarse, held) - _log_likelihood(rest, fitted, coarse, held)
 
@@ -131,12 +128,18 @@ class Nested:
         for fold, pair in enumerate(pairs):
             if pair is not None:
                 rows += held_out_gain(*pair, self.coarse, self.blocks % len(pairs) == fold)
-        return _over_blocks(rows, self.blocks, self.coarse.valid, folds)
+        return gain_over(rows, self.blocks, self.coarse.valid, folds)
+
+
+def gain_over(rows: FloatArray, blocks: IntArray, valid: BoolArray, folds: int) -> Gain:
+    """Mean over blocks of what their rows gain, shape (n,), with its standard error. [nat]"""
+    sums = np.bincount(blocks, rows)[np.unique(blocks[valid])]
+    error = float(np.std(sums, ddof=1) / np.sqrt(len(sums))) if len(sums) > 1 else 0.0
+    return Gain(float(sums.mean()), error, folds)
 
 
 def nest(
     search: Search,
-    blocks: IntArray,
     initial: Sequence[Term],
     wanted: Mapping[str, int],
     progress: Callable[[float], None] = lambda _: None,
@@ -146,18 +149,12 @@ def nest(
     A level that all have to reach would bias the gain. What a fold lacks of an effect, the others have more of: it is
     significant in just those whose own held-out rows show least of it.
 
-    Parameters
-    ----------
-    blocks : int array, shape (n,)
-        On the 0.2 s grid.
-    wanted : mapping of str to int
-        Terms that the table has, of the components in which any was accepted.
+    `wanted`: terms that the table has, of the components in which any was accepted.
     """
     from joblib import cpu_count
 
-    coarse = search.coarse
-    seconds = coarse_middle(blocks)[: len(coarse)]
-    folds = folds_of(blocks)
+    coarse, blocks = search.coarse, hold_out_blocks(search.coarse.timeline)
+    seconds, folds = coarse_middle(blocks)[: len(coarse)], folds_of(blocks)
     quiet = replace(search, wanted=wanted, progress=lambda _: None)
 
     def selected(fold: int) -> Selection:
@@ -175,9 +172,3 @@ def nest(
 
 def _any_matches(term: Term, others: Sequence[Term]) -> bool:
     return any(type(term) is type(other) and term.matches(other) for other in others)
-
-
-def _over_blocks(rows: FloatArray, blocks: IntArray, valid: BoolArray, folds: int) -> Gain:
-    sums = np.bincount(blocks, rows)[np.unique(blocks[valid])]
-    error = float(np.std(sums, ddof=1) / np.sqrt(len(sums))) if len(sums) > 1 else 0.0
-    return Gain(float(sums.mean()), error, folds)

@@ -18,19 +18,12 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.driver.effects import ColumnEffect
 from xosc_lateral.identification.autocorrelation import Whitener
 from xosc_lateral.identification.candidates import Candidate
 from xosc_lateral.identification.significance import MANY_DRIVES
-from xosc_lateral.identification.timeline import (
-    BoolArray,
-    FloatArray,
-    IntArray,
-    Timeline,
-    coarse_mean,
-    coarse_middle,
-    start_anew,
-)
+from xosc_lateral.identification.timeline import Timeline, coarse_mean, coarse_middle, start_anew
 
 SingleArray = NDArray[np.float32]
 Reals = NDArray[np.floating[Any]]
@@ -59,7 +52,7 @@ class Quantities:
 
     candidates: list[Candidate]
     values: SingleArray
-    drive: IntArray
+    drive: IndexArray
 
     @classmethod
     def of(
@@ -77,7 +70,7 @@ class Quantities:
         stacked = np.stack(rows) if rows else np.zeros((0, len(valid)), dtype=np.float32)
         return cls(kept, stacked, coarse_middle(timeline.drive)[: len(valid)])
 
-    def responses(self, members: IntArray, response_s: float) -> FloatArray:
+    def responses(self, members: IndexArray, response_s: float) -> FloatArray:
         """Some of them through a first-order lag, each drive on its own, shape (n, members)."""
         return respond_by_second(self.values[members].T, response_s, self.drive)
 
@@ -138,7 +131,7 @@ def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:
     return Dictionary([entry[0] for entry in entries], timings[:, 0], timings[:, 1], np.concatenate(blocks))
 
 
-def respond_by_second(values: Reals, response_s: float, drive: IntArray) -> FloatArray:
+def respond_by_second(values: Reals, response_s: float, drive: IndexArray) -> FloatArray:
     """Means over each second of a first-order lag of gain 1, settled where a drive starts; like `values`, (n, k).
 
     Exact for values that stay the same for the second. `drive`: of each row, shape (n,), increasing.
@@ -157,7 +150,7 @@ def score_entries(
     residual: FloatArray,
     known: FloatArray,
     barred: BoolArray,
-    drive: IntArray,
+    drive: IndexArray,
     rng: np.random.Generator,
     *,
     draws: int = NULL_DRAWS,
@@ -234,7 +227,7 @@ def _beside_loud_stretches(
     return robust
 
 
-def draw_null(residual: FloatArray, drive: IntArray, rng: np.random.Generator, draws: int = NULL_DRAWS) -> FloatArray:
+def draw_null(residual: FloatArray, drive: IndexArray, rng: np.random.Generator, draws: int = NULL_DRAWS) -> FloatArray:
     """Residuals whose tie to the columns is broken, shape (seconds, draws).
 
     Few long drives: rotated by at least `LEAST_SHIFT_S`, cut into blocks, and these dealt in random order. Rotations

@@ -29,8 +29,9 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.identification.columns import Assigned, Column, Role, Values
-from xosc_lateral.identification.timeline import BoolArray, FloatArray, IntArray, Timeline
+from xosc_lateral.identification.timeline import Timeline
 
 ComplexArray = NDArray[np.complex128]
 
@@ -148,7 +149,7 @@ def _movement(timeline: Timeline) -> Mapping[str, FloatArray]:
     }
 
 
-def _predicted_share(values: FloatArray, moved: Mapping[str, FloatArray], rows: IntArray) -> float:
+def _predicted_share(values: FloatArray, moved: Mapping[str, FloatArray], rows: IndexArray) -> float:
     """Partial R squared of the recent movement, the present included, given the column's own past."""
     if len(rows) < ROWS_EACH * (1 + OWN_PAST + len(moved) * len(range(0, MOVED_PAST + 1, 2))):
         return 0.0
@@ -168,7 +169,7 @@ def _left(values: FloatArray, design: FloatArray) -> float:
     return float(np.mean((values - scaled @ sizes) ** 2))
 
 
-def _rows_with_past(valid: BoolArray, past: int) -> IntArray:
+def _rows_with_past(valid: BoolArray, past: int) -> IndexArray:
     sums = np.concatenate([[0], np.cumsum(valid)])
     rows = np.arange(past, len(valid))
     return np.asarray(rows[sums[rows + 1] - sums[rows - past] == past + 1], dtype=np.intp)
@@ -178,7 +179,7 @@ def _rows_with_past(valid: BoolArray, past: int) -> IntArray:
 class _Segments:
     """Where the segments of a spectral estimate begin, and how many samples each has."""
 
-    starts: IntArray
+    starts: IndexArray
     length: int
 
     def spectra(self, values: FloatArray) -> ComplexArray:

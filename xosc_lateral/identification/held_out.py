@@ -8,11 +8,13 @@ from functools import cached_property
 import numpy as np
 from msgspec import structs
 
-from xosc_lateral.driver.effects import ColumnEffect, Effect, TimeSmooth
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.driver.effects import Effect
 from xosc_lateral.driver.fitting import fit_population, fit_runs
 from xosc_lateral.driver.models.base import ModelKind
 from xosc_lateral.driver.place import COLUMNS as KNOWN_TO_THE_BASE
 from xosc_lateral.driver.profile import COLUMNS, DriverProfile, Provenance
+from xosc_lateral.driver.seeds import child, generator
 from xosc_lateral.drives.cuts import MIN_RUN
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.filters import filtered
@@ -22,7 +24,8 @@ from xosc_lateral.evaluation.distances import Distances, mean_distances, metric_
 from xosc_lateral.evaluation.metrics import METRICS, snippet_metrics
 from xosc_lateral.identification.columns import Column
 from xosc_lateral.identification.cross_validation import Nested, Progress, folds_of, hold_out_blocks
-from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
+from xosc_lateral.identification.model import Fitted, Removal
+from xosc_lateral.identification.regression import fit_model
 from xosc_lateral.identification.residual import (
     SummaryStatistics,
     error_between,
@@ -34,10 +37,8 @@ from xosc_lateral.identification.residual import (
 )
 from xosc_lateral.identification.selection import Selection
 from xosc_lateral.identification.significance import LoopSeed
-from xosc_lateral.identification.terms.base import Removal
 from xosc_lateral.identification.terms.cycle import CycleTerm
-from xosc_lateral.identification.terms.time import StepTerm
-from xosc_lateral.identification.timeline import COARSE, BoolArray, FloatArray, IntArray, Timeline, coarse_middle
+from xosc_lateral.identification.timeline import Coarse, Timeline, coarse_middle
 from xosc_lateral.rows import true_slices
 
 FINE_S = 1.0  # Movement within this time counts as fine when a spread is taken out. [s]
@@ -93,10 +94,6 @@ class Setting:
         """What is held out."""
         return hold_out_blocks(self.coarse.timeline)
 
-    def rng(self, key: LoopSeed) -> np.random.Generator:
-        """Source of chance for one purpose."""
-        return np.random.default_rng(np.random.SeedSequence(self.root.entropy, spawn_key=(key,)))
-
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
@@ -135,7 +132,7 @@ def score_held_out(
     before = expected(statistics, runs_before, timeline.valid)
     after = before if runs_after is runs_before else expected(statistics, runs_after, timeline.valid)
     unmoved = timeline.offset - removal_of(fitted).location
-    halves = half_samples(statistics, unmoved, setting.blocks, setting.rng(LoopSeed.BLOCKS))
+    halves = half_samples(statistics, unmoved, setting.blocks, generator(setting.root, LoopSeed.BLOCKS))
     return HeldOut(statistics, real, before, after, runs_before, runs_after, halves)
 
 
@@ -158,8 +155,7 @@ def _held_out_runs(
             profiles.append(fit_without(fitted, used, setting.refined_kind, "after", None))
         for side, profile in enumerate(profiles):
             # the same luck for both sides and all folds: what differs is the profile, and runs go on from fold to fold
-            seed = np.random.SeedSequence(setting.root.entropy, spawn_key=(LoopSeed.FOLDS,))
-            runs = simulated_runs(profile, coarse.timeline, seed, held=held)
+            runs = simulated_runs(profile, coarse.timeline, child(setting.root, LoopSeed.FOLDS), held=held)
             sides[side] = sides[side] if len(sides[side]) else np.zeros_like(runs)
             sides[side][:, held] = runs[:, held]
     return sides[0], sides[1] if len(sides[1]) else sides[0]
@@ -195,13 +191,8 @@ def _quantities(fitted: Fitted, columns: list[Column]) -> dict[str, FloatArray]:
             angle = 2.0 * np.pi / column.period * quantities.pop(column.name)
             quantities |= {f"sin({column.name})": np.sin(angle), f"cos({column.name})": np.cos(angle)}
     for key, (term, effects) in fitted.estimates.items():
-        effect = effects[0] if effects else None
-        if isinstance(effect, ColumnEffect):
-            quantities[f"effect: {key}"] = coarse.strength(effect)
-        elif isinstance(effect, TimeSmooth):
-            quantities[f"effect: {key}"] = effect.path(effect.location or effect.spread, coarse.timeline.time)
-        elif isinstance(term, StepTerm):
-            quantities[f"effect: {key}"] = (np.arange(len(coarse.timeline)) >= term.at * COARSE).astype(float)
+        if (own := term.quantity(coarse, effects)) is not None:
+            quantities[f"effect: {key}"] = own
     return quantities
 
 

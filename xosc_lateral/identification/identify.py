@@ -13,15 +13,16 @@ from msgspec import structs
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Drift, TimeSmooth, VarianceTrend
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.identification.columns import Assigned, Column, Role, known_columns, roles_of
-from xosc_lateral.identification.cross_validation import Nested, Progress, hold_out_blocks, nest
+from xosc_lateral.identification.cross_validation import Nested, Progress, nest
 from xosc_lateral.identification.feedback import Feedback, find_feedback
-from xosc_lateral.identification.regression import Coarse
-from xosc_lateral.identification.selection import ERROR_BUDGET, Gain, Rejected, Search, Selection, select
-from xosc_lateral.identification.terms.base import Term
+from xosc_lateral.identification.model import Term
+from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.selection import ERROR_BUDGET, Gain, Rejected, Selection, select
 from xosc_lateral.identification.terms.between import BetweenTerm, is_between
-from xosc_lateral.identification.terms.column import MeanTerm, SpreadTerm
+from xosc_lateral.identification.terms.mean import MeanTerm
+from xosc_lateral.identification.terms.spread import SpreadTerm
 from xosc_lateral.identification.terms.time import StepTerm, TimeMeanTerm, TimeSpreadTerm
-from xosc_lateral.identification.timeline import Timeline
+from xosc_lateral.identification.timeline import Coarse, Timeline, unsized
 
 # Why a term that loses on held-out rows is rejected.
 VETOED = "significant, but chosen and estimated on other blocks it predicts the held-out ones worse than nothing"
@@ -75,16 +76,8 @@ def identify(
 ) -> Identified:
     """Select terms, and keep those that predict blocks on which they were neither selected nor sized.
 
-    Parameters
-    ----------
-    seed : SeedSequence
-        Of the rotations and other nulls.
-    initial : sequence of Term
-        In the model already.
-    excluded : sequence of str
-        Columns that are not to be tested.
-    roles : mapping of str to str
-        What columns are declared to be; see `columns.roles_of`.
+    `initial` terms are in the model already, `excluded` columns are not tested; `roles` are what columns are declared
+    to be, see `columns.roles_of`.
     """
     from threadpoolctl import threadpool_limits
 
@@ -100,12 +93,11 @@ def identify(
         found = {one.term.component for one in selection.accepted} - {StepTerm.component}
         there = Counter(term.component for term in selection.final.terms)
         wanted = {component: there[component] for component in sorted(found)}
-        folds = hold_out_blocks(coarse.timeline)
 
         def done(share: float) -> None:
             progress(0.3 + 0.3 * share, "selecting without a fold")
 
-        return _worst_first(Identified(usable, selection, nest(search, folds, (*initial, *once), wanted, done)))
+        return _worst_first(Identified(usable, selection, nest(search, (*initial, *once), wanted, done)))
 
 
 def usable_columns(
@@ -133,21 +125,12 @@ def initial_terms(base: DriverProfile, timeline: Timeline) -> tuple[Term, ...]:
     terms: list[Term] = []
     for effect in base.effects:
         if isinstance(effect, ColumnEffect) and set(effect.columns) <= there:
-            unsized = structs.replace(
-                effect,
-                coefficients=(),
-                errors=(),
-                reference=(),
-                between_drivers=(),
-                response_range=(),
-                response_s=effect.response_time,
-                response_order=1,
-            )
+            known = structs.replace(unsized(effect), response_s=effect.response_time, response_order=1)
             if effect.acts is Acts.LOCATION:
                 between = is_between(effect) or _same_throughout(effect, timeline)
-                terms.append(BetweenTerm.of(unsized) if between else MeanTerm.of(unsized))
+                terms.append(BetweenTerm.of(known) if between else MeanTerm.of(known))
             elif effect.acts is Acts.SPREAD:
-                terms.append(SpreadTerm.of(unsized))
+                terms.append(SpreadTerm.of(known))
         elif isinstance(effect, VarianceTrend):
             terms.append(TimeSpreadTerm(order=1))
         elif isinstance(effect, Drift):

@@ -17,13 +17,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.driver.effects.hidden import half_cosines
 from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression
 from xosc_lateral.identification.dictionary import beside, orthonormal
 from xosc_lateral.identification.innovations import LONGEST, ORDER
-from xosc_lateral.identification.regression import MIN_DRIFT_S, Coarse, Fitted
+from xosc_lateral.identification.model import Fitted
 from xosc_lateral.identification.significance import LEAST, upper_tail
-from xosc_lateral.identification.timeline import BoolArray, FloatArray
+from xosc_lateral.identification.timeline import MIN_DRIFT_S, Coarse
 
 # Half cosines tried for the mean. The fit has the most of them, penalised: a test wants few, a curve its shape.
 ORDERS = (1, 2, 4, 8)

@@ -13,14 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 from msgspec import structs
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.driver.effects import ColumnEffect, Product
 from xosc_lateral.driver.effects.product import Form
 from xosc_lateral.identification.autocorrelation import Problem
 from xosc_lateral.identification.candidates import FINE_SCALES, Family, shapes_of
 from xosc_lateral.identification.columns import Column
 from xosc_lateral.identification.dictionary import beside, orthonormal
-from xosc_lateral.identification.regression import Coarse
-from xosc_lateral.identification.timeline import COARSE, FloatArray, IntArray
+from xosc_lateral.identification.timeline import COARSE, Coarse
 
 Alternatives = tuple[tuple[str, ...], ...]  # Columns of each effect that explains as much.
 Priced = tuple[ColumnEffect, float]  # An effect, and what its family and a finer choice within it take from its score.
@@ -58,12 +58,7 @@ class Refined:
 class Refinement:
     """Scores effects beside everything known, many at once.
 
-    Parameters
-    ----------
-    known : array, shape (seconds, k)
-        Orthonormal; partialled out.
-    costs : mapping of Family to float
-        What a member of each family costs.
+    `known`, shape (seconds, k), is orthonormal, and partialled out; `costs` are those of a member of each family.
     """
 
     def __init__(self, coarse: Coarse, problem: Problem, known: FloatArray, costs: Mapping[Family, float]) -> None:

@@ -1,8 +1,7 @@
-"""The one model of a drive, and the fit of all its terms together.
+"""The fit of all terms of the model together.
 
-offset = level of the drive + mean terms + scale * movement, the movement an autoregression at 1 Hz, log scale = level
-of the drive + scale terms. Mean terms are fitted jointly by generalised least squares, scale terms by iterated
-regression of squared innovations [1]_: adding a term corrects the ones found before.
+Mean terms are fitted jointly by generalised least squares, scale terms by iterated regression of squared innovations
+[1]_: adding a term corrects the ones found before.
 
 References
 ----------
@@ -11,188 +10,24 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
-from msgspec import structs
 
-from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression, start_factors, unbiased
-from xosc_lateral.identification.innovations import (
-    LONGEST,
-    ORDER,
-    bounded,
-    clipped_squares,
-    covariance_of_log_sizes,
-    innovations,
-    own_levels,
-    scoring_step,
-)
-from xosc_lateral.identification.timeline import (
-    BoolArray,
-    FloatArray,
-    IntArray,
-    Timeline,
-    coarse_all,
-    coarse_mean,
-    coarse_middle,
-    means_by_drive,
-)
-
-if TYPE_CHECKING:
-    from xosc_lateral.identification.terms.base import Term
+from xosc_lateral.identification.innovations import CLIP, LONGEST, ORDER, own_levels
+from xosc_lateral.identification.model import Fitted, Term, joined
+from xosc_lateral.identification.timeline import CLUSTER_S, Coarse, means_by_drive
 
 # White noise that the model of a drive has beside what it shows: no table knows the lane better (in the motorway
 # recording the standard error of a lane's centre is 0.03 m; docs/real_data.md). Providers smooth their tracks,
 # responses and all; without a floor an effect is sized where the smoothing left nothing of it. [m]
 FLOOR = 0.03
-# Stretches of a drive that count as independent in the errors of sizes: far beyond what whitening leaves of the memory,
-# and the whole of a passing vehicle. [s]
-CLUSTER_S = 60
+# Scale terms together change the movement by at most this factor's logarithm, 20 either way: scoring steps of a factor
+# that the movement contradicts grow without end. [-]
+MOST_LOG_SCALE = 3.0
 ROUNDS = 4  # Turns of sizes, autoregression and scale; they settle in three.
-MIN_DRIFT_S = 600.0  # A shorter drive tells nothing about drift or a trend of the variance. [s]
-
-
-@dataclass(frozen=True, eq=False)
-class Coarse:
-    """The timeline at 1 Hz, and every column effect's response on it."""
-
-    timeline: Timeline
-    offset: FloatArray  # shape (n,): Mean of each second. [m]
-    valid: BoolArray  # shape (n,)
-    drive: IntArray  # shape (n,)
-    time: FloatArray  # shape (n,): [s]
-    # Columns on the fine grid, lane width included, clipped to what occurs while road-following: a traffic jam that is
-    # cut out must not stretch a column's range.
-    context: Mapping[str, FloatArray]
-    _responses: dict[ColumnEffect, FloatArray] = field(default_factory=dict, repr=False)
-
-    @classmethod
-    def of(cls, timeline: Timeline) -> Coarse:
-        """Average to 1 Hz."""
-        columns = {"lane_width": timeline.lane_width, **timeline.context}
-        return cls(
-            timeline,
-            coarse_mean(timeline.offset),
-            coarse_all(timeline.valid),
-            coarse_middle(timeline.drive),
-            coarse_mean(timeline.time),
-            {name: _within(values, timeline.valid) for name, values in columns.items()},
-        )
-
-    def __len__(self) -> int:
-        return len(self.offset)
-
-    def only(self, rows: BoolArray) -> Coarse:
-        """The same with fewer valid rows; `rows`: shape (n,)."""
-        return replace(self, valid=self.valid & rows, _responses={})
-
-    @property
-    def drives(self) -> int:
-        """Number of drives."""
-        return int(self.drive.max()) + 1
-
-    @cached_property
-    def cluster(self) -> IntArray:
-        """Clusters: minutes within drives, numbered, shape (n,); they count as independent of each other."""
-        _, first = np.unique(self.drive, return_index=True)
-        minute = (np.arange(len(self)) - first[self.drive]) // CLUSTER_S
-        _, cluster = np.unique(self.drive * len(self) + minute, return_inverse=True)
-        return cluster.astype(np.intp)
-
-    @property
-    def lasts(self) -> bool:
-        """Whether a drive is long enough to change with time: minutes, not the minute of a passing vehicle."""
-        return bool(np.bincount(self.drive, self.valid.astype(float)).max() >= MIN_DRIFT_S)
-
-    def response(self, effect: ColumnEffect, *, keep: bool = False) -> FloatArray:
-        """The effect's quantity [own unit] as the driver responds to it, less its mean where valid; shape (n, k)."""
-        key = structs.replace(
-            effect, acts=Acts.LOCATION, coefficients=(), errors=(), reference=(), between_drivers=(), response_range=()
-        )
-        if key in self._responses:
-            return self._responses[key]
-        response = coarse_mean(self.fine_response(key))
-        response = response - response[self.valid].mean(axis=0)
-        if keep:
-            self._responses[key] = response
-        return np.asarray(response, dtype=np.float64)
-
-    def fine_response(self, effect: ColumnEffect) -> FloatArray:
-        """The same on the 0.2 s grid, as it is, shape (fine n, k). [own unit]"""
-        return self.timeline.response(effect, self.context)
-
-    def strength(self, effect: ColumnEffect) -> FloatArray:
-        """What an effect of columns that the table has does on the 0.2 s grid, shape (fine n,). [m], or log factor"""
-        return effect.weighed(self.fine_response(effect))
-
-    def by_drive(self, values: FloatArray) -> FloatArray:
-        """Mean over the valid rows of each drive, shape (drives,), in the values' unit; 0 where there are none."""
-        return means_by_drive(values, self.valid, self.drive)
-
-
-@dataclass(frozen=True, eq=False)
-class Fitted:
-    """Terms with sizes, and what is left."""
-
-    coarse: Coarse
-    terms: tuple[Term, ...]
-    whitener: Whitener
-    columns: FloatArray  # shape (n, k): Of the mean, term by term.
-    sizes: FloatArray  # shape (k,): [m] per unit.
-    covariance: FloatArray  # shape (k, k): [m] per unit.
-    levels: FloatArray  # shape (drives,): Mean offset of every drive where all mean terms are at their mean. [m]
-    log_sizes: FloatArray  # shape (j,): Natural logarithm per unit.
-    log_covariance: FloatArray  # shape (j, j): Natural logarithm per unit.
-    movement: FloatArray  # shape (n,): Offset less level and mean terms, over the scale; 0 where invalid. [m]
-    starts: FloatArray  # shape (order + 1,): Factor on the errors of the first rows of runs, for the likelihood.
-    log_likelihood: float  # Gaussian, of the valid rows.
-
-    @property
-    def scale(self) -> FloatArray:
-        """Factor on the movement, > 0, shape (n,). [-]"""
-        return self.whitener.scale
-
-    @cached_property
-    def innovations(self) -> FloatArray:
-        """Whitened by the movement as it is seen, without a floor: how large it is just now. Shape (n,), variance 1."""
-        coarse = self.coarse
-        moved = coarse.offset - self.levels[coarse.drive]
-        rows = innovations(moved, self.columns @ self.sizes, coarse.valid, coarse.drive, self.scale)
-        variance = float(rows @ rows) / max(1, int(coarse.valid.sum()) - len(self.sizes))
-        return np.asarray(rows / np.sqrt(max(variance, 1e-300)))
-
-    @property
-    def explained(self) -> FloatArray:
-        """Levels and mean terms on the 0.2 s grid, shape (fine n,). [m]"""
-        timeline = self.coarse.timeline
-        columns = joined([term.fine_mean_columns(self.coarse) for term in self.terms], len(timeline))
-        return columns @ self.sizes + self.levels[timeline.drive]
-
-    @cached_property
-    def estimates(self) -> Mapping[str, tuple[Term, tuple[Effect, ...]]]:
-        """Every term and what the profile gets for it, by component and number ("mean 0", "step 0")."""
-        found: dict[str, tuple[Term, tuple[Effect, ...]]] = {}
-        for term in self.terms:
-            number = sum(1 for key in found if key.rpartition(" ")[0] == term.kind_key)
-            found[f"{term.kind_key} {number}"] = (term, term.estimate(self))
-        return found
-
-    def mean_part(self, term: Term) -> slice:
-        """Where a term's coefficients of the mean are."""
-        return self._part(term, [other.mean_columns(self.coarse).shape[1] for other in self.terms])
-
-    def scale_part(self, term: Term) -> slice:
-        """Where a term's coefficients of the log scale are."""
-        return self._part(term, [other.scale_columns(self.coarse).shape[1] for other in self.terms])
-
-    def _part(self, term: Term, widths: Sequence[int]) -> slice:
-        index = next(i for i, other in enumerate(self.terms) if other is term)
-        first = sum(widths[:index])
-        return slice(first, first + widths[index])
 
 
 def design_of(coarse: Coarse, terms: Sequence[Term]) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -243,16 +78,6 @@ def fit_model(coarse: Coarse, terms: Sequence[Term]) -> Fitted:
     )
 
 
-def _within(values: FloatArray, valid: BoolArray) -> FloatArray:
-    seen = values[valid & np.isfinite(values)]
-    return np.where(np.isinf(values), values, np.clip(values, seen.min(), seen.max())) if len(seen) else values
-
-
-def joined(blocks: Sequence[FloatArray], n: int) -> FloatArray:
-    """Columns side by side, shape (n, k); none of none."""
-    return np.concatenate(blocks, axis=1) if blocks else np.zeros((n, 0))
-
-
 def clustered_least_squares(
     design: FloatArray, observed: FloatArray, cluster: IntArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -276,3 +101,39 @@ def clustered_least_squares(
     clusters = int(np.count_nonzero(scores.any(axis=1)))
     freedom = clusters / max(1, clusters - 1) * (len(observed) - 1) / max(1, len(observed) - design.shape[1])
     return sizes, np.asarray(inverse @ (scores.T @ scores) @ inverse * freedom, dtype=np.float64)
+
+
+def clipped_squares(rows: FloatArray, valid: BoolArray) -> FloatArray:
+    """Squares over their mean where valid, at most `CLIP`, shape (n,). [-]"""
+    return np.asarray(np.minimum(np.square(rows) / max(float(np.mean(rows[valid] ** 2)), 1e-300), CLIP))
+
+
+def _within_drives(scales: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
+    """Valid rows of the scale's columns about their drive's mean."""
+    means = np.stack([means_by_drive(column, valid, drive) for column in scales.T], axis=1)
+    return np.asarray((scales - means[drive])[valid])
+
+
+def scoring_step(scales: FloatArray, rows: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
+    """One Fisher-scoring step [-], shape (j,), for log sd = scales . sizes (variance of a squared normal is 2)."""
+    squares, design = clipped_squares(rows, valid)[valid], _within_drives(scales, valid, drive)
+    return np.asarray(np.linalg.pinv(2.0 * design.T @ design) @ (design.T @ (squares / squares.mean() - 1.0)))
+
+
+def bounded(log_sizes: FloatArray, scales: FloatArray) -> FloatArray:
+    """Log sizes [-], shape (j,), scaled down as a whole so that no row's log scale is beyond `MOST_LOG_SCALE`."""
+    reach = float(np.max(np.abs(scales @ log_sizes), initial=0.0))
+    return log_sizes * min(1.0, MOST_LOG_SCALE / max(reach, 1e-300))
+
+
+def covariance_of_log_sizes(scales: FloatArray, rows: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
+    """Sandwich, clustered like that of the mean, shape (j, j): squares have heavy tails and come in clusters."""
+    if scales.shape[1] == 0:
+        return np.zeros((0, 0))
+    design = _within_drives(scales, valid, drive)
+    bread = np.linalg.pinv(2.0 * design.T @ design)
+    squares = clipped_squares(rows, valid)[valid]
+    scores = design * (squares / squares.mean() - 1.0)[:, None]
+    edges = np.flatnonzero(np.diff(np.flatnonzero(valid) // CLUSTER_S, prepend=-1))
+    sums = np.add.reduceat(scores, edges, axis=0)
+    return np.asarray(bread @ (sums.T @ sums) @ bread * len(sums) / max(1, len(sums) - 1))

@@ -21,11 +21,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import OffsetSampler
 from xosc_lateral.driver.seeds import child
 from xosc_lateral.drives.resampling import in_digits
-from xosc_lateral.identification.timeline import LOCAL_S, PAD, BoolArray, FloatArray, IntArray, Timeline, local_mean
+from xosc_lateral.identification.timeline import LOCAL_S, PAD, Timeline, local_mean, smoothed
 from xosc_lateral.segment import Segment
 
 N_BINS = 5  # Bins of a column, equally filled.
@@ -33,9 +34,7 @@ RESPONSE_S = 2.0  # Columns are smoothed as a driver responds before they are bi
 BANDS_S = (1.0, 3.0, 8.0, 20.0, 60.0, 200.0)  # Averaging times between which the bands of the movement lie. [s]
 # Name of that group, and frequencies to each side that belong to it. [-]
 OSCILLATION, LINE_WIDTH = "movement at the weave's period", 2
-
 LOCAL_QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
-
 N_RUNS = 24  # Runs of the profile that its expectation is taken over ...
 FEW_RUNS, MANY_DRIVES = 6, 50  # ... and how many with so many drives, each of which is another sample already.
 DRAWS = 64  # Half samples of the blocks.
@@ -52,7 +51,7 @@ class SummaryStatistics:
     timeline: Timeline
     labels: Mapping[str, IntArray]  # shape (n,): Bin of every row by group (a column's name, "time", ...), -1: none.
     middles: Mapping[str, FloatArray]  # Mean of the quantity per bin, for curves.
-    oscillation: float | None = None  # Frequency of a weave that was found. [1/s]
+    oscillation: float | None = None  # Frequency of a cycle that was found. [1/s]
 
     def describe(self, offset: FloatArray, used: BoolArray) -> dict[str, FloatArray]:
         """Statistics of one series of offsets on the grid, shape (n,), by group. [m]"""
@@ -153,12 +152,8 @@ def half_samples(
 ) -> list[dict[str, FloatArray]]:
     """Random halves of the blocks less all of them: their variance is that of all of them about the truth [2]_.
 
-    Parameters
-    ----------
-    offset : array, shape (n,)
-        Measured, less the effects on the mean that are known: where the car should be is no chance. [m]
-    blocks : int array, shape (n,)
-        What is drawn: whole ones.
+    `offset`, shape (n,) [m]: measured, less the effects on the mean that are known: where the car should be is no
+    chance. `blocks`, shape (n,): what is drawn, as a whole.
     """
     valid = statistics.timeline.valid
     numbers, whole = np.unique(blocks[valid]), statistics.describe(offset, valid)
@@ -262,8 +257,7 @@ def _by_bin(values: FloatArray, label: IntArray, used: BoolArray) -> FloatArray:
 def _bands(offset: FloatArray, used: BoolArray, timeline: Timeline) -> FloatArray:
     if not used.any():
         return np.full(len(BANDS_S) + 1, np.nan)
-    levels = [offset, *(local_mean(offset, timeline.valid, seconds, timeline.step) for seconds in BANDS_S)]
-    inside = [level[used] for level in levels]
+    inside = [level[used] for level in (offset, *smoothed(offset, timeline, BANDS_S))]
     bands = [np.std(finer - coarser) for finer, coarser in pairwise(inside)]
     return np.array([*bands, np.std(inside[-1])])
 

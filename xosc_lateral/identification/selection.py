@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
-
-import numpy as np
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 from xosc_lateral.identification import terms
-from xosc_lateral.identification.candidates import candidates_of
-from xosc_lateral.identification.columns import Column
-from xosc_lateral.identification.dictionary import CROSS_BASIS, TIMINGS, Quantities, orthonormal
-from xosc_lateral.identification.refinement import Alternatives
-from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
-from xosc_lateral.identification.significance import Budget
-from xosc_lateral.identification.terms.base import Stage, Term
-from xosc_lateral.identification.timeline import FloatArray
+from xosc_lateral.identification.model import Fitted, Stage, Term
+from xosc_lateral.identification.regression import fit_model
+from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.significance import BUDGET
 from xosc_lateral.normal import NORMAL_95
 from xosc_lateral.plugins import defined_in
 
@@ -30,91 +23,19 @@ def in_stages(kinds: tuple[type[Term], ...]) -> tuple[tuple[type[Term], ...], ..
     return tuple(tuple(kind for kind in asked if stage in kind.stages) for stage in Stage)
 
 
-def shared_among(kinds: tuple[type[Term], ...]) -> Budget:
-    """The error budget by the terms' own weights; those of one component compete, and share one part of it."""
-    return Budget(
-        {kind.component: kind.weight for kind in kinds}, {kind.component: kind.least_drives for kind in kinds}
-    )
+def shared_among(kinds: tuple[type[Term], ...]) -> dict[str, float]:
+    """Part of the error budget of every component, by the terms' own weights; those of one component share a part.
+
+    Where nothing can be asked of a component, its part is not spent: a table on which something acts is searched again
+    beside it, at the same levels.
+    """
+    weights = {kind.component: kind.weight for kind in kinds}
+    return {component: BUDGET * weight / sum(weights.values()) for component, weight in weights.items()}
 
 
 STAGES = in_stages(TERMS)  # Of a stage, what has the smallest p-value is added first.
 ERROR_BUDGET = shared_among(TERMS)  # Of all kinds of term.
 MAX_TERMS = 8  # Terms of one table, at most.
-# Products are tried among so many columns at most, those whose role is known first: sixty more columns must not cost
-# twenty times as much.
-MAX_PRODUCT_COLUMNS = 24
-# Scored dictionaries that are kept, each of tens of megabytes: of the mean and of the spread beside the same fit.
-KEPT = 2
-
-
-@dataclass(frozen=True, eq=False)
-class Search:
-    """What stays the same while terms are selected: columns, candidates before whitening, random streams."""
-
-    coarse: Coarse
-    columns: Mapping[str, Column]  # That may act.
-    quantities: Quantities
-    seed: np.random.SeedSequence
-    budget: Budget  # How surely each component has to be found.
-    progress: Callable[[str], None]  # Gets what is being done, in a few words.
-    # How many terms a component has in the table that this is a part of: so many are added, best first, whatever their
-    # p-values, and components that have none are not tested. None: this is the table.
-    wanted: Mapping[str, int] | None = None
-    _kept: dict[tuple[object, int], tuple[object, Any]] = field(default_factory=dict, init=False, repr=False)
-
-    @classmethod
-    def over(
-        cls,
-        coarse: Coarse,
-        columns: list[Column],
-        seed: np.random.SeedSequence,
-        budget: Budget,
-        progress: Callable[[str], None] = lambda _: None,
-    ) -> Search:
-        """Evaluate all candidates once."""
-        inside = coarse.timeline.valid
-        seen = {column.name: coarse.context[column.name][inside] for column in columns}
-        candidates = candidates_of(columns, seen, most=MAX_PRODUCT_COLUMNS)
-        quantities = Quantities.of(candidates, coarse.timeline, coarse.context, coarse.valid)
-        return cls(coarse, {column.name: column for column in columns}, quantities, seed, budget, progress)
-
-    def once(self, kind: object, fitted: object, make: Callable[[], Any]) -> Any:
-        """What is worked out for one kind of term beside one fit, as it was or else now; the last few are kept.
-
-        For one thread: a search that is replaced, by that of a fold, begins with a memory of its own.
-        """
-        key = (kind, id(fitted))
-        if key not in self._kept:
-            self._kept[key] = (fitted, make())  # the fit is kept with it: no other has its id meanwhile
-            for old in list(self._kept)[:-KEPT]:
-                del self._kept[old]
-        return self._kept[key][1]
-
-    def cross_basis(self, columns: Collection[str]) -> FloatArray:
-        """What columns can do in any shape, at any lag and response, at 1 Hz, orthonormal, shape (n, rank)."""
-        known = frozenset(columns)
-        own = np.array([known.issuperset(one.columns) for one in self.quantities.candidates], dtype=np.bool_)
-        seconds, valid = np.arange(len(self.coarse)), self.coarse.valid[:, None]
-        blocks = []
-        for response_s, lags in TIMINGS.items():
-            response = self.quantities.responses(np.flatnonzero(own), response_s)
-            blocks += [response[np.clip(seconds - lag, 0, len(seconds) - 1)] * valid for lag in lags]
-        return orthonormal(np.concatenate(blocks, axis=1).astype(np.float64), CROSS_BASIS)
-
-    def level_of(self, component: str) -> float:
-        """Family-wise level that a component may spend."""
-        return self.budget.level_of(component, self.coarse.drives)
-
-    def passes(self, component: str, p_value: float, terms: Sequence[Term]) -> bool:
-        """Whether the best that was found of a component is good enough to be added to terms."""
-        if p_value <= self.level_of(component):
-            return True
-        there = sum(term.component == component for term in terms)
-        return self.wanted is not None and there < self.wanted.get(component, 0)
-
-    def rng(self, *key: int) -> np.random.Generator:
-        """Independent stream by purpose."""
-        return np.random.default_rng(np.random.SeedSequence(self.seed.entropy, spawn_key=key))
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,12 +72,6 @@ class Accepted:
     term: Term
     p_value: float
     gain: Gain | None = None
-
-    @property
-    def alike(self) -> Alternatives:
-        """Columns of each other effect that explains as much."""
-        alike: Alternatives = getattr(self.term, "alike", ())
-        return alike
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,11 +124,11 @@ def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
                 test = kind.test(search, fitted)
                 if test is None:
                     continue
-                if test.term is not None and search.passes(component, test.p_value, fitted.terms):
+                if test.term is not None and kind.passes(search, test.p_value, fitted):
                     passed.append((test.p_value, (test.term, *test.together), test.after))
                 else:
                     seen_at[component] = len(accepted)
-                    why = f"not significant: its p-value is above {search.level_of(component):.2g}"
+                    why = f"not significant: its p-value is above {search.levels[component]:.2g}"
                     rejected[component] = Rejected(component, test.columns, test.p_value, why)
             if not passed:
                 break
@@ -240,4 +155,4 @@ def _tested_again(search: Search, selection: Selection, one: Accepted) -> Select
     without = selection.without([one.term], "what was found after it explains it")
     search.progress(f"looking at {one.term.component.replace('_', ' ')} again")
     p_value = one.term.probability_beside(search, without.final)
-    return selection if search.passes(one.term.component, p_value, without.final.terms) else without
+    return selection if one.term.passes(search, p_value, without.final) else without

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
 
-from xosc_lateral.identification.timeline import FloatArray
+from xosc_lateral.arrays import FloatArray
 
 
 class LoopSeed(IntEnum):
@@ -38,30 +36,6 @@ ENOUGH = 10
 CHI_SQUARE_EXCESS = 2.0
 # From so many drives on a table tells what differs between them, and its null is drawn by whole drives.
 MANY_DRIVES = 20
-
-
-@dataclass(frozen=True, slots=True)
-class Budget:
-    """How the error budget is shared among the components that are tested."""
-
-    # Of each component. As shipped: as much for the mean within drives as between them; a quarter for what changes the
-    # movement's size or its strength; the rest for hidden effects, which are few to choose among. [-]
-    weights: Mapping[str, float]
-    least_drives: Mapping[str, int]  # Drives from which a component is asked at all, where that is more than one.
-
-    def level_of(self, component: str, drives: int) -> float:
-        """Family-wise level that a component may spend.
-
-        Parameters
-        ----------
-        component : str
-        drives : int
-            In the table. Where nothing can be asked between them, that share is not spent: a table on which something
-            acts is searched again beside it, at the same levels.
-        """
-        if drives < self.least_drives.get(component, 1):
-            return 0.0
-        return BUDGET * self.weights[component] / sum(self.weights.values())
 
 
 def upper_tail(
@@ -102,10 +76,7 @@ def upper_tail(
 def effective_number(draws: FloatArray) -> float:
     """Independent draws that tell as much about a mean as these do, by their autocorrelation [1]_; 1 to n.
 
-    Parameters
-    ----------
-    draws : array, shape (n,)
-        In an order in which those that resemble each other are neighbours.
+    `draws`, shape (n,): in an order in which those that resemble each other are neighbours.
 
     References
     ----------

@@ -7,25 +7,24 @@ seconds never brings in another drive's values.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from msgspec import structs
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects import ColumnEffect
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.driver.effects import Acts, ColumnEffect
 from xosc_lateral.driver.effects.response import respond
 from xosc_lateral.drives.cuts import CutRules
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.drives.gridding import GriddedDrive, grid_drives
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import NotEnoughDataError
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
 
 # Samples of the 0.2 s grid per sample of the coarse one: effects take seconds, so they are tested at 1 Hz. [-]
 COARSE = 5
@@ -34,6 +33,10 @@ PAD = 75  # Samples before and after each drive in which the context holds its o
 # of the lane.
 TRACE_RULES = CutRules(lane_change_margin=6.0)
 LOCAL_S = 20.0  # Movement slower than this counts as mean, faster as spread. [s]
+# Stretches of a drive that count as independent in the errors of sizes: far beyond what whitening leaves of the memory,
+# and the whole of a passing vehicle. [s]
+CLUSTER_S = 60
+MIN_DRIFT_S = 600.0  # A shorter drive tells nothing about drift or a trend of the variance. [s]
 MIN_VALID_S = 120.0  # Road-following time below which nothing can be said. [s]
 
 
@@ -67,10 +70,6 @@ class Timeline:
         edges = np.searchsorted(self.drive, np.arange(len(self.names) + 1))
         return [slice(int(first), int(last)) for first, last in pairwise(edges)]
 
-    def response(self, effect: ColumnEffect, context: Mapping[str, FloatArray]) -> FloatArray:
-        """An effect's quantity of columns on this grid as each drive responds to it, shape (n, k). [own unit]"""
-        return self.respond(effect.known(context), effect.lag_s, effect.response_s)
-
     def respond(self, values: FloatArray, lag_s: float, response_s: float) -> FloatArray:
         """`driver.effects.response.respond` drive by drive: shape of `values`, (n,) or (n, k), in their unit.
 
@@ -87,13 +86,20 @@ class Timeline:
         return anew[np.maximum(rows, np.minimum(starts + PAD // 2, len(rows) - 1)[self.drive])]
 
 
+def smoothed(offset: FloatArray, timeline: Timeline, times_s: Sequence[float]) -> list[FloatArray]:
+    """Moving averages of a series over each of several times, shape (n,) each, in its unit."""
+    return [local_mean(offset, timeline.valid, seconds, timeline.step) for seconds in times_s]
+
+
+def unsized(effect: ColumnEffect) -> ColumnEffect:
+    """The same effect before it was fitted."""
+    return structs.replace(effect, coefficients=(), errors=(), reference=(), between_drivers=(), response_range=())
+
+
 def join_drives(drives: Sequence[Drive], rules: CutRules = TRACE_RULES) -> Timeline:
     """Put drives on one grid.
 
-    Raises
-    ------
-    NotEnoughDataError
-        When less than two minutes of road-following are left.
+    Raises `NotEnoughDataError` when less than two minutes of road-following are left.
     """
     kept, periods = grid_drives(drives, rules, pad=PAD, multiple=COARSE)
     valid_s = STEP * sum(float(part.valid.sum()) for part in kept)
@@ -154,14 +160,8 @@ def start_anew(
     What is constant within drives must stay so: a threshold or a cell's edge would tell what is left of the drive
     before.
 
-    Parameters
-    ----------
-    response : array, shape (n,) or (n, k)
-        Of the lag, to `values` of the same shape.
-    keep : float
-        What the lag keeps of itself from row to row.
-    drive : int array, shape (n,)
-        Increasing.
+    `response`, shape (n,) or (n, k): of the lag, to `values` of the same shape; `keep`: what the lag keeps of itself
+    from row to row; `drive`, shape (n,): increasing.
     """
     _, starts, own = np.unique(drive, return_index=True, return_inverse=True)
     first = starts[own]
@@ -187,3 +187,84 @@ def local_mean(values: FloatArray, valid: BoolArray, seconds: float, step: float
     low, high = np.maximum(index - half, 0), np.minimum(index + half + 1, len(values))
     count = counts[high] - counts[low]
     return np.asarray((sums[high] - sums[low]) / np.maximum(count, 1.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Coarse:
+    """The timeline at 1 Hz, and every column effect's response on it."""
+
+    timeline: Timeline
+    offset: FloatArray  # shape (n,): Mean of each second. [m]
+    valid: BoolArray  # shape (n,)
+    drive: IntArray  # shape (n,)
+    time: FloatArray  # shape (n,): [s]
+    # Columns on the fine grid, lane width included, clipped to what occurs while road-following: a traffic jam that is
+    # cut out must not stretch a column's range.
+    context: Mapping[str, FloatArray]
+    _responses: dict[ColumnEffect, FloatArray] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def of(cls, timeline: Timeline) -> Coarse:
+        """Average to 1 Hz."""
+        columns = {"lane_width": timeline.lane_width, **timeline.context}
+        return cls(
+            timeline,
+            coarse_mean(timeline.offset),
+            coarse_all(timeline.valid),
+            coarse_middle(timeline.drive),
+            coarse_mean(timeline.time),
+            {name: _within(values, timeline.valid) for name, values in columns.items()},
+        )
+
+    def __len__(self) -> int:
+        return len(self.offset)
+
+    def only(self, rows: BoolArray) -> Coarse:
+        """The same with fewer valid rows; `rows`: shape (n,)."""
+        return replace(self, valid=self.valid & rows, _responses={})
+
+    @property
+    def drives(self) -> int:
+        """Number of drives."""
+        return int(self.drive.max()) + 1
+
+    @cached_property
+    def cluster(self) -> IntArray:
+        """Clusters: minutes within drives, numbered, shape (n,); they count as independent of each other."""
+        _, first = np.unique(self.drive, return_index=True)
+        minute = (np.arange(len(self)) - first[self.drive]) // CLUSTER_S
+        _, cluster = np.unique(self.drive * len(self) + minute, return_inverse=True)
+        return cluster.astype(np.intp)
+
+    @property
+    def lasts(self) -> bool:
+        """Whether a drive is long enough to change with time: minutes, not the minute of a passing vehicle."""
+        return bool(np.bincount(self.drive, self.valid.astype(float)).max() >= MIN_DRIFT_S)
+
+    def response(self, effect: ColumnEffect, *, keep: bool = False) -> FloatArray:
+        """The effect's quantity [own unit] as the driver responds to it, less its mean where valid; shape (n, k)."""
+        key = structs.replace(unsized(effect), acts=Acts.LOCATION)
+        if key in self._responses:
+            return self._responses[key]
+        response = coarse_mean(self.fine_response(key))
+        response = response - response[self.valid].mean(axis=0)
+        if keep:
+            self._responses[key] = response
+        return np.asarray(response, dtype=np.float64)
+
+    def fine_response(self, effect: ColumnEffect) -> FloatArray:
+        """The same on the 0.2 s grid, as it is, shape (fine n, k). [own unit]"""
+        return self.timeline.respond(effect.known(self.context), effect.lag_s, effect.response_s)
+
+    def strength(self, effect: ColumnEffect) -> FloatArray:
+        """What an effect of columns that the table has does on the 0.2 s grid, shape (fine n,). [m], or log factor"""
+        return effect.weighed(self.fine_response(effect))
+
+    def by_drive(self, values: FloatArray) -> FloatArray:
+        """Mean over the valid rows of each drive, shape (drives,), in the values' unit; 0 where there are none."""
+        return means_by_drive(values, self.valid, self.drive)
+
+
+def _within(values: FloatArray, valid: BoolArray) -> FloatArray:
+    seen = values[valid & np.isfinite(values)]
+    return np.where(np.isinf(values), values, np.clip(values, seen.min(), seen.max())) if len(seen) else values

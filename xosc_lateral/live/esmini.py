@@ -7,23 +7,24 @@ action runs, nothing is reported: both would write the same place.
 
 from __future__ import annotations
 
-import ctypes as c
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import IntArray
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.enrich.result import Neighbours
 from xosc_lateral.errors import FormatError, SimulationError
 from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.formats.openscenario.read import read_scenario
+from xosc_lateral.live.esmini_library import ObjectState, Player, StoryboardCallback
+from xosc_lateral.live.paths import LEADING_OVER, TURN, Moves
 from xosc_lateral.live.surroundings import OpenDriveRoads, Places
-from xosc_lateral.live.traffic import LEADING_OVER, TURN, Moment, Moves, Traffic
+from xosc_lateral.live.traffic import Moment, Traffic
 from xosc_lateral.motion.deviation import SETTLING_TIME, settle
 from xosc_lateral.motion.segments import MINIMUM_SPEED
 from xosc_lateral.scenario import Scenario
@@ -46,98 +47,6 @@ _ACTION, _RUNNING = 7, 2
 
 _VEHICLE, _TRUCKS, _PULLED = 1, (2, 3, 4, 5), (3, 4)
 """`Object::Type`; `Vehicle::Category` of trucks, trailers and buses, and of what has no driver of its own."""
-
-
-class ObjectState(c.Structure):
-    """``SE_ScenarioObjectState``, as esmini 3 has it."""
-
-    _fields_: ClassVar[list[Any]] = (
-        [("id", c.c_int), ("model_id", c.c_int), ("ctrl_type", c.c_int)]
-        + [(name, c.c_double) for name in ("timestamp", "x", "y", "z", "h", "p", "r")]
-        + [("road", c.c_uint32), ("junction", c.c_uint32), ("t", c.c_double), ("lane", c.c_int)]
-        + [(name, c.c_double) for name in ("offset_t", "s", "speed", "center_x", "center_y", "center_z")]
-        + [(name, c.c_double) for name in ("width", "length", "height")]
-        + [("type", c.c_int), ("category", c.c_int), ("wheel_angle", c.c_double), ("wheel_rot", c.c_double)]
-        + [("visibility", c.c_int)]
-    )
-
-
-_StoryboardCallback = c.CFUNCTYPE(None, c.c_char_p, c.c_int, c.c_int, c.c_char_p)
-
-FUNCTIONS: dict[str, tuple[Any, ...]] = {
-    "SE_Init": (c.c_int, c.c_char_p, c.c_int, c.c_int, c.c_int, c.c_int),
-    "SE_StepDT": (c.c_int, c.c_double),
-    "SE_Close": (None,),
-    "SE_GetQuitFlag": (c.c_int,),
-    "SE_GetSimulationTime": (c.c_double,),
-    "SE_GetNumberOfObjects": (c.c_int,),
-    "SE_GetId": (c.c_int, c.c_int),
-    "SE_GetObjectName": (c.c_char_p, c.c_int),
-    "SE_GetObjectState": (c.c_int, c.c_int, c.c_void_p),
-    "SE_GetODRFilename": (c.c_char_p,),
-    "SE_ReportObjectLateralPosition": (c.c_int, c.c_int, c.c_double),
-    "SE_RegisterStoryBoardElementStateChangeCallback": (None, _StoryboardCallback),
-}
-"""What is called: type of the answer, types of the arguments."""
-
-OPTIONAL = {"SE_SetLogFilePath": (None, c.c_char_p), "SE_LogToConsole": (None, c.c_bool)}
-"""What is called where it is there."""
-
-
-class Player:
-    """An esmini library, its functions by name; the types that a user has declared on them stay as they are.
-
-    Raises `SimulationError`: if it can't be loaded, or lacks a function.
-    """
-
-    def __init__(self, library: Any) -> None:
-        self.where = str(library) if isinstance(library, str | Path) else "the given library"
-        if isinstance(library, str | Path):
-            try:
-                library = c.CDLL(str(library))
-            except OSError as error:
-                raise SimulationError(f"{self.where}: no library that can be loaded ({error})") from error
-        for name, (result, *arguments) in (FUNCTIONS | OPTIONAL).items():
-            if not hasattr(library, name):
-                if name in OPTIONAL:
-                    continue
-                raise SimulationError(f"{self.where}: has no function {name}; the library of esmini 3 is needed")
-            own = c.CFUNCTYPE(result, *arguments)((name, library)) if isinstance(library, c.CDLL) else None
-            setattr(self, name, own or getattr(library, name))
-        self._is_known = False
-
-    if TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Callable[..., Any]: ...
-
-    def state(self, number: int) -> ObjectState | None:
-        """Of an object; None if there is none of that number.
-
-        Raises `SimulationError`: if the library's structure is another than ours.
-        """
-        state = ObjectState()
-        if not self._is_known:
-            self._compare(number)
-        return state if self.SE_GetObjectState(number, c.addressof(state)) == 0 else None
-
-    def _compare(self, number: int) -> None:
-        """Refuse another structure than ours: longer, shorter, or with something else first."""
-        size, spare = c.sizeof(ObjectState), 256
-        buffer = (c.c_ubyte * (size + spare)).from_buffer(bytearray([_UNTOUCHED] * (size + spare)))
-        if self.SE_GetObjectState(number, c.addressof(buffer)) != 0:
-            return
-        end = ObjectState.visibility
-        last, beyond = bytes(buffer[end.offset : end.offset + end.size]), bytes(buffer[size:])
-        if last.count(_UNTOUCHED) == len(last) or beyond.count(_UNTOUCHED) < spare or buffer[0] != number & 0xFF:
-            raise SimulationError(
-                f"{self.where}: another SE_ScenarioObjectState than the {size} bytes of esmini 3; a library of that "
-                "version is needed"
-            )
-        self._is_known = True
-
-
-_UNTOUCHED = 0xA5
-"""A byte that nobody writes by chance at every place."""
 
 
 class _Lane(NamedTuple):
@@ -234,7 +143,7 @@ class EsminiTraffic:
             profile, profiles=profiles, seed=seed, roads=OpenDriveRoads(self.network), neighbours=neighbours,
             left_hand=left_hand,
         )  # fmt: skip
-        self._back = _StoryboardCallback(self._on_element)
+        self._back = StoryboardCallback(self._on_element)
         self.player.SE_RegisterStoryBoardElementStateChangeCallback(self._back)
         names = {name for name, _ in self._objects()}
         if missing := sorted(self._ego - names):
@@ -245,10 +154,8 @@ class EsminiTraffic:
     def steer(self, dt: float) -> Moves:
         """Say where everybody is sideways after the next step of `dt` seconds; before ``SE_StepDT(dt)``.
 
-        Raises
-        ------
-        SimulationError
-            If what the simulation says can't be used; nothing was reported then, and the simulation can go on.
+        Raises `SimulationError` if what the simulation says can't be used; nothing was reported then, and the
+        simulation can go on.
         """
         seen = [(name, state) for name, state in self._objects() if self._is_sound(name, state)]
         moment = self._moment(seen, dt)
@@ -258,8 +165,7 @@ class EsminiTraffic:
                 direction = self.network.travel_direction(self._road(state), state.lane)
                 t = state.t + direction * float(moves.offset[row] - moment.offset[row])
                 self.player.SE_ReportObjectLateralPosition(state.id, t)
-        steered = zip(moment.names, moves.offset.tolist(), moves.steered.tolist(), strict=True)
-        self.moves = {name: (offset, own) for name, offset, own in steered}
+        self.moves = moves.by_name(moment.names)
         self._rates = dict(zip(moment.names, moves.rate.tolist(), strict=True))
         return moves
 
@@ -307,7 +213,7 @@ class EsminiTraffic:
                 yield (self.player.SE_GetObjectName(number) or b"").decode(), state
 
     def _is_sound(self, name: str, state: ObjectState) -> bool:
-        """Whether it is a vehicle that says where it is; one that doesn't is left alone, and the user told once."""
+        """Whether it is a vehicle that says where it is; one that doesn't is left alone, which is a warning."""
         if state.type != _VEHICLE:
             return False
         numbers = {what: getattr(state, what) for what in ("x", "y", "h", "t", "s", "speed", "offset_t")}
@@ -353,7 +259,7 @@ class EsminiTraffic:
                           column["width"], column["center_x"]),
         )  # fmt: skip
 
-    def _lanes(self, seen: list[tuple[str, ObjectState]], road: NDArray[np.int64], anew: bool) -> list[_Lane]:
+    def _lanes(self, seen: list[tuple[str, ObjectState]], road: IntArray, anew: bool) -> list[_Lane]:
         """The lanes that vehicles are on; between steps of the model as they were, if they are the same."""
         network, found = self.network, []
         for (name, state), index in zip(seen, road.tolist(), strict=True):
@@ -402,18 +308,3 @@ def lateral_actions(scenario: Scenario) -> dict[str, set[str]]:
                                 names = (story.name, act.name, group.name, maneuver.name, event.name, action.name)
                                 found.setdefault("::".join(names), set()).update(actors)
     return found
-
-
-def open_player(library: Any, scenario: str | Path, *, window: bool = False) -> Player:
-    """A library that has opened a scenario; quiet, without a log file.
-
-    Raises `SimulationError`: if it is none, or can't open the scenario.
-    """
-    player = Player(library)
-    if hasattr(player, "SE_SetLogFilePath"):
-        player.SE_SetLogFilePath(b"")
-    if hasattr(player, "SE_LogToConsole"):
-        player.SE_LogToConsole(False)
-    if player.SE_Init(str(scenario).encode(), 0, int(window), 0, 0) != 0:
-        raise SimulationError(f"{scenario}: {player.where} can't open it")
-    return player

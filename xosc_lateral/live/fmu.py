@@ -106,29 +106,15 @@ def unit_methods(fmi: str, script: str) -> dict[str, Any]:
     The class itself has to be in the script, made from the base class that is imported there: the loaders of pythonfmu
     look for it so.
     """
+    package = import_module("pythonfmu3" if fmi == "3.0" else "pythonfmu")
+    base, causality, variability = (
+        getattr(package, f"Fmi{fmi[0]}{word}") for word in ("Slave", "Causality", "Variability")
+    )
+    Boolean, String, Unit = package.Boolean, package.String, getattr(package, "Unit", None) if fmi == "3.0" else None
     if fmi == "3.0":
-        from pythonfmu3 import (
-            Boolean,
-            Float64,
-            Fmi3Causality,
-            Fmi3Slave,
-            Fmi3Status,
-            Fmi3StepResult,
-            Fmi3Variability,
-            Int32,
-            String,
-            Unit,
-        )  # fmt: skip
-
-        causality, variability, base, real, integer = Fmi3Causality, Fmi3Variability, Fmi3Slave, Float64, Int32
-        result, done, refused = Fmi3StepResult, Fmi3Status.ok, Fmi3Status.error
+        real, integer, status = package.Float64, package.Int32, package.Fmi3Status
     else:
-        from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real, String
-        from pythonfmu.enums import Fmi2Status
-
-        causality, variability, base, real, integer = Fmi2Causality, Fmi2Variability, Fmi2Slave, Real, Integer
-        Unit = result = done = None
-        refused = Fmi2Status.error
+        real, integer, status = package.Real, package.Integer, import_module("pythonfmu.enums").Fmi2Status
     own = read_profile(Path(script).with_name("profile.json"))
     columns = ("speed", "lane_width", *sorted(set(own.columns) - {"speed", "lane_width"}))
 
@@ -203,12 +189,13 @@ def unit_methods(fmi: str, script: str) -> dict[str, Any]:
         """Where the driver is at the end of the step."""
         if self._traffic is None:
             self.start_at(current_time)
+        done = True
         try:
             self.look(current_time + step_size)
         except SimulationError as error:
-            self.log(str(error), refused)
-            return result(status=refused) if Unit is not None else False
-        return result(status=done) if Unit is not None else True
+            self.log(str(error), status.error)
+            done = False
+        return package.Fmi3StepResult(status=status.ok if done else status.error) if Unit is not None else done
 
     def _get_fmu_state(self: Any) -> dict[str, Any]:
         names = (*columns, "position", "following", *OUTPUTS, "seed", "profile")

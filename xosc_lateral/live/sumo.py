@@ -10,22 +10,22 @@ only.)
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.enrich.result import Neighbours
 from xosc_lateral.errors import SimulationError
+from xosc_lateral.live.paths import Moves
 from xosc_lateral.live.scene import KINDS
 from xosc_lateral.live.surroundings import Places
-from xosc_lateral.live.traffic import Moment, Moves, Traffic
-from xosc_lateral.motion.context import REACH, TRUCKS, Reach
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from xosc_lateral.live.traffic import Moment, Traffic
+from xosc_lateral.motion.around import REACH, Reach
+from xosc_lateral.motion.context import TRUCKS
 
 HOLD = 0.5
 """A lane change is over when SUMO has wanted none for so long, and moves the vehicle no more. [s]"""
@@ -166,10 +166,23 @@ class SumoRoads:
         return np.full(len(s), self._middle[road, lane])
 
 
+@dataclass(slots=True)
+class _Vehicle:
+    """What is known of a vehicle that SUMO drives: class, size [m], lane, until when at least it is SUMO's [s]."""
+
+    kind: str
+    length: float
+    width: float
+    lane: str
+    busy_until: float | None = None
+
+
 class SumoTraffic:
     """Drivers of the vehicles of a SUMO simulation that runs.
 
     Call `steer` before (or after) every ``simulationStep``.
+
+    Raises `SimulationError` if the sublane model is off.
 
     Parameters
     ----------
@@ -180,11 +193,6 @@ class SumoTraffic:
         Vehicles that nobody of ours drives.
     seed, profiles, neighbours
         See `Traffic`.
-
-    Raises
-    ------
-    SimulationError
-        If the sublane model is off.
     """
 
     def __init__(
@@ -204,9 +212,7 @@ class SumoTraffic:
         self.roads = SumoRoads(connection)
         self._ego = {ego} if isinstance(ego, str) else set(ego)
         self.traffic = Traffic(profile, profiles=profiles, seed=seed, roads=self.roads, neighbours=neighbours)
-        self._kinds: dict[str, tuple[str, float, float]] = {}
-        self._lanes: dict[str, str] = {}
-        self._busy: dict[str, float] = {}  # until when at least they are SUMO's [s]
+        self._known: dict[str, _Vehicle] = {}
         self.moves: dict[str, tuple[float, bool]] = {}
         self.warnings: list[str] = []
         if sublane < (widest := max(self.roads.width.values(), default=0.0)):
@@ -218,10 +224,8 @@ class SumoTraffic:
     def steer(self) -> Moves:
         """Say where everybody is sideways after the next step.
 
-        Raises
-        ------
-        SimulationError
-            If what the simulation says can't be used; nothing was asked for then, and the simulation can go on.
+        Raises `SimulationError` if what the simulation says can't be used; nothing was asked for then, and the
+        simulation can go on.
         """
         vehicles, now = self.connection.vehicle, float(self.connection.simulation.getTime())
         step = float(self.connection.simulation.getDeltaT())
@@ -232,8 +236,7 @@ class SumoTraffic:
                 vehicles.changeSublane(name, float(moves.offset[row] - moment.offset[row]))
             elif self.moves.get(name, (0.0, False))[1]:  # what is left of the last way would hold SUMO's own back
                 vehicles.changeSublane(name, 0.0)
-        steered = zip(moment.names, moves.offset.tolist(), moves.steered.tolist(), strict=True)
-        self.moves = {name: (offset, own) for name, offset, own in steered}
+        self.moves = moves.by_name(moment.names)
         return moves
 
     def states(self) -> Iterable[tuple[str, float, float, float, float, str, float, float]]:
@@ -256,47 +259,42 @@ class SumoTraffic:
     def _moment(self, now: float) -> Moment:
         seen = list(self.states())
         names = tuple(row[0] for row in seen)
-        for gone in self._kinds.keys() - set(names):
-            del self._kinds[gone]
-            self._lanes.pop(gone, None)
-            self._busy.pop(gone, None)
-        for name in names:
-            if name not in self._kinds:
-                vehicles = self.connection.vehicle
-                self._kinds[name] = (
-                    vehicles.getVehicleClass(name), float(vehicles.getLength(name)), float(vehicles.getWidth(name)),
-                )  # fmt: skip
-        kinds = [self._kinds[name] for name in names]
+        api = self.connection.vehicle
+        self._known = {
+            row[0]: self._known.get(row[0])
+            or _Vehicle(api.getVehicleClass(row[0]), float(api.getLength(row[0])), float(api.getWidth(row[0])), row[5])
+            for row in seen
+        }
+        vehicles = list(self._known.values())
         following = np.array([self._follows(row[0], row[5], row[7], now) for row in seen], dtype=np.bool_)
         x, y, speed, s, offset = (np.array([row[k] for row in seen], dtype=np.float64) for k in (1, 2, 4, 6, 7))
         where = [self.roads.place[row[5]] for row in seen]
         heading = np.array([self.roads.heading(place, at) for place, at in zip(where, s.tolist(), strict=True)])
         road, lane = (np.array([place[k] for place in where], dtype=np.int64) for k in (0, 1))
-        length, width = (np.array([kind[k] for kind in kinds], dtype=np.float64) for k in (1, 2))
+        length, width = np.array([(one.length, one.width) for one in vehicles]).reshape(-1, 2).T.copy()
         return Moment(
             names, speed, np.array([self.roads.width[place] for place in where]), offset, following,
-            np.array([kind[0] not in OTHERS and name not in self._ego for name, kind in zip(names, kinds, strict=True)],
-                     dtype=np.bool_),
-            np.array([KINDS.get(kind[0]) in TRUCKS for kind in kinds], dtype=np.bool_),
+            np.array([name not in self._ego and one.kind not in OTHERS for name, one in self._known.items()], np.bool_),
+            np.array([KINDS.get(one.kind) in TRUCKS for one in vehicles], dtype=np.bool_),
             places=Places(x, y, heading, road, lane, s, length, width, -0.5 * length),
         )  # fmt: skip
 
     def _follows(self, name: str, lane: str, offset: float, now: float) -> bool:
         """Whether a vehicle keeps its lane, as far as SUMO is concerned: it wants no other, and lies still in this."""
-        vehicles, before = self.connection.vehicle, self._lanes.get(name, lane)
-        self._lanes[name] = lane
+        vehicles, own = self.connection.vehicle, self._known[name]
+        before, own.lane = own.lane, lane
         wishes = [int(vehicles.getLaneChangeState(name, side)[0]) for side in (1, -1)]
         wants = any(wish & _REASONS and wish & _SIDES and not wish & _BLOCKED for wish in wishes)
         changed = before != lane and before.rpartition("_")[0] == lane.rpartition("_")[0]
         wanted, steered = self.moves.get(name, (offset, False))
         if wants or changed or (steered and abs(wanted - offset) > ELSEWHERE):
-            self._busy[name] = now + HOLD
-        if name not in self._busy:
+            own.busy_until = now + HOLD
+        if own.busy_until is None:
             return True
-        sticks_out = abs(offset) + 0.5 * self._kinds[name][2] > 0.5 * self.roads.width[self.roads.place[lane]] + _STILL
-        if now < self._busy[name] or sticks_out or abs(float(vehicles.getLateralSpeed(name))) > _STILL:
+        sticks_out = abs(offset) + 0.5 * own.width > 0.5 * self.roads.width[self.roads.place[lane]] + _STILL
+        if now < own.busy_until or sticks_out or abs(float(vehicles.getLateralSpeed(name))) > _STILL:
             return False
-        del self._busy[name]
+        own.busy_until = None
         return True
 
 

@@ -1,6 +1,6 @@
 """What every driver sees at one moment: the road, the vehicles around from where they are, and whom to give way to.
 
-Gaps, sides and the law of giving way are those of a conversion (`motion.context`, `enrich.give_way`), there for one
+Gaps, sides and the law of giving way are those of a conversion (`motion.around`, `enrich.give_way`), there for one
 vehicle at many moments, here for many vehicles at one.
 """
 
@@ -11,26 +11,13 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from xosc_lateral.enrich.give_way import FADES, Frame, part_of, widened
-from xosc_lateral.motion.context import (
-    IN_SIGHT,
-    Around,
-    Extent,
-    Reach,
-    free_space,
-    lane_path,
-    lanes_beside,
-    road_columns,
-    see_along,
-)  # fmt: skip
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.enrich.give_way import FADES, Frame, own_share, widened
+from xosc_lateral.motion.around import IN_SIGHT, Around, Extent, Reach, free_space, lane_path, see_along
+from xosc_lateral.motion.context import lanes_beside, road_columns, spread_out
 from xosc_lateral.motion.nearby import pairs_now
 from xosc_lateral.road.network import RoadNetwork
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 
 class Roads(Protocol):
@@ -94,29 +81,21 @@ class OpenDriveRoads:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Places:
-    """Where vehicles are at one moment, shape (n,) each.
-
-    Parameters
-    ----------
-    x, y, heading : array
-        Reference point [m] and the lane's direction of travel there. [rad]
-    road, lane : array of int
-        Index of the road, -1 for none; lane id.
-    s : array
-        Along the road. [m]
-    length, width, center_x : array
-        Of the bounding box, and how far its middle is ahead of the reference point. [m]
-    """
+    """Where vehicles are at one moment, shape (n,) each."""
 
     x: FloatArray
     y: FloatArray
     heading: FloatArray
+    """Reference point [m] and the lane's direction of travel there. [rad]"""
     road: IntArray
     lane: IntArray
+    """Index of the road, -1 for none; lane id."""
     s: FloatArray
+    """Along the road. [m]"""
     length: FloatArray
     width: FloatArray
     center_x: FloatArray
+    """Of the bounding box, and how far its middle is ahead of the reference point. [m]"""
 
 
 def look_around(roads: Roads, places: Places, offset: FloatArray, is_truck: BoolArray) -> dict[str, FloatArray]:
@@ -125,14 +104,12 @@ def look_around(roads: Roads, places: Places, offset: FloatArray, is_truck: Bool
     A conversion knows what comes, and has the road's columns as means over the way around; here they are as they are.
     """
     n = len(places.x)
-    on = np.flatnonzero((places.road >= 0) & (places.lane != 0))
-    road: dict[str, FloatArray] = {}
-    for name, values in roads.columns(places.road[on], places.lane[on], places.s[on]).items():
-        road[name] = np.full(n, np.nan)
-        road[name][on] = values
-    direction, t = np.ones(n, dtype=np.int64), np.full(n, np.nan)
-    direction[on] = roads.directions(places.road[on], places.lane[on])
-    t[on] = roads.across(places.road[on], places.lane[on], places.s[on], offset[on])
+    there = (places.road >= 0) & (places.lane != 0)
+    on = np.flatnonzero(there)
+    where = (places.road[on], places.lane[on], places.s[on])
+    road = {name: spread_out(values, there) for name, values in roads.columns(*where).items()}
+    direction, t = np.ones(n, dtype=np.int64), spread_out(roads.across(*where, offset[on]), there)
+    direction[on] = roads.directions(*where[:2])
     width = np.maximum(np.fmax(road["lane_width"], places.width), 0.1)
     around = Around.nobody(n)
     for path, u, i, j in _along_paths(roads, places, on):
@@ -178,15 +155,9 @@ def give_way_now(
 ) -> FloatArray:
     """By how much vehicles move aside for whom they are beside, shape (n,), positive left. [m]
 
-    Parameters
-    ----------
-    places : Places
-    lateral, deviation : array, shape (n,)
-        Of each from its lane's centre, as it is and without what it has moved aside; 0 in a maneuver. [m]
-    can_move : array of bool, shape (n,)
-        Who has a driver that follows the road.
-    known : mapping of str to array of bool, shape (n,)
-        ``responds_left``, ``responds_right``, ``alone_left``, ``alone_right``: see `enrich.give_way.SampledVehicle`.
+    Of each, shape (n,), `lateral` and `deviation` from its lane's centre, as it is and without what it has moved aside,
+    0 in a maneuver [m]; whether it has a driver that follows the road (`can_move`); and what is `known` of that driver:
+    ``responds_left``, ``responds_right``, ``alone_left``, ``alone_right``, see `enrich.give_way.SampledVehicle`.
     """
     n = len(places.x)
     cos, sin = np.cos(places.heading), np.sin(places.heading)
@@ -211,8 +182,8 @@ def give_way_now(
     if found is None:
         return left
     aside, is_left, responding = found
-    share = np.where(can_move[other], part_of(is_left == left_hand, responding), 1.0)
-    share *= np.where(is_left, ~known["alone_left"][own], ~known["alone_right"][own])
-    np.maximum.at(right, own, np.where(is_left, share * aside, 0.0))
-    np.maximum.at(left, own, np.where(is_left, 0.0, share * aside))
+    alone = np.where(is_left, known["alone_left"][own], known["alone_right"][own])
+    aside = aside * own_share(is_left == left_hand, responding, can_move[other], alone)
+    np.maximum.at(right, own, np.where(is_left, aside, 0.0))
+    np.maximum.at(left, own, np.where(is_left, 0.0, aside))
     return left - right

@@ -1,4 +1,4 @@
-"""Drivers of the vehicles of a running simulation: told once per step what it knows, they say where they are.
+"""Drivers of the vehicles of a running simulation: once per step they get what it knows, and say where they are.
 
 A driver goes on at the model's step (5 Hz), on what he sees at that moment; in between he follows the curve of
 `driver.upsampling`. What he sees he responds to a little later than in a conversion, which knows what comes
@@ -11,58 +11,22 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.driver.group import OffsetGroup
 from xosc_lateral.driver.plausibility import first_implausible, implausible
 from xosc_lateral.driver.profile import Basis, DriverProfile, sampling_hash
-from xosc_lateral.enrich.enrich import sides_known
-from xosc_lateral.enrich.give_way import mirrored_context
 from xosc_lateral.enrich.result import Neighbours
+from xosc_lateral.enrich.seen import mirrored_context, sides_known
 from xosc_lateral.errors import SimulationError
+from xosc_lateral.live.paths import DRIVER, SPEEDS, Moves, drive_on
 from xosc_lateral.live.surroundings import Places, Roads, give_way_now, look_around
 from xosc_lateral.motion.context import STEERING
-from xosc_lateral.motion.deviation import SETTLING_TIME, settle
-from xosc_lateral.motion.segments import MINIMUM_SPEED
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 FORMAT = "xosc-lateral live traffic"
-
-TURN = 0.03
-"""Change of heading per time that nobody takes for a kink: 0.3 mrad in a step of 0.01 s. [rad/s]"""
-
-LEADING_OVER = 0.5
-"""Part of `TURN` that leading over to the driver's path may take; the driver's own movement has the rest. [-]"""
-
-_PEAK = 10.0 / np.sqrt(3.0)
-"""Largest second derivative of the smooth step from 0 to 1 in unit time (of 10 u^3 - 15 u^4 + 6 u^5, by hand). [-]"""
-
-_STANDSTILL = 0.1
-"""Below this speed a path has no direction. [m/s]"""
-
-_SPEEDS = 6
-"""Model steps of speed remembered: acceleration is over one second, as in a conversion. [-]"""
-
-_NOTHING = 1e-12
-"""A remainder this small is none. [m]"""
-
-_DRIVER = np.dtype(
-    [("curve", float, 6), ("begun", bool), ("following", bool), ("place", float), ("own", float),
-     ("rest", float), ("from", float), ("from_rate", float), ("share", float), ("over", float), ("slip", float),
-     ("aside", float), ("aside_rate", float), ("wanted", float), ("speeds", float, _SPEEDS), ("width", float)]
-)  # fmt: skip
-"""A driver beside his random numbers.
-
-His curve until the next model step and whether it has begun; whether the vehicle followed the road a step ago, where it
-was, and the driver's own offset there [m]; what leads over to his path: `rest` [m], from `from` [m] at `from_rate`
-[m/s], done to `share` [-] of `over` [s], plus what slow driving left out (`slip` [m]); how far he has moved aside, how
-fast, and how far he wants to; speeds of the last second; width of the lane as he has it [m].
-"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,19 +73,6 @@ class Moment:
         return np.zeros(len(self.names)) if self.base is None else self.base
 
 
-class Moves(NamedTuple):
-    """Where drivers are, by the rows of the moment, shape (n,) each; where nobody of ours drives, as it was.
-
-    Offset from the lane's centre, positive left [m], its rate [m/s], the heading relative to the lane, positive left
-    [rad], and whether it is the driver's (else the simulation's, or there is none).
-    """
-
-    offset: FloatArray
-    rate: FloatArray
-    heading: FloatArray
-    steered: BoolArray
-
-
 class Traffic:
     """The drivers of many vehicles.
 
@@ -166,7 +117,7 @@ class Traffic:
         self._groups: dict[str, tuple[OffsetGroup, list[str]]] = {}
         self._names: list[str] = []
         self._index: dict[str, int] = {}
-        self._state = np.zeros(0, dtype=_DRIVER)
+        self._state = np.zeros(0, dtype=DRIVER)
         self._time: float | None = None
         self._knots = 0
         self._columns: tuple[str, ...] | None = None
@@ -175,41 +126,32 @@ class Traffic:
         return len(self._names)
 
     def step(self, time: float, moment: Moment) -> Moves:
-        """Where everybody is at `time`.
+        """Where everybody is at a time of the simulation, not earlier than the last one [s].
 
-        Parameters
-        ----------
-        time : float
-            Of the simulation, not earlier than the last one. [s]
-        moment : Moment
-            What is known: how the last step of the simulation has left everybody.
-
-        Raises
-        ------
-        SimulationError
-            If a number is NaN or none that a road has, time runs backwards, or a context column is missing that was
-            there. Nothing has changed then: the next good moment goes on.
+        From what is known then: how the last step of the simulation has left everybody. Raises `SimulationError` if a
+        number is NaN or none that a road has, time runs backwards, or a context column is missing that was there.
+        Nothing has changed then: the next good moment goes on.
         """
         _check(time, self._time, moment)
         context = self._context(moment) if self.is_due(time) else None
         there = np.flatnonzero(moment.driven)
         who = self._present([moment.names[k] for k in there])
-        passed = 0.0 if self._time is None else time - self._time
-        is_first, self._time = self._time is None, time
+        passed = None if self._time is None else time - self._time
+        self._time = time
         if context is not None:
             self._advance(time, moment, context, there, who)
-        moves = Moves(moment.offset.copy(), np.zeros(len(moment.names)), np.zeros(len(moment.names)),
-                      np.zeros(len(moment.names), dtype=np.bool_))  # fmt: skip
+        rate, heading = np.zeros((2, len(moment.names)))
+        moves = Moves(moment.offset.copy(), rate, heading, np.zeros(len(moment.names), dtype=np.bool_))
         if len(there):
             rows = (moment.speed[there], moment.offset[there], moment.nominal[there], moment.following[there])
-            found = self._drive(self._state[who], time, passed, *rows, is_first=is_first)
-            self._state[who] = found[0]
-            for values, own in zip(moves, found[1], strict=True):
+            u = min(max(time / self._step - (self._knots - 1), 0.0), 1.0)
+            self._state[who], found = drive_on(self._state[who], u, self._step, passed, *rows)
+            for values, own in zip(moves, found, strict=True):
                 values[there] = own
         return moves
 
     # ---- who is there ------------------------------------------------------------------------------------------------
-    def _present(self, names: list[str]) -> NDArray[np.int64]:
+    def _present(self, names: list[str]) -> IntArray:
         """Drivers of these vehicles, shape (n,): those of others have gone, new ones have come."""
         if names != self._names:
             gone = self._index.keys() - set(names)
@@ -218,7 +160,7 @@ class Traffic:
             new = [name for name in names if name not in self._index]
             self._names += new
             self._index.update({name: k for k, name in enumerate(self._names)})
-            self._state = np.concatenate([self._state, np.zeros(len(new), dtype=_DRIVER)])
+            self._state = np.concatenate([self._state, np.zeros(len(new), dtype=DRIVER)])
         return np.array([self._index[name] for name in names], dtype=np.int64)
 
     def _keep(self, gone: set[str]) -> None:
@@ -248,7 +190,7 @@ class Traffic:
         for row, name in enumerate(moment.names):
             k = self._index.get(name)
             if k is not None and self._state["begun"][k]:
-                acceleration[row] = (moment.speed[row] - self._state["speeds"][k, 0]) / (_SPEEDS - 1) / self._step
+                acceleration[row] = (moment.speed[row] - self._state["speeds"][k, 0]) / (SPEEDS - 1) / self._step
         found["acceleration"] = acceleration
         if moment.places is not None and self._roads is not None:
             found |= look_around(self._roads, moment.places, moment.offset, moment.is_truck)
@@ -266,8 +208,8 @@ class Traffic:
         time: float,
         moment: Moment,
         context: dict[str, FloatArray],
-        there: NDArray[np.int64],
-        who: NDArray[np.int64],
+        there: IntArray,
+        who: IntArray,
     ) -> None:
         """On to the model step that is now, or to the last one of those that have passed."""
         if self._columns is None:
@@ -308,7 +250,7 @@ class Traffic:
         self._state["width"][drivers] = width + (before - width) * np.exp(-self._step / STEERING)
         return np.asarray(self._state["width"][drivers])
 
-    def _aside(self, moment: Moment, there: NDArray[np.int64], who: NDArray[np.int64]) -> FloatArray:
+    def _aside(self, moment: Moment, there: IntArray, who: IntArray) -> FloatArray:
         """How far everybody wants to move aside, shape (n,). [m]"""
         if moment.places is None or self._neighbours is not Neighbours.BORROW:
             return np.zeros(len(moment.names))
@@ -327,53 +269,6 @@ class Traffic:
         can_move = moment.driven & moment.following
         return give_way_now(moment.places, lateral, deviation, can_move, known, left_hand=self._left_hand)
 
-    # ---- every step --------------------------------------------------------------------------------------------------
-    def _drive(
-        self,
-        state: NDArray[Any],
-        time: float,
-        passed: float,
-        speed: FloatArray,
-        offset: FloatArray,
-        base: FloatArray,
-        following: BoolArray,
-        *,
-        is_first: bool,
-    ) -> tuple[NDArray[Any], Moves]:
-        """The drivers' states and moves after so much time [s], shape (n,) each; see `_DRIVER`."""
-        u = min(max(time / self._step - (self._knots - 1), 0.0), 1.0)
-        powers = u ** np.arange(6)
-        own = state["curve"] @ powers
-        own_rate = state["curve"][:, 1:] @ (np.arange(1, 6) * powers[:-1]) / self._step
-        pace = _pace(speed)
-        is_driven = following & state["begun"]
-        taken_over = is_driven & ~state["following"]
-        was_rate = np.where(passed > 0.0, (offset - state["place"]) / max(passed, 1e-9), 0.0)
-        _move_aside(state, passed * pace)
-        aside, aside_rate = state["aside"], state["aside_rate"] * pace
-        if is_first:
-            state["rest"][taken_over] = 0.0
-        elif taken_over.any():
-            was_rate = np.where(np.abs(was_rate) < np.maximum(0.2 * np.abs(speed), 0.1), was_rate, 0.0)  # placed anew
-            was_rate = np.where(state["place"] == 0.0, 0.0, was_rate)
-            gap_rate = was_rate - own_rate * pace - aside_rate
-            gap = offset - base - own - aside + (own_rate * pace + aside_rate) * passed  # a step ago
-            _lead_over(state, taken_over, gap, gap_rate, speed)
-        went_on = is_driven & state["following"]
-        state["slip"] = np.where(went_on, state["slip"] - (1.0 - pace) * (own - state["own"]), 0.0)
-        slipped = is_driven & (state["over"] <= 0.0) & (np.abs(state["slip"]) > _NOTHING)
-        if slipped.any():
-            _lead_over(state, slipped, state["slip"], np.zeros(len(state)), speed)
-            state["slip"][slipped] = 0.0
-        rest_rate = _settle(state, passed * pace) * pace
-        place = np.where(is_driven, base + own + state["rest"] + state["slip"] + aside, offset)
-        rate = np.where(is_driven, own_rate * pace + rest_rate + aside_rate, was_rate * (passed > 0.0))
-        moving = np.abs(speed) > _STANDSTILL
-        sine = np.divide(rate, speed, out=np.zeros(len(state)), where=moving)
-        heading = np.arcsin(np.clip(sine, -1.0, 1.0))
-        state["following"], state["place"], state["own"] = is_driven, place, own
-        return state, Moves(place, np.where(is_driven, rate, 0.0), np.where(is_driven, heading, 0.0), is_driven)
-
     # ---- state -------------------------------------------------------------------------------------------------------
     def to_dict(self) -> dict[str, Any]:
         """All that changes while driving, as plain JSON values."""
@@ -386,7 +281,7 @@ class Traffic:
             "knots": self._knots,
             "columns": self._columns,
             "drivers": {
-                name: [_plain(value) for value in own]
+                name: [np.asarray(value).tolist() for value in own]
                 for name, own in zip(self._names, self._state.tolist(), strict=True)
             },
             "groups": {key: {"members": members, **group.to_dict()} for key, (group, members) in self._groups.items()},
@@ -395,10 +290,7 @@ class Traffic:
     def restore(self, state: Mapping[str, Any]) -> None:
         """Go on from what `to_dict` gave; the same profiles, settings and roads were given at the start.
 
-        Raises
-        ------
-        SimulationError
-            If it is no such state, or one of other profiles.
+        Raises `SimulationError` if it is no such state, or one of other profiles.
         """
         if not isinstance(state, Mapping) or state.get("format") != FORMAT or state.get("version") != 1:
             raise SimulationError(f'not a state of live traffic: "format" is not "{FORMAT}", or its version is not 1')
@@ -408,7 +300,8 @@ class Traffic:
         self._columns = None if state["columns"] is None else tuple(state["columns"])
         self._names = list(state["drivers"])
         self._index = {name: k for k, name in enumerate(self._names)}
-        self._state = np.array([tuple(map(_tupled, own)) for own in state["drivers"].values()], dtype=_DRIVER)
+        rows = [tuple(tuple(one) if isinstance(one, list) else one for one in own) for own in state["drivers"].values()]
+        self._state = np.array(rows, dtype=DRIVER)
         self._groups = {}
         for key, saved in state["groups"].items():
             group = OffsetGroup(self._profiles[key], self._columns or ())
@@ -433,57 +326,3 @@ def _check(time: float, before: float | None, moment: Moment) -> None:
         if bad.any():
             row = int(np.flatnonzero(bad)[0])
             raise SimulationError(f"vehicle {moment.names[row]!r} at {time:g} s: {what} is {values[row]}")
-
-
-def _pace(speed: FloatArray) -> FloatArray:
-    """How much of the driver's lateral movement there is, shape as the speed [m/s]. [-]
-
-    All from 40 km/h on; below, less, so that a path runs along the lane where its car stops and drives on.
-    """
-    u = np.abs(speed) / MINIMUM_SPEED
-    u = np.where(u > 1.0 - 1e-6, 1.0, u)  # 11.1111 m/s are meant as 40 km/h
-    return np.asarray(u**2 * (3.0 - 2.0 * u))
-
-
-def _move_aside(state: NDArray[Any], passed: FloatArray) -> None:
-    """Two equal first-order lags towards what is wanted, solved exactly; drivers respond within `STEERING`."""
-    keep = np.exp(-passed / STEERING)
-    gap = state["aside"] - state["wanted"]
-    drift = state["aside_rate"] + gap / STEERING
-    state["aside"] = state["wanted"] + (gap + drift * passed) * keep
-    state["aside_rate"] = (drift - (gap + drift * passed) / STEERING) * keep
-
-
-def _lead_over(state: NDArray[Any], which: BoolArray, gap: FloatArray, rate: FloatArray, speed: FloatArray) -> None:
-    """Begin to lead over from a gap [m] that changes at a rate [m/s], within what is no kink at this speed. [m/s]"""
-    bound = LEADING_OVER * TURN * np.maximum(np.abs(speed), MINIMUM_SPEED)
-    over = np.maximum(SETTLING_TIME, np.maximum(np.sqrt(_PEAK * np.abs(gap) / bound), 4.0 * np.abs(rate) / bound))
-    for name, values in (("from", gap), ("from_rate", rate), ("share", 0.0), ("over", over)):
-        state[name] = np.where(which, values, state[name])
-
-
-def _settle(state: NDArray[Any], passed: FloatArray) -> FloatArray:
-    """On with leading over; returns how fast what is left changes, shape (n,). [m/s]"""
-    active = state["over"] > 0.0
-    state["rest"] = np.where(active, state["rest"], 0.0)
-    if not active.any():
-        return np.zeros(len(state))
-    over = np.where(active, state["over"], 1.0)
-    share = state["share"] + passed / over
-    done = active & (share >= 1.0)
-    state["share"], state["over"] = np.where(active, share, 0.0), np.where(done, 0.0, state["over"])
-    u = np.clip(share, 0.0, 1.0)
-    level = 1.0 - u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
-    by_level = -30.0 * u**2 * (1.0 - u) ** 2 / over
-    by_slope = 1.0 - 18.0 * u**2 + 32.0 * u**3 - 15.0 * u**4
-    rest = state["from"] * level + settle(u * over, over, state["from_rate"], 0.0)
-    state["rest"] = np.where(active & ~done, rest, 0.0)
-    return np.where(active & ~done, state["from"] * by_level + state["from_rate"] * by_slope, 0.0)
-
-
-def _plain(value: Any) -> Any:
-    return value.tolist() if hasattr(value, "tolist") else value
-
-
-def _tupled(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value

@@ -11,9 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from msgspec import Struct
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from xosc_lateral.arrays import FloatArray
 
 
 class NaturalSpline(Struct, frozen=True, eq=False):
@@ -81,36 +80,23 @@ SETTLING_TIME = 3.0
 
 
 class SampledDeviation(Struct, frozen=True, eq=False):
-    """Offsets sampled on one road-following segment.
-
-    Parameters
-    ----------
-    distance : array, shape (n,)
-        Distance driven at each sample, strictly increasing; n >= 2. [m]
-    deviation : array, shape (n,)
-        Sampled offset, positive left. [m]
-    settling : tuple of float
-        Distances before the first and after the last sample within which lateral movement may settle. [m]
-    """
+    """Offsets sampled on one road-following segment."""
 
     distance: FloatArray
+    """Shape (n,). Distance driven at each sample, strictly increasing; n >= 2. [m]"""
     deviation: FloatArray
+    """Shape (n,). Sampled offset, positive left. [m]"""
     settling: tuple[float, float]
+    """Distances before the first and after the last sample within which lateral movement may settle. [m]"""
 
 
 class Deviation(Struct, frozen=True, eq=False):
-    """Deviation from nominal motion, twice continuously differentiable in the distance driven.
-
-    Parameters
-    ----------
-    splines : tuple of NaturalSpline
-        One per sampled segment, in order of distance.
-    settling : tuple of (float, float)
-        As in `SampledDeviation`.
-    """
+    """Deviation from nominal motion, twice continuously differentiable in the distance driven."""
 
     splines: tuple[NaturalSpline, ...]
+    """One per sampled segment, in order of distance."""
     settling: tuple[tuple[float, float], ...]
+    """As in `SampledDeviation`."""
 
     def __call__(self, distance: FloatArray) -> FloatArray:
         """Evaluate at distances driven, shape (n,). [m]"""

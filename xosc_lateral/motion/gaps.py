@@ -14,10 +14,9 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.motion.nearby import stretches_within
 from xosc_lateral.rows import BLOCK, give_back
-
-FloatArray = NDArray[np.float64]
 
 REACH = 30.0
 """Boxes farther apart than this at all times are no pair worth naming. [m]"""
@@ -31,43 +30,28 @@ TOGETHER = 256
 
 
 class BoxPath(Struct, frozen=True, eq=False):
-    """A vehicle's bounding box along its path.
-
-    Parameters
-    ----------
-    name : str
-    x, y, heading : array, shape (n,)
-        Pose of the reference point; NaN where the vehicle is absent. [m], [rad]
-    length, width : float
-        Of the box. [m]
-    centre : float
-        Box centre ahead of the reference point. [m]
-    """
+    """A vehicle's bounding box along its path."""
 
     name: str
     x: FloatArray
     y: FloatArray
     heading: FloatArray
+    """Shape (n,). Pose of the reference point; NaN where the vehicle is absent. [m], [rad]"""
     length: float
     width: float
+    """Of the box. [m]"""
     centre: float
+    """Box centre ahead of the reference point. [m]"""
 
 
 class Gap(Struct, frozen=True):
-    """Smallest free space between two vehicles over a run; 0: they touch.
-
-    Parameters
-    ----------
-    names : tuple of str
-    distance : float
-        [m]
-    time : float
-        When it is reached first. [s]
-    """
+    """Smallest free space between two vehicles over a run; 0: they touch."""
 
     names: tuple[str, str]
     distance: float
+    """[m]"""
     time: float
+    """When it is reached first. [s]"""
 
     @property
     def touches(self) -> bool:
@@ -76,17 +60,7 @@ class Gap(Struct, frozen=True):
 
 
 def smallest_gaps(time: FloatArray, paths: Sequence[BoxPath], *, reach: float = REACH) -> tuple[Gap, ...]:
-    """Smallest gap of each pair of vehicles that come within `reach` of each other.
-
-    Parameters
-    ----------
-    time : array, shape (n,)
-        [s]
-    paths : sequence of BoxPath
-        On that time grid.
-    reach : float
-        [m]
-    """
+    """Smallest gap of each pair of vehicles that come within `reach` [m] of each other, on one time grid [s]."""
     smallest: dict[tuple[int, int], Gap] = {}
     for part in _together(_near_pairs(paths, reach)):
         a, b = ([(paths[pair[side]], near) for pair, near in part] for side in (0, 1))
@@ -150,24 +124,16 @@ _POSE, _SIZE = ("x", "y", "heading"), ("length", "width", "centre")
 
 
 def box_distance(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Distance between rectangles, row by row; 0 where they overlap.
+    """Distance between rectangles, row by row, shape (n,); 0 where they overlap. [m]
 
-    Parameters
-    ----------
-    a, b : array, shape (n, 4, 2)
-        Corners in order. [m]
-
-    Returns
-    -------
-    array, shape (n,)
-        [m]
+    From their corners in order, shape (n, 4, 2). [m]
     """
     from_a, apart_of_a = _beyond(a, b)
     from_b, apart_of_b = _beyond(b, a)
     return np.where(apart_of_a | apart_of_b, np.minimum(from_a, from_b), 0.0)
 
 
-def _beyond(box: FloatArray, corners: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+def _beyond(box: FloatArray, corners: FloatArray) -> tuple[FloatArray, BoolArray]:
     """Distance of the nearest corner from a box that they are not in [m], and whether a side of it parts them from it.
 
     Convex shapes are nearest to each other at a corner of one of them, and apart if a side of one parts them.

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, Int32Array
 from xosc_lateral.errors import locate
 from xosc_lateral.scenario import Entity
-
-FloatArray = NDArray[np.float64]
 
 
 def axes(yaw: FloatArray, pitch: FloatArray, roll: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -23,9 +22,6 @@ def axes(yaw: FloatArray, pitch: FloatArray, roll: FloatArray) -> tuple[FloatArr
         np.stack([cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr], axis=1),
         np.stack([cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr], axis=1),
     )
-
-
-IntArray = NDArray[np.int32]
 
 
 class Activity(IntFlag):
@@ -48,47 +44,33 @@ class Activity(IntFlag):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class EntityMotion:
-    """One entity's rows, one per step, from time 0 to the end.
-
-    Parameters
-    ----------
-    entity : Entity
-        Name, category, bounding box, performance.
-    time : array, shape (n,)
-        [s] from scenario start, uniform.
-    x, y, z, heading, pitch, roll : array, shape (n,)
-        Pose of the reference point (rear axle). [m], [rad]
-    speed : array, shape (n,)
-        Signed scalar speed. [m/s]
-    road : array of int32, shape (n,)
-        Index into `RoadNetwork.road_ids`; -1 where the entity is on no road.
-    lane : array of int32, shape (n,)
-        OpenDRIVE lane id; 0 where on no road.
-    s : array, shape (n,)
-        Along the road's reference line. [m]
-    offset : array, shape (n,)
-        From the centre of `lane`, positive to the LEFT of the lane's direction of travel. [m]
-    heading_relative : array, shape (n,)
-        Turn from the lane's direction of travel, about the normal of the road's surface. [rad]
-    activity : array of uint8, shape (n,)
-        `Activity` bits.
-    """
+    """One entity's rows, one per step, from time 0 to the end; arrays of shape (n,)."""
 
     entity: Entity
+    """Name, category, bounding box, performance."""
     time: FloatArray
+    """[s] from scenario start, uniform."""
     x: FloatArray
     y: FloatArray
     z: FloatArray
     heading: FloatArray
     pitch: FloatArray
     roll: FloatArray
+    """Pose of the reference point (rear axle). [m], [rad]"""
     speed: FloatArray
-    road: IntArray
-    lane: IntArray
+    """Signed scalar speed. [m/s]"""
+    road: Int32Array
+    """Index into `RoadNetwork.road_ids`; -1 where the entity is on no road."""
+    lane: Int32Array
+    """OpenDRIVE lane id; 0 where on no road."""
     s: FloatArray
+    """Along the road's reference line. [m]"""
     offset: FloatArray
+    """From the centre of `lane`, positive to the LEFT of the lane's direction of travel. [m]"""
     heading_relative: FloatArray
+    """Turn from the lane's direction of travel, about the normal of the road's surface. [rad]"""
     activity: NDArray[np.uint8]
+    """`Activity` bits."""
 
     @property
     def name(self) -> str:
@@ -98,27 +80,18 @@ class EntityMotion:
 
 @dataclass(frozen=True, slots=True)
 class PlayedAction:
-    """An action that the player started (and perhaps ended).
-
-    Parameters
-    ----------
-    action : object
-        The action of `xosc_lateral.scenario`, with its place in the file.
-    actor : str or None
-        Entity acting; None for global and user-defined actions.
-    path : tuple of str
-        Names from story to action; ``("Init",)`` for init actions.
-    start : float
-        Time of the frame in which it started. [s]
-    end : float or None
-        Time at which it ended; None: still running at the end of the run. [s]
-    """
+    """An action that the player started (and perhaps ended)."""
 
     action: Any
+    """The action of `xosc_lateral.scenario`, with its place in the file."""
     actor: str | None
+    """Entity acting; None for global and user-defined actions."""
     path: tuple[str, ...]
+    """Names from story to action; ``("Init",)`` for init actions."""
     start: float
+    """Time of the frame in which it started. [s]"""
     end: float | None
+    """Time at which it ended; None: still running at the end of the run. [s]"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,30 +114,19 @@ CUT_OFF = "still runs at the time limit"
 
 @dataclass(frozen=True, eq=False, slots=True)
 class NominalMotion:
-    """A played scenario.
-
-    Parameters
-    ----------
-    step : float
-        [s]
-    entities : tuple of EntityMotion
-        In the scenario's order.
-    actions : tuple of PlayedAction
-        Every action started, in order of start.
-    end_time : float
-        [s]
-    ended_by : str
-        ``"stop trigger"`` or ``"time limit"`` or what else ended the run.
-    notes : tuple of Note
-        What could not be played as written.
-    cut_off : Note or None
-        Says that the time limit came before the scenario's end, or before all its stories were over.
-    """
+    """A played scenario."""
 
     step: float
+    """[s]"""
     entities: tuple[EntityMotion, ...]
+    """In the scenario's order."""
     actions: tuple[PlayedAction, ...]
+    """Every action started, in order of start."""
     end_time: float
+    """[s]"""
     ended_by: str
+    """``"stop trigger"`` or ``"time limit"`` or what else ended the run."""
     notes: tuple[Note, ...]
+    """What could not be played as written."""
     cut_off: Note | None = None
+    """Says that the time limit came before the scenario's end, or before all its stories were over."""

@@ -6,8 +6,8 @@ from enum import Enum
 
 import numpy as np
 from msgspec import Struct
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, IntArray
 from xosc_lateral.motion.nominal import Activity, EntityMotion
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.rows import blocks
@@ -42,22 +42,15 @@ _KINDS = tuple(SegmentKind)
 
 
 class SegmentSpan(Struct, frozen=True):
-    """A segment as the rows ``first`` to ``last`` (both included) of one entity, of one kind throughout.
-
-    Parameters
-    ----------
-    kind : SegmentKind
-    first, last : int
-        Rows of the entity's motion.
-    start, end : float
-        Time of those rows. [s]
-    """
+    """A segment as the rows ``first`` to ``last`` (both included) of one entity, of one kind throughout."""
 
     kind: SegmentKind
     first: int
     last: int
+    """Rows of the entity's motion."""
     start: float
     end: float
+    """Time of those rows. [s]"""
 
     @property
     def is_road_following(self) -> bool:
@@ -66,44 +59,24 @@ class SegmentSpan(Struct, frozen=True):
 
 
 class SegmentRow(Struct, frozen=True):
-    """One segment of one entity.
-
-    Parameters
-    ----------
-    entity : str
-    start, end : float
-        [s]
-    road_following : bool
-    why : str
-        Why it is no road-following segment; empty if it is one.
-    road, lane : str, int
-        Where it begins; empty and 0 off the road.
-    """
+    """One segment of one entity."""
 
     entity: str
     start: float
     end: float
+    """[s]"""
     road_following: bool
     why: str
+    """Why it is no road-following segment; empty if it is one."""
     road: str
     lane: int
+    """Where it begins; empty and 0 off the road."""
 
 
 def cut_segments(motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool = False) -> tuple[SegmentSpan, ...]:
-    """Cut an entity's whole motion into segments; teleports always cut.
+    """Cut an entity's whole motion into segments, each row into exactly one; teleports always cut.
 
-    Parameters
-    ----------
-    motion : EntityMotion
-    network : RoadNetwork
-        The one that it was played on.
-    is_trailer : bool
-        The entity is pulled by another: it has no driver.
-
-    Returns
-    -------
-    tuple of SegmentSpan
-        In order of time, without gaps: each row belongs to exactly one.
+    `is_trailer`: the entity is pulled by another, and has no driver.
     """
     firsts: list[tuple[int, int]] = []  # rows at which segments begin, and their kinds
     before = -1
@@ -120,7 +93,7 @@ def cut_segments(motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool
     )
 
 
-def _row_kinds(motion: EntityMotion, network: RoadNetwork, rows: slice, is_trailer: bool) -> NDArray[np.int64]:
+def _row_kinds(motion: EntityMotion, network: RoadNetwork, rows: slice, is_trailer: bool) -> IntArray:
     """Kind of each of these rows, as its index in `SegmentKind`; the first reason that applies, in the enum's order."""
     kinds = np.zeros(rows.stop - rows.start, dtype=np.int64)
     for kind, applies in reversed(_reasons(motion, network, rows, is_trailer).items()):
@@ -130,7 +103,7 @@ def _row_kinds(motion: EntityMotion, network: RoadNetwork, rows: slice, is_trail
 
 def _reasons(
     motion: EntityMotion, network: RoadNetwork, rows: slice, is_trailer: bool
-) -> dict[SegmentKind, NDArray[np.bool_] | bool]:
+) -> dict[SegmentKind, BoolArray | bool]:
     """Where in these rows each kind applies, by the enum's order."""
     activity, road, lane, s = motion.activity[rows], motion.road[rows], motion.lane[rows], motion.s[rows]
     on_road = (road >= 0) & ((activity & Activity.OFF_ROAD) == 0)

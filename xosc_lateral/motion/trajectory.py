@@ -15,13 +15,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.motion.nominal import Activity, EntityMotion
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.rows import blocks, columns, empty, put, rows_where, scratch
-
-FloatArray = NDArray[np.float64]
 
 _STANDSTILL = 1e-3
 """Displacement per step under which a direction of motion can't be read from it. [m]"""
@@ -35,28 +33,20 @@ _ASIDE = 10.0
 
 @dataclass(frozen=True, eq=False, slots=True)
 class WorldTrajectory:
-    """A path in the world over time, on the rows of the nominal motion.
-
-    Parameters
-    ----------
-    time : array, shape (n,)
-        [s]
-    x, y, z : array, shape (n,)
-        [m]
-    heading, pitch, roll : array, shape (n,)
-        [rad]
-    speed : array, shape (n,)
-        Along the path, negative when driving backwards. [m/s]
-    """
+    """A path in the world over time, on the rows of the nominal motion; arrays of shape (n,)."""
 
     time: FloatArray
+    """[s]"""
     x: FloatArray
     y: FloatArray
     z: FloatArray
+    """[m]"""
     heading: FloatArray
     pitch: FloatArray
     roll: FloatArray
+    """[rad]"""
     speed: FloatArray
+    """Along the path, negative when driving backwards. [m/s]"""
 
 
 def distance_driven(motion: EntityMotion) -> FloatArray:
@@ -81,7 +71,7 @@ def leaps(motion: EntityMotion) -> list[tuple[float, float]]:
     def moved(around: slice) -> FloatArray:
         return np.hypot(np.diff(motion.x[around]), np.diff(motion.y[around]))
 
-    def leaps_there(rows: slice) -> NDArray[np.bool_]:
+    def leaps_there(rows: slice) -> BoolArray:
         around = slice(rows.start - 1, rows.stop)
         step, speed, activity = np.diff(motion.time[around]), np.abs(motion.speed[around]), motion.activity[around]
         active = (activity & Activity.ACTIVE) != 0
@@ -96,12 +86,8 @@ def leaps(motion: EntityMotion) -> list[tuple[float, float]]:
 def displace(motion: EntityMotion, network: RoadNetwork, deviation: FloatArray) -> WorldTrajectory:
     """Shift a motion sideways in lane coordinates; headings and speeds follow from the shifted path.
 
-    Parameters
-    ----------
-    motion : EntityMotion
-    network : RoadNetwork
-    deviation : array, shape (n,)
-        Added to the nominal offset, positive to the left of the vehicle's travel; ignored where it is on no road. [m]
+    The deviation [m], shape (n,), is added to the nominal offset, positive to the left of the vehicle's travel; it is
+    ignored where the vehicle is on no road.
     """
     n = len(motion.time)
     x, y, z = columns(n, _shifted(motion, network, deviation)) if n else (motion.x, motion.y, motion.z)
@@ -111,7 +97,7 @@ def displace(motion: EntityMotion, network: RoadNetwork, deviation: FloatArray) 
     return WorldTrajectory(motion.time, x, y, z, heading, motion.pitch, motion.roll, speed)
 
 
-def _moves(motion: EntityMotion, deviation: FloatArray, rows: slice) -> NDArray[np.bool_]:
+def _moves(motion: EntityMotion, deviation: FloatArray, rows: slice) -> BoolArray:
     return np.asarray((motion.road[rows] >= 0) & (deviation[rows] != 0.0))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Collection, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -16,10 +16,9 @@ from xosc_lateral.errors import DriverProfileError, FormatError
 from xosc_lateral.formats.context_table import read_context
 from xosc_lateral.formats.openscenario.provenance import PENDING
 from xosc_lateral.formats.openscenario.write.build import named
-from xosc_lateral.formats.openscenario.write.result import WrittenScenario
-from xosc_lateral.formats.openscenario.write.sampled import motion_unknown_to
+from xosc_lateral.formats.openscenario.write.draft import WrittenScenario
 from xosc_lateral.formats.openscenario.write.target import Player
-from xosc_lateral.formats.openscenario.write.trajectory_scenario import write_trajectory_scenario
+from xosc_lateral.formats.openscenario.write.trajectory_scenario import motion_unknown_to, write_trajectory_scenario
 from xosc_lateral.formats.output_paths import refuse_outputs
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.formats.source import edit_in_place, guarding_inputs
@@ -283,7 +282,7 @@ def _write(
     profiles = sorted({name for name, _ in provenance.profiles.values()})
     summary = f"seed {settings.seed}, variant {provenance.variant}, {', '.join(profiles) or 'no profile'}"
     summary += ", with sensor" if settings.with_sensor else ""
-    facts = asdict(provenance)
+    facts = {field.name: getattr(provenance, field.name) for field in fields(provenance)}
     if not plan.is_replay:
         from xosc_lateral.formats.openscenario.write.lane_offset_scenario import write_lane_offset_scenario
         from xosc_lateral.formats.openscenario.write.lateral_actions import awaited, lateral_actions, overruled_until

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import cache, partial
 from pathlib import Path
 
 from xosc_lateral.driver.profile import DriverProfile
@@ -42,10 +43,11 @@ def choose_drivers(scenario: Scenario, settings: ConvertSettings, egos: Mapping[
                     path=scenario.path,
                 )
     under_test = {name: f"vehicle under test: {why}" for name, why in (egos or {}).items()}
-    return {entity.name: under_test.get(entity.name) or _driver(entity, settings) for entity in scenario.entities}
+    read = cache(partial(read_profile, folders=settings.library))
+    return {entity.name: under_test.get(entity.name) or _driver(entity, settings, read) for entity in scenario.entities}
 
 
-def _driver(entity: Entity, settings: ConvertSettings) -> DriverProfile | str:
+def _driver(entity: Entity, settings: ConvertSettings, read: Callable[[str], DriverProfile]) -> DriverProfile | str:
     if not entity.is_vehicle:
         return f"a {entity.category.value}, no vehicle"
     if settings.only is not None and entity.name not in settings.only:
@@ -56,7 +58,7 @@ def _driver(entity: Entity, settings: ConvertSettings) -> DriverProfile | str:
         if category in NO_DRIVER:
             return NO_DRIVER[category]
         named = AUTO_PROFILE
-    return named if isinstance(named, DriverProfile) else read_profile(named, settings.library)
+    return named if isinstance(named, DriverProfile) else read(named)
 
 
 def uses_auto(settings: ConvertSettings) -> bool:

@@ -274,12 +274,17 @@ class _Fingerprints:
 def _profile_state(name: str, libraries: tuple[Path, ...]) -> str:
     """What a profile's name means now: its file's hash; "auto": that of what it chooses."""
     try:
-        if name == AUTO:
-            return file_hash(find_profile(AUTO_PROFILE, libraries))
-        return _hash_or_missing(find_profile(name, libraries))
+        return _hash_or_missing(find_profile(AUTO_PROFILE if name == AUTO else name, libraries))
     except (XoscLateralError, OSError):
-        return "missing"  # the conversion says so
+        return MISSING
 
 
 def _hash_or_missing(path: Path) -> str:
-    return file_hash(path) if path.is_file() else "missing"
+    try:
+        return file_hash(path)
+    except (FormatError, OSError):
+        return MISSING
+
+
+MISSING = "missing"
+"""In place of the hash of a file that can't be read: its conversion says why, and the others go on."""

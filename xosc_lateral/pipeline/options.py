@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import MISSING, dataclass, field, fields
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 if TYPE_CHECKING:
     from xosc_lateral.driver.profile import DriverProfile
@@ -21,6 +22,8 @@ Paths: TypeAlias = PathLike | Sequence[PathLike]
 
 NO_EGO = "none"
 """In place of a vehicle under test: there is none."""
+
+Verb = TypeVar("Verb", bound=Callable[..., Any])
 
 Cell = Callable[[str, Path], Any]
 """Text of a table's cell and the table's folder -> what a user would say in Python."""
@@ -82,6 +85,45 @@ def option(
     if isinstance(default, dict):
         return field(default_factory=dict, metadata=metadata)
     return field(default=default, metadata=metadata)
+
+
+def options_of(settings: type) -> dict[str, Option]:
+    """What users can set of some settings, by name."""
+    return {item.name: item.metadata["option"] for item in fields(settings) if "option" in item.metadata}
+
+
+def values_of(settings: type, said: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of fields from what a user says; None: nothing is said.
+
+    Raises `TypeError`: there is no such option; `ValueError`: it can't have that value.
+    """
+    options = options_of(settings)
+    unknown = said.keys() - options.keys()
+    if unknown:
+        raise TypeError(f"no option {min(unknown)!r}; there are {', '.join(options)}")
+    return {name: options[name].value(name, value) for name, value in said.items() if value is not None}
+
+
+def spelled_out(settings: type) -> Callable[[Verb], Verb]:
+    """Name the options that a call takes as keywords in its signature, for help and completion."""
+
+    def with_options(verb: Verb) -> Verb:
+        signature = inspect.signature(verb)
+        own = [one for one in signature.parameters.values() if one.kind is not one.VAR_KEYWORD]
+        named = [
+            inspect.Parameter(
+                item.name,
+                inspect.Parameter.KEYWORD_ONLY,
+                default=None if item.default is MISSING else item.default,
+                annotation=item.type,
+            )
+            for item in fields(settings)
+            if "option" in item.metadata
+        ]
+        verb.__signature__ = signature.replace(parameters=[*own, *named])  # type: ignore[attr-defined]
+        return verb
+
+    return with_options
 
 
 def names(said: str | Collection[str]) -> frozenset[str]:

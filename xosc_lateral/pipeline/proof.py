@@ -8,18 +8,17 @@ from functools import cache, partial
 
 import numpy as np
 from msgspec.structs import replace
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.enrich.enrich import SAMPLE_STEP, enrich
+from xosc_lateral.enrich.enrich import enrich
 from xosc_lateral.enrich.result import Neighbours
+from xosc_lateral.enrich.seen import SAMPLE_STEP
 from xosc_lateral.motion.context import entity_context
 from xosc_lateral.pipeline.load import Played, play_scenario
 from xosc_lateral.shipped import shipped_folder
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Converted = Callable[[str, int], FloatArray]
 """Template, number of the vehicle -> deviations."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -17,13 +17,15 @@ from xosc_lateral.formats.openscenario.write.reconstructed import Triggers, reco
 from xosc_lateral.formats.output_tables import write_frame
 from xosc_lateral.formats.profiles import find_profile, list_profiles, profile_bytes, read_profile
 from xosc_lateral.formats.recordings import RecordedTraffic
+from xosc_lateral.pipeline import options as say
 from xosc_lateral.pipeline.drivers import AUTO_PROFILE
+from xosc_lateral.pipeline.options import option
 from xosc_lateral.reconstruction.drivers import ChosenDriver, WindowModel, choose_driver, drive_of, in_lane_offsets
 from xosc_lateral.reconstruction.encounters import Encounter, encounters, relative_triggers
 from xosc_lateral.reconstruction.plan import Residuals, VehiclePlan, plan_vehicles, residuals_of
 from xosc_lateral.reconstruction.recorded import Recording, Track, place_tracks
 
-VERSIONS: tuple[Version, ...] = ((1, 0), (1, 1), (1, 2), (1, 3))
+VERSIONS: dict[str, Version] = {named(version): version for version in ((1, 0), (1, 1), (1, 2), (1, 3))}
 """Of the standard that can be written."""
 LONG_DRIVE = 100.0
 """Of road-following, for a profile of one vehicle: ten windows that the evaluation compares drivers by. [s]"""
@@ -33,22 +35,75 @@ AROUND = 100.0
 """Who comes as near as this to the vehicle in question, along or across, belongs to its surroundings. [m]"""
 
 
+def _version(text: str) -> str:
+    if text not in VERSIONS:
+        raise ValueError(f"version {text!r}, expected {', '.join(VERSIONS)}")
+    return text
+
+
 @dataclass(frozen=True, slots=True)
 class ReconstructSettings:
-    """What is reconstructed, and how: `api.reconstruct` says what each is; times and `error` in [s] and [m]."""
+    """What is reconstructed, and how: keywords of `reconstruct`, and options of the command line.
 
-    begin: float | None = None
-    end: float | None = None
-    vehicles: Collection[str] | None = None
-    around: str | None = None
-    window: float = 60.0
-    host: str | None = None
-    error: float = 0.5
-    version: Version = (1, 2)
-    relative: bool = False
-    exact: bool = False
-    fit: bool = False
-    libraries: tuple[Path, ...] = ()
+    Parameters
+    ----------
+    begin, end : float, optional
+        Part of the recording. [s]
+    vehicles : collection of str, optional
+        These alone.
+    around, window : str, float
+        A vehicle and those who come near it, for so long in the middle of its passage. [s]
+    host : str, optional
+        The vehicle under test: `convert` leaves it to the system that drives it.
+    error : float
+        Positions along the road are within this; smaller: more corners in the speeds. [m]
+    version : str
+        Of OpenSCENARIO, "1.0" to "1.3".
+    relative : bool
+        Lane changes and braking begin at a distance to another vehicle, where the recording bears it out.
+    exact : bool
+        Recorded paths as trajectories, instead of maneuvers.
+    fit : bool
+        A driver profile of its own for every vehicle that drove long enough.
+    library : path or paths
+        Folders with further profiles to choose from.
+    """
+
+    # What is said of one option stays together.
+    # fmt: off
+    begin: float | None = option(
+        None, float, "--from", kind=float | None, show_default=False, help="Begin there [s].",
+    )
+    end: float | None = option(None, float, "--to", kind=float | None, show_default=False, help="End there [s].")
+    vehicles: frozenset[str] | None = option(
+        None, say.names, kind=list[str] | None, metavar="ID", help="This vehicle alone; may be repeated.",
+    )
+    around: str | None = option(
+        None, str, kind=str | None, metavar="ID", show_default=False,
+        help="This vehicle and those who come near it.",
+    )
+    window: float = option(
+        60.0, float, kind=float, min=1, max=3600, help="Length of the part that --around takes [s].",
+    )
+    host: str | None = option(
+        None, str, kind=str | None, metavar="ID", show_default=False, help="The vehicle under test.",
+    )
+    error: float = option(
+        0.5, float, kind=float, min=0.01,
+        help="Positions along the road are within this [m]: the smaller, the more corners.",
+    )
+    version: str = option("1.2", _version, kind=str, metavar="1.0..1.3", help="Version of OpenSCENARIO to write.")
+    relative: bool = option(
+        False, bool, "--relative", kind=bool, help="Cut-ins and braking begin at a distance to another vehicle.",
+    )
+    exact: bool = option(
+        False, bool, "--exact", kind=bool, help="Recorded paths as trajectories, no maneuvers.",
+    )
+    fit: bool = option(
+        False, bool, "--fit", kind=bool, help="Fit a profile to everybody who drove long enough.",
+    )
+    library: tuple[Path, ...] = option((), say.paths)
+    # fmt: on
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -102,7 +157,7 @@ def reconstruct_recording(traffic: RecordedTraffic, settings: ReconstructSetting
         traffic.network,
         road_file=traffic.road_name,
         duration=end - begin,
-        version=settings.version,
+        version=VERSIONS[settings.version],
         host=None if settings.host is None else by_name[settings.host],
         description=f"{traffic.name}: reconstructed from {traffic.sources[0].name}, {begin:g} to {end:g} s",
         relative=relative,
@@ -122,8 +177,8 @@ def _drivers(
     """A profile for each vehicle: its own, the likeliest of the library, or the population's."""
     from xosc_lateral.driver.fitting import fit_profile
 
-    population = find_profile(AUTO_PROFILE, settings.libraries)
-    paths = {path.stem: path for path in reversed(list_profiles(settings.libraries))}
+    population = find_profile(AUTO_PROFILE, settings.library)
+    paths = {path.stem: path for path in reversed(list_profiles(settings.library))}
     models = {name: _window_model(path, path.stat().st_mtime_ns) for name, path in paths.items()}
     chosen, fitted = list[ChosenDriver](), dict[str, DriverProfile]()
     for plan, residual in zip(plans, residuals, strict=True):
@@ -165,14 +220,6 @@ def fitted_profiles(made: Reconstructed) -> dict[str, bytes]:
     return {f"drivers/{name}.json": profile_bytes(profile) for name, profile in made.fitted.items()}
 
 
-def version_named(text: str) -> Version:
-    """A version that can be written, by its name; `ValueError` for another."""
-    found = {named(version): version for version in VERSIONS}
-    if text not in found:
-        raise ValueError(f"version {text!r}, expected {', '.join(found)}")
-    return found[text]
-
-
 def chosen(traffic: RecordedTraffic, settings: ReconstructSettings) -> tuple[list[Track], float, float]:
     """Tracks and window of time [s] that the settings ask for.
 
@@ -196,7 +243,7 @@ def chosen(traffic: RecordedTraffic, settings: ReconstructSettings) -> tuple[lis
         begin, end = max(begin, middle - 0.5 * settings.window), min(end, middle + 0.5 * settings.window)
         tracks = [track for track in tracks if _comes_near(track, centre, begin, end)]
     if settings.vehicles is not None:
-        tracks = [track for track in tracks if track.name in set(settings.vehicles)]
+        tracks = [track for track in tracks if track.name in settings.vehicles]
     begin, end = max(begin, first), min(end, last)
     wrong = ""
     if end - begin < 1.0:

@@ -22,7 +22,6 @@ from xosc_lateral.formats.output_paths import file_name
 from xosc_lateral.formats.source import open_source
 from xosc_lateral.formats.tables import TABLE_SUFFIXES, as_text, read_text_table
 from xosc_lateral.limits import PARAMETER_SETS, XML_TREE
-from xosc_lateral.pipeline.manifest import MANIFEST
 from xosc_lateral.pipeline.options import Option, as_it_is, whole
 from xosc_lateral.pipeline.settings import OPTIONS, ConvertSettings
 
@@ -234,6 +233,8 @@ def is_single(given: str | Path) -> bool:
 
 def _search(folder: Path, leave_out: Path | None) -> Iterator[Path]:
     """Scenario files below a folder, sorted; hidden folders, output trees of former batches and `leave_out` aside."""
+    from xosc_lateral.pipeline.manifest import MANIFEST  # one scenario needs none
+
     avoided = None if leave_out is None else leave_out.resolve()
     for name, folders, files in os.walk(folder):
         here = Path(name)

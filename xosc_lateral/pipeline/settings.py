@@ -6,13 +6,12 @@ configuration file that decide a conversion are all made from the fields of `Con
 
 from __future__ import annotations
 
-import inspect
 import os
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, TypeVar, Unpack
+from typing import TYPE_CHECKING, Any
 
 from xosc_lateral.enrich.result import Neighbours
 from xosc_lateral.errors import FormatError
@@ -24,9 +23,6 @@ from xosc_lateral.pipeline.options import Option, option
 
 if TYPE_CHECKING:
     from xosc_lateral.driver.profile import DriverProfile
-    from xosc_lateral.pipeline.options import PathLike, Paths, ProfileLike
-
-Verb = TypeVar("Verb", bound=Callable[..., Any])
 
 STEP = 0.02
 """Of playback, as in the reference logs. [s]"""
@@ -43,8 +39,9 @@ class OutputMode(StrEnum):
     LANE_OFFSET = "lane-offset"
 
 
-class ConvertOptions(TypedDict, total=False):
-    """What a user may say of a conversion.
+@dataclass(frozen=True, slots=True)
+class ConvertSettings:
+    """Settings of one conversion, as plain values that a batch can send and hash.
 
     Parameters
     ----------
@@ -91,34 +88,11 @@ class ConvertOptions(TypedDict, total=False):
         driver alone is written.
     strict : bool
         A missing vehicle catalog is an error, instead of a note and a usual car.
-    """
 
-    profile: ProfileLike
-    seed: int
-    entity: Mapping[str, ProfileLike] | None
-    only: Collection[str] | None
-    ego: Collection[str] | None
-    neighbours: Literal["profile", "borrow", "none"] | None
-    context: PathLike | None
-    parameters: Mapping[str, object] | None
-    library: Paths
-    mode: Literal["auto", "trajectory", "lane-offset"]
-    player: Literal["standard", "esmini", "carla"]
-    version: str | None
-    allow: Paths
-    road: PathLike | None
-    road_path: Paths
-    attempts: int
-    time_limit: float | None
-    with_sensor: bool
-    strict: bool
-
-
-@dataclass(frozen=True, slots=True)
-class ConvertSettings:
-    """Settings of one conversion: `ConvertOptions` as plain values that a batch can send and hash.
-
-    `ValueError` for a version of the standard that can't be written, or that the player does not read.
+    Raises
+    ------
+    ValueError
+        A version of the standard that can't be written, or that the player does not read.
     """
 
     # What is said of one option stays together.
@@ -189,17 +163,14 @@ class ConvertSettings:
         _ = self.target
 
     @classmethod
-    def of(cls, **options: Unpack[ConvertOptions]) -> ConvertSettings:
+    def of(cls, **options: Any) -> ConvertSettings:
         """Settings from what a user says, else as configured; None: nothing is said.
 
-        Raises `TypeError`: there is no such option; `ValueError`: it can't have that value; `FormatError`: it is the
-        configuration that says so; there is no such road, or folder of roads.
+        Raises what `values_of` does; `FormatError`: it is the configuration that says so; there is no such road, or
+        folder of roads.
         """
-        unknown = options.keys() - OPTIONS.keys()
-        if unknown:
-            raise TypeError(f"no option {min(unknown)!r}; there are {', '.join(OPTIONS)}")
         path, configured = configuration()
-        values = {name: OPTIONS[name].value(name, said) for name, said in options.items() if said is not None}
+        values = say.values_of(cls, options)
         for name in (SETTINGS - values.keys()) & configured.keys():
             try:
                 values[name] = OPTIONS[name].value(name, configured[name])
@@ -248,9 +219,7 @@ class ConvertSettings:
         return RoadSearch(self.road, self.road_path)
 
 
-OPTIONS: Mapping[str, Option] = {
-    item.name: item.metadata["option"] for item in fields(ConvertSettings) if "option" in item.metadata
-}
+OPTIONS: Mapping[str, Option] = say.options_of(ConvertSettings)
 """What users can set, by name."""
 
 NOT_RECORDED = frozenset({"library", "allow", "road_path", "strict"})
@@ -274,20 +243,6 @@ def _plain(name: str, value: Any, folder: Path) -> Any:
 def relative(path: Path, folder: Path) -> str:
     """Path as seen from a folder, with forward slashes: the same on every machine."""
     try:
-        return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
+        return Path(os.path.relpath(os.path.realpath(path), os.path.realpath(folder))).as_posix()
     except ValueError:  # another drive of a Windows machine
         return path.resolve().as_posix()
-
-
-def spelled_out(verb: Verb) -> Verb:
-    """Name the options of a verb that takes `ConvertOptions` in its signature, for help and completion."""
-    signature = inspect.signature(verb)
-    own = [one for one in signature.parameters.values() if one.kind is not one.VAR_KEYWORD]
-    defaults = ConvertSettings().record(Path())
-    keyword = inspect.Parameter.KEYWORD_ONLY
-    named = [
-        inspect.Parameter(name, keyword, default=defaults.get(name), annotation=getattr(hint, "__forward_arg__", hint))
-        for name, hint in ConvertOptions.__annotations__.items()
-    ]
-    verb.__signature__ = signature.replace(parameters=[*own, *named])  # type: ignore[attr-defined]
-    return verb

@@ -13,8 +13,9 @@ from math import cos, hypot, sin
 
 import numpy as np
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import PlaybackError
-from xosc_lateral.motion.nominal import CUT_OFF, Activity, FloatArray, NominalMotion, Note
+from xosc_lateral.motion.nominal import CUT_OFF, Activity, NominalMotion, Note
 from xosc_lateral.playback.drive import drive, halt_at_road_end
 from xosc_lateral.playback.recorder import NO_LANE
 from xosc_lateral.playback.simulation import Simulation

@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from xosc_lateral.errors import PlaybackError
-from xosc_lateral.motion.nominal import Activity, EntityMotion, FloatArray, IntArray
+from xosc_lateral.motion.nominal import Activity, EntityMotion
 from xosc_lateral.playback.state import NOWHERE, EntityState
 from xosc_lateral.road import RoadNetwork
 from xosc_lateral.road.tables import turned_in_surface
@@ -56,7 +57,7 @@ class Rows:
         self._rows_put_away = 0
         self._free_rows = array("q")
         self._free = array("d")
-        self._free_put_away: list[tuple[NDArray[np.int64], FloatArray]] = []
+        self._free_put_away: list[tuple[IntArray, FloatArray]] = []
         self._knows_height = True
         """Of all rows whose road nobody has asked for."""
 
@@ -178,7 +179,7 @@ class Rows:
                 yield [np.concatenate(column) for column in zip(*together, strict=True)]
                 together = []
 
-    def _free_within(self, begin: int, end: int) -> tuple[NDArray[np.int64], FloatArray]:
+    def _free_within(self, begin: int, end: int) -> tuple[IntArray, FloatArray]:
         """World poses that were given, shape (n, 6), and their rows, counted from `begin`, before `end`."""
         parts = [(rows, free) for rows, free in self._free_put_away if rows[0] < end and rows[-1] >= begin]
         if not parts:
@@ -200,12 +201,12 @@ class Rows:
 class _Where(NamedTuple):
     """Road coordinates of rows."""
 
-    road: IntArray
-    lane: IntArray
+    road: Int32Array
+    lane: Int32Array
     s: FloatArray
     offset: FloatArray
 
-    def at(self, rows: NDArray[np.int64]) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    def at(self, rows: IntArray) -> tuple[Int32Array, Int32Array, FloatArray, FloatArray]:
         """Those of some rows."""
         return self.road[rows], self.lane[rows], self.s[rows], self.offset[rows]
 
@@ -229,7 +230,7 @@ def _poses(network: RoadNetwork, where: _Where, to_lane: FloatArray) -> FloatArr
 
 def _look_up(
     network: RoadNetwork,
-    rows: NDArray[np.int64],
+    rows: IntArray,
     free: FloatArray,
     height: FloatArray | None,
     where: _Where,
@@ -249,7 +250,7 @@ def _look_up(
     direction[rows] = network.travel_directions(found.road, found.lane)
 
 
-def _beside_road(network: RoadNetwork, where: _Where, pose: FloatArray) -> NDArray[np.bool_]:
+def _beside_road(network: RoadNetwork, where: _Where, pose: FloatArray) -> BoolArray:
     """Rows whose reference point is on no lane of any kind."""
     beside = where.road < 0
     rows = np.flatnonzero(~beside)

@@ -13,7 +13,8 @@ from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.unwatched import Unwatched
 from xosc_lateral.playback.values import Values
 from xosc_lateral.road.network import RoadNetwork
-from xosc_lateral.scenario import Action, Place, Scenario, TrafficSignalController, TrafficSignalPhase
+from xosc_lateral.scenario import Action, Place, Scenario, TrafficSignalController
+from xosc_lateral.scenario.scenario import TrafficSignalPhase
 
 
 @dataclass
@@ -150,7 +151,7 @@ class Simulation:
         """The entity of that name, for actions of its own alone; raises `PlaybackError` as `entity` does."""
         state = self.by_name.get(name)
         if state is None:
-            raise place.error(PlaybackError, f"entity '{name}' is not in the scenario")
+            raise place.error(f"entity '{name}' is not in the scenario", PlaybackError)
         return state
 
     def note(self, what: str, place: Place) -> None:

@@ -10,16 +10,14 @@ from collections.abc import Iterable
 from math import isnan
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.playback.drive import along_reference, beside_line
 from xosc_lateral.playback.recorder import FARTHEST, FASTEST, Rows
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.transition import EPSILON
 from xosc_lateral.road.geometry import Arc, Line
-
-FloatArray = NDArray[np.float64]
 
 MOST, LEAST = 1000, 5
 """Frames that are worked out at once: more would often be for nothing, and fewer are not worth it."""

@@ -14,16 +14,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.evaluation.metrics import free_runs
 from xosc_lateral.motion.segments import MINIMUM_SPEED
 from xosc_lateral.reconstruction.plan import Residuals, VehiclePlan
 from xosc_lateral.rows import true_slices
-
-FloatArray = NDArray[np.float64]
 
 WINDOW, STEP = 10.0, 0.2
 """Of movement that is summed up, as long as the evaluation's snippets; between rows, as profiles have it. [s]"""

@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.reconstruction.plan import VehiclePlan
 from xosc_lateral.road.network import RoadNetwork
-
-FloatArray = NDArray[np.float64]
 
 REACH = 150.0
 """Who is farther away has nothing to do with it: 5 s at 30 m/s. [m]"""
@@ -70,15 +68,11 @@ def encounters(plans: Sequence[VehiclePlan], network: RoadNetwork) -> tuple[Enco
     for plan in plans:
         for one, lane in zip(plan.lateral.transitions, plan.targets, strict=True):
             if one.lanes:
-                time = one.start + 0.5 * one.duration
-                ahead, behind = _beside(plan, plans, time, network, lane)
-                found.append(
-                    Encounter("lane change", plan.name, time, "left" if one.lanes > 0 else "right", ahead, behind)
-                )
-        for k in brakings(plan):
-            time = float(plan.speed.time[k])
-            ahead, behind = _beside(plan, plans, time, network, None)
-            found.append(Encounter("braking", plan.name, time, "", ahead, behind))
+                time, side = one.start + 0.5 * one.duration, "left" if one.lanes > 0 else "right"
+                beside = _beside(plan, plans, time, network, lane)
+                found.append(Encounter("lane change", plan.name, time, side, *beside))
+        for time in plan.speed.time[brakings(plan)].tolist():
+            found.append(Encounter("braking", plan.name, time, "", *_beside(plan, plans, time, network, None)))
     return tuple(sorted(found, key=lambda one: (one.time, one.vehicle)))
 
 
@@ -142,40 +136,33 @@ def relative_triggers(
         if one.lanes:
             _, behind = _beside(plan, plans, one.start, network, lane)
             ahead, _ = _beside(plan, plans, one.start, network, None)
-            for other in (behind, ahead):
-                if other is not None and k not in changes:
-                    _add(changes, k, _trigger(plan, other.name, plans, one.start))
+            if trigger := _trigger(plan, behind, plans, one.start) or _trigger(plan, ahead, plans, one.start):
+                changes[k] = trigger
     for k in brakings(plan):
-        ahead, _ = _beside(plan, plans, float(plan.speed.time[k]), network, None)
-        if ahead is not None:
-            _add(braking, k, _trigger(plan, ahead.name, plans, float(plan.speed.time[k])))
+        time = float(plan.speed.time[k])
+        ahead, _ = _beside(plan, plans, time, network, None)
+        if trigger := _trigger(plan, ahead, plans, time):
+            braking[k] = trigger
     return changes, braking
 
 
-def _add(found: dict[int, RelativeTrigger], k: int, trigger: RelativeTrigger | None) -> None:
-    if trigger is not None:
-        found[k] = trigger
-
-
-def _trigger(plan: VehiclePlan, name: str, plans: Sequence[VehiclePlan], time: float) -> RelativeTrigger | None:
+def _trigger(
+    plan: VehiclePlan, beside: Beside | None, plans: Sequence[VehiclePlan], time: float
+) -> RelativeTrigger | None:
     """The distance to another vehicle as a trigger, if it passes its value at that time and not in a while before."""
-    other = next(one for one in plans if one.name == name)
+    other = next((one for one in plans if beside is not None and one.name == beside.name), None)
+    if other is None:
+        return None
     first = max(plan.present[0], other.present[0], time - WATCHED)
-    if time - first < 1.0:
+    roads = np.unique(np.r_[plan.vehicle.road, other.vehicle.road])
+    if time - first < 1.0 or len(roads) > 1:  # distances over several roads depend on the player's way
         return None
     t = np.arange(first, min(time + 1.0, plan.present[1], other.present[1]), 0.02)
-    one, two = plan.vehicle, other.vehicle
-    if len(np.unique(np.r_[one.road, two.road])) > 1:  # distances over several roads depend on the player's way
-        return None
     distance = np.abs(_along(plan, t) - _along(other, t))
-    at = float(np.interp(time, t, distance))
-    ahead = float(np.interp(time + 0.5, t, distance))
-    before = float(np.interp(time - 0.5, t, distance))
-    rate = ahead - before
-    if abs(rate) < SURE_RATE:
-        return None
-    passed = distance > at if rate > 0.0 else distance < at
+    before, at, ahead = np.interp((time - 0.5, time, time + 0.5), t, distance).tolist()
+    grows = ahead > before
+    passed = distance > at if grows else distance < at
     moment = float(t[int(np.argmax(passed))]) if passed.any() else np.inf
-    if abs(moment - time) > BORNE_OUT:
+    if abs(ahead - before) < SURE_RATE or abs(moment - time) > BORNE_OUT:
         return None
-    return RelativeTrigger(name, at, rate > 0.0, first)
+    return RelativeTrigger(other.name, at, grows, first)

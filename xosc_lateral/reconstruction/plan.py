@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.motion.nominal import Activity, EntityMotion
 from xosc_lateral.reconstruction.lateral import LateralPlan, lateral_plan
 from xosc_lateral.reconstruction.recorded import RecordedVehicle, Recording
@@ -19,8 +20,6 @@ from xosc_lateral.scenario import Entity
 from xosc_lateral.scenario.entity import BoundingBox
 from xosc_lateral.scenario.enums import EntityCategory
 from xosc_lateral.scenario.place import Place
-
-FloatArray = NDArray[np.float64]
 
 FRAME = 0.1
 """Vehicles appear and leave at whole multiples of this: a moment between two frames of a player would place them up to

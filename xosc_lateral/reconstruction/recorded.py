@@ -9,13 +9,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.road.positions import Poses
 from xosc_lateral.rows import true_slices
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 BESIDE = 1.0
 """So far beside every driving lane a vehicle still keeps to one: it drives on its marking. [m]"""

@@ -10,12 +10,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from xosc_lateral.arrays import FloatArray
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
-
-FloatArray = NDArray[np.float64]
 
 SPACING = 0.4
 """Rows are thinned to this: in that time, a change of acceleration of 1 m/s2 shows as 1 cm. [s]"""

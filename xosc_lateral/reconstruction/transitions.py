@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.scenario.enums import DynamicsShape
-
-FloatArray = NDArray[np.float64]
 
 MARGIN = 1.0
 """Rows of road-following that are fitted along, at both ends. [s]"""

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.answers import basis_of, beside_line
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.driver.profile import SIDES, DriverProfile, Provenance
 from xosc_lateral.evaluation.lane_keeping import LaneKeeping, keeping_of
 from xosc_lateral.evaluation.metrics import DURATION, MovementSummary, free_runs, summarise, summary_of
-from xosc_lateral.evaluation.spectra import Spectrum, spectrum
+from xosc_lateral.evaluation.spectra import spectrum
 from xosc_lateral.formats.profiles import FIELDS, Entry, facts_of, profile_hash
+from xosc_lateral.normal import NORMAL_95
 from xosc_lateral.report.chart import SAMPLED
 from xosc_lateral.report.figure import Figure
 from xosc_lateral.report.page import KeyFigure, Page, format_value
-
-FloatArray = NDArray[np.float64]
 
 CHANGED: Mapping[Acts, str] = {
     Acts.LOCATION: "mean offset",
@@ -30,12 +30,21 @@ CHANGED: Mapping[Acts, str] = {
 }
 """What a column effect changes, in words."""
 
+FEW = 10
+"""Drives below which a profile is taken to be of one driver."""
 
+SHOWN_DRIVERS, SHOWN_S = 4, 120.0
+"""Sample paths that are drawn, and their length. [s]"""
+
+PROSE = ("", "lane", "sure", "source", "licence")
+"""Rows of a card that are wrapped in the terminal."""
+
+
+# ---- the list --------------------------------------------------------------------------------------------------------
 def list_text(entries: Sequence[Entry]) -> str:
     """One line per profile: name, model, hours, drives, effects, where from; what is wrong with a file, in a line."""
-    good = [entry for entry in entries if entry.profile is not None]
-    width = max((len(entry.name) for entry in good), default=0)
-    lines = [_list_line(entry, width) for entry in good]
+    width = max((len(entry.name) for entry in entries if entry.profile is not None), default=0)
+    lines = [_list_line(entry.name, entry.profile, width) for entry in entries if entry.profile is not None]
     lines += [f"! {entry.problem}" for entry in entries if entry.problem]
     for entry in entries:
         if entry.hidden_by is not None:
@@ -44,41 +53,32 @@ def list_text(entries: Sequence[Entry]) -> str:
     return "\n".join(lines) or "no profiles"
 
 
-def _list_line(entry: Entry, width: int) -> str:
-    profile = entry.profile
-    assert profile is not None, "only those that can be read are listed"
-    known = profile.provenance
+def _list_line(name: str, profile: DriverProfile, width: int) -> str:
+    known, tags = profile.provenance, "".join(f"#{tag} " for tag in profile.metadata.tags)
     return (
-        f"{entry.name:{width}s}  {profile.model.kind:14s} {known.hours:6.2f} h  {known.drives:4d} drives  "
-        f"{len(profile.effects)} effects  {_tagged(profile)}{known.notes or known.source}"
+        f"{name:{width}s}  {profile.model.kind:14s} {known.hours:6.2f} h  {known.drives:4d} drives  "
+        f"{len(profile.effects)} effects  {tags}{known.notes or known.source}"
     ).rstrip()
-
-
-def _tagged(profile: DriverProfile) -> str:
-    return "".join(f"#{tag} " for tag in profile.metadata.tags)
 
 
 def list_record(entries: Sequence[Entry]) -> list[dict[str, Any]]:
     """The same as plain values."""
-    return [_entry_record(entry) for entry in entries]
+    return [
+        {
+            "id": entry.name,
+            "path": str(entry.path),
+            "problem": entry.problem,
+            "hidden_by": None if entry.hidden_by is None else str(entry.hidden_by),
+            **({} if entry.profile is None else _listed(entry.profile)),
+        }
+        for entry in entries
+    ]
 
 
-def _entry_record(entry: Entry) -> dict[str, Any]:
-    place: dict[str, Any] = {
-        "id": entry.name,
-        "path": str(entry.path),
-        "problem": entry.problem,
-        "hidden_by": None if entry.hidden_by is None else str(entry.hidden_by),
-    }
-    return place if entry.profile is None else place | _profile_record(entry.profile)
-
-
-def _profile_record(profile: DriverProfile) -> dict[str, Any]:
-    known, metadata = profile.provenance, facts_of(profile)
+def _listed(profile: DriverProfile) -> dict[str, Any]:
+    known = profile.provenance
     return {
-        "metadata": {name: metadata[name] for name in FIELDS} | {"tags": list(profile.metadata.tags)},
-        "sha256": profile_hash(profile),
-        "model": profile.model.kind,
+        **_identity(profile),
         "hours": known.hours,
         "drives": known.drives,
         "effects": len(profile.effects),
@@ -87,133 +87,73 @@ def _profile_record(profile: DriverProfile) -> dict[str, Any]:
     }
 
 
-def card(profile: DriverProfile) -> dict[str, Any]:
-    """Everything that a person asks first, as plain values."""
-    known = profile.provenance
+def _identity(profile: DriverProfile) -> dict[str, Any]:
+    facts = facts_of(profile)
     return {
-        "id": profile.name,
-        "metadata": {name: facts_of(profile)[name] for name in FIELDS} | {"tags": list(profile.metadata.tags)},
+        "metadata": {name: facts[name] for name in FIELDS} | {"tags": list(profile.metadata.tags)},
         "sha256": profile_hash(profile),
         "model": profile.model.kind,
-        "effects": [effect.to_dict() for effect in profile.effects],
-        "neighbours": {side: basis_of(profile, side).value for side in SIDES},
-        "lane_width": profile.lane_width,
-        "summary": {name: round(value, 4) for name, value in asdict(summary_of(profile)).items()},
-        "lane_keeping": keeping_record(keeping_of(profile)),
-        "provenance": known.to_dict(),
     }
 
 
-def card_text(profile: DriverProfile) -> str:
-    """The card for the terminal."""
-    known, keeping = profile.provenance, keeping_of(profile)
-    lines = [
-        profile.name,
-        *_indented("", known.notes),
-        f"  model      {profile.model.kind}, {_effects(profile)}, lane width {profile.lane_width:.2f} m",
-        *(f"  effect     {effect_line(effect)}" for effect in profile.effects),
-        f"  neighbours {'; '.join(beside_line(profile, side) for side in SIDES)}",
-        *_summary_lines(profile, summary_of(profile)),
-        *_indented("lane", keeping.words),
-        *_indented("sure", sureness(profile, keeping)),
-        f"  fitted on  {amount(profile)}",
-        *_indented("source", known.source),
-        *_indented("licence", known.licence),
-        *(f"  input      {name} sha256 {digest}" for name, digest in known.inputs.items()),
-        *(f"  {name:10s} {value}" for name, value in provenance_items(known)),
-        f"  sha256     {profile_hash(profile)}",
-    ]
-    return "\n".join(lines)
+# ---- one profile -----------------------------------------------------------------------------------------------------
+def card(profile: DriverProfile) -> dict[str, Any]:
+    """Everything that a person asks first, as plain values."""
+    return {
+        "id": profile.name,
+        **_identity(profile),
+        "effects": [effect.to_dict() for effect in profile.effects],
+        "neighbours": {side: basis_of(profile, side).value for side in SIDES},
+        "lane_width": profile.lane_width,
+        "summary": rounded(asdict(summary_of(profile))),
+        "lane_keeping": keeping_record(keeping_of(profile)),
+        "provenance": profile.provenance.to_dict(),
+    }
 
 
-def provenance_items(known: Provenance) -> list[tuple[str, str]]:
-    """How a closed loop came to the profile, if one did, and its evaluation on held-out drives."""
-    try:
-        return [*_loop_items(known.fit.get("closed_loop")), *_evaluation_items(known.evaluation)]
-    except (AttributeError, KeyError, TypeError, ValueError):  # anybody may write there what they like
-        return [("evaluation", "not as this package writes it")]
-
-
-def _loop_items(loop: Mapping[str, Any] | None) -> list[tuple[str, str]]:
-    if not loop:
-        return []
-    found = ", ".join(loop["found"]) or "nothing"
-    return [("loop", f"started from a {loop['base']} model, seed {loop['seed']}; found: {found}")]
-
-
-def _evaluation_items(evaluation: Mapping[str, Any]) -> list[tuple[str, str]]:
-    items = []
-    short = evaluation.get("snippets")
-    if short:
-        items.append(("held out", f"{evaluation.get('held_out', '')}: {_scores(short)}"))
-    if evaluation.get("spectrum_error_db") is not None:
-        difference = f"{evaluation['spectrum_error_db']:.1f} dB"
-        items.append(
-            ("spectrum", f"the driver alone differs from what was recorded by {difference} (rms over frequency bands)")
-        )
-    if evaluation.get("told_apart"):
-        items.append(("own driver", str(evaluation["told_apart"])))
-    return items
-
-
-def _scores(short: Mapping[str, Any]) -> str:
-    return (
-        f"distance {short['mean_distance']:.3f}, between real drivers {short['mean_floor']:.3f}, "
-        f"ratio {short['mean_ratio']:.2f}, worst {short['worst_metric']} {short['worst_ratio']:.2f}"
-    )
-
-
-def _summary_lines(profile: DriverProfile, summary: MovementSummary) -> list[str]:
-    side = "left" if summary.mean_offset > 0 else "right"
-    return [
-        f"  mean       {abs(summary.mean_offset):.2f} m to the {side} of the lane centre",
-        f"  spread     {spread_text(profile, summary)}; 90 % within {summary.low:+.2f} to {summary.high:+.2f} m",
-        f"  speed      {summary.lateral_speed:.3f} m/s lateral (rms)",
-    ]
-
-
-def amount(profile: DriverProfile) -> str:
-    """What a profile was fitted on: time, vehicles, runs."""
-    known = profile.provenance
-    vehicles = "1 vehicle" if known.drives == 1 else f"{known.drives} vehicles"
-    return (
-        f"{60 * known.hours:.1f} min, {vehicles}, {known.runs} runs"
-        if known.hours < 1
-        else (f"{known.hours:.2f} h, {vehicles}, {known.runs} runs")
-    )
+def rounded(values: Mapping[str, float]) -> dict[str, float]:
+    """To 0.1 mm and the like."""
+    return {name: round(value, 4) for name, value in values.items()}
 
 
 def keeping_record(keeping: LaneKeeping) -> dict[str, Any]:
     """The figures of lane keeping and their standard errors, as plain values."""
     values = asdict(keeping)
-    errors = {name: round(value, 4) for name, value in values.pop("errors").items()}
-    return {name: round(value, 4) for name, value in values.items()} | {"errors": errors}
+    errors = rounded(values.pop("errors"))
+    return {**rounded(values), "errors": errors}
 
 
-def sureness(profile: DriverProfile, keeping: LaneKeeping) -> str:
-    """How well one driver's mean and spread are known from so much driving; empty where it is of many or unknown."""
-    known = profile.provenance
-    independent = 3600.0 * known.hours / (2.0 * keeping.memory) if keeping.memory else 0.0
-    if "derived_from" in known.fit or not 0.0 < known.drives < FEW or independent < 1.0:
-        return ""
-    mean = 1.96 * keeping.sdlp / independent**0.5
-    spread = 1.96 * keeping.sdlp / (2.0 * independent) ** 0.5
-    return (
-        f"from {60 * known.hours:.3g} min his mean is known to +- {mean:.2f} m, his SDLP to +- {spread:.2f} m (95 %), "
-        "other days apart"
-    )
+def card_text(profile: DriverProfile) -> str:
+    """The card for the terminal."""
+    lines = [profile.name]
+    for label, value in [("", profile.provenance.notes), *card_rows(profile, summary_of(profile))]:
+        parts = textwrap.wrap(value, 100) if label in PROSE else [value]
+        lines += [f"  {label if k == 0 else '':10s} {part}" for k, part in enumerate(parts)]
+    return "\n".join([*lines, f"  {'sha256':10s} {profile_hash(profile)}"])
 
 
-FEW = 10
-"""Drives below which a profile is taken to be of one driver."""
-
-
-def spread_text(profile: DriverProfile, summary: MovementSummary) -> str:
-    """Standard deviation of the offset: of one driver, or of all and within one."""
-    if profile.provenance.drives == 1:
-        return f"{summary.spread:.2f} m"
-    within = f"{summary.spread_within:.2f} m within one driver over {DURATION / 60:g} min"
-    return f"{summary.spread:.2f} m over all drivers, {within}"
+def card_rows(profile: DriverProfile, summary: MovementSummary) -> list[tuple[str, str]]:
+    """What there is to know of a profile, a line each: label and words; an empty one has nothing to say."""
+    known, keeping = profile.provenance, keeping_of(profile)
+    side = "left" if summary.mean_offset > 0 else "right"
+    count = len(profile.effects)
+    effects = "1 effect" if count == 1 else f"{count or 'no'} effects"
+    rows = [
+        ("model", f"{profile.model.kind}, {effects}, lane width {profile.lane_width:.2f} m"),
+        *(("effect", effect_line(effect)) for effect in profile.effects),
+        ("neighbours", "; ".join(beside_line(profile, side) for side in SIDES)),
+        ("mean", f"{abs(summary.mean_offset):.2f} m to the {side} of the lane centre"),
+        ("spread", f"{_spread(known, summary)}; 90 % within {summary.low:+.2f} to {summary.high:+.2f} m"),
+        ("speed", f"{summary.lateral_speed:.3f} m/s lateral (rms)"),
+        ("lane", keeping.words),
+        ("sure", _sureness(known, keeping)),
+        ("fitted on", _amount(known)),
+        ("source", known.source),
+        ("licence", known.licence),
+        *(("input", f"{name} sha256 {digest}") for name, digest in known.inputs.items()),
+        *_outcome(known),
+    ]
+    return [(label, words) for label, words in rows if words]
 
 
 def effect_line(effect: Effect) -> str:
@@ -227,22 +167,58 @@ def effect_line(effect: Effect) -> str:
     return f"{kind}: " + ", ".join(f"{name} {format_value(value)}" for name, value in plain.items())
 
 
-def _effects(profile: DriverProfile) -> str:
-    count = len(profile.effects)
-    return "1 effect" if count == 1 else f"{count or 'no'} effects"
+def _spread(known: Provenance, summary: MovementSummary) -> str:
+    """Standard deviation of the offset: of one driver, or of all and within one."""
+    within = f" over all drivers, {summary.spread_within:.2f} m within one driver over {DURATION / 60:g} min"
+    return f"{summary.spread:.2f} m{'' if known.drives == 1 else within}"
 
 
-def _indented(label: str, text: str) -> list[str]:
-    import textwrap
+def _sureness(known: Provenance, keeping: LaneKeeping) -> str:
+    """How well one driver's mean and spread are known from so much driving; empty where it is of many or unknown."""
+    independent = 3600.0 * known.hours / (2.0 * keeping.memory) if keeping.memory else 0.0
+    if "derived_from" in known.fit or not 0.0 < known.drives < FEW or independent < 1.0:
+        return ""
+    mean = NORMAL_95 * keeping.sdlp / independent**0.5
+    spread = NORMAL_95 * keeping.sdlp / (2.0 * independent) ** 0.5
+    return (
+        f"from {60 * known.hours:.3g} min his mean is known to +- {mean:.2f} m, his SDLP to +- {spread:.2f} m (95 %), "
+        "other days apart"
+    )
 
-    wrapped = textwrap.wrap(text, 100)
-    return [f"  {label if k == 0 else '':10s} {line}" for k, line in enumerate(wrapped)]
+
+def _amount(known: Provenance) -> str:
+    """What a profile was fitted on: time, vehicles, runs."""
+    vehicles = "1 vehicle" if known.drives == 1 else f"{known.drives} vehicles"
+    time = f"{60 * known.hours:.1f} min" if known.hours < 1 else f"{known.hours:.2f} h"
+    return f"{time}, {vehicles}, {known.runs} runs"
 
 
-SHOWN_DRIVERS, SHOWN_S = 4, 120.0
-"""Sample paths that are drawn, and their length. [s]"""
+def _outcome(known: Provenance) -> list[tuple[str, str]]:
+    """How a closed loop came to the profile, if one did, and its evaluation on held-out drives."""
+    try:
+        return list(_outcome_items(known.fit.get("closed_loop"), known.evaluation))
+    except (AttributeError, KeyError, TypeError, ValueError):  # anybody may write there what they like
+        return [("evaluation", "not as this package writes it")]
 
 
+def _outcome_items(loop: Mapping[str, Any] | None, evaluation: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    if loop:
+        found = ", ".join(loop["found"]) or "nothing"
+        yield "loop", f"started from a {loop['base']} model, seed {loop['seed']}; found: {found}"
+    if short := evaluation.get("snippets"):
+        scores = (
+            f"distance {short['mean_distance']:.3f}, between real drivers {short['mean_floor']:.3f}, "
+            f"ratio {short['mean_ratio']:.2f}, worst {short['worst_metric']} {short['worst_ratio']:.2f}"
+        )
+        yield "held out", f"{evaluation.get('held_out', '')}: {scores}"
+    if (error := evaluation.get("spectrum_error_db")) is not None:
+        differs = f"the driver alone differs from what was recorded by {error:.1f} dB"
+        yield "spectrum", f"{differs} (rms over frequency bands)"
+    if evaluation.get("told_apart"):
+        yield "own driver", str(evaluation["told_apart"])
+
+
+# ---- the page --------------------------------------------------------------------------------------------------------
 def card_page(profile: DriverProfile, seed: int = 0) -> str:
     """HTML page; same profile and seed, same bytes.
 
@@ -278,21 +254,13 @@ def card_page(profile: DriverProfile, seed: int = 0) -> str:
     )
     page.section("Distribution and spectrum")
     page.figure(
-        _places(runs, spectrum(list(runs), step)),
+        _places(runs, step),
         "Left: distribution of the offset. Right: its power spectral density.",
         "Density of the offset, and its spectrum",
     )
-    page.section(
-        "Model and effects",
-        f"Model `{profile.model.kind}`, time step {profile.model.step} s, lane width {profile.lane_width:.2f} m.",
-    )
-    page.items(effect_line(effect) for effect in profile.effects)
-    page.text("" if profile.effects else "The profile has no effects: it does not depend on context.")
-    page.section("Where it comes from")
-    facts = [("fitted on", amount(profile)), *provenance_items(known)]
-    page.table([{"fact": name, "value": value} for name, value in facts])
-    page.text(f"Source: {known.source}" if known.source else "")
-    page.text(f"Licence of the data: {known.licence}" if known.licence else "")
+    page.section("What it is and where it comes from")
+    rows = [(label, words.replace("+-", "±")) for label, words in card_rows(profile, summary) if label != "input"]
+    page.table([{"": label, "what is known": words} for label, words in rows])
     return page.html(
         {
             "profile sha256": profile_hash(profile),
@@ -313,11 +281,12 @@ def _paths(runs: FloatArray, step: float) -> Figure:
     return figure
 
 
-def _places(runs: FloatArray, power: Spectrum) -> Figure:
+def _places(runs: FloatArray, step: float) -> Figure:
     figure = Figure(1, 2)
     place, spectral = figure.panels
     density, edges = np.histogram(runs, np.linspace(-1.2, 1.2, 97), density=True)
     place.steps(edges, density, SAMPLED, label="density")
+    power = spectrum(list(runs), step)
     spectral.line(power.frequency, power.density, SAMPLED, label="power density")
     spectral.x.log = spectral.y.log = True
     place.title, place.x.label, place.y.label = "Distribution", "offset [m], positive to the left", "density [1/m]"

@@ -1,16 +1,18 @@
-"""A panel of a figure: lines, areas, dots and texts over linear or logarithmic axes, and how they become SVG."""
+"""A panel of a figure: lines, areas and dots over linear or logarithmic axes, and how they become SVG."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from html import escape
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
+from xosc_lateral.arrays import FloatArray
+from xosc_lateral.rows import true_slices
+
 Ticks = list[tuple[float, str]]
 
 # Okabe and Ito, "Color universal design" (2008), and six more. Each of these was chosen as the colour farthest from all
@@ -79,20 +81,16 @@ class Axis:
 class Mark:
     """Something drawn in a panel; infinite places are the panel's edges."""
 
-    kind: Literal["line", "area", "dots", "text"]
+    kind: Literal["line", "area", "dots"]
     x: FloatArray
     y: FloatArray
     color: str
     width: float = 1.5
-    """Of a line, diameter of a dot, size of a text. [pt]"""
+    """Of a line, diameter of a dot. [pt]"""
     dashes: str = ""
     opacity: float = 1.0
     label: str = ""
     """Shown in the legend, and when somebody points at it."""
-    text: str = ""
-    lift: tuple[float, float] = (0.0, 0.0)
-    """Of a text, from its place. [pt], down positive"""
-    anchor: str = "middle"
 
 
 @dataclass(slots=True)
@@ -119,7 +117,7 @@ class Panel:
     def band(self, x: ArrayLike, low: ArrayLike, high: ArrayLike, color: str, **style: Any) -> None:
         """Fill between two curves over x, but where one of them is NaN."""
         x, low, high = np.broadcast_arrays(*(np.asarray(each, dtype=np.float64) for each in (x, low, high)))
-        for part in runs_of(np.isfinite(low) & np.isfinite(high)):
+        for part in true_slices(np.isfinite(low) & np.isfinite(high)):
             self.area(np.r_[x[part], x[part][::-1]], np.r_[low[part], high[part][::-1]], color, **style)
 
     def across(self, first: float, last: float, color: str, **style: Any) -> None:
@@ -136,25 +134,13 @@ class Panel:
         self.area(x, y, color, opacity=0.5)
         self._add("line", x, y, color, width=1.0, label=label)
 
-    def note(self, x: float, y: float, text: str, color: str = INK, **style: Any) -> None:
-        """Write a text at a place; `lift`, `anchor` as in `Mark`."""
-        self._add("text", (x,), (y,), color, text=text, **({"width": 8.0, "lift": (0.0, 3.0)} | style))
-
     def curves(self, label: str = "") -> list[Mark]:
         """What is drawn as a line or as dots, under that label or any."""
         return [mark for mark in self.marks if mark.kind in ("line", "dots") and label in ("", mark.label)]
 
-    def _add(
-        self, kind: Literal["line", "area", "dots", "text"], x: ArrayLike, y: ArrayLike, color: str, **style: Any
-    ) -> None:
+    def _add(self, kind: Literal["line", "area", "dots"], x: ArrayLike, y: ArrayLike, color: str, **style: Any) -> None:
         places = [np.atleast_1d(np.asarray(each, dtype=np.float64)) for each in (x, y)]
         self.marks.append(Mark(kind, places[0], places[1], color, **style))
-
-
-def runs_of(kept: NDArray[np.bool_]) -> Iterator[slice]:
-    """Runs of True."""
-    edges = np.flatnonzero(np.diff(np.r_[False, kept, False].astype(np.int8)))
-    return (slice(int(first), int(last)) for first, last in edges.reshape(-1, 2))
 
 
 # ---- ticks ----
@@ -171,12 +157,16 @@ def ticks_of(panel: Panel, name: str, length: float) -> Ticks:
 
 
 def _linear_places(first: float, last: float, count: float) -> FloatArray:
-    """Multiples of 1, 2 or 5 times a power of ten, at most so many."""
+    """Multiples of 1, 2 or 5 times a power of ten, at most so many; a finer step where one alone would be there."""
     low, high = min(first, last), max(first, last)
     rough = (high - low) / count
-    power = 10.0 ** np.floor(np.log10(rough))
-    step = power * next(each for each in (1.0, 2.0, 5.0, 10.0) if each * power >= rough * (1.0 - 1e-9))
-    return np.asarray(step * np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1.0)) + 0.0
+    steps = 10.0 ** np.floor(np.log10(rough)) * np.array([0.5, 1.0, 2.0, 5.0, 10.0])
+    enough = 1 + int(np.argmax(steps[1:] >= rough * (1.0 - 1e-9)))
+    for step in steps[[enough, enough - 1]]:
+        places = step * np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1.0) + 0.0
+        if len(places) > 1:
+            break
+    return np.asarray(places)
 
 
 def _log_places(first: float, last: float) -> FloatArray:
@@ -227,9 +217,6 @@ def _mark(panel: Panel, mark: Mark, width: float, height: float) -> str:
     x = np.clip(width * panel.x.share(mark.x), -far, far)
     y = np.clip(height * (1.0 - panel.y.share(mark.y)), -far, far)
     label = f' data-label="{escape(mark.label)}"' if mark.label else ""
-    if mark.kind == "text":
-        place = f'x="{x[0] + mark.lift[0]:.1f}" y="{y[0] + mark.lift[1]:.1f}" text-anchor="{mark.anchor}"'
-        return f'<text {place} font-size="{mark.width:g}" fill="{mark.color}">{escape(mark.text)}</text>'
     if mark.kind == "area":
         return f'<path d="{_path(x, y)} Z" {fill_of(mark)}/>'
     seen = np.isfinite(x) & np.isfinite(y)
@@ -237,7 +224,7 @@ def _mark(panel: Panel, mark: Mark, width: float, height: float) -> str:
         places = zip(x[seen].tolist(), y[seen].tolist(), strict=True)
         dots = "".join(f'<circle cx="{a:.1f}" cy="{b:.1f}" r="{0.5 * mark.width:g}"/>' for a, b in places)
         return f'<g fill="{mark.color}"{label}>{dots}</g>'
-    line = " ".join(_path(*_thinned(x[part], y[part])) for part in runs_of(seen))
+    line = " ".join(_path(*_thinned(x[part], y[part])) for part in true_slices(seen))
     return f'<path d="{line}" {stroke_of(mark)}{label}/>'
 
 

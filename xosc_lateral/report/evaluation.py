@@ -7,10 +7,9 @@ from math import isfinite
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.evaluation.lane_keeping import NEAR_MARKING, Margins
+from xosc_lateral.evaluation.lane_keeping import NEAR_MARKING
 from xosc_lateral.evaluation.metrics import METRICS
 from xosc_lateral.evaluation.parts import PartEvaluation
 from xosc_lateral.evaluation.realism import Realism
@@ -30,8 +29,6 @@ from xosc_lateral.report.realism import (
 )
 from xosc_lateral.report.violins import LABELS, violin_figure
 from xosc_lateral.version import __version__
-
-FloatArray = NDArray[np.float64]
 
 
 def trace_figure(scores: ProfileScores) -> Figure:
@@ -70,10 +67,11 @@ CLOSE, FAR = 1.2, 2.0
 
 def evaluation_text(scores: ProfileScores, profile: DriverProfile, inputs: Mapping[str, str]) -> str:
     """A table for the terminal."""
+    block, ratio = worst_block(scores)
     lines = [
         f"{scores.profile} on {scores.hours:.2f} h of {scores.drives} drives ({scores.runs} runs), seed {scores.seed}",
         *([FITTED] if _fitted_on(profile, inputs) else []),
-        _worst_line(scores),
+        f"worst comparison: {block}, {ratio:.2f} times that between real drivers",
         *realism_lines(scores.realism),
         "as in the paper: from the same start, without the sensor; real drivers are compared without a common start",
         *_snippet_lines(scores.snippets),
@@ -164,7 +162,17 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         f"How often the reference point comes within {NEAR_MARKING:g} m of a marking (half the width of a car, and a "
         "margin).",
     )
-    page.table([_margin_row("measured", scores.margins_real), _margin_row("sampled", scores.margins_sampled)])
+    page.table(
+        [
+            {
+                "drives": name,
+                "time near a marking [%]": 100.0 * one.share_near,
+                "excursions [1/h]": one.excursions_per_hour,
+                "largest offset [m]": one.largest,
+            }
+            for name, one in (("measured", scores.margins_real), ("sampled", scores.margins_sampled))
+        ]
+    )
     return page.html(_provenance(scores, profile, inputs))
 
 
@@ -215,33 +223,27 @@ def _part_row(one: PartEvaluation) -> dict[str, object]:
     }
 
 
+def _metric_rows(scores: SnippetScores) -> list[tuple[str, float, float]]:
+    """Each metric and their mean: name, distance, and that between real drivers, in standard deviations."""
+    rows = [(LABELS[name], scores.distances.by_metric[name], scores.floor.by_metric[name]) for name in METRICS]
+    return [*rows, ("mean", scores.distances.mean, scores.floor.mean)]
+
+
 def _add_metrics(page: Page, scores: SnippetScores) -> None:
-    pairs = [(LABELS[name], scores.distances.by_metric[name], scores.floor.by_metric[name]) for name in METRICS]
-    pairs.append(("mean", scores.distances.mean, scores.floor.mean))
+    rows = _metric_rows(scores)
     page.table(
-        [{"metric": name, "distance": one, "real drivers": real, "ratio": one / real} for name, one, real in pairs],
+        [{"metric": name, "distance": one, "real drivers": real, "ratio": one / real} for name, one, real in rows],
         f"{scores.count} snippets of {scores.seconds:g} s; distances in standard deviations of the measured metric",
         formats={"distance": ".3f", "real drivers": ".3f", "ratio": ".2f"},
-        tones={number: _tone(one / real) for number, (_, one, real) in enumerate(pairs[:-1])},
+        tones={number: _tone(one / real) for number, (_, one, real) in enumerate(rows[:-1])},
     )
 
 
-def _margin_row(name: str, one: Margins) -> dict[str, object]:
-    return {
-        "drives": name,
-        "time near a marking [%]": 100.0 * one.share_near,
-        "excursions [1/h]": one.excursions_per_hour,
-        "largest offset [m]": one.largest,
-    }
-
-
 def _snippet_lines(scores: SnippetScores) -> list[str]:
-    lines = [f"{scores.count} snippets of {scores.seconds:g} s      distance  real drivers  ratio"]
-    for name in METRICS:
-        distance, floor = scores.distances.by_metric[name], scores.floor.by_metric[name]
-        lines.append(f"  {LABELS[name]:24s}  {distance:8.3f}  {floor:12.3f}  {distance / floor:5.2f}")
-    lines.append(f"  {'mean':24s}  {scores.distances.mean:8.3f}  {scores.floor.mean:12.3f}  {scores.ratio:5.2f}")
-    return lines
+    return [
+        f"{scores.count} snippets of {scores.seconds:g} s      distance  real drivers  ratio",
+        *(f"  {name:24s}  {one:8.3f}  {real:12.3f}  {one / real:5.2f}" for name, one, real in _metric_rows(scores)),
+    ]
 
 
 def _key_figures(realism: Realism) -> list[KeyFigure]:
@@ -280,11 +282,6 @@ def worst_block(scores: ProfileScores) -> tuple[str, float]:
     blocks = blocks_of(scores)
     worst = max(blocks, key=blocks.__getitem__)
     return worst, blocks[worst]
-
-
-def _worst_line(scores: ProfileScores) -> str:
-    block, ratio = worst_block(scores)
-    return f"worst comparison: {block}, {ratio:.2f} times that between real drivers"
 
 
 def _tone(ratio: float) -> Tone:

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.report.chart import (
     GRID,
     INK,
@@ -32,8 +32,6 @@ from xosc_lateral.report.chart import (
     stroke_of,
     ticks_of,
 )
-
-FloatArray = NDArray[np.float64]
 
 CSS_VARIABLES: Mapping[str, str] = {
     INK: "--ink",
@@ -75,16 +73,13 @@ class Figure:
     """Of one panel without its title and labels. [pt]"""
     width: float = WIDTH
     """Of the whole figure. [pt]"""
-    share_x: Literal["", "all", "column"] = ""
-    share_y: Literal["", "all", "column"] = ""
-    """Panels with the same limits: all, those of a column, or each on its own. Tick labels stand once where all panels
-    of a column, or of a row, share them."""
+    share_x: Literal["", "all"] = ""
+    share_y: Literal["", "all"] = ""
+    """Whether all panels have the same limits; tick labels stand once then, below each column or beside each row."""
     legend: bool = False
     """Whether labels are explained above the panels."""
     axes: bool = True
     """Whether there are ticks, labels and a frame."""
-    equal: bool = False
-    """Whether a unit is as long along y as along x; y limits are widened for it."""
     panels: list[Panel] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -110,11 +105,7 @@ class Figure:
     def settle(self) -> None:
         """Give every axis its limits."""
         for name, shared in (("x", self.share_x), ("y", self.share_y)):
-            groups: dict[int, list[Panel]] = {}
-            for number, panel in enumerate(self.panels):
-                key = 0 if shared == "all" else number % self.columns if shared else number
-                groups.setdefault(key, []).append(panel)
-            for group in groups.values():
+            for group in [self.panels] if shared else [[panel] for panel in self.panels]:
                 axes: list[Axis] = [getattr(panel, name) for panel in group]
                 drawn = [getattr(mark, name) for panel in group for mark in panel.marks]
                 held = [value for axis in axes for value in axis.holds]
@@ -152,11 +143,6 @@ def svg_of(figure: Figure, alt: str = "", *, themed: bool = False) -> str:
     figure.settle()
     left, right = _margins(figure)
     inner = (figure.width - sum(left) - right - (figure.columns - 1) * BETWEEN) / figure.columns
-    if figure.equal:
-        for panel in figure.panels:
-            low, high = panel.x.ends
-            half, middle = 0.5 * figure.height / inner * (high - low), 0.5 * sum(panel.y.ends)
-            panel.y.limits = middle - half, middle + half
     body, height = _body(figure, left, inner)
     head = f'viewBox="0 0 {figure.width:g} {height:g}" role="img" aria-label="{escape(alt)}" font-size="{TEXT:g}"'
     title = f"<title>{escape(alt)}</title>" if alt else ""
@@ -176,7 +162,7 @@ def _margins(figure: Figure) -> tuple[list[float], float]:
     for column in range(figure.columns):
         panels = [panel for panel in figure.panels[column :: figure.columns] if panel.marks]
         widths = [text_width(name) for panel in panels for _, name in ticks_of(panel, "y", figure.height)]
-        numbers = max(widths, default=0.0) + 7.0 if column == 0 or figure.share_y != "all" else 2.0
+        numbers = max(widths, default=0.0) + 7.0 if column == 0 or not figure.share_y else 2.0
         left.append(numbers + (16.0 if any(panel.y.label for panel in panels) else 0.0))
     return left, BETWEEN + 3.0
 
@@ -198,7 +184,7 @@ def _body(figure: Figure, left: list[float], inner: float) -> tuple[str, float]:
         for column, panel in enumerate(panels):
             at += left[column]
             if panel.marks:
-                room = left[column] if column == 0 or figure.share_y != "all" else 0.0
+                room = left[column] if column == 0 or not figure.share_y else 0.0
                 parts += _frame(panel, at, top, inner, figure.height, room, numbered[column]) if figure.axes else []
                 parts.append(panel_svg(panel, at, top, inner, figure.height))
             at += inner + BETWEEN

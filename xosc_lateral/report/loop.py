@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from xosc_lateral.driver.effects import ColumnEffect
 from xosc_lateral.formats.hashes import parsed_hashes
@@ -12,7 +11,6 @@ from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.identification.close import Finding, LoopResult
 from xosc_lateral.identification.held_out import SNIPPET_ROWS
 from xosc_lateral.identification.residual import GroupError
-from xosc_lateral.identification.selection import Rejected
 from xosc_lateral.report.loop_figures import DRAWINGS, effect_figure, residual_figure, spectrum_figure, traces_figure
 from xosc_lateral.report.loop_json import column_record
 from xosc_lateral.report.loop_words import (
@@ -31,14 +29,9 @@ from xosc_lateral.report.loop_words import (
 from xosc_lateral.report.page import KeyFigure, Page, Tone
 from xosc_lateral.report.violins import LABELS, violin_figure
 
-NAMED_DRIVES = 3
-"""So many drives are named in the title; more are counted."""
-
-LEFT_ROWS = 8
-"""Rows of the table of what is left."""
-
-FAR, CLOSE = 2.0, 1.2
-"""Ratios to the floor from which a number is marked bad, and up to which it is marked good. [-]"""
+NAMED_DRIVES = 3  # So many drives are named in the title; more are counted.
+LEFT_ROWS = 8  # Rows of the table of what is left.
+FAR, CLOSE = 2.0, 1.2  # Ratios to the floor from which a number is marked bad, and up to which it is marked good. [-]
 
 
 def loop_text(result: LoopResult) -> str:
@@ -98,7 +91,18 @@ def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] 
         "The strongest candidate of each component that was not significant, and what was found and taken back.",
     )
     rejected = result.identified.selection.rejected
-    page.table([_rejected_row(item) for item in rejected], formats={"p-value": ".2g"})
+    page.table(
+        [
+            {
+                "component": COMPONENT_WORDS.get(item.component, item.component),
+                "strongest candidate": ", ".join(item.columns) or None,
+                "p-value": item.p_value,
+                "reason": item.why,
+            }
+            for item in rejected
+        ],
+        formats={"p-value": ".2g"},
+    )
     page.items(f"`{column}` was not tested: {why}." for column, why in result.identified.usable.unused.items())
     page.section("How to read this page")
     page.items(line.format(n_runs=len(result.scored.runs_after), certain=f"{CERTAIN:g}") for line in HOW_TO_READ)
@@ -235,23 +239,12 @@ def _add_movement(page: Page, result: LoopResult) -> None:
     )
 
 
-def _rejected_row(item: Rejected) -> dict[str, Any]:
-    return {
-        "component": COMPONENT_WORDS.get(item.component, item.component),
-        "strongest candidate": ", ".join(item.columns) or None,
-        "p-value": item.p_value,
-        "reason": item.why,
-    }
-
-
 def _numbers(result: LoopResult) -> list[KeyFigure]:
     tone: Tone = "bad" if result.lack_of_fit.clear else "good" if result.findings else ""
-    errors = (result.error_before, result.error_after, result.floor)
-    before, after, floor = (f"{1000 * value:.1f} mm" for value in errors)
     return [
-        KeyFigure(before, "error before", "of the base profile"),
-        KeyFigure(after, "error after", "of the refined profile", tone=tone),
-        KeyFigure(floor, "floor", "of random halves of the drives against all of them"),
+        KeyFigure(f"{1000 * result.error_before:.1f} mm", "error before", "of the base profile"),
+        KeyFigure(f"{1000 * result.error_after:.1f} mm", "error after", "of the refined profile", tone=tone),
+        KeyFigure(f"{1000 * result.floor:.1f} mm", "floor", "of random halves of the drives against all of them"),
     ]
 
 

@@ -7,52 +7,33 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.driver.effects import Acts, Angular, ColumnEffect, Product
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.cross_validation import hold_out_blocks
-from xosc_lateral.identification.terms.base import latent_path
+from xosc_lateral.identification.model import latent_path
 from xosc_lateral.identification.terms.between import is_between
-from xosc_lateral.identification.terms.cycle import CycleTerm
 from xosc_lateral.identification.terms.regimes import RegimesTerm
-from xosc_lateral.identification.terms.time import StepTerm, TimeMeanTerm
-from xosc_lateral.identification.timeline import LOCAL_S, coarse_mean, coarse_middle, local_mean
+from xosc_lateral.identification.timeline import LOCAL_S, Timeline, coarse_mean, coarse_middle, local_mean
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
-
-POINTS = 9
-"""Equally wide bins between the 1 % and 99 % quantile of what drives an effect."""
-
-LEAST_S = 30
-"""A bin with less driving is left out. [s]"""
-
-SHOWN_DRIVES, SHOWN_S = 3, 120.0
-"""Drives of which a stretch is drawn, and the longest stretch of each. [-], [s]"""
+POINTS = 9  # Equally wide bins between the 1 % and 99 % quantile of what drives an effect.
+LEAST_S = 30  # A bin with less driving is left out. [s]
+SHOWN_DRIVES, SHOWN_S = 3, 120.0  # Drives of which a stretch is drawn, and the longest stretch of each. [-], [s]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Curve:
-    """A fitted effect over what drives it, and what was measured there.
+    """A fitted effect over what drives it, and what was measured there."""
 
-    Parameters
-    ----------
-    over : array, shape (n,)
-        The column, or the product, in its own unit.
-    strength, error : array, shape (n,)
-        Fitted, with its standard error: [m], or a natural logarithm.
-    seen, measured, measured_error : array, shape (k,)
-        Means of bins: where, how much, standard error from blocks. Empty where it can't be measured alone.
-    """
-
-    over: FloatArray
-    strength: FloatArray
-    error: FloatArray
+    over: FloatArray  # shape (n,): The column, or the product, in its own unit.
+    strength: FloatArray  # shape (n,): Fitted, with its standard error: [m], or a natural logarithm.
+    error: FloatArray  # shape (n,)
+    # shape (k,): Means of bins: where, how much, standard error from blocks. Empty where it can't be measured alone.
     seen: FloatArray
     measured: FloatArray
     measured_error: FloatArray
@@ -66,9 +47,8 @@ def curve_of(result: LoopResult, effect: ColumnEffect) -> Curve:
         return Curve(over, strength, error, nothing, nothing, nothing)
     where, own = _driving(result, effect)
     inside = result.coarse.valid & np.isfinite(where)
-    blocks = coarse_middle(hold_out_blocks(result.scored.statistics.timeline))
-    values = _values(result, effect, inside)
-    seen, mean, spread, fitted = _binned(where, values, own, blocks, inside)
+    blocks = coarse_middle(hold_out_blocks(result.coarse.timeline))
+    seen, mean, spread, fitted = _binned(where, _values(result, effect, inside), own, blocks, inside)
     if effect.acts is not Acts.LOCATION:
         mean, spread = 0.5 * np.log(np.maximum(mean, 1e-9)), 0.5 * spread / np.maximum(mean, 1e-9)
     # where the curve is zero is a matter of taste, so the points are shifted onto it as a whole
@@ -77,13 +57,17 @@ def curve_of(result: LoopResult, effect: ColumnEffect) -> Curve:
 
 
 def _values(result: LoopResult, effect: ColumnEffect, inside: BoolArray) -> FloatArray:
-    """What is measured of what the effect acts on, shape (n,): metres, or squares about 1."""
+    """What is measured of what the effect acts on, shape (n,): metres, or squares about 1.
+
+    Of the movement within 20 s, or for fine noise from sample to sample.
+    """
     if effect.acts is Acts.LOCATION:
-        values = _alone(result, effect)
-    else:
-        squares = _squares(result, effect.acts)
-        values = squares / max(float(squares[inside].mean()), 1e-30)
-    return values
+        return _alone(result, effect)
+    timeline = result.coarse.timeline
+    fine = effect.acts is Acts.FINE
+    offset = timeline.offset
+    squares = coarse_mean(np.square(np.diff(offset, prepend=offset[:1]) if fine else _fast(offset, timeline)))
+    return squares / max(float(squares[inside].mean()), 1e-30)
 
 
 def _fitted(result: LoopResult, effect: ColumnEffect) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -126,17 +110,13 @@ def _alone(result: LoopResult, effect: ColumnEffect) -> FloatArray:
     return np.asarray(rest + coarse_mean(coarse.strength(effect)))
 
 
-def _squares(result: LoopResult, acts: Acts) -> FloatArray:
-    """Mean square of the movement within 20 s (or, for fine noise, from sample to sample), per second. [m^2]"""
-    timeline = result.scored.statistics.timeline
-    if acts is Acts.FINE:
-        return coarse_mean(np.square(np.diff(timeline.offset, prepend=timeline.offset[:1])))
-    fast = timeline.offset - local_mean(timeline.offset, timeline.valid, LOCAL_S, timeline.step)
-    return coarse_mean(np.square(fast))
+def _fast(offset: FloatArray, timeline: Timeline) -> FloatArray:
+    """Movement within 20 s, shape (n,). [m]"""
+    return offset - local_mean(offset, timeline.valid, LOCAL_S, timeline.step)
 
 
 def _binned(
-    where: FloatArray, values: FloatArray, own: FloatArray, blocks: IntArray, inside: BoolArray
+    where: FloatArray, values: FloatArray, own: FloatArray, blocks: IndexArray, inside: BoolArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Mean place, mean value, its standard error with blocks as the independent pieces, mean of the fit, per bin."""
     low, high = _ends(where[inside])
@@ -157,51 +137,44 @@ def _binned(
 # ---- over time ----
 @dataclass(frozen=True, eq=False, slots=True)
 class MovingStatistic:
-    """A quantity of the longest drive over time, at 1 Hz, shape (n,) each; road-following seconds only.
+    """A quantity of the longest drive over time, at 1 Hz, shape (n,) each; road-following seconds only."""
 
-    Parameters
-    ----------
-    time : array
-        The drive's own clock. [s]
-    measured, before, after : array
-        Of the measured drive, and the mean over the profiles' runs. [m]
-    """
-
-    time: FloatArray
-    measured: FloatArray
+    time: FloatArray  # The drive's own clock. [s]
+    measured: FloatArray  # Of the measured drive, and the mean over the profiles' runs. [m]
     before: FloatArray
     after: FloatArray
 
 
 def moving_mean(result: LoopResult, seconds: float) -> MovingStatistic:
     """Moving mean of the offset over so many `seconds` > 0. [m]"""
-    timeline = result.scored.statistics.timeline
-
-    def mean(offset: FloatArray) -> FloatArray:
-        return coarse_mean(local_mean(offset, timeline.valid, seconds, timeline.step))
-
-    return _statistic(result, mean(timeline.offset), *(mean(runs.mean(axis=0)) for runs in _runs(result)))
+    timeline = result.coarse.timeline
+    return _moving(result, lambda runs: local_mean(runs.mean(axis=0), timeline.valid, seconds, timeline.step))
 
 
 def moving_spread(result: LoopResult, seconds: float) -> MovingStatistic:
     """Root mean square of the movement faster than 20 s, over so many `seconds` > 0. [m]"""
-    timeline = result.scored.statistics.timeline
-
-    def squares(offset: FloatArray) -> FloatArray:
-        fast = offset - local_mean(offset, timeline.valid, LOCAL_S, timeline.step)
-        return local_mean(fast**2, timeline.valid, seconds, timeline.step)
+    timeline = result.coarse.timeline
 
     def spread(runs: FloatArray) -> FloatArray:
-        return coarse_mean(np.sqrt(np.mean([squares(run) for run in runs], axis=0)))
+        squares = [local_mean(_fast(run, timeline) ** 2, timeline.valid, seconds, timeline.step) for run in runs]
+        return np.asarray(np.sqrt(np.mean(squares, axis=0)))
 
-    return _statistic(result, spread(timeline.offset[None]), *(spread(runs) for runs in _runs(result)))
+    return _moving(result, spread)
+
+
+def _moving(result: LoopResult, statistic: Callable[[FloatArray], FloatArray]) -> MovingStatistic:
+    """A statistic of runs, shape (runs, n), of the measured drives and of both profiles."""
+    timeline, scored, shown = result.coarse.timeline, result.scored, _longest(result)
+    runs = (timeline.offset[None], scored.runs_before, scored.runs_after)
+    time = coarse_middle(timeline.time)[: len(result.coarse)]
+    return MovingStatistic(time[shown], *(coarse_mean(statistic(own))[shown] for own in runs))
 
 
 def hidden_mean(result: LoopResult) -> FloatArray:
     """Step, drift and oscillation as fitted, about their mean; 0: none. [m] Shape as a `MovingStatistic`'s times."""
     coarse, fitted = result.coarse, result.final
-    own = [term for term in fitted.terms if isinstance(term, CycleTerm | StepTerm | TimeMeanTerm)]
-    hidden = np.sum([np.zeros(len(coarse)), *(latent_path(term, fitted) for term in own)], axis=0)
+    own = [latent_path(term, fitted) for term in fitted.terms if not term.columns]
+    hidden = np.sum([np.zeros(len(coarse)), *own], axis=0)
     return np.asarray((hidden - hidden[coarse.valid].mean())[_longest(result)])
 
 
@@ -212,22 +185,11 @@ def regime_probability(result: LoopResult) -> FloatArray:
     return np.asarray(on[_longest(result)])
 
 
-def _runs(result: LoopResult) -> tuple[FloatArray, FloatArray]:
-    return result.scored.runs_before, result.scored.runs_after
-
-
 def _longest(result: LoopResult) -> BoolArray:
     """Valid seconds of the drive that has most of them."""
     coarse = result.coarse
     seconds = np.bincount(coarse.drive, coarse.valid.astype(np.float64))
     return np.asarray(coarse.valid & (coarse.drive == int(np.argmax(seconds))))
-
-
-def _statistic(result: LoopResult, measured: FloatArray, before: FloatArray, after: FloatArray) -> MovingStatistic:
-    shown = _longest(result)
-    n = len(result.coarse)
-    time = coarse_middle(result.scored.statistics.timeline.time)[:n]
-    return MovingStatistic(time[shown], measured[shown], before[shown], after[shown])
 
 
 def longest_parts(result: LoopResult) -> list[slice]:

@@ -6,12 +6,13 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Cycle, Product, Regimes, Step, TimeSmooth
 from xosc_lateral.evaluation.spectra import gapped_spectrum
 from xosc_lateral.identification.close import Finding, LoopResult
 from xosc_lateral.identification.cross_validation import hold_out_blocks
+from xosc_lateral.identification.residual import LOCAL_QUANTILES
 from xosc_lateral.report.chart import BLUE, DASHED, MUTED, ORANGE, VERMILLION, Panel
 from xosc_lateral.report.figure import Figure
 from xosc_lateral.report.loop_curves import (
@@ -26,37 +27,18 @@ from xosc_lateral.report.loop_curves import (
 from xosc_lateral.report.loop_words import SPREAD, column_label, product_label
 from xosc_lateral.rows import true_slices
 
-FloatArray = NDArray[np.float64]
-
+# Measured drives, the profile before and the profile after, in every figure of the loop.
 DRIVES, BEFORE, AFTER = BLUE, MUTED, VERMILLION
-"""Measured drives, the profile before and the profile after, in every figure of the loop."""
-
+# Samples per segment of a spectrum: 102 s; of that about a cycle, at most: 14 min, or a line would be smeared.
 SPECTRUM_ROWS, CYCLE_ROWS = 512, 4096
-"""Samples per segment of a spectrum: 102 s; of that about a cycle, at most: 14 min, or a line would be smeared."""
-
-SURROUNDINGS_HZ = 0.07
-"""To either side of a cycle's line. [Hz]"""
-
-TWO_ERRORS = 2.0
-"""Half width of bands, in standard errors: chance leaves them 1 time in 20. [-]"""
-
-FLAT_AXIS_CM = 1.0
-"""A residual's axis reaches at least so far to both sides, lest noise look large. [cm]"""
-
-NEGLIGIBLE = 1e-2
-"""Share of a column's range that is written as 0. [-]"""
-
-PANELS = 4
-"""Residual panels side by side."""
-
+SURROUNDINGS_HZ = 0.07  # To either side of a cycle's line. [Hz]
+TWO_ERRORS = 2.0  # Half width of bands, in standard errors: chance leaves them 1 time in 20. [-]
+FLAT_AXIS_CM = 1.0  # A residual's axis reaches at least so far to both sides, lest noise look large. [cm]
+NEGLIGIBLE = 1e-2  # Share of a column's range that is written as 0. [-]
+PANELS = 4  # Residual panels side by side.
+# Averaging times of the paths of the mean, of the spread, and of the spread with regimes. [s]
 MEAN_S, SPREAD_S, REGIME_S = 120.0, 240.0, 20.0
-"""Averaging times of the paths of the mean, of the spread, and of the spread with regimes. [s]"""
-
-GAP_S = 5.0
-"""Longer gaps in a drive interrupt a line. [s]"""
-
-QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
-"""As `identification.residual.LOCAL_QUANTILES`."""
+GAP_S = 5.0  # Longer gaps in a drive interrupt a line. [s]
 
 
 def _three(result: LoopResult) -> tuple[tuple[Mapping[str, FloatArray], str, str], ...]:
@@ -213,7 +195,7 @@ def _cycle(result: LoopResult, finding: Finding) -> Figure:
     panel.across(
         line - 0.002, line + 0.002, ORANGE, opacity=0.4, label=f"fitted: {line:.3f} Hz, once in {effect.period_s:.1f} s"
     )
-    longest = int(np.bincount(result.scored.statistics.timeline.drive).max())
+    longest = int(np.bincount(result.coarse.timeline.drive).max())
     draw_spectra(panel, result, min(CYCLE_ROWS, 2 ** int(np.log2(longest))), within_blocks=False)
     curves = [curve.y[(curve.x > low) & (curve.x < high)] for curve in panel.curves()]
     seen = np.concatenate([each[np.isfinite(each) & (each > 0.0)] for each in curves])
@@ -271,11 +253,8 @@ def _regimes(result: LoopResult, finding: Finding) -> Figure:
     loud = np.where(regime_probability(result) > 0.5, top, np.nan)
     over_time.band(moving.time, 0.0, loud, ORANGE, opacity=0.3, label="large spread more likely than not")
     over_time.line(moving.time, _gapped(moving, moving.measured), DRIVES, width=0.8, label="measured")
-    over_time.y.limits, over_time.y.label, over_time.x.label = (
-        (0.0, top),
-        f"spread within {REGIME_S:.0f} s [m]",
-        "time [s]",
-    )
+    over_time.y.limits, over_time.y.label = (0.0, top), f"spread within {REGIME_S:.0f} s [m]"
+    over_time.x.label = "time [s]"
     _draw_quantiles(quantiles, result)
     return figure
 
@@ -289,7 +268,7 @@ def _population(result: LoopResult, finding: Finding) -> Figure:
 
 def _draw_quantiles(panel: Panel, result: LoopResult) -> None:
     for values, color, label in _three(result):
-        place, spread = 100.0 * np.asarray(QUANTILES), values["quantiles of local spread"]
+        place, spread = 100.0 * np.asarray(LOCAL_QUANTILES), values["quantiles of local spread"]
         panel.line(place, spread, color, label=label)
         panel.dots(place, spread, color)
     panel.y.holds, panel.y.label = (0.0,), f"{SPREAD} [m]"
@@ -301,6 +280,7 @@ def _gapped(moving: MovingStatistic, values: FloatArray) -> FloatArray:
     return np.where(np.diff(moving.time, prepend=moving.time[:1]) > GAP_S, np.nan, values)
 
 
+# By kind of effect, or of finding: what draws it, and the caption.
 DRAWINGS: Mapping[str, tuple[Callable[[LoopResult, Finding], Figure], str]] = MappingProxyType(
     {
         Cycle.kind: (
@@ -318,4 +298,3 @@ DRAWINGS: Mapping[str, tuple[Callable[[LoopResult, Finding], Figure], str]] = Ma
         "population": (_population, "Distribution of the local spread of the movement on held-out blocks."),
     }
 )
-"""By kind of effect, or of finding: what draws it, and the caption."""

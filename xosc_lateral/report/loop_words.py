@@ -15,18 +15,12 @@ from xosc_lateral.identification.selection import Rejected
 from xosc_lateral.identification.timeline import LOCAL_S
 from xosc_lateral.segment import CONTEXT_UNITS
 
-CERTAIN = 1e-4
-"""p-values below this are extrapolated far beyond the null's sample: "certain", and no better known. [-]"""
+CERTAIN = 1e-4  # p-values below this are extrapolated far beyond the null's sample: "certain", and no better known. [-]
+NAMED_GROUPS = 4  # So many groups with the most left unexplained are named.
+GAP = "\N{NO-BREAK SPACE}"  # Between a number and its unit: they stay on one line.
+SPREAD = f"spread within {LOCAL_S:g}{GAP}s"  # What the local standard deviation is called in figures.
 
-NAMED_GROUPS = 4
-"""So many groups with the most left unexplained are named."""
-
-GAP = "\N{NO-BREAK SPACE}"
-"""Between a number and its unit: they stay on one line."""
-
-SPREAD = f"spread within {LOCAL_S:g}{GAP}s"
-"""What the local standard deviation is called in figures."""
-
+# Signs that a reader of a figure has to know.
 HINTS: Mapping[str, str] = MappingProxyType(
     {
         "curvature": "positive in left bends",
@@ -36,8 +30,8 @@ HINTS: Mapping[str, str] = MappingProxyType(
         "wind_direction": "90: blows to the left",
     }
 )
-"""Signs that a reader of a figure has to know."""
 
+# What is asked of each component.
 COMPONENT_WORDS: Mapping[str, str] = MappingProxyType(
     {
         "mean": "a column that changes the mean offset",
@@ -51,8 +45,8 @@ COMPONENT_WORDS: Mapping[str, str] = MappingProxyType(
         "time_mean": "a mean offset that changes with time, smoothly or by a step",
     }
 )
-"""What is asked of each component."""
 
+# Groups of cells whose own name is not plain.
 _PLAIN_GROUPS: Mapping[str, str] = MappingProxyType(
     {
         "movement by band": "standard deviation by frequency band",
@@ -60,7 +54,6 @@ _PLAIN_GROUPS: Mapping[str, str] = MappingProxyType(
         "mean by effect: step 0": "mean before and after it",
     }
 )
-"""Groups of cells whose own name is not plain."""
 
 _HIDDEN: Mapping[str, str] = MappingProxyType(
     {
@@ -248,6 +241,7 @@ def _hidden_sentence(finding: Finding) -> str:
     return f"{sentence} ({detail[0].upper()}{detail[1:]}.)"
 
 
+# Where a driver is, by the column that says so.
 OTHERS: Mapping[str, str] = MappingProxyType(
     {
         "left_distance": "beside vehicles on his left",
@@ -263,10 +257,8 @@ OTHERS: Mapping[str, str] = MappingProxyType(
         "oncoming_distance": "when somebody comes towards him",
     }
 )
-"""Where a driver is, by the column that says so."""
 
-FAR = 200.0
-"""Free space at which others count as far away. [m]"""
+FAR = 200.0  # Free space at which others count as far away. [m]
 
 
 def beside_words(effect: ColumnEffect, error: float = 0.0) -> str:

@@ -1,14 +1,12 @@
-"""A played scenario, before anything is converted: a page with the player, and its segments as text."""
+"""The page of a played scenario, before anything is converted."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from xosc_lateral.motion.nominal import NominalMotion
-from xosc_lateral.motion.segments import SegmentRow
+from xosc_lateral.motion.nominal import NominalMotion, Note
 from xosc_lateral.report.page import Page
-from xosc_lateral.report.scenario import add_notes
 from xosc_lateral.report.scenario_figures import speeds_over_time
 from xosc_lateral.report.scene import scene_of
 from xosc_lateral.road import RoadNetwork
@@ -51,11 +49,14 @@ def view_page(motion: NominalMotion, network: RoadNetwork, *, source: str, prove
     return page.html(provenance)
 
 
-def as_text(rows: Sequence[SegmentRow]) -> str:
-    """One line per segment."""
-    width = max((len(row.entity) for row in rows), default=0)
-    return "\n".join(
-        f"{row.entity:<{width}}  {row.start:8.2f} - {row.end:8.2f} s  "
-        + (f"road {row.road} lane {row.lane}: road-following" if row.road_following else f"no: {row.why}")
-        for row in rows
-    )
+def add_notes(page: Page, notes: Sequence[Note]) -> None:
+    """The section on what was not played as the scenario states it."""
+    page.section("Not played as written")
+    if not notes:
+        page.text("Nothing: every action and condition was played as the scenario states it.")
+        return
+    rows = [
+        {"what": note.what, "element": note.element, "file": Path(note.path).name, "line": str(note.line or "")}
+        for note in notes
+    ]
+    page.table(rows, "What was left out or played differently")

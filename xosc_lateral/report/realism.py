@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from xosc_lateral.driver.models.base import ModelKind
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.evaluation.classifier import TwoSampleResult
-from xosc_lateral.evaluation.lane_keeping import INDICATORS, UNITS
+from xosc_lateral.evaluation.lane_keeping import INDICATORS
 from xosc_lateral.evaluation.realism import ConditionScores, Realism
 
 FAMILIES: Mapping[str, str] = {
@@ -27,13 +27,13 @@ AREAS: Mapping[str, str] = {
 }
 
 INDICATOR_LABELS: Mapping[str, str] = {
-    "sdlp": "SDLP",
-    "tlc_min": "smallest time to line crossing",
-    "tlc_median": "median time to line crossing",
+    "sdlp": "SDLP [m]",
+    "tlc_min": "smallest time to line crossing [s]",
+    "tlc_median": "median time to line crossing [s]",
     "beyond_wandering_zone": "share of time beyond the wandering zone (UN R157)",
     "near_marking": "share of time near a marking",
-    "lateral_acceleration": "lateral acceleration, rms",
-    "lateral_jerk": "lateral jerk, rms",
+    "lateral_acceleration": "lateral acceleration, rms [m/s²]",
+    "lateral_jerk": "lateral jerk, rms [m/s³]",
 }
 
 START_FADE = (
@@ -76,12 +76,12 @@ def ratio_rows(group: list[ConditionScores]) -> list[dict[str, object]]:
 def indicator_rows(scores: ConditionScores) -> list[dict[str, object]]:
     """A row for each lane-keeping indicator: means, distance, that between real drivers."""
     rows: list[dict[str, object]] = []
-    for name, unit in zip(INDICATORS, UNITS, strict=True):
+    for name in INDICATORS:
         real, sampled = scores.means[name]
         beside = scores.named[name]
         rows.append(
             {
-                "indicator": INDICATOR_LABELS[name] + ("" if unit == "-" else _bracketed(unit)),
+                "indicator": INDICATOR_LABELS[name],
                 "measured": real,
                 "sampled": sampled,
                 "distance [sd]": beside.value,
@@ -101,30 +101,18 @@ def realism_lines(realism: Realism) -> list[str]:
             lines.append(f"    {label!s:44s}" + "".join(f"{cell!s:>18s}" for cell in cells))
     if all(one.alone is None for one in realism.conditions):
         lines.append("    classifier AUC: not computed")
-    lines += _indicator_lines(realism)
-    real, made = realism.variance_real, realism.variance_sampled
-    lines.append(
-        f"variance between drivers, within drivers, inside snippets [m²]: "
-        f"measured {real.between:.4f}, {real.within:.4f}, {real.inside:.4f}; "
-        f"sampled {made.between:.4f}, {made.within:.4f}, {made.inside:.4f}"
-    )
-    return lines
-
-
-def _indicator_lines(realism: Realism) -> list[str]:
-    """Lane keeping in free driving, a line each."""
-    lines = []
     shown = next((one for one in realism.conditions if not one.condition.same_start), None)
     if shown is not None:
         lines.append(f"lane keeping, {shown.condition.name:24s} measured    sampled   distance  real drivers [sd]")
-        for row in indicator_rows(shown):
-            label, real, sampled, distance, floor = row.values()
+        for label, real, sampled, distance, floor in (row.values() for row in indicator_rows(shown)):
             lines.append(f"  {label!s:40s}{real:8.4f}  {sampled:9.4f}  {distance:9.3f}  {floor:12.3f}")
+    before, made = realism.variance_real, realism.variance_sampled
+    lines.append(
+        f"variance between drivers, within drivers, inside snippets [m²]: "
+        f"measured {before.between:.4f}, {before.within:.4f}, {before.inside:.4f}; "
+        f"sampled {made.between:.4f}, {made.within:.4f}, {made.inside:.4f}"
+    )
     return lines
-
-
-def _bracketed(unit: str) -> str:
-    return f" [{unit.replace('/s2', '/s²').replace('/s3', '/s³')}]"
 
 
 def _length(one: ConditionScores) -> str:

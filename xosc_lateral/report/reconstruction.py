@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.enrich.result import EntityResult, SampledSegment
 from xosc_lateral.formats.hashes import parsed_hashes
 from xosc_lateral.motion.nominal import EntityMotion, NominalMotion
@@ -25,10 +25,24 @@ from xosc_lateral.version import __version__
 if TYPE_CHECKING:
     from xosc_lateral.pipeline.reconstruct import Reconstructed
 
-FloatArray = NDArray[np.float64]
-
 FRAME = 0.1
 """Rows of the page's player. [s]"""
+VEHICLES = {
+    "entity": "entity", "recorded_as": "recorded as", "class": "class", "from": "from [s]", "to": "to [s]",
+    "corners": "changes of acceleration", "along_rms": "along, rms [m]", "along_largest": "along, largest [m]",
+    "across_in_lane_rms": "across in lane, rms [m]", "across_in_maneuvers_rms": "across in maneuvers, rms [m]",
+    "profile": "profile",
+}  # fmt: skip
+MANEUVERS = {
+    "entity": "entity", "kind": "maneuver", "side": "side", "start": "start [s]", "duration": "duration [s]",
+    "shape": "shape", "lanes": "lanes", "residual": "residual, rms [m]", "cut_off": "cut off", "begins": "begins",
+}  # fmt: skip
+ENCOUNTERS = {
+    "entity": "entity", "kind": "maneuver", "time": "time [s]", "side": "side", "ahead": "ahead",
+    "gap_ahead": "gap ahead [m]", "time_to_collision_ahead": "time to collision ahead [s]", "behind": "behind",
+    "gap_behind": "gap behind [m]", "time_to_collision_behind": "time to collision behind [s]",
+}  # fmt: skip
+"""Columns of the page's tables: keys of the rows, and headings."""
 WORTH_NAMING = 1.0
 """A position that is off by more is named in the list of what could not be expressed, across beside the lane's own
 spread. [m]"""
@@ -218,23 +232,29 @@ def page_of(made: Reconstructed, facts: dict[str, Any]) -> str:
         "Histograms of recorded less planned position, along and across the road",
     )
     page.section("Vehicles")
-    page.table(facts["vehicles"], "Times in s, lengths in m. Profile: who drives it in a twin.")
+    _add_table(page, facts["vehicles"], VEHICLES, "Profile: who drives it in a twin.")
     page.section("Lateral maneuvers")
-    page.table(
-        facts["maneuvers"],
-        "Start and duration in s, residual of the fitted shape in m (rms). Cut off: the recording begins or ends "
-        "within it.",
-    )
+    cut = "Residual of the fitted shape. Cut off: the recording begins or ends within it."
+    _add_table(page, facts["maneuvers"], MANEUVERS, cut)
     page.section("Encounters")
-    page.table(
+    _add_table(
+        page,
         facts["encounters"],
+        ENCOUNTERS,
         "Every lane change, half way, and every braking at its begin: who is ahead and behind in the lane it leads to, "
-        "free space between the bumpers in m, and time in s until that is used up.",
+        "free space between the bumpers, and time until that is used up.",
     )
     page.section("Not expressed")
     page.items(facts["not_expressed"])
     page.text("" if facts["not_expressed"] else "Nothing was left out.")
     return page.html(facts["provenance"])
+
+
+def _add_table(page: Page, rows: Sequence[dict[str, Any]], headings: dict[str, str], caption: str) -> None:
+    """Rows under readable headings; times to 0.1 s, lengths to 1 cm."""
+    shown = [{heading: row[key] for key, heading in headings.items()} for row in rows]
+    formats = {one: ".1f" if "[s]" in one else ".2f" for one in headings.values() if "[" in one}
+    page.table(shown, caption, formats=formats)
 
 
 def _spread(residuals: Sequence[Residuals]) -> Figure:

@@ -2,117 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
-from pathlib import Path
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
-from xosc_lateral.driver.answers import basis_of, beside_line, borrows
-from xosc_lateral.driver.profile import SIDES, DriverProfile
-from xosc_lateral.enrich.result import ConversionProvenance, ConvertedScenario, Enriched, EntityResult, Neighbours
+from xosc_lateral.enrich.result import ConvertedScenario, Enriched, EntityResult
 from xosc_lateral.motion.gaps import REACH, Gap
-from xosc_lateral.motion.nominal import Note
 from xosc_lateral.report import scenario_figures as figures
+from xosc_lateral.report.conversion import WRITTEN_AS, beside_text, under_test
 from xosc_lateral.report.page import KeyFigure, Page, Tone
-from xosc_lateral.report.path_dynamics import COMFORTABLE
+from xosc_lateral.report.played import add_notes
+from xosc_lateral.report.scenario_figures import COMFORTABLE
 from xosc_lateral.report.scene import scene_of
-
-WRITTEN_AS = {"trajectory": "a trajectory", "lane-offset": "lane offsets"}
-
-
-def as_text(conversion: ConvertedScenario, report: Path | None = None) -> str:
-    """What was done, what was not, what to know."""
-    lines = [f"{conversion.source if conversion.data else conversion.output}"]
-    lines.append(f"  {under_test(conversion)}")
-    for entity in conversion.enriched.entities:
-        if entity.is_enriched and entity.profile is not None:
-            mode = conversion.provenance.modes.get(entity.name, "")
-            lines.append(
-                f"  {entity.name}: {len(entity.segments)} segments, {entity.segment_seconds:.1f} s, "
-                f"offsets {entity.offset_spread:.2f} m (standard deviation), profile {entity.profile.name}, "
-                f"as {WRITTEN_AS.get(mode, mode)}"
-            )
-            lines.append(f"    neighbours: {beside_text(entity.profile, conversion.provenance.options['neighbours'])}")
-        else:
-            lines.append(f"  {entity.name}: as in the scenario ({entity.why})")
-    if conversion.provenance.options["with_sensor"]:
-        lines.append("  offsets include the sensor error of the drives that the profiles were fitted to")
-    lines += [f"  note: {note.what}" for note in conversion.enriched.motion.notes]
-    lines += [f"  warning: {warning}" for warning in conversion.warnings]
-    if report is not None:
-        lines.append(f"report: {report}")
-    return "\n".join(lines)
-
-
-def beside_text(profile: DriverProfile, neighbours: str) -> str:
-    """How a driver answers to vehicles beside him, and where that is known from, in a line."""
-    if neighbours == Neighbours.NONE:
-        return "no answer (--neighbours none)"
-    may_borrow = neighbours == Neighbours.BORROW
-    lines = []
-    for side in SIDES:
-        borrowed = ": borrowed from the population" if may_borrow and borrows(profile, side) else ""
-        lines.append(beside_line(profile, side) + borrowed)
-    return "; ".join(lines)
-
-
-def under_test(conversion: ConvertedScenario) -> str:
-    """Who is under test, in a line."""
-    egos = conversion.provenance.ego
-    if egos:
-        return f"under test, left as written: {', '.join(egos)}"
-    return "no vehicle under test: " + (
-        "everything is replayed" if conversion.is_replay else "maneuvers that stay react to the run"
-    )
-
-
-def facts(conversion: ConvertedScenario, report: Path | None = None) -> dict[str, Any]:
-    """Plain values about a conversion, rounded to what they are read for: a micrometre, a microsecond."""
-    enriched = conversion.enriched
-    return {
-        "source": str(conversion.source),
-        "output": None if conversion.data else str(conversion.output),
-        "report": None if report is None else str(report),
-        "sha256": conversion.output_sha256,
-        "end_time": round(enriched.motion.end_time, 6),
-        "ended_by": enriched.motion.ended_by,
-        "ego": list(conversion.provenance.ego),
-        "entities": [
-            {
-                "name": entity.name,
-                "profile": entity.profile.name if entity.is_enriched and entity.profile is not None else None,
-                "why_not": entity.why,
-                "neighbours": _beside_facts(entity.profile) if entity.is_enriched else None,
-                "mode": conversion.provenance.modes.get(entity.name),
-                "segments": [[round(segment.span.start, 6), round(segment.span.end, 6)] for segment in entity.segments],
-                "offset_spread": round(entity.offset_spread, 6),
-                "neutral_context": list(entity.neutral),
-            }
-            for entity in enriched.entities
-        ],
-        "gap_before": _smallest(enriched.gaps_before),
-        "gap_after": _smallest(enriched.gaps_after),
-        "notes": [asdict(note) for note in enriched.motion.notes],
-        "warnings": list(conversion.warnings),
-        "provenance": provenance_record(conversion.provenance),
-    }
-
-
-def _beside_facts(profile: DriverProfile | None) -> dict[str, str] | None:
-    return None if profile is None else {side: basis_of(profile, side).value for side in SIDES}
-
-
-def provenance_record(provenance: ConversionProvenance) -> dict[str, Any]:
-    """Provenance of a conversion as plain values."""
-    profiles = {name: {"name": profile, "sha256": sha} for name, (profile, sha) in provenance.profiles.items()}
-    return asdict(provenance) | {"profiles": profiles}
-
-
-def _smallest(gaps: tuple[Gap, ...]) -> float | None:
-    return min((round(gap.distance, 6) for gap in gaps), default=None)
-
 
 MOST_PANELS, MOST_DYNAMICS = 12, 6
 """Entities with panels of their own, for offsets and for dynamics; those with the largest offsets come first."""
@@ -120,65 +21,15 @@ MOST_PANELS, MOST_DYNAMICS = 12, 6
 SELDOM = 0.01
 """Share of the time beyond which lateral acceleration is rougher than people's. [-]"""
 
-MOST_PAIRS = 20
-"""Pairs of vehicles that the gap figure shows, the closest first."""
-
 GAP_TIMES = ("at [s]", "at [s] ")
 """Headings of the times of the nominal and the enriched gap: a table's headings differ, if only by a blank."""
 
 
 def conversion_page(conversion: ConvertedScenario) -> str:
-    """`scenario_page` of a conversion, with all its provenance."""
-    made = conversion.provenance
-    return scenario_page(
-        conversion.enriched,
-        source=conversion.source.name,
-        output=conversion.output.name,
-        warnings=conversion.warnings,
-        under_test=under_test(conversion),
-        provenance={
-            "under test": list(made.ego) or "none",
-            "written as": [f"{name}: {WRITTEN_AS[mode]}" for name, mode in made.modes.items()],
-            "neighbours": [
-                f"{one.name}: {beside_text(one.profile, made.options['neighbours'])}"
-                for one in conversion.enriched.entities
-                if one.is_enriched and one.profile is not None
-            ],
-            "seed": made.options["seed"],
-            "variant": made.variant,
-            "parameters set": [f"{name} = {value}" for name, value in made.options["parameters"].items()],
-            "profiles": [f"{entity}: {name} ({sha[:12]})" for entity, (name, sha) in made.profiles.items()],
-            "inputs": [f"{name} ({sha[:12]})" for name, sha in made.inputs.items()],
-            "output hash": conversion.output_sha256,
-        },
-    )
-
-
-def scenario_page(
-    enriched: Enriched,
-    *,
-    source: str,
-    output: str,
-    provenance: Mapping[str, object],
-    warnings: Sequence[str] = (),
-    under_test: str = "",
-) -> str:
-    """HTML page on one converted scenario, self-contained; same input, same bytes.
-
-    Parameters
-    ----------
-    enriched : Enriched
-    source, output : str
-        File names, for the reader.
-    provenance : mapping
-        Shown in the footer: hashes, seed, profiles, version.
-    warnings : sequence of str
-        What the user has to know; shown on top.
-    under_test : str
-        Who is, in a line.
-    """
+    """HTML page on one converted scenario, self-contained; same input, same bytes."""
+    enriched = conversion.enriched
     done = [entity for entity in enriched.entities if entity.is_enriched]
-    page = Page(f"{Path(source).name}: lateral movement added")
+    page = Page(f"{conversion.source.name}: lateral movement added")
     page.lead(
         (
             f"{len(done)} of {len(enriched.entities)} entities now move inside their lanes as the chosen drivers do; "
@@ -187,11 +38,11 @@ def scenario_page(
             else "No entity was enriched; the reasons are listed below."
         )
         + f" The scenario runs for {enriched.motion.end_time:.1f} s (ended by the {enriched.motion.ended_by}). "
-        f"The result is in `{output}`."
+        f"The result is in `{conversion.output.name}`."
     )
     page.key_figures(_key_figures(enriched, done))
-    page.lead(under_test)
-    for warning in warnings:
+    page.lead(under_test(conversion))
+    for warning in conversion.warnings:
         page.warning(warning)
     page.section(
         "Player",
@@ -219,35 +70,42 @@ def scenario_page(
     ]
     page.table(rows, "Segments of every entity", formats={"from [s]": ".2f", "to [s]": ".2f"})
     add_notes(page, enriched.motion.notes)
-    return page.html({"scenario": source, "output": output, **provenance})
+    return page.html(_provenance(conversion))
 
 
-def add_notes(page: Page, notes: Sequence[Note]) -> None:
-    """The section on what was not played as the scenario states it."""
-    page.section("Not played as written")
-    if not notes:
-        page.text("Nothing: every action and condition was played as the scenario states it.")
-        return
-    rows = [
-        {"what": note.what, "element": note.element, "file": Path(note.path).name, "line": str(note.line or "")}
-        for note in notes
-    ]
-    page.table(rows, "What was left out or played differently")
+def _provenance(conversion: ConvertedScenario) -> dict[str, object]:
+    made = conversion.provenance
+    return {
+        "scenario": conversion.source.name,
+        "output": conversion.output.name,
+        "under test": list(made.ego) or "none",
+        "written as": [f"{name}: {WRITTEN_AS[mode]}" for name, mode in made.modes.items()],
+        "neighbours": [
+            f"{one.name}: {beside_text(one.profile, made.options['neighbours'])}"
+            for one in conversion.enriched.entities
+            if one.is_enriched and one.profile is not None
+        ],
+        "seed": made.options["seed"],
+        "variant": made.variant,
+        "parameters set": [f"{name} = {value}" for name, value in made.options["parameters"].items()],
+        "profiles": [f"{entity}: {name} ({sha[:12]})" for entity, (name, sha) in made.profiles.items()],
+        "inputs": [f"{name} ({sha[:12]})" for name, sha in made.inputs.items()],
+        "output hash": conversion.output_sha256,
+    }
 
 
 def _add_paths(page: Page, enriched: Enriched) -> None:
-    stretched, above = figures.paths_stretched(enriched), figures.paths_from_above(enriched)
     page.section("Paths")
-    if stretched is None or above is None:
+    paths = figures.paths_stretched(enriched)
+    if paths is None:
         page.text("No entity is on a road.")
         return
     page.figure(
-        stretched,
+        paths,
         "Position across the road (t) over position along it (s), with the scale across the road exaggerated. "
         "Coloured: enriched. Dashed: nominal. Dots: where each entity starts. Bends of the road are drawn straight.",
         "Lateral position of every vehicle along the road, nominal and enriched, with lane markings",
     )
-    page.figure(above, "The same, true to scale.", "Plan view of the road with nominal and enriched paths")
 
 
 def _add_offsets(page: Page, enriched: Enriched, done: Sequence[EntityResult]) -> None:
@@ -281,11 +139,11 @@ def _add_dynamics(page: Page, enriched: Enriched, done: Sequence[EntityResult]) 
     )
     if done:
         page.figure(
-            figures.dynamics_over_time(_largest(done, MOST_DYNAMICS)),
-            "Blue: enriched. Dashed: nominal, that is, what curves and lane changes require. The band reaches "
-            f"{COMFORTABLE} m/s² to either side of nominal; real drivers rarely leave it while they keep their lane."
+            figures.accelerations_over_time(_largest(done, MOST_DYNAMICS)),
+            "Lateral acceleration beyond what curves and lane changes require. The band reaches "
+            f"{COMFORTABLE} m/s² to either side; real drivers rarely leave it while they keep their lane."
             f"{_left_out(done, MOST_DYNAMICS)}",
-            "Lateral acceleration and jerk over time, nominal and enriched",
+            "Added lateral acceleration over time",
             over_time=True,
         )
 
@@ -303,17 +161,9 @@ def _add_gaps(page: Page, enriched: Enriched) -> None:
     if not pairs:
         page.text("No two vehicles come that close to each other.")
         return
-    closest = (
-        f"the {MOST_PAIRS} closest of {len(pairs)} pairs" if len(pairs) > MOST_PAIRS else "the closest pairs first"
-    )
-    page.figure(
-        figures.gaps_before_and_after(pairs[:MOST_PAIRS]),
-        f"Nominal and enriched, {closest}.",
-        "Smallest gap of each pair of vehicles, nominal and enriched",
-    )
     page.table(
         [_gap_row(*pair) for pair in pairs],
-        "Pairs of vehicles. Marked: pairs that touch in the enriched scenario only.",
+        "Pairs of vehicles, the closest first. Marked: pairs that touch in the enriched scenario only.",
         formats=dict.fromkeys(("nominal [m]", "enriched [m]", "change [m]"), ".2f") | dict.fromkeys(GAP_TIMES, ".1f"),
         tones=_tones(enriched, pairs),
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
@@ -11,17 +10,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.enrich.result import EntityResult
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.motion.trajectory import WorldTrajectory
-from xosc_lateral.report.path_dynamics import lateral_dynamics
+from xosc_lateral.report.road_lines import lane_surfaces, markings
 from xosc_lateral.road import RoadNetwork
 from xosc_lateral.road.geometry import simplify
 from xosc_lateral.road.network import DRIVING
-from xosc_lateral.road.positions import RoadMark
 from xosc_lateral.rows import true_slices
 
-FloatArray = NDArray[np.float64]
 RowArray = NDArray[np.int64]
 
 FRAME = 0.1
@@ -30,6 +28,18 @@ FRAME = 0.1
 MOST_FRAMES = 60_000
 """Frames of all entities together beyond which they are spaced farther apart: what a browser takes at once."""
 
+MILLI, ANGLE, LINE = 1e-3, 1e-4, 5e-3
+"""Resolution of positions [m] and speeds [m/s]; of headings, 0.5 mm at the end of a car of 5 m [rad]; of lines [m]."""
+
+REACH = 250.0
+"""Roads are shown as far as this around every place where a vehicle was. [m]"""
+
+PIECE = 200.0
+"""Length of one piece of a lane or marking: pieces out of sight are not drawn. [m]"""
+
+TOLERANCE = 0.01
+"""Lines are simplified to this: less than a tenth of a marking's width. [m]"""
+
 
 def scene_of(motion: NominalMotion, network: RoadNetwork, results: Sequence[EntityResult] = ()) -> str:
     """JSON for the player: results with the nominal motion as ghosts, or the nominal motion alone."""
@@ -37,18 +47,26 @@ def scene_of(motion: NominalMotion, network: RoadNetwork, results: Sequence[Enti
     given = given or [(one, None) for one in motion.entities]
     shown = [(number, entity, result) for number, (entity, result) in enumerate(given) if _present(entity).any()]
     rows = _rows(motion, len(shown))
-    origin = _origin([entity for _, entity, _ in shown])
-    places = [np.column_stack([e.x[_present(e)], e.y[_present(e)]]) for _, e, _ in shown]
-    step = (rows[1] - rows[0]) * motion.step if len(rows) > 1 else FRAME
+    places = [np.column_stack([entity.x, entity.y])[_present(entity)] for _, entity, _ in shown]
+    # whole metres near the first place: coordinates stay small on roads with geographic ones
+    origin = np.round(places[0][0]) if places else np.zeros(2)
     scene = {
-        "step": round(float(step), 9),
+        "step": round(float(rows[1] - rows[0]) * motion.step if len(rows) > 1 else FRAME, 9),
         "frames": len(rows),
-        "end": motion.end_time,
         "entities": [_entity(network, number, each, result, rows, origin) for number, each, result in shown],
-        **road_shapes(network, np.concatenate(places) if places else np.empty((0, 2)), origin),
+        **_roads(network, np.concatenate(places) if places else np.empty((0, 2)), origin),
     }
     # "<" would end the script element that holds this
     return json.dumps(scene, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c")
+
+
+def packed(values: ArrayLike, resolution: float) -> dict[str, Any]:
+    """One column of finite values, small as text: the resolution `r`, and in units of it `d`, each less the one before.
+
+    The first stands as it is. `static/player.js` adds them up again.
+    """
+    whole = np.rint(np.asarray(values, dtype=np.float64) / resolution).astype(np.int64)
+    return {"r": resolution, "d": np.diff(whole, prepend=0).tolist()}
 
 
 def _rows(motion: NominalMotion, entities: int) -> RowArray:
@@ -58,17 +76,9 @@ def _rows(motion: NominalMotion, entities: int) -> RowArray:
     return np.arange(0, count, every)
 
 
+# ---- vehicles --------------------------------------------------------------------------------------------------------
 def _present(motion: EntityMotion) -> NDArray[np.bool_]:
     return np.asarray((motion.activity & Activity.ACTIVE) != 0)
-
-
-def _origin(entities: Sequence[EntityMotion]) -> FloatArray:
-    """Whole metres near the first place: coordinates stay small on roads with geographic ones."""
-    if not entities:
-        return np.zeros(2)
-    first = entities[0]
-    row = int(np.argmax(_present(first)))
-    return np.round(np.array([first.x[row], first.y[row]]))
 
 
 def _entity(
@@ -80,6 +90,7 @@ def _entity(
     origin: FloatArray,
 ) -> dict[str, Any]:
     box = motion.entity.bounding_box
+    placed = np.cumsum((motion.activity & Activity.TELEPORTED) != 0)[rows]
     values: dict[str, Any] = {
         "name": motion.name,
         "number": number,
@@ -87,17 +98,16 @@ def _entity(
         "width": box.width,
         "ahead": box.center_x,
         "left": box.center_y,
-        "vehicle": motion.entity.is_vehicle,
         "present": [[part.start, part.stop - 1] for part in true_slices(_present(motion)[rows])],
-        "jumps": _jumps(motion, rows),
+        "jumps": (1 + np.flatnonzero(np.diff(placed))).tolist(),  # frames that nobody reaches by moving
         "lanes": _lane_changes(network, motion, rows),
-        "course": pack(np.unwrap(_filled(_course(motion)[rows])), MILLIRADIAN_TENTH),
-        "nominal": _path(motion, rows, origin, motion),
-        "offset": pack(_filled(motion.offset[rows]), MILLIMETRE),
+        "course": packed(np.unwrap(_filled(_course(motion)[rows])), ANGLE),
+        "nominal": _path(motion, rows, origin),
+        "offset": packed(_filled(motion.offset[rows]), MILLI),
     }
     if result is not None and result.is_enriched:
-        values["enriched"] = _path(result.trajectory, rows, origin, motion)
-        values["added"] = pack(_filled(result.deviation[rows]), MILLIMETRE)
+        values["enriched"] = _path(result.trajectory, rows, origin)
+        values["added"] = packed(_filled(result.deviation[rows]), MILLI)
     return values
 
 
@@ -107,29 +117,18 @@ def _course(motion: EntityMotion) -> FloatArray:
     return np.asarray(motion.heading - np.where(motion.road >= 0, turned, 0.0))
 
 
-def _path(
-    path: EntityMotion | WorldTrajectory, rows: RowArray, origin: FloatArray, motion: EntityMotion
-) -> dict[str, Any]:
-    dynamics = lateral_dynamics(motion, path)
-    across = np.interp(path.time[rows], dynamics.time, np.nan_to_num(dynamics.acceleration))
+def _path(path: EntityMotion | WorldTrajectory, rows: RowArray, origin: FloatArray) -> dict[str, Any]:
     return {
-        "x": pack(_filled(path.x[rows] - origin[0]), MILLIMETRE),
-        "y": pack(_filled(path.y[rows] - origin[1]), MILLIMETRE),
-        "h": pack(np.unwrap(_filled(path.heading[rows])), MILLIRADIAN_TENTH),
-        "v": pack(_filled(path.speed[rows]), CENTIMETRE_PER_SECOND),
-        "a": pack(across, MILLIMETRE),
+        "x": packed(_filled(path.x[rows] - origin[0]), MILLI),
+        "y": packed(_filled(path.y[rows] - origin[1]), MILLI),
+        "h": packed(np.unwrap(_filled(path.heading[rows])), ANGLE),
+        "v": packed(_filled(path.speed[rows]), MILLI),
     }
 
 
 def _filled(values: FloatArray) -> FloatArray:
     """Numbers instead of NaN, where an entity is absent: nobody sees them there."""
     return np.nan_to_num(np.asarray(values, dtype=np.float64))
-
-
-def _jumps(motion: EntityMotion, rows: RowArray) -> list[int]:
-    """Frames that are not reached by moving from the one before."""
-    placed = np.cumsum((motion.activity & Activity.TELEPORTED) != 0)[rows]
-    return [k + 1 for k, (one, other) in enumerate(pairwise(placed.tolist())) if other > one]
 
 
 def _lane_changes(network: RoadNetwork, motion: EntityMotion, rows: RowArray) -> list[tuple[int, str, int]]:
@@ -139,174 +138,43 @@ def _lane_changes(network: RoadNetwork, motion: EntityMotion, rows: RowArray) ->
     return [(int(k), network.road_ids[road[k]] if road[k] >= 0 else "", int(lane[k])) for k in np.flatnonzero(is_new)]
 
 
-# ---- roads ----
-MILLIMETRE = CENTIMETRE_PER_SECOND = 1e-3
-"""Resolution of positions [m]; of speeds a hundred times finer than anybody reads them. [m/s]"""
+# ---- roads -----------------------------------------------------------------------------------------------------------
+def _roads(network: RoadNetwork, places: FloatArray, origin: FloatArray) -> dict[str, list[dict[str, Any]]]:
+    """Lanes and markings near some places, shape (n, 2) [m], as seen from the origin.
 
-MILLIRADIAN_TENTH = 1e-4
-"""Resolution of headings: 0.5 mm at the end of a car of 5 m. [rad]"""
-
-
-def pack(values: ArrayLike, resolution: float) -> dict[str, Any]:
-    """Pack one column: rounded, stored as differences, a fraction of the size of decimal text.
-
-    ``{"r": resolution, "b": first, "w": 2 or 4, "d": base64}``: `d` holds the differences between successive values in
-    units of the resolution, as little-endian integers of `w` bytes. ``static/player.js`` unpacks it.
-
-    Parameters
-    ----------
-    values : array, shape (n,)
-        Finite.
-    resolution : float
-        Values come back as whole multiples of it. [unit of the values]
-    """
-    whole = np.rint(np.asarray(values, dtype=np.float64) / resolution).astype(np.int64)
-    if not len(whole):
-        return {"r": resolution, "b": 0, "w": 2, "d": ""}
-    steps = np.diff(whole)
-    is_small = not len(steps) or np.abs(steps).max() <= np.iinfo(np.int16).max
-    data = steps.astype("<i2" if is_small else "<i4").tobytes()
-    return {
-        "r": resolution,
-        "b": int(whole[0]),
-        "w": 2 if is_small else 4,
-        "d": base64.b64encode(data).decode("ascii"),
-    }
-
-
-def unpack(column: dict[str, Any]) -> NDArray[np.float64]:
-    """The values of a packed column, shape (n,): what the page's script does."""
-    steps = np.frombuffer(base64.b64decode(column["d"]), dtype=f"<i{column['w']}").astype(np.int64)
-    return np.asarray(np.concatenate(([0], np.cumsum(steps))) + column["b"]) * float(column["r"])
-
-
-REACH = 250.0
-"""Roads are shown as far as this around every place where a vehicle was. [m]"""
-
-PIECE = 200.0
-"""Length of one piece of a lane or marking: pieces out of sight are not drawn. [m]"""
-
-LINE_STEP = 2.0
-"""Between two points of a line before it is simplified. [m]"""
-
-TOLERANCE = 0.01
-"""Lines are simplified to this: less than a tenth of a marking's width. [m]"""
-
-RESOLUTION = 0.005
-"""Of the coordinates of lines. [m]"""
-
-NO_MARK = frozenset({"none", "curb", "grass", "edge"})
-"""Road marks that are no paint."""
-
-
-def road_shapes(network: RoadNetwork, places: FloatArray, origin: FloatArray) -> dict[str, list[dict[str, Any]]]:
-    """Lanes and markings near the given places.
-
-    Parameters
-    ----------
-    network : RoadNetwork
-    places : array, shape (n, 2)
-        Where vehicles were. [m]
-    origin : array, shape (2,)
-        Subtracted from all coordinates. [m]
-
-    Returns
-    -------
-    dict
-        ``lanes``: polygons with the lane's `type`; ``marks``: lines with `type`, `color`, `width` [m] and `start`
-        (s, so that dashes go on from piece to piece). [m]
+    Lanes are polygons with their `type`; marks are lines with `type`, `color`, `width` [m] and `start` (s, so that
+    dashes go on from piece to piece) [m].
     """
     lanes, marks = [], []
-    near = _cells(places, reach=REACH)
+    cells = {(int(i), int(k)) for i, k in np.unique(np.floor(places / REACH), axis=0)}
+    near = {(i + a, k + b) for i, k in cells for a in (-1, 0, 1) for b in (-1, 0, 1)}
+
+    def line(road: int, s: FloatArray, t: FloatArray) -> FloatArray:
+        poses = network.road_to_world(road, s, t)
+        places = np.column_stack([poses.x, poses.y]) - origin
+        return places[simplify(places[:, 0], places[:, 1], TOLERANCE)]
+
+    def drawn(places: FloatArray, **what: Any) -> dict[str, Any]:
+        return what | {"x": packed(places[:, 0], LINE), "y": packed(places[:, 1], LINE)}
+
     for road in range(len(network.roads)):
-        for first, last in _ranges_near(network, road, near):
-            lanes += [shape for shape in _lanes(network, road, first, last, origin) if shape]
-            marks += list(_marks(network, road, first, last, origin))
+        for first, last in _pieces_near(network, road, near):
+            for kind, s, right, left in lane_surfaces(network, road, first, last):
+                if (left - right).max() >= TOLERANCE:
+                    outline = np.concatenate([line(road, s, left), line(road, s, right)[::-1]])
+                    lanes.append(drawn(outline, type="driving" if kind in DRIVING else kind))
+            for mark, s, t in markings(network, road, first, last):
+                what = {"type": mark.type, "color": mark.color, "width": mark.width, "start": round(float(s[0]), 2)}
+                marks.append(drawn(line(road, s, t), **what))
     return {"lanes": lanes, "marks": marks}
 
 
-def _cells(places: FloatArray, reach: float) -> set[tuple[int, int]]:
-    """Squares of the size of the reach that lie within it of any place."""
-    whole = {(int(i), int(k)) for i, k in np.unique(np.floor(places / reach), axis=0)} if len(places) else set()
-    return {(i + a, k + b) for i, k in whole for a in (-1, 0, 1) for b in (-1, 0, 1)}
-
-
-def _ranges_near(network: RoadNetwork, road: int, near: set[tuple[int, int]]) -> Iterator[tuple[float, float]]:
+def _pieces_near(network: RoadNetwork, road: int, near: set[tuple[int, int]]) -> Iterator[tuple[float, float]]:
     """Parts of a road, as (first, last) s, that lie in those squares, at most `PIECE` long each."""
     length = network.roads[road].length
-    count = max(1, int(np.ceil(length / PIECE)))
-    edges = np.linspace(0.0, length, count + 1)
-    for first, last in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+    edges = np.linspace(0.0, length, max(1, int(np.ceil(length / PIECE))) + 1).tolist()
+    for first, last in pairwise(edges):
         poses = network.road_to_world(road, np.linspace(first, last, 5))
         cells = np.floor(np.column_stack([poses.x, poses.y]) / REACH)
         if last > first and any((int(i), int(k)) in near for i, k in cells):
             yield first, last
-
-
-def _sections(network: RoadNetwork, road: int, first: float, last: float) -> Iterator[tuple[float, float]]:
-    """The lane sections within a range."""
-    start = first
-    while start < last:
-        section_start, section_end = network.section_at(road, start)
-        if section_end <= start:  # a section of no length: OpenDRIVE forbids it, field files have it
-            return
-        yield max(section_start, start), min(section_end, last)
-        start = section_end
-
-
-def _grid(start: float, stop: float) -> FloatArray:
-    """From start to just before stop, where the next section begins."""
-    return np.linspace(start, max(start, stop - 1e-6), max(2, int(np.ceil((stop - start) / LINE_STEP)) + 1))
-
-
-def _lanes(
-    network: RoadNetwork, road: int, first: float, last: float, origin: FloatArray
-) -> Iterator[dict[str, Any] | None]:
-    for start, stop in _sections(network, road, first, last):
-        s = _grid(start, stop)
-        for lane in network.lanes_at(road, 0.5 * (start + stop)):
-            if lane.type == "none":
-                continue
-            centre, width = network.lane_centre_t(road, lane.id, s), network.lane_width(road, lane.id, s)
-            if width.max() < TOLERANCE:
-                continue
-            left = _line(network, road, s, centre + 0.5 * width, origin)
-            right = _line(network, road, s, centre - 0.5 * width, origin)
-            x, y = (np.concatenate([one, other[::-1]]) for one, other in zip(left, right, strict=True))
-            kind = "driving" if lane.type in DRIVING else lane.type
-            yield {"type": kind, "x": pack(x, RESOLUTION), "y": pack(y, RESOLUTION)}
-
-
-def _marks(network: RoadNetwork, road: int, first: float, last: float, origin: FloatArray) -> Iterator[dict[str, Any]]:
-    for mark, start, s, t in _mark_lines(network, road, first, last):
-        x, y = _line(network, road, s, t, origin)
-        yield {
-            "type": mark.type,
-            "color": mark.color,
-            "width": mark.width,
-            "start": round(start, 2),
-            "x": pack(x, RESOLUTION),
-            "y": pack(y, RESOLUTION),
-        }
-
-
-def _mark_lines(
-    network: RoadNetwork, road: int, first: float, last: float
-) -> Iterator[tuple[RoadMark, float, FloatArray, FloatArray]]:
-    """Paint between two s: the mark, where it starts, and t over s."""
-    for mark in network.road_marks(road):
-        start, stop = max(first, mark.s_start), min(last, mark.s_end)
-        if stop <= start or mark.type in NO_MARK:
-            continue
-        s = _grid(start, stop)
-        outer = 0.5 * np.sign(mark.lane) * network.lane_width(road, mark.lane, s) if mark.lane else 0.0
-        yield mark, start, s, network.lane_centre_t(road, mark.lane, s) + outer
-
-
-def _line(
-    network: RoadNetwork, road: int, s: FloatArray, t: FloatArray, origin: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    poses = network.road_to_world(road, s, t)
-    x, y = np.asarray(poses.x) - origin[0], np.asarray(poses.y) - origin[1]
-    kept = simplify(x, y, TOLERANCE)
-    return x[kept], y[kept]

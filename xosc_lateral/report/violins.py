@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.evaluation.metrics import METRICS
 from xosc_lateral.report.chart import DASHED, MEASURED, MUTED, SAMPLED
 from xosc_lateral.report.figure import Figure
-
-FloatArray = NDArray[np.float64]
 
 LABELS = {
     "max": "maximum",

@@ -20,17 +20,7 @@ from numpy.typing import NDArray
 def simplify(x: NDArray[np.float64], y: NDArray[np.float64], tolerance: float) -> NDArray[np.int64]:
     """Points of a polyline to keep so that no other one is farther off than `tolerance` (Douglas and Peucker 1973).
 
-    Parameters
-    ----------
-    x, y : array, shape (n,)
-        [m]
-    tolerance : float
-        [m]
-
-    Returns
-    -------
-    array of int, shape (m,)
-        Indices, first and last included.
+    x, y of shape (n,), `tolerance` in [m]; the result: indices, shape (m,), first and last included.
     """
     kept = {0, len(x) - 1}
     todo = [(0, len(x) - 1)]
@@ -65,25 +55,15 @@ MAX_TURN = 2000.0
 
 
 class ClothoidPiece(Struct, frozen=True):
-    """A stretch of clothoid (line and arc included) about its middle.
+    """A stretch of clothoid (line and arc included) about its middle."""
 
-    Attributes
-    ----------
-    start, middle, end : float
-        ds in its element. [m]
-    heading, curvature, sharpness : float
-        At the middle: [rad], [1/m]; change of curvature [1/m^2].
-    x_series, y_series : tuple of float
-        x and y as power series in ds - middle, lowest power first.
-    """
-
-    start: float
+    start: float  # start, middle, end: ds in its element [m]
     middle: float
     end: float
-    heading: float
-    curvature: float
-    sharpness: float
-    x_series: tuple[float, ...]
+    heading: float  # at the middle [rad]
+    curvature: float  # at the middle [1/m]
+    sharpness: float  # change of curvature [1/m^2]
+    x_series: tuple[float, ...]  # power series in ds - middle, lowest power first
     y_series: tuple[float, ...]
 
 
@@ -235,23 +215,13 @@ class Spiral(Struct, frozen=True):
 
 
 class ParamCubic(Struct, frozen=True):
-    """A parametric cubic (paramPoly3, and poly3 as its special case) run through by arc length.
+    """A parametric cubic (paramPoly3, and poly3 as its special case) run through by arc length."""
 
-    Attributes
-    ----------
-    x, y : tuple of 4 floats
-        World coordinates as cubics of the parameter p.
-    step : float
-        Length of the pieces of p(ds). [m]
-    parameter : tuple of 4-tuples
-        p as a cubic of ds about each piece's start (see `arc_length`).
-    """
-
-    x: tuple[float, ...]
+    x: tuple[float, ...]  # x, y: world coordinates as cubics of the parameter p
     y: tuple[float, ...]
     length: float
-    step: float
-    parameter: tuple[tuple[float, ...], ...]
+    step: float  # length of the pieces of p(ds) [m]
+    parameter: tuple[tuple[float, ...], ...]  # p as a cubic of ds about each piece's start
 
     def _parameter_at(self, ds: float) -> float:
         i = int(ds / self.step)

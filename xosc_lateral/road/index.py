@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from xosc_lateral.arrays import FloatArray, Int32Array
 from xosc_lateral.road.places import lane_at
-from xosc_lateral.road.positions import FloatArray, IntArray, LaneCoordinates, LanePositions
+from xosc_lateral.road.positions import LaneCoordinates, LanePositions
 from xosc_lateral.road.projection import Feet, project, project_at
-from xosc_lateral.road.samples import BRUTE_FORCE, Candidates, Samples, joined
+from xosc_lateral.road.samples import Candidates, Samples
 from xosc_lateral.road.tables import NetworkTables
 
 WRONG_WAY = 2.0
@@ -39,7 +41,6 @@ class SurfaceIndex:
         z: ArrayLike | None,
         heading: ArrayLike | None,
         *,
-        near: Sequence[int] | None,
         lane_types: Collection[str] | None,
     ) -> LanePositions:
         """Nearest lanes (see `RoadNetwork.world_to_lane`)."""
@@ -53,42 +54,14 @@ class SurfaceIndex:
         best = _Best(len(flat[0]))
         for begin in range(0, len(flat[0]), 16384):
             part = slice(begin, begin + 16384)
-            found = self._candidates(flat[0][part], flat[1][part], near, types)
-            point = found.point + begin
-            self._score(
-                best, point, found.road, found.s, flat[0][point], flat[1][point],
-                None if height is None else height[point], None if direction is None else direction[point], types,
-            )  # fmt: skip
+            found = self._candidates(flat[0][part], flat[1][part], types)
+            self._score(best, found._replace(point=found.point + begin), flat[0], flat[1], height, direction, types)
         return best.positions(arrays[0].shape)
 
-    def _candidates(
-        self, x: FloatArray, y: FloatArray, near: Sequence[int] | None, types: frozenset[str] | None
-    ) -> Candidates:
+    def _candidates(self, x: FloatArray, y: FloatArray, types: frozenset[str] | None) -> Candidates:
         if types not in self._samples:
             self._samples[types] = Samples(self._tables, types)
-        samples = self._samples[types]
-        found = samples.near(x, y)
-        if near is None:
-            return found
-        kept = np.isin(found.road, np.asarray(near, dtype=np.int32))
-        found = Candidates(found.point[kept], found.road[kept], found.s[kept])
-        missing = np.setdiff1d(np.arange(len(x)), found.point)
-        extra = [self._on_road(samples, missing, x, y, int(road)) for road in near] if len(missing) else []
-        return joined(found, *extra)
-
-    @staticmethod
-    def _on_road(samples: Samples, points: NDArray[np.int64], x: FloatArray, y: FloatArray, road: int) -> Candidates:
-        """The nearest sample of one road to each point."""
-        own = np.flatnonzero(samples.road == road)
-        if not len(own):
-            return Candidates(points[:0], samples.road[:0], samples.s[:0])
-        nearest = np.empty(len(points), dtype=np.int64)
-        rows = max(1, BRUTE_FORCE // len(own))
-        for begin in range(0, len(points), rows):
-            part = points[begin : begin + rows]
-            squared = (x[part, None] - samples.x[own]) ** 2 + (y[part, None] - samples.y[own]) ** 2
-            nearest[begin : begin + rows] = own[np.argmin(squared, axis=1)]
-        return Candidates(points, samples.road[nearest], samples.s[nearest])
+        return self._samples[types].near(x, y)
 
     def path_to_lane(
         self, x: ArrayLike, y: ArrayLike, road: ArrayLike, s: ArrayLike, *, lane_types: Collection[str] | None
@@ -101,13 +74,12 @@ class SurfaceIndex:
         best = _Best(len(flat[0]))
         roads = flat[3].astype(np.int32)
         known = np.flatnonzero(roads >= 0)
-        self._score(best, known, roads[known], flat[2][known], flat[0][known], flat[1][known], None, None, types)
+        self._score(best, Candidates(known, roads[known], flat[2][known]), flat[0], flat[1], None, None, types)
         # Driven off the road that it was on, onto the next one: look again, without prejudice.
         lost = np.flatnonzero(best.distance > TOUCHING)
         if len(lost):
-            found = self._candidates(flat[0][lost], flat[1][lost], None, types)
-            point = lost[found.point]
-            self._score(best, point, found.road, found.s, flat[0][point], flat[1][point], None, None, types)
+            found = self._candidates(flat[0][lost], flat[1][lost], types)
+            self._score(best, found._replace(point=lost[found.point]), flat[0], flat[1], None, None, types)
         return best.positions(arrays[0].shape)
 
     def world_to_lane_at(
@@ -127,18 +99,14 @@ class SurfaceIndex:
             here = lane_at(road, near[0], s, t, lane_types)
             if abs(ahead) <= TOUCHING and here.distance <= TOUCHING and here.lane != 0:
                 return here
-        best = self.world_to_lane(x, y, z, heading, near=None, lane_types=lane_types)
-        return LaneCoordinates(
-            int(best.road), int(best.lane), float(best.s), float(best.offset), float(best.t), float(best.distance)
-        )
+        best = self.world_to_lane(x, y, z, heading, lane_types=lane_types)
+        return LaneCoordinates(int(best.road), int(best.lane), *(float(values) for values in best[2:]))
 
     # ---- choosing ----------------------------------------------------------------------------------------------------
     def _score(
         self,
         best: _Best,
-        point: NDArray[np.int64],
-        road: IntArray,
-        guess: FloatArray,
+        found: Candidates,
         x: FloatArray,
         y: FloatArray,
         z: FloatArray | None,
@@ -146,7 +114,8 @@ class SurfaceIndex:
         types: frozenset[str] | None,
     ) -> None:
         """Project each point onto its candidate road, find the lane there, keep what beats the best so far."""
-        feet = project(self._tables, road, x, y, guess)
+        point, road, guess = found
+        feet = project(self._tables, road, x[point], y[point], guess)
         row, centre, width = self._lanes(road, feet, types)
         away = np.abs(feet.t - centre)
         outside = np.hypot(np.maximum(away - 0.5 * width, 0.0), feet.ahead)
@@ -154,18 +123,18 @@ class SurfaceIndex:
         direction = self._tables.directions[row]
         score = outside
         if z is not None:
-            score = score + np.maximum(np.abs(z - self._tables.height(road, feet.s, feet.t)) - SAME_LEVEL, 0.0)
+            above = np.abs(z[point] - self._tables.height(road, feet.s, feet.t))
+            score = score + np.maximum(above - SAME_LEVEL, 0.0)
         if heading is not None:
             lane_heading = feet.heading + np.where(direction < 0, np.pi, 0.0)
-            score = score + 0.5 * WRONG_WAY * (1.0 - np.cos(heading - lane_heading))
-        best.offer(
-            point, score, away, road, np.where(row < 0, 0, self._tables.ids[row]), feet.s,
-            direction * (feet.t - centre), feet.t, outside,
-        )  # fmt: skip
+            score = score + 0.5 * WRONG_WAY * (1.0 - np.cos(heading[point] - lane_heading))
+        lane = np.where(row < 0, 0, self._tables.ids[row])
+        offset = direction * (feet.t - centre)
+        best.offer(point, score, away, LanePositions(road, lane, feet.s, offset, feet.t, outside))
 
     def _lanes(
-        self, road: IntArray, feet: Feet, types: frozenset[str] | None
-    ) -> tuple[IntArray, FloatArray, FloatArray]:
+        self, road: Int32Array, feet: Feet, types: frozenset[str] | None
+    ) -> tuple[Int32Array, FloatArray, FloatArray]:
         """Row, centre and width of the lane of these types that holds t, else of the nearest; row -1: there is none."""
         tables = self._tables
         if types not in self._wanted:
@@ -198,25 +167,14 @@ class _Best:
 
     def __init__(self, n: int) -> None:
         self._score, self._away = np.full(n, np.inf), np.full(n, np.inf)
-        self.road, self.lane = np.full(n, -1, dtype=np.int32), np.zeros(n, dtype=np.int32)
-        self.s, self.offset, self.t = np.zeros(n), np.zeros(n), np.zeros(n)
-        self.distance = np.full(n, np.inf)
+        whole = np.full(n, -1, dtype=np.int32), np.zeros(n, dtype=np.int32)
+        self._found = LanePositions(*whole, np.zeros(n), np.zeros(n), np.zeros(n), np.full(n, np.inf))
+        self.distance = self._found.distance
 
-    def offer(
-        self,
-        point: NDArray[np.int64],
-        score: FloatArray,
-        away: FloatArray,
-        road: IntArray,
-        lane: IntArray,
-        s: FloatArray,
-        offset: FloatArray,
-        t: FloatArray,
-        distance: FloatArray,
-    ) -> None:
+    def offer(self, point: NDArray[np.int64], score: FloatArray, away: FloatArray, found: LanePositions) -> None:
         """Take what has a smaller score; of equals (lanes on top of each other) the one whose centre is nearer."""
         score = np.round(score, 9)  # rounding noise must not decide between roads that touch
-        order = np.lexsort((road, np.round(away, 9), score, point))
+        order = np.lexsort((found.road, np.round(away, 9), score, point))
         order = order[np.append(True, np.diff(point[order]) > 0)] if len(order) else order
         target = point[order]
         better = (score[order] < self._score[target]) | (
@@ -224,14 +182,15 @@ class _Best:
         )
         order, target = order[better], target[better]
         self._score[target], self._away[target] = score[order], away[order]
-        self.road[target], self.lane[target] = road[order], lane[order]
-        self.s[target], self.offset[target], self.t[target] = s[order], offset[order], t[order]
-        self.distance[target] = distance[order]
+        kept: tuple[NDArray[Any], ...] = self._found
+        offered: tuple[NDArray[Any], ...] = found
+        for whole, part in zip(kept, offered, strict=True):
+            whole[target] = part[order]
 
     def positions(self, shape: tuple[int, ...]) -> LanePositions:
         """The result, in the shape of the question."""
-        lane = LanePositions(self.road, self.lane, self.s, self.offset, self.t, self.distance)
-        return LanePositions(lane.road.reshape(shape), lane.lane.reshape(shape), *(a.reshape(shape) for a in lane[2:]))
+        road, lane, *others = self._found
+        return LanePositions(road.reshape(shape), lane.reshape(shape), *(values.reshape(shape) for values in others))
 
 
 def _refuse_nan(arrays: Sequence[FloatArray]) -> None:

@@ -13,11 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from xosc_lateral.errors import PlaybackError
+from xosc_lateral.arrays import FloatArray, Int32Array
 from xosc_lateral.road.lanes import DRIVING, NARROW, Lane
 from xosc_lateral.road.piecewise import IndexLike, Lookup
-from xosc_lateral.road.places import limit_at
-from xosc_lateral.road.positions import FloatArray, IntArray
+from xosc_lateral.road.places import find_lane, limit_at
 from xosc_lateral.road.road import Road
 
 CHUNK = 8192
@@ -31,7 +30,7 @@ class LaneProfile(NamedTuple):
     centre: FloatArray
     slope: FloatArray
     width: FloatArray
-    direction: IntArray
+    direction: Int32Array
 
 
 class LaneTables:
@@ -42,7 +41,6 @@ class LaneTables:
     """
 
     def __init__(self, roads: Sequence[Road], path: str) -> None:
-        """Gather everything."""
         self.roads = roads
         self._path = path
         self.lengths = np.array([road.length for road in roads])
@@ -84,16 +82,10 @@ class LaneTables:
             self._complain(road, lane, s, row < 0)
         return int(row) if np.ndim(row) == 0 else row
 
-    def _complain(self, road: IndexLike, lane: IndexLike, s: FloatArray, wrong: object) -> None:
-        bad = np.broadcast_to(np.asarray(wrong), s.shape)
-        i = int(np.flatnonzero(bad)[0])
-        at = float(s[i])
+    def _complain(self, road: IndexLike, lane: IndexLike, s: FloatArray, wrong: ArrayLike) -> None:
+        i = int(np.argmax(np.broadcast_to(wrong, s.shape)))
         here = self.roads[int(np.broadcast_to(road, s.shape)[i])]
-        there = ", ".join(str(info.id) for info in here.section_at(at).lanes) or "none"
-        number = int(np.broadcast_to(lane, s.shape)[i])
-        raise PlaybackError(
-            f"road '{here.id}' has no lane {number} at s={at:.3f} m (lanes there: {there})", path=self._path or None
-        )
+        find_lane(here, int(np.broadcast_to(lane, s.shape)[i]), float(s[i]), self._path or None)
 
     def profile_of(self, row: IndexLike, s: FloatArray) -> LaneProfile:
         """Centre, slope and width of rows of the lane table. Shape as `s`; [m], [-], [m]."""
@@ -118,7 +110,7 @@ class LaneTables:
         row, centre, slope, width, direction = self._batch(evaluate, 5, road, s, lane=lane)
         return LaneProfile(row.astype(np.int32), centre, slope, width, direction.astype(np.int32))
 
-    def travel_directions(self, road: ArrayLike, lane: ArrayLike) -> IntArray:
+    def travel_directions(self, road: ArrayLike, lane: ArrayLike) -> Int32Array:
         """+1 along s, -1 against s. Shape as the arguments. [-]"""
         road_, lane_ = np.broadcast_arrays(np.asarray(road, dtype=np.int32), np.asarray(lane, dtype=np.int32))
         one = [_one_or_many(index, road_.shape) for index in (road_, lane_)]
@@ -129,22 +121,7 @@ class LaneTables:
         found = [self.roads[(k + 2**31) >> 32].directions.get((k + 2**31) % 2**32 - 2**31, 1) for k in both.tolist()]
         return np.array(found, dtype=np.int32)[inverse.ravel()].reshape(road_.shape)
 
-    def offset_to_t(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, offset: ArrayLike) -> FloatArray:
-        """Left of travel -> left of the reference line. Shape as the arguments. [m]"""
-        profile = self.lane_profile(road, lane, s)
-        return np.asarray(profile.centre + profile.direction * np.asarray(offset, dtype=np.float64))
-
-    def t_to_offset(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, t: ArrayLike) -> FloatArray:
-        """Left of the reference line -> left of travel. Shape as the arguments. [m]"""
-        profile = self.lane_profile(road, lane, s)
-        return np.asarray(profile.direction * (np.asarray(t, dtype=np.float64) - profile.centre))
-
-    def lane_edges(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """T of the edges to the left and right of travel. Shape as the arguments. [m]"""
-        _, centre, _, width, direction = self.lane_profile(road, lane, s)
-        return centre + 0.5 * direction * width, centre - 0.5 * direction * width
-
-    def lane_index(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[IntArray, IntArray]:
+    def lane_index(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[Int32Array, Int32Array]:
         """Index from the right in travel direction among driving lanes of one direction, and their count.
 
         Shape as the arguments. [-]
@@ -162,7 +139,7 @@ class LaneTables:
         index, count = self._batch(evaluate, 2, road, s, lane=lane)
         return index.astype(np.int32), count.astype(np.int32)
 
-    def _section_index(self, section: int, own: IntArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _section_index(self, section: int, own: Int32Array, s: FloatArray) -> tuple[FloatArray, FloatArray]:
         first, n = int(self.section_first[section]), int(self.section_count[section])
         direction = self.directions[own]
         index, count, is_driving = np.zeros(len(s)), np.zeros(len(s)), np.zeros(len(s), dtype=bool)

@@ -28,52 +28,39 @@ NARROW = 0.1
 """A lane narrower than this at some s does not count as one there (it opens or closes). [m]"""
 
 
-class LaneRecord(Struct, frozen=True):
-    """A lane as written in the file; starts are s of the road, not of the section. [m], [m/s]"""
+def beside(lane: int, step: int) -> int:
+    """Id of the lane on the left (+1) or right (-1), looking along s; lane 0 is none."""
+    return lane + step if lane + step else lane + 2 * step
 
-    id: int
+
+class LaneFacts(Struct, frozen=True):
+    """What a file says about a lane and what needs no evaluation; s is that of the road, not of the section."""
+
+    id: int  # positive to the left of the reference line, negative to the right
     type: str
-    level: bool
-    widths: tuple[tuple[float, Cubic], ...]
-    borders: tuple[tuple[float, Cubic], ...]
-    heights: tuple[tuple[float, float, float], ...]
-    speeds: tuple[tuple[float, float], ...]
-    marks: tuple[RoadMark, ...]
-    predecessors: tuple[int, ...]
-    successors: tuple[int, ...]
+    level: bool = False
+    # heights: s, and height over the road at the inner and outer edge [m]
+    heights: tuple[tuple[float, float, float], ...] = ()
+    speeds: tuple[tuple[float, float], ...] = ()  # s [m], and limit from there on [m/s]; inf: none
+    marks: tuple[RoadMark, ...] = ()
+    predecessors: tuple[int, ...] = ()
+    successors: tuple[int, ...] = ()
 
 
-class Lane(Struct, frozen=True):
-    """A lane of one section, evaluated.
+class LaneRecord(LaneFacts, frozen=True):
+    """A lane as written in the file. [m]"""
 
-    Attributes
-    ----------
-    id : int
-        Positive to the left of the reference line, negative to the right.
-    direction : int
-        Travel along (+1) or against (-1) s.
-    starts : tuple of float
-        s where new cubics begin. [m]
-    centre, width : tuple of Cubic
-        t of the lane centre and width, about each start. [m]
-    heights : tuple of (s, inner, outer)
-        Height over the road surface at its edges. [m]
-    speeds : tuple of (s, limit)
-        [m/s], inf: none.
-    """
+    widths: tuple[tuple[float, Cubic], ...] = ()
+    borders: tuple[tuple[float, Cubic], ...] = ()
 
-    id: int
-    type: str
-    direction: int
-    level: bool
-    starts: tuple[float, ...]
-    centre: tuple[Cubic, ...]
-    width: tuple[Cubic, ...]
-    heights: tuple[tuple[float, float, float], ...]
-    speeds: tuple[tuple[float, float], ...]
-    marks: tuple[RoadMark, ...]
-    predecessors: tuple[int, ...]
-    successors: tuple[int, ...]
+
+class Lane(LaneFacts, frozen=True, kw_only=True):
+    """A lane of one section, evaluated."""
+
+    direction: int  # of travel: along (+1) or against (-1) s
+    starts: tuple[float, ...]  # s where new cubics begin [m]
+    centre: tuple[Cubic, ...]  # t of the lane centre, about each start [m]
+    width: tuple[Cubic, ...]  # [m]
 
     def state_at(self, s: float) -> LaneState:
         """Centre t, its slope and the width at s. [m], [-], [m]"""
@@ -83,11 +70,7 @@ class Lane(Struct, frozen=True):
         s -= self.starts[i]
         a, b, c, d = self.centre[i]
         e, f, g, h = self.width[i]
-        return LaneState(
-            a + s * (b + s * (c + s * d)),
-            b + s * (2.0 * c + 3.0 * s * d),
-            e + s * (f + s * (g + s * h)),
-        )
+        return LaneState(a + s * (b + s * (c + s * d)), b + s * (2.0 * c + 3.0 * s * d), e + s * (f + s * (g + s * h)))
 
     def height_at(self, s: float, across: float) -> float:
         """Height over the road surface, `across` the lane from its inner (0) to its outer edge (1). [m]
@@ -105,28 +88,15 @@ class Lane(Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class LaneSection:
-    """The cross-section of a road over [start, end).
-
-    Attributes
-    ----------
-    lanes : tuple of Lane
-        From left to right looking along s, without the centre lane 0.
-    centre : Lane
-        Lane 0: no width, its t is the lane offset.
-    by_id : mapping
-        All of them by id.
-    centre_marks : tuple of RoadMark
-        Markings of lane 0.
-    """
+    """The cross-section of a road over [start, end)."""
 
     start: float
     end: float
-    lanes: tuple[Lane, ...]
-    centre: Lane
-    by_id: Mapping[int, Lane] = field(init=False)
+    lanes: tuple[Lane, ...]  # from left to right looking along s, without the centre lane 0
+    centre: Lane  # lane 0: no width, its t is the lane offset
+    by_id: Mapping[int, Lane] = field(init=False)  # lane 0 included
 
     def __post_init__(self) -> None:
-        """Index the lanes by id."""
         object.__setattr__(self, "by_id", {lane.id: lane for lane in (*self.lanes, self.centre)})
 
 
@@ -153,7 +123,7 @@ def build_section(
             lanes.append(_lane(record, directions[record.id], middle, width))
             inner = outer
     nothing = PiecewiseCubic(centre.starts, (ZERO,) * len(centre.starts))
-    lane_zero = LaneRecord(0, "none", True, (), (), (), (), centre_marks, (), ())
+    lane_zero = LaneRecord(0, "none", True, marks=centre_marks)
     return LaneSection(
         start, end, tuple(sorted(lanes, key=lambda lane: -lane.id)), _lane(lane_zero, 1, centre, nothing)
     )
@@ -174,16 +144,9 @@ def _outer_edge(
 
 def _lane(record: LaneRecord, direction: int, centre: PiecewiseCubic, width: PiecewiseCubic) -> Lane:
     return Lane(
-        id=record.id,
-        type=record.type,
+        **{name: getattr(record, name) for name in LaneFacts.__struct_fields__},
         direction=direction,
-        level=record.level,
         starts=centre.starts,
         centre=centre.cubics,
         width=width.cubics if width.starts == centre.starts else tuple(width.cubic_at(s) for s in centre.starts),
-        heights=record.heights,
-        speeds=record.speeds,
-        marks=record.marks,
-        predecessors=record.predecessors,
-        successors=record.successors,
     )

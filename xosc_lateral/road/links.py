@@ -16,7 +16,6 @@ class Links:
     """Links between lanes and roads; look-ups are kept, since a player asks the same ones again and again."""
 
     def __init__(self, roads: Sequence[Road], junctions: Sequence[Junction]) -> None:
-        """Index roads and junctions by id."""
         self.roads = roads
         self._index = {road.id: i for i, road in enumerate(roads)}
         self._junctions = {junction.id: junction for junction in junctions}
@@ -47,7 +46,7 @@ class Links:
         if other is None:
             return
         contact = link.contact or self._contact_of(road, direction, other)
-        for target in self._linked_ids(found, direction, self.roads[other], contact, here):
+        for target in self._linked_ids(found, direction, self.roads[other], contact):
             yield self._enter(other, target, contact)
 
     def _through_junction(self, here: Road, lane: Lane, link: RoadLink) -> Iterator[LaneLink]:
@@ -63,16 +62,9 @@ class Links:
 
     def _against_traffic(self, here: Road, lane: Lane, link: RoadLink, direction: int) -> Iterator[LaneLink]:
         """Into a junction on a lane that leads out of it: connections hold the other way, lanes name their links."""
-        touches = "end" if direction > 0 else "start"
-        for index, other in enumerate(self.roads):
-            if other.junction != link.element_id:
-                continue
-            for back, contact in ((other.predecessor, "start"), (other.successor, "end")):
-                if back is None or back.element_type != "road" or back.element_id != here.id or back.contact != touches:
-                    continue
-                for candidate in _end_section(other, contact).lanes:
-                    if lane.id in (candidate.predecessors if contact == "start" else candidate.successors):
-                        yield self._enter(index, candidate.id, contact)
+        for other, contact in self._roads_back(here, link.element_id, direction):
+            for candidate in _lanes_linked_to(lane, self.roads[other], contact):
+                yield self._enter(other, candidate, contact)
 
     def _back_through_direct_junction(
         self, here: Road, lane: Lane, link: RoadLink, direction: int
@@ -101,16 +93,14 @@ class Links:
         """Lanes of the connecting road; without any laneLink, those that name the lane as their own link."""
         if connection.lanes:
             return [to for source, to in connection.lanes if source == lane.id]
-        lanes = _end_section(other, contact).lanes
-        return [o.id for o in lanes if lane.id in (o.predecessors if contact == "start" else o.successors)]
+        return _lanes_linked_to(lane, other, contact)
 
-    def _linked_ids(self, lane: Lane, direction: int, other: Road, contact: str, here: Road) -> list[int]:
+    def _linked_ids(self, lane: Lane, direction: int, other: Road, contact: str) -> list[int]:
         """Lanes of the linked road: as the lane says, else as the other side says."""
-        there = _end_section(other, contact)
         ids = lane.successors if direction > 0 else lane.predecessors
         if ids:
-            return [i for i in ids if i in there.by_id and i != 0]
-        return [o.id for o in there.lanes if lane.id in (o.predecessors if contact == "start" else o.successors)]
+            return [i for i in ids if i in _end_section(other, contact).by_id and i != 0]
+        return _lanes_linked_to(lane, other, contact)
 
     def _contact_of(self, road: int, direction: int, other: int) -> str:
         """Contact point that a file leaves out: the end of the other road that is nearer."""
@@ -150,17 +140,22 @@ class Links:
         for _, other, contact in self._direct_connections(here, link, direction):
             yield other, 1 if contact == "start" else -1
         # Files list a connection from the road that drives into it only; on the way back it is found by its own links.
-        yield from self._links_back(here, link.element_id, direction)
+        for other, contact in self._roads_back(here, link.element_id, direction):
+            yield other, 1 if contact == "start" else -1
 
-    def _links_back(self, here: Road, element: str, direction: int) -> Iterator[End]:
-        """Roads of a junction that lead to this one by their own links."""
-        for other, there in enumerate(self.roads):
-            if there.junction != element:
-                continue
-            for back, entry in ((there.predecessor, 1), (there.successor, -1)):
-                touches = "end" if direction > 0 else "start"
-                if back and back.element_id == here.id and back.element_type == "road" and back.contact == touches:
-                    yield other, entry
+    def _roads_back(self, here: Road, junction: str, direction: int) -> Iterator[tuple[int, str]]:
+        """Roads of a junction that lead to this one's end (+1) or start (-1) by their own links, and by which end."""
+        touches = RoadLink("road", here.id, "end" if direction > 0 else "start")
+        for index, other in enumerate(self.roads):
+            if other.junction == junction:
+                ends = (other.predecessor, "start"), (other.successor, "end")
+                yield from ((index, contact) for back, contact in ends if back == touches)
+
+
+def _lanes_linked_to(lane: Lane, other: Road, contact: str) -> list[int]:
+    """Lanes at an end of another road that name this lane as their own link."""
+    lanes = _end_section(other, contact).lanes
+    return [one.id for one in lanes if lane.id in (one.predecessors if contact == "start" else one.successors)]
 
 
 def _end_section(road: Road, contact: str) -> LaneSection:

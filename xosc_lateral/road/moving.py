@@ -1,14 +1,16 @@
-"""Moving along lanes over sections, roads and junctions."""
+"""Moving along lanes over sections, roads and junctions, and which road a moved point has gone on to."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from math import inf, nextafter
 
+from xosc_lateral.road.index import TOUCHING
 from xosc_lateral.road.lanes import LaneSection
 from xosc_lateral.road.links import Links
-from xosc_lateral.road.places import find_lane, normal_angle
-from xosc_lateral.road.positions import Advance, LaneLink
+from xosc_lateral.road.places import find_lane, lane_at, normal_angle
+from xosc_lateral.road.positions import Advance, LaneCoordinates, LaneLink
+from xosc_lateral.road.projection import project_at
 from xosc_lateral.road.road import Road
 
 Chooser = Callable[[Sequence[LaneLink]], LaneLink]
@@ -56,7 +58,9 @@ def advance(
         # A ring of roads without length would never end.
         if not options or links_passed > 100_000:
             return Advance(road, lane, s, way, distance)
-        link = _chosen(links, options, choose)
+        link = options[0]
+        if len(options) > 1:
+            link = choose(options) if choose else straightest(links.roads, options)
         road, lane, s, way = link
         here = links.roads[road]
         section = here.sections[0 if way > 0 else -1]
@@ -74,12 +78,6 @@ def most_turning(roads: Sequence[Road], options: Sequence[LaneLink]) -> LaneLink
 
 def _turn(road: Road) -> float:
     return normal_angle(road.reference_at(road.length)[2] - road.reference_at(0.0)[2])
-
-
-def _chosen(links: Links, options: Sequence[LaneLink], choose: Chooser | None) -> LaneLink:
-    if len(options) == 1:
-        return options[0]
-    return choose(options) if choose else straightest(links.roads, options)
 
 
 def follow_section(road: Road, section: LaneSection, beyond: LaneSection, lane: int, way: int) -> int | None:
@@ -103,3 +101,35 @@ def follow_section(road: Road, section: LaneSection, beyond: LaneSection, lane: 
 def _just_before(s: float) -> float:
     """The last place of the section that ends at s."""
     return nextafter(s, -inf)
+
+
+def gone_on(
+    links: Links,
+    found: LaneCoordinates,
+    near: tuple[int, float],
+    point: tuple[float, float],
+    *,
+    lane_types: Collection[str] | None,
+) -> LaneCoordinates:
+    """Of the roads that hold a point, the one that its lane leads on to, and of several the least bent there.
+
+    At the entry of a junction its roads lie on each other, and a point that is between two vertices of a path has no
+    other sign of where it goes. Without such a road it stays where it was found. So the reference player has it.
+
+    `found`: where it is without regard to where it came from. `near`: road and s [m] where it was a moment ago.
+    `lane_types`: those that count.
+    """
+    before, s = near
+    if found.road == before or found.distance > TOUCHING:
+        return found
+    road = links.roads[before]
+    s, t, _ = project_at(road, *point, s)
+    lane = lane_at(road, before, s, t, lane_types).lane
+    options = [link for way in (1, -1) for link in links.next_lanes(before, lane, way)]
+    for link in sorted(options, key=lambda link: abs(links.roads[link.road].curvature_at(link.s))):
+        other = links.roads[link.road]
+        s, t, ahead = project_at(other, *point, link.s)
+        onward = lane_at(other, link.road, s, t, lane_types)
+        if abs(ahead) <= TOUCHING and onward.distance <= TOUCHING and onward.lane != 0:
+            return onward
+    return found

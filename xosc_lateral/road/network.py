@@ -14,20 +14,19 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
+import numpy as np
 from numpy.typing import ArrayLike
 
+from xosc_lateral.arrays import FloatArray, Int32Array
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.road.index import SurfaceIndex
 from xosc_lateral.road.lanes import DRIVING
 from xosc_lateral.road.links import Links
-from xosc_lateral.road.moving import Chooser, advance, straightest
-from xosc_lateral.road.onward import gone_on
+from xosc_lateral.road.moving import Chooser, advance, gone_on, straightest
 from xosc_lateral.road.piecewise import IndexLike
-from xosc_lateral.road.places import cross_section, find_lane, lane_at, lane_pose, surface_pose
+from xosc_lateral.road.places import find_lane, lane_at, lane_pose, surface_pose
 from xosc_lateral.road.positions import (
     Advance,
-    FloatArray,
-    IntArray,
     LaneCoordinates,
     LaneInfo,
     LaneLink,
@@ -39,7 +38,7 @@ from xosc_lateral.road.positions import (
     RoadPath,
     RouteStep,
 )
-from xosc_lateral.road.road import Junction, Road, road_marks
+from xosc_lateral.road.road import Junction, Road
 from xosc_lateral.road.routes import path_between, route
 from xosc_lateral.road.surface import HeaderOffset
 from xosc_lateral.road.tables import NetworkTables
@@ -49,36 +48,21 @@ from xosc_lateral.road.tables import NetworkTables
 class RoadNetwork:
     """Roads, their lanes and their links, as read from one OpenDRIVE file.
 
-    Attributes
-    ----------
-    roads : tuple of Road
-    junctions : tuple of Junction
-    path : str
-        The file.
-    sha256 : str
-        Of the bytes that were parsed; empty for a network that was not read from a file.
-    notes : tuple of str
-        What was repaired, ignored or degenerate on reading: never silent.
-    geo_reference : str or None
-        Projection of inertial x, y (PROJ string).
-    header_offset : HeaderOffset
-        From the coordinates of the file, which all answers are in, to inertial ones.
-    road_ids : tuple of str
-        ``road/@id`` in file order.
+    Arguments of a batch broadcast; what it answers has the shape of the arguments.
     """
 
     roads: tuple[Road, ...]
     junctions: tuple[Junction, ...] = ()
-    path: str = ""
-    notes: tuple[str, ...] = ()
-    geo_reference: str | None = None
-    sha256: str = ""
+    path: str = ""  # the file
+    notes: tuple[str, ...] = ()  # what was repaired, ignored or degenerate on reading: never silent
+    geo_reference: str | None = None  # projection of inertial x, y (PROJ string)
+    sha256: str = ""  # of the bytes that were parsed; empty: not read from a file
+    # from the coordinates of the file, which all answers are in, to inertial ones
     header_offset: HeaderOffset = field(default_factory=HeaderOffset)
-    road_ids: tuple[str, ...] = field(init=False)
+    road_ids: tuple[str, ...] = field(init=False)  # ``road/@id`` in file order
     _indices: dict[str, int] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Index the roads by id."""
         object.__setattr__(self, "road_ids", tuple(road.id for road in self.roads))
         object.__setattr__(self, "_indices", {road.id: i for i, road in enumerate(self.roads)})
 
@@ -107,17 +91,19 @@ class RoadNetwork:
         """+1: the lane is driven along s, -1: against s. Lane id and ``road/@rule`` (RHT, LHT) decide."""
         return self.roads[road].directions.get(lane, 1)
 
-    def travel_directions(self, road: ArrayLike, lane: ArrayLike) -> IntArray:
-        """`travel_direction` for arrays. Shape as the arguments. [-]"""
+    def travel_directions(self, road: ArrayLike, lane: ArrayLike) -> Int32Array:
+        """`travel_direction` for arrays. [-]"""
         return self._tables.travel_directions(road, lane)
 
     def offset_to_t(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, offset: ArrayLike) -> FloatArray:
-        """Offset to the left of travel -> t from the reference line. [m] Shape as the arguments."""
-        return self._tables.offset_to_t(road, lane, s, offset)
+        """Offset to the left of travel -> t from the reference line. [m]"""
+        profile = self._tables.lane_profile(road, lane, s)
+        return np.asarray(profile.centre + profile.direction * np.asarray(offset, dtype=np.float64))
 
     def t_to_offset(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, t: ArrayLike) -> FloatArray:
-        """Inverse of `offset_to_t`. Shape as the arguments. [m]"""
-        return self._tables.t_to_offset(road, lane, s, t)
+        """Inverse of `offset_to_t`. [m]"""
+        profile = self._tables.lane_profile(road, lane, s)
+        return np.asarray(profile.direction * (np.asarray(t, dtype=np.float64) - profile.centre))
 
     def offset_from_offset_t(self, road: int, lane: int, offset_t: float) -> float:
         """OpenSCENARIO's LanePosition offset (along +t) -> offset (left of travel); its own inverse. [m]"""
@@ -149,53 +135,39 @@ class RoadNetwork:
         z: ArrayLike | None = None,
         heading: ArrayLike | None = None,
         *,
-        near: Sequence[int] | None = None,
         lane_types: Collection[str] | None = DRIVING,
     ) -> LanePositions:
         """Nearest lane of the given types (None: any) under each point.
 
-        `z` distinguishes roads on top of each other; `heading` prefers lanes driven that way; `near` limits the search
-        to those roads. Everything is found, however far off: look at `distance`.
+        `z` distinguishes roads on top of each other; `heading` prefers lanes driven that way. Everything is found,
+        however far off: look at `distance`.
         """
-        return self._index.world_to_lane(x, y, z, heading, near=near, lane_types=lane_types)
+        return self._index.world_to_lane(x, y, z, heading, lane_types=lane_types)
 
     def path_to_lane(
-        self,
-        x: ArrayLike,
-        y: ArrayLike,
-        road: ArrayLike,
-        s: ArrayLike,
-        *,
-        lane_types: Collection[str] | None = DRIVING,
+        self, x: ArrayLike, y: ArrayLike, road: ArrayLike, s: ArrayLike, *, lane_types: Collection[str] | None = DRIVING
     ) -> LanePositions:
         """Like `world_to_lane`, on known roads and from a guess of `s` per point (a written path, say): cheap."""
         return self._index.path_to_lane(x, y, road, s, lane_types=lane_types)
 
     # ---- batch: what a lane is like ----------------------------------------------------------------------------------
     def lane_centre_t(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> FloatArray:
-        """T of the lane centre. [m] Shape as the arguments."""
+        """T of the lane centre. [m]"""
         return self._tables.lane_profile(road, lane, s).centre
 
     def lane_width(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> FloatArray:
-        """Width of the lane. [m] Shape as the arguments."""
+        """Width of the lane. [m]"""
         return self._tables.lane_profile(road, lane, s).width
 
-    def lane_edges_t(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """T of the lane's edges to the left and to the right of TRAVEL. [m] Shape as the arguments."""
-        return self._tables.lane_edges(road, lane, s)
-
     def curvature(self, road: ArrayLike, s: ArrayLike) -> FloatArray:
-        """Curvature of the reference line along +s, positive in left turns. [1/m] Shape as the arguments."""
+        """Curvature of the reference line along +s, positive in left turns. [1/m]"""
         return self._tables.curvature(road, s)
 
     def lane_curvature(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, offset: ArrayLike = 0.0) -> FloatArray:
-        """Curvature of the driven path parallel to the reference line, positive turning left in TRAVEL. [1/m]
-
-        Shape as the arguments.
-        """
+        """Curvature of the driven path parallel to the reference line, positive turning left in TRAVEL. [1/m]"""
         return self._tables.lane_curvature(road, lane, s, offset)
 
-    def lane_index(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[IntArray, IntArray]:
+    def lane_index(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[Int32Array, Int32Array]:
         """Index among the driving lanes of its direction (0 = rightmost in travel direction), and their count.
 
         Index -1 for a lane that is no driving lane.
@@ -203,18 +175,15 @@ class RoadNetwork:
         return self._tables.lane_index(road, lane, s)
 
     def crossfall(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> FloatArray:
-        """Cross slope seen in travel direction, positive when the road falls to the RIGHT. [%]
-
-        Shape as the arguments.
-        """
+        """Cross slope seen in travel direction, positive when the road falls to the RIGHT. [%]"""
         return self._tables.lean(road, lane, s)[0]
 
     def grade(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> FloatArray:
-        """Slope along travel, positive uphill. [%] Shape as the arguments."""
+        """Slope along travel, positive uphill. [%]"""
         return self._tables.lean(road, lane, s)[1]
 
     def speed_limit(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> FloatArray:
-        """Speed limit of the lane, else of the road; inf where none is given. [m/s] Shape as the arguments."""
+        """Speed limit of the lane, else of the road; inf where none is given. [m/s]"""
         return self._tables.speed_limit(road, lane, s)
 
     # ---- one place at a time, fast -----------------------------------------------------------------------------------
@@ -241,7 +210,8 @@ class RoadNetwork:
 
     def lanes_at(self, road: int, s: float) -> tuple[LaneInfo, ...]:
         """All lanes of the cross-section but the centre lane 0, from left to right looking along s. `s` in [m]."""
-        return cross_section(self.roads[road], s)
+        states = ((lane, lane.state_at(s)) for lane in self.roads[road].section_at(s).lanes)
+        return tuple(LaneInfo(lane.id, lane.type, at.centre_t, at.width, lane.direction) for lane, at in states)
 
     def has_lane_at(self, road: int, lane: int, s: float) -> bool:
         """Whether the lane exists there. `s` in [m]."""
@@ -256,7 +226,7 @@ class RoadNetwork:
         """
         return lane_at(self.roads[road], road, s, t, lane_types)
 
-    def section_numbers(self, road: IntArray, s: FloatArray) -> IndexLike:
+    def section_numbers(self, road: Int32Array, s: FloatArray) -> IndexLike:
         """Numbers of lane sections, counted over all roads; road and s [m] of the same shape (n,)."""
         return self._tables.section_of(road, s)
 
@@ -314,12 +284,7 @@ class RoadNetwork:
         return straightest(self.roads, options)
 
     def path_between(
-        self,
-        start: tuple[int, float],
-        end: tuple[int, float],
-        *,
-        direction: int = 1,
-        limit: float = float("inf"),
+        self, start: tuple[int, float], end: tuple[int, float], *, direction: int = 1, limit: float = float("inf")
     ) -> RoadPath | None:
         """Shortest way along the reference lines of linked roads between two (road, s).
 
@@ -345,12 +310,22 @@ class RoadNetwork:
 
     # ---- to be seen --------------------------------------------------------------------------------------------------
     def road_marks(self, road: int) -> tuple[RoadMark, ...]:
-        """Markings at the outer edges of all lanes, lane 0 included, of one road."""
-        return road_marks(self.roads[road])
+        """Markings at the outer edges of all lanes of a road, lane 0 included, by section from left to right."""
+        every = (
+            lane
+            for section in self.roads[road].sections
+            for lane in sorted((*section.lanes, section.centre), key=lambda lane: -lane.id)
+        )
+        return tuple(mark for lane in every for mark in lane.marks if mark.type != "none")
 
     def mark_line(self, road: int, mark: RoadMark, *, step: float = 2.0) -> tuple[FloatArray, FloatArray]:
-        """Polyline x, y of a marking, for plots. [m] Shape (n,) each."""
-        return self._tables.mark_line(road, mark, step)
+        """Polyline x, y of a marking, the lane's outer edge (of lane 0 itself), for plots. Shape (n,) each. [m]"""
+        s = np.linspace(mark.s_start, mark.s_end, max(2, int(np.ceil((mark.s_end - mark.s_start) / step)) + 1))
+        # the end of a section belongs to the next one, which may not have the lane
+        inside = np.minimum(s, np.nextafter(mark.s_end, -np.inf))
+        profile = self._tables.lane_profile(road, mark.lane, inside)
+        poses = self.road_to_world(road, s, profile.centre + 0.5 * np.sign(mark.lane) * profile.width)
+        return poses.x, poses.y
 
 
 __all__ = ["DRIVING", "Chooser", "RoadNetwork"]

@@ -14,7 +14,7 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from xosc_lateral.road.positions import FloatArray
+from xosc_lateral.arrays import FloatArray
 
 Cubic = tuple[float, float, float, float]
 """a, b, c, d of a + b ds + c ds^2 + d ds^3."""
@@ -31,17 +31,9 @@ def shift(cubic: Cubic, ds: float) -> Cubic:
 
 
 class PiecewiseCubic(Struct, frozen=True):
-    """A function of s that is one cubic from each start to the next, about that start.
+    """A function of s that is one cubic from each start to the next, about that start."""
 
-    Parameters
-    ----------
-    starts : tuple of float
-        Increasing s; the first piece also holds before its start, the last one to infinity. [m]
-    cubics : tuple of Cubic
-        One per start.
-    """
-
-    starts: tuple[float, ...]
+    starts: tuple[float, ...]  # increasing s; the first piece also holds before, the last one to infinity [m]
     cubics: tuple[Cubic, ...]
 
     @classmethod
@@ -109,15 +101,10 @@ class Lookup:
 
     All starts lie on one axis, owner behind owner, so that one `searchsorted` finds any mixture of owners; the result
     is then put right where rounding on that long axis moved it over a start.
-
-    Parameters
-    ----------
-    starts : sequence of sequences of float
-        Per owner the starts of its pieces, at least one. [m]
+    `starts`: per owner the starts of its pieces, at least one. [m]
     """
 
     def __init__(self, starts: Sequence[Sequence[float]]) -> None:
-        """Lay the owners out one behind the other."""
         counts = np.array([len(owner) for owner in starts], dtype=np.int64)
         self.starts: FloatArray = np.array([s for owner in starts for s in owner], dtype=np.float64)
         last = np.cumsum(counts)

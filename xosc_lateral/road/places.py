@@ -11,7 +11,7 @@ from math import asin, atan, atan2, ceil, cos, inf, pi, sin
 
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.road.lanes import Lane
-from xosc_lateral.road.positions import LaneCoordinates, LaneInfo, Pose
+from xosc_lateral.road.positions import LaneCoordinates, Pose
 from xosc_lateral.road.road import Road
 
 TWO_PI = 2.0 * pi
@@ -24,13 +24,13 @@ def normal_angle(angle: float) -> float:
     return angle - TWO_PI * ceil((angle - pi) / TWO_PI)
 
 
-def find_lane(road: Road, lane: int, s: float) -> Lane:
+def find_lane(road: Road, lane: int, s: float, path: str | None = None) -> Lane:
     """A lane at s; raises `PlaybackError` naming the road, the lane and the lanes that are there. `s` in [m]."""
     section = road.section_at(s)
     found = section.by_id.get(lane)
     if found is None:
         there = ", ".join(str(other.id) for other in section.lanes) or "none"
-        raise PlaybackError(f"road '{road.id}' has no lane {lane} at s={s:.3f} m (lanes there: {there})")
+        raise PlaybackError(f"road '{road.id}' has no lane {lane} at s={s:.3f} m (lanes there: {there})", path=path)
     return found
 
 
@@ -109,15 +109,6 @@ def across_lane(lane: Lane, t: float, centre: float, width: float) -> float:
         return 0.0
     outwards = (t - centre) / width if lane.id > 0 else (centre - t) / width
     return min(max(0.5 + outwards, 0.0), 1.0)
-
-
-def cross_section(road: Road, s: float) -> tuple[LaneInfo, ...]:
-    """All lanes but lane 0, from left to right looking along s. `s` in [m]."""
-    infos = []
-    for lane in road.section_at(s).lanes:
-        centre, _, width = lane.state_at(s)
-        infos.append(LaneInfo(lane.id, lane.type, centre, width, lane.direction))
-    return tuple(infos)
 
 
 def lane_at(road: Road, index: int, s: float, t: float, lane_types: Collection[str] | None) -> LaneCoordinates:

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
+from xosc_lateral.arrays import FloatArray, Int32Array
 
 
 class Pose(NamedTuple):
@@ -37,26 +33,21 @@ class Poses(NamedTuple):
 
 
 class LaneCoordinates(NamedTuple):
-    """A place on the road.
+    """A place on the road."""
 
-    `road` is an index into `RoadNetwork.road_ids`, `offset` [m] counts from the lane centre, positive to the LEFT of
-    travel, `t` [m] from the reference line, positive to its left, and `distance` [m] from the lane's nearest edge
-    (0 inside the lane).
-    """
-
-    road: int
+    road: int  # index into `RoadNetwork.road_ids`
     lane: int
-    s: float
-    offset: float
-    t: float
-    distance: float
+    s: float  # [m]
+    offset: float  # from the lane centre, positive to the LEFT of travel [m]
+    t: float  # from the reference line, positive to its left [m]
+    distance: float  # from the lane's nearest edge, 0 inside the lane [m]
 
 
 class LanePositions(NamedTuple):
     """Places on the road as arrays of one shape; fields as in `LaneCoordinates`; lane 0 where there is none."""
 
-    road: IntArray
-    lane: IntArray
+    road: Int32Array
+    lane: Int32Array
     s: FloatArray
     offset: FloatArray
     t: FloatArray
@@ -91,29 +82,21 @@ class LaneLink(NamedTuple):
 
 
 class Advance(NamedTuple):
-    """Where a move along the lanes ended.
-
-    `direction` is that of the movement along s on the new road; `remaining` [m] is what could not be moved because the
-    lane ends there (0 otherwise).
-    """
+    """Where a move along the lanes ended."""
 
     road: int
     lane: int
-    s: float
-    direction: int
-    remaining: float
+    s: float  # [m]
+    direction: int  # of the movement along s on the new road
+    remaining: float  # what could not be moved because the lane ends there, else 0 [m]
 
 
 class RoadPath(NamedTuple):
-    """A way along the reference lines of linked roads, in whatever direction they are driven.
+    """A way along the reference lines of linked roads, in whatever direction they are driven."""
 
-    `ds` [m] is its signed length; `way` the direction along s in which the first road is left (+1, -1); `entered` the
-    roads on the way after it, each with the direction along s (+1: entered at its start).
-    """
-
-    ds: float
-    way: int
-    entered: tuple[tuple[int, int], ...]
+    ds: float  # signed length [m]
+    way: int  # direction along s in which the first road is left (+1, -1)
+    entered: tuple[tuple[int, int], ...]  # roads after it, each with the direction along s (+1: entered at its start)
 
     @property
     def is_turned(self) -> bool:

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from xosc_lateral.arrays import FloatArray, Int32Array
 from xosc_lateral.road.lane_tables import CHUNK
-from xosc_lateral.road.positions import FloatArray, IntArray
 from xosc_lateral.road.road import Road
 from xosc_lateral.road.tables import NetworkTables
 
@@ -39,7 +39,7 @@ class Feet(NamedTuple):
     heading: FloatArray
 
 
-def project(tables: NetworkTables, road: IntArray, x: FloatArray, y: FloatArray, guess: FloatArray) -> Feet:
+def project(tables: NetworkTables, road: Int32Array, x: FloatArray, y: FloatArray, guess: FloatArray) -> Feet:
     """Feet on the given roads, from guesses of s; arrays of one length. Shape (n,). [m]"""
     parts = [
         _project(tables, road[part], x[part], y[part], guess[part])
@@ -50,7 +50,7 @@ def project(tables: NetworkTables, road: IntArray, x: FloatArray, y: FloatArray,
     return Feet(*(np.concatenate(field) for field in zip(*parts, strict=True)))
 
 
-def _project(tables: NetworkTables, road: IntArray, x: FloatArray, y: FloatArray, guess: FloatArray) -> Feet:
+def _project(tables: NetworkTables, road: Int32Array, x: FloatArray, y: FloatArray, guess: FloatArray) -> Feet:
     length = tables.lengths[road]
     s = np.minimum(np.maximum(guess, 0.0), length)
     low, high = np.full(len(x), -1.0), length + 1.0  # beyond the ends: nothing is known yet
@@ -78,7 +78,7 @@ def _project(tables: NetworkTables, road: IntArray, x: FloatArray, y: FloatArray
     return _feet(tables, road, x, y, s)
 
 
-def _feet(tables: NetworkTables, road: IntArray, x: FloatArray, y: FloatArray, s: FloatArray) -> Feet:
+def _feet(tables: NetworkTables, road: Int32Array, x: FloatArray, y: FloatArray, s: FloatArray) -> Feet:
     frame = tables.lines.at(road, s)
     dx, dy = x - frame.x, y - frame.y
     t = (dy * frame.cos - dx * frame.sin) / tables.shrink(road, s)

@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.road.geometry import SERIES_TERMS, ClothoidPiece, ParamCubic
 from xosc_lateral.road.piecewise import IndexLike, Lookup
-from xosc_lateral.road.positions import FloatArray
 from xosc_lateral.road.road import Road
 
 
@@ -36,35 +36,28 @@ class ReferenceLines:
     """All reference lines of a network."""
 
     def __init__(self, roads: Sequence[Road]) -> None:
-        """Gather the pieces of all elements."""
         starts: list[list[float]] = []
-        origins: list[float] = []
-        kinds: list[bool] = []
-        rows: list[int] = []
+        pieces: list[tuple[float, bool, int]] = []  # s of what it is expanded about, whether a cubic, row of its table
         clothoids: list[ClothoidPiece] = []
-        cubics: list[tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]] = []
+        cubics: list[tuple[float, ...]] = []
         for road in roads:
             own: list[float] = []
             for start, element in zip(road.starts, road.elements, strict=True):
                 if isinstance(element, ParamCubic):
                     for i, parameter in enumerate(element.parameter):
                         own.append(start + i * element.step)
-                        origins.append(own[-1])
-                        kinds.append(True)
-                        rows.append(len(cubics))
-                        cubics.append((parameter, element.x, element.y))
+                        pieces.append((own[-1], True, len(cubics)))
+                        cubics.append((*parameter, *element.x, *element.y))
                 else:
                     for piece in element.pieces():
                         own.append(start + piece.start)
-                        origins.append(start + piece.middle)
-                        kinds.append(False)
-                        rows.append(len(clothoids))
+                        pieces.append((start + piece.middle, False, len(clothoids)))
                         clothoids.append(piece)
             starts.append(own)
         self._lookup = Lookup(starts)
-        self._origin = np.array(origins)
-        self._is_cubic = np.array(kinds)
-        self._row = np.array(rows, dtype=np.intp)
+        self._origin = np.array([origin for origin, _, _ in pieces])
+        self._is_cubic = np.array([is_cubic for _, is_cubic, _ in pieces])
+        self._row = np.array([row for _, _, row in pieces], dtype=np.intp)
         self._any_cubic, self._all_cubic = bool(self._is_cubic.any()), bool(self._is_cubic.all())
         self._clothoid = np.array([(p.heading, p.curvature, p.sharpness) for p in clothoids]).reshape(-1, 3).T.copy()
         self._x_series = np.array([p.x_series for p in clothoids]).reshape(-1, SERIES_TERMS + 1).T.copy()
@@ -72,7 +65,7 @@ class ReferenceLines:
         # Straight roads need no power series at all: the highest power that any piece uses.
         used = np.flatnonzero((self._x_series != 0.0).any(axis=1) | (self._y_series != 0.0).any(axis=1))
         self._powers = int(used[-1]) if len(used) else 0
-        self._cubic = np.array([(*p, *x, *y) for p, x, y in cubics]).reshape(-1, 12).T.copy()
+        self._cubic = np.array(cubics).reshape(-1, 12).T.copy()
 
     def at(self, road: IndexLike, s: FloatArray, *, derivatives: bool = False) -> Frame:
         """The reference lines at s; curvature and speed are only filled in where `derivatives` are asked for.

@@ -9,27 +9,16 @@ from math import inf, nan
 
 from xosc_lateral.road.geometry import Line, ReferenceElement
 from xosc_lateral.road.lanes import LaneSection
-from xosc_lateral.road.positions import RoadMark
 from xosc_lateral.road.surface import Surface
 
 
 @dataclass(frozen=True, slots=True)
 class RoadLink:
-    """What a road is linked to at one of its ends.
+    """What a road is linked to at one of its ends."""
 
-    Attributes
-    ----------
-    element_type : str
-        ``"road"`` or ``"junction"``.
-    element_id : str
-        Its id.
-    contact : str
-        Where the other road is touched: ``"start"``, ``"end"``, or empty when the file does not say (junctions).
-    """
-
-    element_type: str
+    element_type: str  # "road" or "junction"
     element_id: str
-    contact: str
+    contact: str  # where the other road is touched: "start", "end", or "": the file does not say (junctions)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,49 +45,25 @@ class Junction:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Road:
-    """One road.
-
-    Attributes
-    ----------
-    id, name : str
-        As in the file.
-    length : float
-        [m]
-    rule : str
-        ``"RHT"`` or ``"LHT"``: on which side one drives.
-    junction : str or None
-        Id of the junction that it is a connecting road of.
-    starts : tuple of float
-        s where each element of the reference line starts. [m]
-    elements : tuple of ReferenceElement
-    sections : tuple of LaneSection
-        Gapless over [0, length].
-    surface : Surface
-    speeds : tuple of (s, limit)
-        From ``road/type/speed``; inf: none. [m/s]
-    directions : mapping of int to int
-        Travel direction along s by lane id.
-    predecessor, successor : RoadLink or None
-    """
+    """One road."""
 
     id: str
     name: str
-    length: float
-    rule: str
-    junction: str | None
-    starts: tuple[float, ...]
+    length: float  # [m]
+    rule: str  # side of the traffic: "RHT" or "LHT"
+    junction: str | None  # that it is a connecting road of
+    starts: tuple[float, ...]  # s of each element [m]
     elements: tuple[ReferenceElement, ...]
-    sections: tuple[LaneSection, ...]
+    sections: tuple[LaneSection, ...]  # gapless over [0, length]
     surface: Surface
-    speeds: tuple[tuple[float, float], ...]
-    directions: Mapping[int, int]
+    speeds: tuple[tuple[float, float], ...]  # s [m], and limit from there on [m/s] (``road/type/speed``); inf: none
+    directions: Mapping[int, int]  # of travel along s, by lane id
     predecessor: RoadLink | None
     successor: RoadLink | None
     section_starts: tuple[float, ...] = field(init=False)
     is_flat: bool = field(init=False)
 
     def __post_init__(self) -> None:
-        """Keep what every look-up needs."""
         object.__setattr__(self, "section_starts", tuple(section.start for section in self.sections))
         heights = any(lane.heights for section in self.sections for lane in section.lanes)
         object.__setattr__(self, "is_flat", self.surface.is_flat and not heights)
@@ -143,14 +108,3 @@ class Road:
         low = max(low, found.starts[j] if j else -inf)
         high = min(high, (*found.starts[j + 1 :], inf)[0])
         return low, high, element, self.starts[i], nan if any(found.centre[j][1:]) else found.centre[j][0]
-
-
-def road_marks(road: Road) -> tuple[RoadMark, ...]:
-    """Markings at the outer edges of all lanes, lane 0 included, section by section from left to right."""
-    marks: list[RoadMark] = []
-    for section in road.sections:
-        left = [lane for lane in section.lanes if lane.id > 0]
-        right = [lane for lane in section.lanes if lane.id < 0]
-        for lane in (*left, section.centre, *right):
-            marks += [mark for mark in lane.marks if mark.type != "none"]
-    return tuple(marks)

@@ -95,7 +95,12 @@ def _leg(
     for own_lane in (lane, None):
         path = _shortest(links, (road, way), own_lane, target, s)
         if path is not None:
-            return _steps(links, (road, way, s), path, target_s)
+            steps = [RouteStep(road, way, s, links.roads[road].length if way > 0 else 0.0)]
+            for index, entry in path:
+                length = links.roads[index].length
+                steps.append(RouteStep(index, entry, *((0.0, length) if entry > 0 else (length, 0.0))))
+            steps[-1] = steps[-1]._replace(s_end=target_s)
+            return tuple(steps)
     return None
 
 
@@ -149,13 +154,3 @@ def _at_end(road: Road, way: int, lane: int, s: float | None) -> int | None:
             return None
         lane = onward
     return lane
-
-
-def _steps(links: Links, start: tuple[int, int, float], path: Sequence[End], target_s: float) -> tuple[RouteStep, ...]:
-    road, way, s = start
-    steps = [RouteStep(road, way, s, links.roads[road].length if way > 0 else 0.0)]
-    for index, entry in path:
-        length = links.roads[index].length
-        steps.append(RouteStep(index, entry, *((0.0, length) if entry > 0 else (length, 0.0))))
-    steps[-1] = steps[-1]._replace(s_end=target_s)
-    return tuple(steps)

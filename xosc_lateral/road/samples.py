@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, Int32Array
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.road.lanes import Lane, LaneSection
-from xosc_lateral.road.positions import FloatArray, IntArray
 from xosc_lateral.road.tables import NetworkTables
 
 SPACING = 8.0
@@ -35,19 +35,12 @@ class Candidates(NamedTuple):
     """Roads that a point may lie on: index of the point, road, guess of s."""
 
     point: NDArray[np.int64]
-    road: IntArray
+    road: Int32Array
     s: FloatArray
 
 
 class Samples:
-    """Samples of all lanes of some types, in a grid.
-
-    Parameters
-    ----------
-    tables : NetworkTables
-    lane_types : collection of str or None
-        None: all but lane 0.
-    """
+    """Samples of all lanes of some types (None: all but lane 0), in a grid."""
 
     def __init__(self, tables: NetworkTables, lane_types: Collection[str] | None) -> None:
         """Lay samples over the lanes, and list for each cell those in it and around it."""
@@ -63,16 +56,9 @@ class Samples:
         self._x0, self._y0 = float(self.x.min()) - CELL, float(self.y.min()) - CELL
         column, line = self._cell(self.x, self.y)
         self._lines = int(line.max()) + 2
-        self._file(column, line)
-
-    def _file(self, column: NDArray[np.int64], line: NDArray[np.int64]) -> None:
-        """Which samples lie in each cell and in those around it."""
-        keys, samples = [], []
-        for across in (-1, 0, 1):
-            for along in (-1, 0, 1):
-                keys.append((column + across) * self._lines + line + along)
-                samples.append(np.arange(len(self.x)))
-        key, sample = np.concatenate(keys), np.concatenate(samples)
+        around = [(across, along) for across in (-1, 0, 1) for along in (-1, 0, 1)]
+        key = np.concatenate([(column + across) * self._lines + line + along for across, along in around])
+        sample = np.tile(np.arange(len(self.x)), len(around))
         order = np.lexsort((self.piece[sample], key))
         self._sample = sample[order]
         self._cells, first = np.unique(key[order], return_index=True)
@@ -96,7 +82,8 @@ class Samples:
         if found.all():
             return hits
         far = self._nearest(np.flatnonzero(~found), x, y)
-        return joined(hits, far)
+        point, road = np.concatenate([hits.point, far.point]), np.concatenate([hits.road, far.road])
+        return Candidates(point, road, np.concatenate([hits.s, far.s]))
 
     def _in_cells(
         self, points: NDArray[np.int64], cells: NDArray[np.int64], x: FloatArray, y: FloatArray
@@ -141,15 +128,6 @@ class Samples:
         point_number = np.cumsum(new_point) - 1
         keep = chosen[distance[chosen] <= nearest[point_number[chosen]] + REACH]
         return Candidates(point[keep], self.road[sample[keep]], self.s[sample[keep]])
-
-
-def joined(*parts: Candidates) -> Candidates:
-    """All of them, one behind the other."""
-    return Candidates(
-        np.concatenate([part.point for part in parts]),
-        np.concatenate([part.road for part in parts]),
-        np.concatenate([part.s for part in parts]),
-    )
 
 
 def _road_samples(

@@ -10,6 +10,7 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.road.piecewise import PiecewiseCubic
 
 BEND_STEP = 1e-3
@@ -17,18 +18,10 @@ BEND_STEP = 1e-3
 
 
 class Shape(Struct, frozen=True):
-    """Lateral profile over t at a few stations (``lateralProfile/shape``), linear in s between them.
+    """Lateral profile over t at a few stations (``lateralProfile/shape``), linear in s between them."""
 
-    Attributes
-    ----------
-    stations : tuple of float
-        Increasing s. [m]
-    profiles : tuple of PiecewiseCubic
-        Height over t at each station. [m]
-    """
-
-    stations: tuple[float, ...]
-    profiles: tuple[PiecewiseCubic, ...]
+    stations: tuple[float, ...]  # increasing s [m]
+    profiles: tuple[PiecewiseCubic, ...]  # height over t at each station [m]
 
     def at(self, s: float, t: float) -> tuple[float, float, float]:
         """Height, its slope along s, its slope along t. [m], [-], [-]"""
@@ -47,24 +40,13 @@ class Shape(Struct, frozen=True):
 
 
 class Surface(Struct, frozen=True):
-    """Elevation and lean of one road.
+    """Elevation and lean of one road."""
 
-    Attributes
-    ----------
-    elevation : PiecewiseCubic
-        z of the reference line over s. [m]
-    superelevation : PiecewiseCubic
-        Roll about the reference line, positive when the road falls to the right looking along s. [rad]
-    crossfall : tuple of 2 PiecewiseCubic
-        OpenDRIVE 1.4: angle of the surface left and right of the reference line, positive falling outwards. [rad]
-    shape : Shape or None
-        Height over t on top of all that.
-    """
-
-    elevation: PiecewiseCubic
-    superelevation: PiecewiseCubic
+    elevation: PiecewiseCubic  # z of the reference line over s [m]
+    superelevation: PiecewiseCubic  # roll about it, positive: the road falls to the right along s [rad]
+    # OpenDRIVE 1.4: angle of the surface left and right of the reference line, positive falling outwards [rad]
     crossfall: tuple[PiecewiseCubic, PiecewiseCubic] | None = None
-    shape: Shape | None = None
+    shape: Shape | None = None  # height over t on top of all that
 
     @property
     def is_flat(self) -> bool:
@@ -132,8 +114,6 @@ class Surface(Struct, frozen=True):
         return height, along, lean
 
 
-FloatArray = NDArray[np.float64]
-
 Place = TypeVar("Place", float, NDArray[np.float64])
 
 
@@ -142,19 +122,12 @@ class HeaderOffset(Struct, frozen=True):
 
     First moved, then turned about the inertial origin (OpenDRIVE 1.7, 8.2). Everything is worked out in the coordinates
     of the file, in which numbers are small; what leaves the program as a world position goes through here.
-
-    Parameters
-    ----------
-    x, y, z : float
-        [m]
-    heading : float
-        [rad]
     """
 
-    x: float = 0.0
+    x: float = 0.0  # x, y, z: [m]
     y: float = 0.0
     z: float = 0.0
-    heading: float = 0.0
+    heading: float = 0.0  # [rad]
 
     def __bool__(self) -> bool:
         """Whether it moves anything."""

@@ -16,10 +16,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.road.lane_tables import LaneProfile, LaneTables
 from xosc_lateral.road.lanes import Lane
 from xosc_lateral.road.piecewise import IndexLike, Lookup, PiecewiseCubic
-from xosc_lateral.road.positions import FloatArray, Poses, RoadMark
+from xosc_lateral.road.positions import Poses
 from xosc_lateral.road.reference_line import Frame, ReferenceLines
 from xosc_lateral.road.road import Road
 from xosc_lateral.road.surface import BEND_STEP
@@ -29,7 +30,6 @@ class Cubics:
     """Piecewise cubics of several owners."""
 
     def __init__(self, functions: Sequence[PiecewiseCubic]) -> None:
-        """Gather the pieces."""
         self._lookup = Lookup([function.starts for function in functions])
         self._table = np.array([cubic for function in functions for cubic in function.cubics]).T.copy()
         self.is_zero = not self._table.any()
@@ -46,7 +46,6 @@ class HeightTable:
     """Heights of lanes over the road surface (kerbs), linear from one record to the next."""
 
     def __init__(self, lanes: Sequence[Lane]) -> None:
-        """Gather the records of all lanes; a lane without any lies on the road."""
         records = [lane.heights or ((0.0, 0.0, 0.0),) for lane in lanes]
         self.any = any(lane.heights for lane in lanes)
         self._lookup = Lookup([[s for s, _, _ in own] for own in records])
@@ -84,7 +83,6 @@ class NetworkTables(LaneTables):
     """Roads, lane sections, lanes and surfaces of a network as flat arrays."""
 
     def __init__(self, roads: Sequence[Road], path: str) -> None:
-        """Gather everything."""
         super().__init__(roads, path)
         self.lines = ReferenceLines(roads)
         self._elevation = Cubics([road.surface.elevation for road in roads])
@@ -286,16 +284,6 @@ class NetworkTables(LaneTables):
         angle, twist = self._superelevation.at(road, s)
         _, lift_along, lean = self._shaped(road, s, t)
         return angle + np.arctan(lean), grade + t * np.cos(angle) * twist + lift_along
-
-    def mark_line(self, road: int, mark: RoadMark, step: float) -> tuple[FloatArray, FloatArray]:
-        """Polyline of a marking: the lane's outer edge, or the lane offset for lane 0. Shape (n,) each. [m]"""
-        n = max(2, int(np.ceil((mark.s_end - mark.s_start) / step)) + 1)
-        s = np.linspace(mark.s_start, mark.s_end, n)
-        # the end of a section belongs to the next one, which may not have the lane
-        inside = np.minimum(s, np.nextafter(mark.s_end, -np.inf))
-        profile = self.lane_profile(road, mark.lane, inside)
-        poses = self.road_to_world(road, s, profile.centre + 0.5 * np.sign(mark.lane) * profile.width)
-        return poses.x, poses.y
 
 
 def _along_lane(

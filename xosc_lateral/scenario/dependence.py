@@ -25,7 +25,7 @@ from xosc_lateral.scenario.conditions import (
 )
 from xosc_lateral.scenario.enums import StoryboardElementState, StoryboardElementType
 from xosc_lateral.scenario.global_actions import TrafficSignalControllerAction, TrafficSignalStateAction
-from xosc_lateral.scenario.private_actions import AnimationAction, LightStateAction, TeleportAction, VisibilityAction
+from xosc_lateral.scenario.private_actions import APPEARANCE, TeleportAction
 from xosc_lateral.scenario.scenario import Scenario
 from xosc_lateral.scenario.storyboard import Act, Condition, Event, ManeuverGroup, Trigger
 from xosc_lateral.scenario.under_test import controlled_entities
@@ -42,7 +42,6 @@ _DEPTH = {
 }
 """Names from the story down to an element."""
 
-_APPEARANCE = (AnimationAction, LightStateAction, VisibilityAction)
 _REFERENCES = frozenset({"entity_ref", "entity_refs", "master_entity_ref", "trailer_ref"})
 
 
@@ -164,10 +163,9 @@ def _follow_act(found: Dependence, above: Path, act: Act) -> None:
         found.ends |= {path, above}
     for group in act.maneuver_groups:
         again = group.maximum_execution_count > 1 and (*path, group.name) in found.ends
-        for maneuver in group.maneuvers:
-            for event in maneuver.events:
-                here = (*path, group.name, maneuver.name, event.name)
-                _follow_event(found, here, act, group, event, cut=begins or stops or again)
+        for maneuver, event in group.events():
+            here = (*path, group.name, maneuver.name, event.name)
+            _follow_event(found, here, act, group, event, cut=begins or stops or again)
 
 
 def _follow_event(found: Dependence, path: Path, act: Act, group: ManeuverGroup, event: Event, *, cut: bool) -> None:
@@ -176,7 +174,7 @@ def _follow_event(found: Dependence, path: Path, act: Act, group: ManeuverGroup,
     refers = False
     for action in event.actions:
         references = set(entity_references(action.content))
-        moves = action.is_private and not isinstance(action.content, _APPEARANCE)
+        moves = action.is_private and not isinstance(action.content, APPEARANCE)
         steered = bool(references & found.entities)
         refers |= steered
         if moves and (depends or steered):

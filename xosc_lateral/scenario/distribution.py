@@ -6,12 +6,12 @@ import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from decimal import Decimal
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
 from msgspec import Struct
 
-from xosc_lateral.scenario.place import Place
+from xosc_lateral.scenario.place import Place, Xml, called
 
 ParameterSet = Mapping[str, str]
 
@@ -90,6 +90,10 @@ MAX_TRIES = 10_000
 """Draws until a truncated distribution gives up."""
 
 
+class DistributionError(ValueError):
+    """No value of the distribution lies inside its limits. The reader adds file and line."""
+
+
 class Draw(Protocol):
     """A distribution of one parameter."""
 
@@ -98,80 +102,129 @@ class Draw(Protocol):
         ...
 
 
-class Weighted(Struct, frozen=True):
-    """Values with weights that need not sum to 1."""
+class Limits(Struct, frozen=True):
+    """From `lower` to `upper`."""
 
-    values: tuple[str, ...]
-    weights: tuple[float, ...]
+    lower: Annotated[float, Xml(("lowerLimit",), finite=False)]
+    upper: Annotated[float, Xml(("upperLimit",), finite=False)]
 
-    def draw(self, rng: np.random.Generator) -> str:
-        """One of the values."""
-        return self.values[_weighted_index(self.weights, rng)]
+    def __post_init__(self) -> None:
+        if self.upper < self.lower:
+            raise ValueError(f"upperLimit {self.upper} is below lowerLimit {self.lower}")
+
+    def first_inside(self, draw: Callable[[], float]) -> float:
+        """The first of several draws that lies inside."""
+        for _ in range(MAX_TRIES):
+            value = draw()
+            if self.lower <= value <= self.upper:
+                return value
+        raise DistributionError(f"no value within [{self.lower}, {self.upper}] in {MAX_TRIES} draws")
 
 
-class Uniform(Struct, frozen=True):
+class Limited(Struct, frozen=True, kw_only=True):
+    """Within a range, or without one."""
+
+    limits: Annotated[Limits, called("Range")] = Limits(-math.inf, math.inf)
+
+
+class Uniform(Limited, frozen=True):
     """Evenly between two limits."""
 
-    lower: float
-    upper: float
+    def __post_init__(self) -> None:
+        if math.isinf(self.limits.lower) or math.isinf(self.limits.upper):
+            raise ValueError("needs a finite Range")
 
     def draw(self, rng: np.random.Generator) -> str:
         """One value."""
-        return repr(float(rng.uniform(self.lower, self.upper)))
+        return repr(float(rng.uniform(self.limits.lower, self.limits.upper)))
 
 
-class Histogram(Struct, frozen=True):
-    """Bins with weights, evenly inside a bin."""
-
-    bins: tuple[tuple[float, float], ...]
-    weights: tuple[float, ...]
-
-    def draw(self, rng: np.random.Generator) -> str:
-        """One value."""
-        lower, upper = self.bins[_weighted_index(self.weights, rng)]
-        return repr(float(rng.uniform(lower, upper)))
-
-
-class Normal(Struct, frozen=True):
+class Normal(Limited, frozen=True):
     """Normal, by mean and variance; truncated to the limits by drawing again."""
 
-    mean: float
+    mean: Annotated[float, called("expectedValue")]
     variance: float
-    limits: tuple[float, float] = (-math.inf, math.inf)
+
+    def __post_init__(self) -> None:
+        if self.variance < 0:
+            raise ValueError(f"variance of {self.variance} is negative")
 
     def draw(self, rng: np.random.Generator) -> str:
         """One value."""
         scale = math.sqrt(self.variance)
-        return repr(_truncated(lambda: float(rng.normal(self.mean, scale)), self.limits))
+        return repr(self.limits.first_inside(lambda: float(rng.normal(self.mean, scale))))
 
 
-class LogNormal(Struct, frozen=True):
+class LogNormal(Normal, frozen=True):
     """Log-normal; `mean` and `variance` are those of the parameter itself, not of its logarithm."""
 
-    mean: float
-    variance: float
-    limits: tuple[float, float] = (-math.inf, math.inf)
+    def __post_init__(self) -> None:
+        if self.mean <= 0:
+            raise ValueError(f"expectedValue of {self.mean} is not positive")
+        Normal.__post_init__(self)
 
     def draw(self, rng: np.random.Generator) -> str:
         """One value."""
         spread = math.log1p(self.variance / self.mean**2)
         centre = math.log(self.mean) - spread / 2
-        return repr(_truncated(lambda: float(rng.lognormal(centre, math.sqrt(spread))), self.limits))
+        return repr(self.limits.first_inside(lambda: float(rng.lognormal(centre, math.sqrt(spread)))))
 
 
-class Poisson(Struct, frozen=True):
+class Poisson(Limited, frozen=True):
     """Poisson; whole numbers."""
 
-    mean: float
-    limits: tuple[float, float] = (-math.inf, math.inf)
+    mean: Annotated[float, called("expectedValue")]
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.mean <= 1e9:
+            raise ValueError(f"expectedValue of {self.mean} is not within [0, 1e9]")
 
     def draw(self, rng: np.random.Generator) -> str:
         """One value."""
-        return str(round(_truncated(lambda: float(rng.poisson(self.mean)), self.limits)))
+        return str(round(self.limits.first_inside(lambda: float(rng.poisson(self.mean)))))
 
 
-class DistributionError(ValueError):
-    """No value of the distribution lies inside its limits. The reader adds file and line."""
+class Bin(Uniform, frozen=True):
+    """Values evenly between two limits, with a weight."""
+
+    weight: float
+
+
+class Element(Struct, frozen=True):
+    """One value, with a weight."""
+
+    value: str
+    weight: float
+
+    def draw(self, _: np.random.Generator) -> str:
+        """The value."""
+        return self.value
+
+
+class Weighted(Struct, frozen=True):
+    """Values with weights that need not sum to 1."""
+
+    elements: tuple[Element, ...]
+
+    def __post_init__(self) -> None:
+        _check_weights(self.elements)
+
+    def draw(self, rng: np.random.Generator) -> str:
+        """One of the values."""
+        return _one_of(self.elements, rng)
+
+
+class Histogram(Struct, frozen=True):
+    """Bins with weights, evenly inside a bin."""
+
+    bins: Annotated[tuple[Bin, ...], called("Bin", "HistogramBin")]
+
+    def __post_init__(self) -> None:
+        _check_weights(self.bins)
+
+    def draw(self, rng: np.random.Generator) -> str:
+        """One value."""
+        return _one_of(self.bins, rng)
 
 
 class Stochastic(Struct, frozen=True):
@@ -186,14 +239,14 @@ class Stochastic(Struct, frozen=True):
         return {parameter: draw.draw(rng) for parameter, draw in self.draws}
 
 
-def _weighted_index(weights: Sequence[float], rng: np.random.Generator) -> int:
-    cumulative = np.cumsum(weights)
-    return int(np.searchsorted(cumulative, rng.uniform(0.0, cumulative[-1]), side="right").clip(0, len(weights) - 1))
+def _check_weights(parts: Sequence[Element | Bin]) -> None:
+    weights = [part.weight for part in parts]
+    if not weights or min(weights) < 0 or sum(weights) <= 0:
+        raise ValueError("needs weights that are not negative and not all zero")
 
 
-def _truncated(draw: Callable[[], float], limits: tuple[float, float]) -> float:
-    for _ in range(MAX_TRIES):
-        value = draw()
-        if limits[0] <= value <= limits[1]:
-            return value
-    raise DistributionError(f"no value within [{limits[0]}, {limits[1]}] in {MAX_TRIES} draws")
+def _one_of(parts: Sequence[Element | Bin], rng: np.random.Generator) -> str:
+    """A value of one of them, which comes as often as it is weighted."""
+    cumulative = np.cumsum([part.weight for part in parts])
+    index = np.searchsorted(cumulative, rng.uniform(0.0, cumulative[-1]), side="right")
+    return parts[min(int(index), len(parts) - 1)].draw(rng)

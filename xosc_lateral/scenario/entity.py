@@ -8,7 +8,7 @@ from typing import Annotated
 from msgspec import Struct, field
 
 from xosc_lateral.scenario.enums import EntityCategory, VehicleCategory
-from xosc_lateral.scenario.place import Name, Place, Zero, called
+from xosc_lateral.scenario.place import Name, Place, Xml, Zero, called
 
 
 class BoundingBox(Struct, frozen=True):
@@ -20,6 +20,10 @@ class BoundingBox(Struct, frozen=True):
     length: Annotated[float, called("Dimensions/length")]
     width: Annotated[float, called("Dimensions/width")]
     height: Annotated[float, called("Dimensions/height")]
+
+
+USUAL_BOX = BoundingBox(1.5, 0.0, 0.9, 5.0, 2.0, 1.8)
+"""Where a file gives none: the middle of the field's passenger cars."""
 
 
 class Performance(Struct, frozen=True):
@@ -49,11 +53,6 @@ class Axles(Struct, frozen=True):
     rear: Annotated[Axle | None, called("RearAxle")]
     additional: Annotated[tuple[Axle, ...], called("AdditionalAxle")] = ()
 
-    @property
-    def wheelbase(self) -> float | None:
-        """Distance from the rear to the front axle. [m]"""
-        return None if self.front is None or self.rear is None else self.front.position_x - self.rear.position_x
-
 
 class Controller(Struct, frozen=True):
     """A controller by name. It is named and reported; playback uses the default driver instead."""
@@ -77,7 +76,7 @@ class Entity(Struct, frozen=True):
     place : Place
         Of the ScenarioObject.
     bounding_box : BoundingBox
-        Field default where the file has none: a car of 5 m x 2 m.
+        `USUAL_BOX` where the file has none.
     vehicle_category : VehicleCategory or None
         Vehicles only.
     performance : Performance
@@ -105,9 +104,9 @@ class Entity(Struct, frozen=True):
     name: str
     category: EntityCategory
     place: Place
-    bounding_box: BoundingBox
+    bounding_box: Annotated[BoundingBox, Xml(default=USUAL_BOX)]
     vehicle_category: VehicleCategory | None = None
-    performance: Performance = field(default_factory=Performance)
+    performance: Performance = Performance()
     axles: Axles | None = None
     controllers: tuple[Controller, ...] = ()
     object_name: str = ""
@@ -116,7 +115,7 @@ class Entity(Struct, frozen=True):
     hitch_x: float | None = None
     coupler_x: float | None = None
     mass: float | None = None
-    model3d: str | None = None
+    model3d: Annotated[str | None, called("model3d", "model")] = None
     properties: Mapping[str, str] = field(default_factory=dict)
 
     @property

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Annotated, TypeVar
+from typing import Annotated
 
 from msgspec import UNSET, Struct
 
 from xosc_lateral.errors import FormatError
-
-Error = TypeVar("Error", bound=FormatError)
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,8 +31,8 @@ class Place:
     element: str
     node: tuple[int, ...] = field(default=(), repr=False, compare=False)
 
-    def error(self, kind: type[Error], what: str) -> Error:
-        """An error that names this place."""
+    def error(self, what: str, kind: type[FormatError] = FormatError) -> FormatError:
+        """An error that names the place."""
         return kind(what, path=self.path, line=self.line, element=self.element)
 
 

@@ -171,6 +171,10 @@ class Route(Content, frozen=True):
     waypoints: tuple[Waypoint, ...]
     closed: No
 
+    def __post_init__(self) -> None:
+        if len(self.waypoints) < 2:
+            raise ValueError(f"a route needs at least 2 waypoints, this one has {len(self.waypoints)}")
+
 
 class Vertex(Struct, frozen=True):
     """Corner of a polyline; `time` [s] or None."""
@@ -183,6 +187,10 @@ class Polyline(Struct, frozen=True):
     """Straight pieces between vertices."""
 
     vertices: tuple[Vertex, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.vertices) < 2:
+            raise ValueError(f"a polyline needs at least 2 vertices, this one has {len(self.vertices)}")
 
 
 class Clothoid(Struct, frozen=True):
@@ -213,6 +221,10 @@ class ClothoidSpline(Struct, frozen=True):
     segments: tuple[ClothoidSplineSegment, ...]
     time_end: float | None = None
 
+    def __post_init__(self) -> None:
+        if not self.segments:
+            raise ValueError("a clothoid spline needs a segment")
+
 
 class ControlPoint(Struct, frozen=True):
     """Of a NURBS curve."""
@@ -228,6 +240,19 @@ class Nurbs(Struct, frozen=True):
     order: int
     control_points: tuple[ControlPoint, ...]
     knots: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        order, count, knots = self.order, len(self.control_points), list(self.knots)
+        if order < 2 or count < order:
+            raise ValueError(f"order {order} with {count} control points")
+        if len(knots) != count + order:
+            raise ValueError(f"{len(knots)} knots, {count} control points and order {order} need {count + order}")
+        if knots != sorted(knots):
+            raise ValueError("knots decrease")
+        if knots[order - 1] >= knots[count]:
+            raise ValueError("the knots span no curve")
+        if any(point.weight <= 0 for point in self.control_points):
+            raise ValueError("a weight is not positive")
 
 
 Shape = Polyline | Clothoid | ClothoidSpline | Nurbs | Unsupported

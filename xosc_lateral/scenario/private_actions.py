@@ -267,3 +267,10 @@ class AnimationAction(Content, frozen=True):
     kind: str
     loop: bool = False
     duration: Annotated[float, called("animationDuration")] = 0.0
+
+
+LONGITUDINAL = (SpeedAction, SpeedProfileAction, LongitudinalDistanceAction, SynchronizeAction)
+LATERAL = (LaneChangeAction, LaneOffsetAction, LateralDistanceAction, FollowTrajectoryAction)
+MOTION = (*LONGITUDINAL, *LATERAL, TeleportAction, AssignRouteAction, AcquirePositionAction)
+CONTROLLER = (AssignControllerAction, ActivateControllerAction, OverrideControllerValueAction)
+APPEARANCE = (AnimationAction, LightStateAction, VisibilityAction)

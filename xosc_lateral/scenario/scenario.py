@@ -77,8 +77,6 @@ class Scenario:
         Catalog element name (``VehicleCatalog``) to its folder or file.
     road_file : Path or None
         RoadNetwork/LogicFile, resolved against the scenario's folder; None: no road.
-    scene_graph_file : str or None
-        As written.
     traffic_signal_controllers : tuple
     entities : tuple of Entity
         In file order; a trailer described inside its tractor follows it as an entity of its own.
@@ -97,11 +95,9 @@ class Scenario:
     variables: Mapping[str, Parameter]
     catalog_locations: Mapping[str, Path]
     road_file: Path | None
-    scene_graph_file: str | None
     traffic_signal_controllers: tuple[TrafficSignalController, ...]
     entities: tuple[Entity, ...]
     storyboard: Storyboard
-    road_place: Place | None = None
     remarks: tuple[Unsupported, ...] = ()
     input_hashes: Mapping[Path, str] = field(default_factory=dict)
     source: bytes = field(default=b"", repr=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated
 
@@ -31,6 +31,10 @@ class Condition(Struct, frozen=True):
     content: Content | Unsupported
     triggering_entities: TriggeringEntities | None
     place: Place
+
+    def __post_init__(self) -> None:
+        if self.delay < 0:
+            raise ValueError(f"delay of {self.delay} s is negative")
 
 
 class ConditionGroup(Struct, frozen=True):
@@ -108,6 +112,10 @@ class ManeuverGroup(Struct, frozen=True):
     place: Place
     maximum_execution_count: int = 1
 
+    def events(self) -> Iterator[tuple[Maneuver, Event]]:
+        """Every event, with its maneuver."""
+        return ((maneuver, event) for maneuver in self.maneuvers for event in maneuver.events)
+
 
 class Act(Struct, frozen=True):
     """`start_trigger` None: starts at once."""
@@ -150,3 +158,10 @@ class Storyboard(Struct, frozen=True):
     stories: tuple[Story, ...]
     stop_trigger: Annotated[Trigger | None, StopTrigger]
     place: Place
+
+    def groups(self) -> Iterator[tuple[Story, Act, ManeuverGroup]]:
+        """Every maneuver group, with what it is in, in file order."""
+        for story in self.stories:
+            for act in story.acts:
+                for group in act.maneuver_groups:
+                    yield story, act, group

@@ -73,14 +73,10 @@ def _named(properties: Mapping[str, str], table: Mapping[str, frozenset[str]]) -
 
 
 def _private_actions(scenario: Scenario) -> Iterator[tuple[tuple[str, ...], Action]]:
-    board = scenario.storyboard
-    for private in board.init.privates:
+    for private in scenario.storyboard.init.privates:
         for action in private.actions:
             yield (private.entity_ref,), action
-    for story in board.stories:
-        for act in story.acts:
-            for group in act.maneuver_groups:
-                for maneuver in group.maneuvers:
-                    for event in maneuver.events:
-                        for action in event.actions:
-                            yield group.actors.entity_refs, action
+    for _, _, group in scenario.storyboard.groups():
+        for _, event in group.events():
+            for action in event.actions:
+                yield group.actors.entity_refs, action

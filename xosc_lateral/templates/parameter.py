@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from xosc_lateral.errors import XoscLateralError
 
@@ -45,6 +46,11 @@ class Number:
         """Default as text."""
         return f"{self.default:g}"
 
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values."""
+        known = {"name": self.name, "default": self.default, "what": self.what}
+        return known | {"unit": self.unit, "low": self.low, "high": self.high}
+
 
 @dataclass(frozen=True, slots=True)
 class Choice:
@@ -72,6 +78,10 @@ class Choice:
         """Default as text."""
         return self.default
 
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values."""
+        return {"name": self.name, "default": self.default, "what": self.what, "options": list(self.options)}
+
 
 @dataclass(frozen=True, slots=True)
 class Declared:
@@ -98,6 +108,10 @@ class Declared:
     def shown_default(self) -> str:
         """Default as text."""
         return self.default
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values."""
+        return {"name": self.name, "default": self.default, "what": self.what, "type": self.kind}
 
 
 Parameter = Number | Choice | Declared

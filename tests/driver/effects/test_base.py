@@ -67,5 +67,3 @@ def test_what_an_effect_must_say_itself_is_asked_for() -> None:
 
     with pytest.raises(NotImplementedError):
         _ = Silent().columns
-    with pytest.raises(NotImplementedError):
-        Silent().terms(np.zeros(3), {}, np.random.default_rng(0))

@@ -10,6 +10,7 @@ import pytest
 
 from tests.driver.certified import FOLDER, contexts
 from tests.driver.effects.made_effects import EXAMPLES
+from tests.profiles import whole_terms
 from xosc_lateral.driver.effects import (
     EFFECTS,
     ColumnEffect,
@@ -60,7 +61,7 @@ def test_every_effect_is_here() -> None:
 @pytest.mark.parametrize("kind", HIDDEN)
 def test_hidden_effects_go_on_from_their_state_and_from_a_saved_one(kind: str) -> None:
     effect, time = cast(HiddenEffect, HIDDEN[kind]), 7.0 + STEP * np.arange(N)
-    whole = effect.terms(time, {}, np.random.default_rng(4))
+    whole = whole_terms(effect, time, {}, np.random.default_rng(4))
     state = effect.begin(np.random.default_rng(4), STEP)
     parts = []
     for rows in cut(time):
@@ -82,7 +83,7 @@ def test_hidden_effects_go_on_from_their_state_and_from_a_saved_one(kind: str) -
 def test_column_effects_respond_in_blocks_as_to_the_whole(name: str) -> None:
     effect, context = cast(ColumnEffect, COLUMNED[name]), contexts(N)
     context |= {"x": context["lead_distance"], "y": context["speed"]}
-    whole = effect.terms(STEP * np.arange(N), context, np.random.default_rng(0))
+    whole = whole_terms(effect, STEP * np.arange(N), context, np.random.default_rng(0))
     response, parts = effect.response_in_blocks(STEP), []
     for rows in cut(np.arange(N)):
         parts.append(response.take(effect.known({column: values[rows] for column, values in context.items()})))

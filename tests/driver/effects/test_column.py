@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.driver.effects.made_effects import STEP, made, strength
+from tests.profiles import whole_terms
 from xosc_lateral.driver.effects import Acts, Angular, ColumnEffect, Linear, Saturating, Threshold
 from xosc_lateral.errors import DriverProfileError
 
@@ -132,7 +133,7 @@ def test_drivers_who_are_alike_cost_no_random_number() -> None:
 
 def test_the_generator_is_left_as_it_is() -> None:
     rng, other = np.random.default_rng(6), np.random.default_rng(6)
-    made(Linear, 0.1, column="x").terms(STEP * np.arange(5), {"x": np.ones(5)}, rng)
+    whole_terms(made(Linear, 0.1, column="x"), STEP * np.arange(5), {"x": np.ones(5)}, rng)
     assert rng.random() == other.random()
 
 

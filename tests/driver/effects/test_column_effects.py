@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.driver.effects.made_effects import EXAMPLES, ONE
-from tests.profiles import effect_from_dict
+from tests.profiles import effect_from_dict, whole_terms
 from xosc_lateral.driver.effects import (
     EFFECTS,
     Acts,
@@ -132,7 +132,7 @@ def test_levels_have_a_value_each_and_others_none() -> None:
 def test_factors_multiply_and_stay_within_bounds(acts: Acts) -> None:
     effect = Linear(acts=acts, column="x", coefficients=(1.0,), errors=(0.0,), reference=(0.0,))
     context = {"x": np.array([0.0, np.log(2.0), 100.0, -100.0])}
-    terms = effect.terms(TIME[:4], context, np.random.default_rng(0))
+    terms = whole_terms(effect, TIME[:4], context, np.random.default_rng(0))
     factor = {Acts.SPREAD: terms.spread, Acts.RATE: terms.rate, Acts.FINE: terms.fine}[acts]
     assert factor == pytest.approx([1.0, 2.0, 5.0, 0.2])
     assert terms.location is None
@@ -140,7 +140,7 @@ def test_factors_multiply_and_stay_within_bounds(acts: Acts) -> None:
 
 def test_a_missing_column_leaves_the_movement_alone() -> None:
     effect = Linear(acts=Acts.LOCATION, column="rain", **ONE)
-    terms = effect.terms(TIME, {"speed": TIME}, np.random.default_rng(0))
+    terms = whole_terms(effect, TIME, {"speed": TIME}, np.random.default_rng(0))
     assert (terms.location, terms.spread, terms.rate, terms.fine) == (None, None, None, None)
 
 
@@ -157,7 +157,7 @@ def test_effects_survive_json(effect: ColumnEffect) -> None:
 @pytest.mark.parametrize("effect", EXAMPLES, ids=lambda effect: effect.kind)
 def test_terms_are_finite_and_repeatable(effect: ColumnEffect) -> None:
     context = {"x": np.sin(TIME), "y": 10.0 * TIME}
-    first, second = (effect.terms(TIME, context, np.random.default_rng(3)) for _ in range(2))
+    first, second = (whole_terms(effect, TIME, context, np.random.default_rng(3)) for _ in range(2))
     for name in ("location", "spread", "rate", "fine"):
         one, other = getattr(first, name), getattr(second, name)
         if one is None:

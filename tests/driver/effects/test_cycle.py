@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from tests.profiles import whole_terms
 from xosc_lateral.driver.effects import Cycle
 from xosc_lateral.errors import DriverProfileError
 
 
 def cycle(effect: Cycle, time: np.ndarray, seed: int) -> np.ndarray:
-    return np.asarray(effect.terms(time, {}, np.random.default_rng(seed)).location)
+    return np.asarray(whole_terms(effect, time, {}, np.random.default_rng(seed)).location)
 
 
 def test_a_steady_swing_is_a_sine() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.profiles import whole_terms
 from xosc_lateral.driver.effects import Drift
 from xosc_lateral.errors import DriverProfileError
 
@@ -12,7 +13,9 @@ DRIVES = 600
 
 
 def drifts(effect: Drift, step: float, rows: int) -> np.ndarray:
-    paths = [effect.terms(step * np.arange(rows), {}, np.random.default_rng(seed)).location for seed in range(DRIVES)]
+    paths = [
+        whole_terms(effect, step * np.arange(rows), {}, np.random.default_rng(seed)).location for seed in range(DRIVES)
+    ]
     return np.stack(paths)  # type: ignore[arg-type]
 
 
@@ -34,7 +37,7 @@ def test_it_moves_to_either_side_alike() -> None:
 
 def test_twice_the_size_is_twice_the_path() -> None:
     time = np.arange(50.0)
-    one, two = (Drift(size=size).terms(time, {}, np.random.default_rng(8)).location for size in (0.1, 0.2))
+    one, two = (whole_terms(Drift(size=size), time, {}, np.random.default_rng(8)).location for size in (0.1, 0.2))
     np.testing.assert_allclose(two, 2.0 * np.asarray(one), rtol=1e-12)
 
 
@@ -47,5 +50,5 @@ def test_sizes_and_times_are_above_nothing_and_finite(field: str, value: float) 
 
 def test_no_rows_have_no_terms_and_draw_nothing() -> None:
     rng, other = np.random.default_rng(1), np.random.default_rng(1)
-    assert Drift(size=0.1).terms(np.zeros(0), {}, rng).location is None
+    assert whole_terms(Drift(size=0.1), np.zeros(0), {}, rng).location is None
     assert rng.random() == other.random()

@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
+from tests.profiles import whole_terms
 from xosc_lateral.driver.effects import EffectTerms, HiddenEffect
 from xosc_lateral.driver.effects.hidden import NoState
 from xosc_lateral.errors import DriverProfileError
@@ -26,7 +27,8 @@ class Ramp(HiddenEffect, frozen=True, kw_only=True):
 def test_a_function_of_time_needs_no_more_than_its_formula() -> None:
     effect = Ramp(slope=0.01, start=-0.1)
     np.testing.assert_allclose(
-        np.asarray(effect.terms(np.arange(4.0), {}, np.random.default_rng(0)).location), [-0.1, -0.09, -0.08, -0.07]
+        np.asarray(whole_terms(effect, np.arange(4.0), {}, np.random.default_rng(0)).location),
+        [-0.1, -0.09, -0.08, -0.07],
     )
     assert effect.columns == ()
     assert isinstance(effect.begin(np.random.default_rng(0), 0.2), NoState)
@@ -55,5 +57,5 @@ def test_what_need_not_be_positive_may_be_negative() -> None:
 
 
 def test_no_rows_have_no_terms() -> None:
-    terms = Ramp(slope=1.0).terms(np.zeros(0), {}, np.random.default_rng(0))
+    terms = whole_terms(Ramp(slope=1.0), np.zeros(0), {}, np.random.default_rng(0))
     assert (terms.location, terms.spread, terms.rate, terms.fine) == (None, None, None, None)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from tests.profiles import whole_terms
 from xosc_lateral.driver.effects import Drift
 from xosc_lateral.driver.effects.response import Response, respond, split_shift
 from xosc_lateral.driver.jit_kernel import WORTH_IMPORTING
@@ -82,7 +83,7 @@ def test_a_drift_is_scipys_filter_of_its_noise() -> None:
     keep = np.exp(-STEP / 40.0)
     noise = np.random.default_rng(5).normal(size=n) * 0.3 * np.sqrt(1.0 - keep**2)
     noise[0] = np.random.default_rng(5).normal() * 0.3
-    drift = effect.terms(STEP * np.arange(n), {}, np.random.default_rng(5)).location
+    drift = whole_terms(effect, STEP * np.arange(n), {}, np.random.default_rng(5)).location
     np.testing.assert_allclose(drift, lfilter([1.0], [1.0, -keep], noise), rtol=0, atol=1e-12)
 
 
@@ -92,7 +93,8 @@ def test_effects_of_a_scenario_of_minutes_import_no_scipy() -> None:
         "from xosc_lateral.driver.effects import Drift\n"
         "from xosc_lateral.driver.effects.response import respond\n"
         "respond(np.ones(900), 0.2, 0.5, 2.0)\n"
-        "Drift(size=0.1).terms(0.2 * np.arange(900), {}, np.random.default_rng(1))\n"
+        "drift = Drift(size=0.1)\n"
+        "drift.advance(drift.begin(np.random.default_rng(1), 0.2), 0.2 * np.arange(900), 0.2)\n"
         "assert 'scipy' not in sys.modules and 'numba' not in sys.modules\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.profiles import whole_terms
 from xosc_lateral.driver.effects import Step
 from xosc_lateral.errors import DriverProfileError
 
@@ -12,7 +13,7 @@ RNG = np.random.default_rng(0)
 
 
 def at(effect: Step, time: object) -> np.ndarray:
-    return np.asarray(effect.terms(np.asarray(time, dtype=float), {}, RNG).location)
+    return np.asarray(whole_terms(effect, np.asarray(time, dtype=float), {}, RNG).location)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.25, 1.0])

@@ -18,7 +18,8 @@ from xosc_lateral.driver.models.autoregressive.coarse import (
     split_bands,
 )
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
-from xosc_lateral.driver.models.autoregressive.parts import COARSE, FINE, Factors, begin_factors, draw_drivers
+from xosc_lateral.driver.models.autoregressive.parameters import draw_drivers
+from xosc_lateral.driver.models.autoregressive.parts import COARSE, FINE, Factors, begin_factors
 from xosc_lateral.driver.models.autoregressive.volatility import Volatility
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.formats.profiles import read_profile

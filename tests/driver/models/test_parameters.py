@@ -12,7 +12,8 @@ from scipy.linalg import toeplitz
 
 from tests.driver.models.made_models import POPULATION, STEADY
 from xosc_lateral.driver.models.autoregressive.coarse import COARSE_EVERY, interpolate
-from xosc_lateral.driver.models.autoregressive.model import START_LAGS, AutoregressiveModel
+from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
+from xosc_lateral.driver.models.autoregressive.parameters import START_LAGS
 from xosc_lateral.driver.models.noise import NOISE_VARIANCE
 from xosc_lateral.driver.records import plain, read_as
 from xosc_lateral.errors import DriverProfileError

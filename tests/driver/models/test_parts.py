@@ -10,12 +10,12 @@ from scipy.signal import lfilter
 from tests.driver.models.made_models import POPULATION, STEADY
 from xosc_lateral.driver.models.autoregressive.coarse import COARSE_EVERY, TICKS, interpolate
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
+from xosc_lateral.driver.models.autoregressive.parameters import DriverState
 from xosc_lateral.driver.models.autoregressive.parts import (
     COARSE,
     FINE,
     CoarsePart,
     CoarseState,
-    DriverState,
     Factors,
     FinePart,
     FineState,
@@ -33,12 +33,12 @@ def drivers(*factors: float) -> DriverState:
 def coarse_part(model: AutoregressiveModel, driver: DriverState, skip: tuple[int, ...]) -> CoarsePart:
     past = np.full((model.coarse.order, len(skip)), 0.01)
     state = CoarseState.begin(np.random.default_rng(5), past, np.array(skip))
-    return CoarsePart(model, driver, state, begin_factors(model, SEED, len(skip)))
+    return CoarsePart(model, driver, state, Factors(model, begin_factors(model, SEED, len(skip))))
 
 
 def fine_part(model: AutoregressiveModel, driver: DriverState, skip: tuple[int, ...]) -> FinePart:
     state = FineState.begin(np.random.default_rng(6), np.array(skip))
-    return FinePart(model, driver, state, begin_factors(model, SEED, len(skip)))
+    return FinePart(model, driver, state, Factors(model, begin_factors(model, SEED, len(skip))))
 
 
 def factors_of(model: AutoregressiveModel, part: int, n: int) -> np.ndarray:

@@ -7,12 +7,12 @@ import pytest
 
 from tests.driver.sensor.test_likelihood import COLOURED, driver_density, measured
 from xosc_lateral.driver.sensor.explanations import explanations
-from xosc_lateral.driver.sensor.likelihood import Colour
+from xosc_lateral.driver.sensor.likelihood import Colour, Measured
 from xosc_lateral.driver.sensor.periodogram import Periodogram
 
 
 def best_of(data: Periodogram):  # type: ignore[no-untyped-def]
-    return min(explanations(data, np.zeros(len(data.frequency)), None), key=lambda one: one.criterion)
+    return min(explanations(Measured(data, np.zeros(len(data.frequency)))), key=lambda one: one.criterion)
 
 
 @pytest.mark.parametrize(("order", "corner"), [(1, 0.32), (1, 0.92), (2, 0.51)])

@@ -8,10 +8,13 @@ import pytest
 from tests.identification.made_coarse import coarse_of, movement, wander
 from xosc_lateral.driver.effects import Acts, Linear
 from xosc_lateral.identification.held_out import removal_of
-from xosc_lateral.identification.regression import Coarse, fit_model
-from xosc_lateral.identification.terms.base import Removal
-from xosc_lateral.identification.terms.column import MeanTerm, SpreadTerm, columns_on_size, of_kind, shrunk
+from xosc_lateral.identification.model import Removal
+from xosc_lateral.identification.regression import fit_model
+from xosc_lateral.identification.terms.column import columns_on_size, of_kind, shrunk
+from xosc_lateral.identification.terms.mean import MeanTerm
+from xosc_lateral.identification.terms.spread import SpreadTerm
 from xosc_lateral.identification.terms.time import StepTerm, TimeSpreadTerm
+from xosc_lateral.identification.timeline import Coarse
 
 SECONDS = 900.0
 

@@ -9,11 +9,12 @@ from scipy.signal import lfilter
 from tests.identification.made_coarse import SPREAD, coarse_of, movement, wander
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Linear
 from xosc_lateral.identification import regression
-from xosc_lateral.identification.regression import Fitted, fit_model
-from xosc_lateral.identification.terms.column import (
-    ColumnTerm,
+from xosc_lateral.identification.model import Fitted
+from xosc_lateral.identification.regression import fit_model
+from xosc_lateral.identification.terms.column import ColumnTerm
+from xosc_lateral.identification.terms.mean import MeanTerm
+from xosc_lateral.identification.terms.spread import (
     FineNoiseTerm,
-    MeanTerm,
     SlowSpreadTerm,
     SpreadTerm,
     fine_twin,

@@ -9,6 +9,7 @@ import pytest
 from scipy import stats
 
 from tests.identification.made_coarse import coarse_of, movement
+from tests.profiles import whole_terms
 from xosc_lateral.driver.effects import Step, TimeSmooth
 from xosc_lateral.identification.low_frequencies import (
     SHORTEST_S,
@@ -18,10 +19,12 @@ from xosc_lateral.identification.low_frequencies import (
     mean_probability,
     smooth_probabilities,
 )
-from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
-from xosc_lateral.identification.selection import ERROR_BUDGET, Search
-from xosc_lateral.identification.terms.base import Removal
+from xosc_lateral.identification.model import Fitted, Removal
+from xosc_lateral.identification.regression import fit_model
+from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.selection import ERROR_BUDGET
 from xosc_lateral.identification.terms.time import StepTerm, TimeMeanTerm, TimeSpreadTerm, penalised
+from xosc_lateral.identification.timeline import Coarse
 
 SECONDS = 2400.0
 N = round(SECONDS / 0.2)
@@ -54,7 +57,7 @@ LEARNING = 0.8 * np.exp(-5.0 * SHARE)
 @pytest.mark.parametrize("shape", [RISE_AND_FALL, LEARNING], ids=["rises and falls", "dies away"])
 def test_a_spread_of_any_smooth_shape_is_found_and_put_where_it_was(shape: np.ndarray) -> None:
     term, p_value, coarse = spread_test(shape, 71)
-    assert p_value < ERROR_BUDGET.level_of("time_spread", 1)
+    assert p_value < ERROR_BUDGET["time_spread"]
     fitted = fit_model(coarse, (term,))
     (effect,) = fitted.terms[0].estimate(fitted)  # type: ignore[attr-defined]
     assert isinstance(effect, TimeSmooth)
@@ -67,7 +70,7 @@ def test_a_spread_of_any_smooth_shape_is_found_and_put_where_it_was(shape: np.nd
 def test_a_mean_that_dies_away_is_a_smooth_and_a_jump_a_step() -> None:
     smooth, p_smooth = mean_test(0.3 * np.exp(-3.0 * SHARE), 72)
     step, p_step = mean_test(0.25 * (SHARE > 0.4), 73)
-    level = ERROR_BUDGET.level_of("time_mean", 1)
+    level = ERROR_BUDGET["time_mean"]
     assert isinstance(smooth, TimeMeanTerm)
     assert p_smooth < level
     assert isinstance(step, StepTerm)
@@ -129,7 +132,7 @@ def test_what_is_removed_is_what_the_profile_gets() -> None:
     removal = Removal(np.zeros(len(timeline)))
     term.remove(fitted, effects, removal)  # type: ignore[attr-defined]
     inside = timeline.valid
-    sampled = effects[0].terms(timeline.time, {}, rng).location
+    sampled = whole_terms(effects[0], timeline.time, {}, rng).location
     np.testing.assert_allclose(np.diff(removal.location[inside]), np.diff(sampled[inside]), atol=1e-12)
     assert removal.location[inside].mean() == pytest.approx(0.0, abs=1e-9)
     assert (removal.spread == 0.0).all()
@@ -179,4 +182,4 @@ def test_drives_of_one_driver_change_alike() -> None:
     coarse = coarse_of(np.exp(shape) * own, drives=2)
     outcome = TimeSpreadTerm.test(search_of(coarse), fit_model(coarse, ()))
     assert outcome is not None
-    assert outcome.p_value < ERROR_BUDGET.level_of("time_spread", 2)
+    assert outcome.p_value < ERROR_BUDGET["time_spread"]

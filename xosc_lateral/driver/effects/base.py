@@ -11,17 +11,14 @@ References
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from xosc_lateral.driver.records import Record, kebab, plain
-
-FloatArray = NDArray[np.float64]
+from xosc_lateral.arrays import FloatArray, IntArray
+from xosc_lateral.driver.records import Record, kebab
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -40,7 +37,7 @@ class EffectTerms:
     rate: FloatArray | None = None
     fine: FloatArray | None = None
 
-    def rows(self, rows: slice | NDArray[np.int64]) -> EffectTerms:
+    def rows(self, rows: slice | IntArray) -> EffectTerms:
         """The same at some rows. Shape of `rows` each. [m], [-]"""
         return EffectTerms(*(None if value is None else value[rows] for value in self.parts))
 
@@ -65,19 +62,6 @@ class Effect(Record, frozen=True, kw_only=True, tag_field="kind", tag=kebab):
     def columns(self) -> tuple[str, ...]:
         """Context columns that it reads; empty for a hidden effect."""
         raise NotImplementedError
-
-    @abstractmethod
-    def terms(self, time: FloatArray, context: Mapping[str, FloatArray], rng: np.random.Generator) -> EffectTerms:
-        """Evaluate on a whole drive: even grid [s] and context columns, each in its own unit (NaN: none), shape (n,).
-
-        `rng` is for hidden effects only.
-        """
-        raise NotImplementedError
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain JSON values."""
-        values: dict[str, Any] = plain(self)
-        return values
 
 
 def step_of(time: FloatArray) -> float:

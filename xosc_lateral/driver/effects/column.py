@@ -15,20 +15,18 @@ from abc import abstractmethod
 from collections.abc import Iterable, Mapping
 from functools import reduce
 from operator import add
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import msgspec
 import numpy as np
 from msgspec.structs import replace
-from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects.base import Acts, Effect, EffectTerms, step_of, terms_of
+from xosc_lateral.arrays import FloatArray
+from xosc_lateral.driver.effects.base import Acts, Effect, EffectTerms, terms_of
 from xosc_lateral.driver.effects.response import Response, ResponseState, respond
-from xosc_lateral.driver.records import plain, set_once
+from xosc_lateral.driver.records import set_once
 from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.segment import FADES
-
-FloatArray = NDArray[np.float64]
 
 MAX_ORDER = 9
 """More lags in a row are a delay. [-]"""
@@ -62,6 +60,8 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         Lowest and highest response, per component, that the effect was fitted on; responses beyond are taken as these.
         Empty: no bounds. [unit of the quantity]
     """
+
+    later = ("between_drivers", "response_range", "response_order")
 
     words: ClassVar[str] = ""
     """For the report, fields of the effect in braces: "linear", "proximity (fades over {0.scale:.3g})" ..."""
@@ -201,11 +201,6 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         """Terms [m], [-] of responses, shape (n, k), in the unit of the quantity."""
         return terms_of(self.acts, self.weighed(response))
 
-    def terms(self, time: FloatArray, context: Mapping[str, FloatArray], rng: np.random.Generator) -> EffectTerms:
-        """Evaluate on an even time grid [s], shape (n,); `rng` is left untouched. See `Effect.terms`."""
-        strength = self.strength(step_of(time), context)
-        return EffectTerms() if strength is None else terms_of(self.acts, strength)
-
     def of_one_driver(self, rng: np.random.Generator) -> ColumnEffect:
         """The effect with one driver's coefficients, drawn from the population."""
         if not any(self.between_drivers):
@@ -213,17 +208,6 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         normal = rng.standard_normal(len(self.coefficients))
         drawn = np.asarray(self.coefficients) + np.asarray(self.between_drivers) * normal
         return replace(self, coefficients=tuple(drawn.tolist()), between_drivers=())
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain JSON values."""
-        values: dict[str, Any] = plain(self)
-        if not self.between_drivers:
-            del values["between_drivers"]
-        if not self.response_range:
-            del values["answer_range"]
-        if self.response_order == 1:
-            del values["response_order"]
-        return values
 
 
 def _finite(context: Mapping[str, FloatArray], columns: Iterable[str]) -> dict[str, FloatArray]:

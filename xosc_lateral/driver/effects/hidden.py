@@ -12,18 +12,15 @@ References
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects.base import FACTOR_LIMIT, Effect, EffectTerms, step_of
+from xosc_lateral.arrays import FloatArray
+from xosc_lateral.driver.effects.base import FACTOR_LIMIT, Effect, EffectTerms
 from xosc_lateral.driver.records import set_once
 from xosc_lateral.errors import DriverProfileError
-
-FloatArray = NDArray[np.float64]
 
 
 class NoState(msgspec.Struct):
@@ -65,16 +62,9 @@ class HiddenEffect(Effect, frozen=True, kw_only=True):
         `time` in the drive's clock, shape (n,), n >= 1, and `step` of the grid in [s].
         """
 
-    def terms(self, time: FloatArray, context: Mapping[str, FloatArray], rng: np.random.Generator) -> EffectTerms:
-        """Evaluate on a whole drive, even grid [s] of shape (n,); see `Effect.terms`."""
-        if not len(time):
-            return EffectTerms()
-        step = step_of(time)
-        return self.advance(self.begin(rng, step), time, step)
-
 
 class Adapted(HiddenEffect, frozen=True, kw_only=True):
-    """What makes another driver of a profile's (`pipeline.derive`).
+    """What makes another driver of a profile's (`identification.derive`).
 
     `shift` of the mean offset, positive left [m]; factors of `EffectTerms`, 1/5 to 5 [-].
     """

@@ -15,13 +15,11 @@ from typing import ClassVar
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.driver.effects.base import EffectTerms
 from xosc_lateral.driver.effects.hidden import HiddenEffect
 from xosc_lateral.driver.linear_filters import recur
-
-FloatArray = NDArray[np.float64]
 
 
 class DriftState(msgspec.Struct):
@@ -130,7 +128,7 @@ class Regimes(HiddenEffect, frozen=True, kw_only=True):
         """Regimes with exponential lengths, on an even grid [s] of shape (n,)."""
         return self.terms_where(self.states(state, time))
 
-    def states(self, state: RegimesState, time: FloatArray) -> NDArray[np.bool_]:
+    def states(self, state: RegimesState, time: FloatArray) -> BoolArray:
         """Whether the regime is on, shape of `time` [s], (n,)."""
         if state.begun_at is None:
             state.begun_at = float(time[0])
@@ -143,7 +141,7 @@ class Regimes(HiddenEffect, frozen=True, kw_only=True):
         switched = np.searchsorted(np.asarray(ends), elapsed, side="right") % 2 == 1
         return np.asarray(switched ^ first)
 
-    def terms_where(self, on: NDArray[np.bool_]) -> EffectTerms:
+    def terms_where(self, on: BoolArray) -> EffectTerms:
         """Terms for given regimes, shape of `on`."""
         return EffectTerms(spread=np.where(on, self.factor, 1.0), fine=np.where(on, self.fine_factor, 1.0))
 

@@ -11,13 +11,11 @@ from collections.abc import Mapping
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects.column import ColumnEffect
-from xosc_lateral.driver.effects.shapes import level_share
+from xosc_lateral.driver.effects.shapes import level_share, nearness, presence, proximity
 from xosc_lateral.driver.records import Record
-
-FloatArray = NDArray[np.float64]
 
 
 class Form(StrEnum):
@@ -53,12 +51,11 @@ class Factor(Record, frozen=True, kw_only=True):
         if self.form is Form.EQUALS:
             return level_share(np.asarray(column, dtype=np.float64), self.at)
         if self.form is Form.PRESENCE:
-            return np.asarray(np.isfinite(column), dtype=np.float64)
+            return presence(column)
         if self.form is Form.NEARNESS:
-            near = self.at / np.maximum(np.abs(column), self.at)
-            return np.nan_to_num(near, nan=0.0)
+            return nearness(column, self.at)
         if self.form is Form.PROXIMITY:
-            return np.nan_to_num(np.exp(-np.abs(column) / self.at), nan=0.0)
+            return proximity(column, self.at)
         return np.asarray(column, dtype=np.float64) - self.at
 
     def __str__(self) -> str:

@@ -11,11 +11,9 @@ import math
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.linear_filters import recur
-
-FloatArray = NDArray[np.float64]
 
 
 class ResponseState(msgspec.Struct):

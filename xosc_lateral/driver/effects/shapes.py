@@ -13,13 +13,11 @@ from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects.column import ColumnEffect
 from xosc_lateral.driver.records import set_once
 from xosc_lateral.errors import DriverProfileError
-
-FloatArray = NDArray[np.float64]
 
 
 class SingleColumnEffect(ColumnEffect, frozen=True, kw_only=True):
@@ -190,12 +188,8 @@ class Nearness(SingleColumnEffect, frozen=True, kw_only=True):
 
     def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
         """From 0 (none) to 1, shape (n, 1). [-]"""
-        distance = np.abs(context[self.column])
-        there = np.isfinite(distance)
-        if self.presence:
-            return there.astype(np.float64)[:, None]
-        near = self.scale / np.maximum(np.where(there, distance, 1.0), self.scale)
-        return np.where(there, near, 0.0)[:, None]
+        column = context[self.column]
+        return (presence(column) if self.presence else nearness(column, self.scale))[:, None]
 
 
 class Proximity(SingleColumnEffect, frozen=True, kw_only=True):
@@ -208,7 +202,7 @@ class Proximity(SingleColumnEffect, frozen=True, kw_only=True):
 
     def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
         """From 0 (none) to 1 (alongside), shape (n, 1). [-]"""
-        return np.nan_to_num(np.exp(-np.abs(np.asarray(context[self.column])) / self.scale), nan=0.0)[:, None]
+        return proximity(context[self.column], self.scale)[:, None]
 
 
 class Angular(SingleColumnEffect, frozen=True, kw_only=True):
@@ -227,3 +221,18 @@ class Angular(SingleColumnEffect, frozen=True, kw_only=True):
 def level_share(values: FloatArray, level: float) -> FloatArray:
     """How far whole numbers are at a level, shape (n,): between two, as a scenario's lanes come and go. [-]"""
     return np.nan_to_num(np.clip(1.0 - np.abs(values - level), 0.0, 1.0), nan=0.0)
+
+
+def presence(distance: FloatArray) -> FloatArray:
+    """1 where there is somebody, 0 where not (NaN, infinite), shape (n,). [-]"""
+    return np.asarray(np.isfinite(distance), dtype=np.float64)
+
+
+def nearness(distance: FloatArray, scale: float) -> FloatArray:
+    """scale / max(|distance|, scale), 0 where there is nobody, shape (n,). [-]"""
+    return np.nan_to_num(scale / np.maximum(np.abs(distance), scale), nan=0.0)
+
+
+def proximity(distance: FloatArray, scale: float) -> FloatArray:
+    """exp(-|distance| / scale), 0 where there is nobody, shape (n,). [-]"""
+    return np.nan_to_num(np.exp(-np.abs(distance) / scale), nan=0.0)

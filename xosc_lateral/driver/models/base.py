@@ -14,11 +14,9 @@ from enum import StrEnum
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.records import Record, kebab
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,13 +12,11 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.records import Record, frozen_array, set_once
 from xosc_lateral.drives.periodogram import periodograms
 from xosc_lateral.errors import DriverProfileError, NotEnoughDataError
-
-FloatArray = NDArray[np.float64]
 
 N_KNOTS = 11
 """Knots of the damping function, evenly from 0 to half the sampling rate. [-]"""

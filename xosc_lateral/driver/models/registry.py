@@ -8,16 +8,12 @@ from functools import cache, reduce
 from operator import or_
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
 from xosc_lateral.driver.models.base import CoreModel
 from xosc_lateral.driver.models.two_level.model import TwoLevelModel
 from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.plugins import entry_points
-
-FloatArray = NDArray[np.float64]
 
 ENTRY_POINTS = "xosc_lateral.models"
 """Group of entry points under which other packages offer core models: each names a `KnownModel`."""

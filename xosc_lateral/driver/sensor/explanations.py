@@ -15,14 +15,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.digits import significant
-from xosc_lateral.driver.sensor.likelihood import Colour, Known, Solution, solve
-from xosc_lateral.driver.sensor.periodogram import Periodogram
+from xosc_lateral.driver.sensor.likelihood import Colour, Measured, Solution, solve
 from xosc_lateral.driver.sensor.second_view import SecondView
-
-FloatArray = NDArray[np.float64]
 
 ORDERS = (1, 2, 4)
 SLOWEST, FASTEST, GRID = 0.05, 1.4, 1.3
@@ -45,35 +41,26 @@ class Explanation:
     criterion: float
 
 
-def explanations(
-    data: Periodogram,
-    base: FloatArray,
-    known: Known | None,
-    view: SecondView | None = None,
-    *,
-    only_view: bool = False,
-) -> list[Explanation]:
-    """All that were tried; of a second view, also or only what it shows. Other arguments as for `solve`."""
+def explanations(measured: Measured, view: SecondView | None = None, *, only_view: bool = False) -> list[Explanation]:
+    """All that were tried; of a second view, also or only what it shows."""
     seen = [] if view is None else [Colour(alone=alone, view=view) for alone in (False, True)]
-    found = [_explanation(data, colour, base, known) for colour in seen]
+    found = [_explanation(measured, colour) for colour in seen]
     if found and only_view:
         return found
-    found.append(_explanation(data, Colour(), base, known))
+    found.append(_explanation(measured, Colour()))
     for order in ORDERS:
         for alone in (False, True):
-            found += _of_family(data, order, alone, base, known)
+            found += _of_family(measured, order, alone)
     return found
 
 
-def _of_family(
-    data: Periodogram, order: int, alone: bool, base: FloatArray, known: Known | None
-) -> Iterator[Explanation]:
+def _of_family(measured: Measured, order: int, alone: bool) -> Iterator[Explanation]:
     """Over a grid of corners, and between the neighbours of the best."""
     from scipy.optimize import minimize_scalar
 
     count = int(np.ceil(np.log(FASTEST / SLOWEST) / np.log(GRID))) + 1
     corners = [_in_digits(c) for c in np.geomspace(SLOWEST, FASTEST, count) if c >= LEAST_CORNER[order]]
-    grid = [_explanation(data, Colour(order, corner, alone), base, known) for corner in corners]
+    grid = [_explanation(measured, Colour(order, corner, alone)) for corner in corners]
     yield from grid
     at = int(np.argmin([one.criterion for one in grid]))
     low, high = (float(np.log(corners[k])) for k in (max(at - 1, 0), min(at + 1, len(corners) - 1)))
@@ -81,7 +68,7 @@ def _of_family(
 
     def lacking(log_corner: float) -> float:
         colour = Colour(order, _in_digits(np.exp(log_corner)), alone)
-        tried.append(_explanation(data, colour, base, known, grid[at].solution))
+        tried.append(_explanation(measured, colour, grid[at].solution))
         return tried[-1].criterion
 
     minimize_scalar(lacking, bounds=(low, high), method="bounded", options={"maxiter": CLIMB, "xatol": 0.01})
@@ -93,15 +80,13 @@ def _in_digits(corner: float) -> float:
     return significant(corner, 3)
 
 
-def _explanation(
-    data: Periodogram, colour: Colour, base: FloatArray, known: Known | None, start: Solution | None = None
-) -> Explanation:
+def _explanation(measured: Measured, colour: Colour, start: Solution | None = None) -> Explanation:
     """White noise has a level, a low-passed part a level and a corner: so many numbers are paid for.
 
     A second view has a level, too, and a shape that is known from as many windows as the data: its own chance costs a
     likelihood as much as fitting its knots would gain, half for each, which is given back.
     """
-    found = solve(data, colour, base, known, start)
+    found = solve(measured, colour, start)
     numbers = 2 * bool(colour.order) + (colour.view is not None) + (not colour.alone)
     own_chance = 0 if colour.view is None else len(colour.view.knots)
-    return Explanation(found, colour, 2.0 * found.loss + numbers * float(np.log(data.count)) - own_chance)
+    return Explanation(found, colour, 2.0 * found.loss + numbers * float(np.log(measured.data.count)) - own_chance)

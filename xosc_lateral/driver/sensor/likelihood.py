@@ -10,13 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.sensor.periodogram import Periodogram, climb
 from xosc_lateral.driver.sensor.second_view import LEVEL_SD, SecondView
 from xosc_lateral.driver.sensor.vehicle_bound import KNOTS, N_KNOTS, N_STATE, interpolation, prior
-
-FloatArray = NDArray[np.float64]
 
 ABOVE = 1.0
 """No driver is seen above this in a sensor worth splitting: where white noise is estimated at first. [Hz]"""
@@ -97,11 +95,22 @@ class Solution:
         return np.asarray(np.exp(self.colour) * colour.shape(frequency))
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Measured:
+    """What driver and sensor are to explain."""
+
+    data: Periodogram
+    base: FloatArray
+    """Density of the sensor's that is known already, at the data's frequencies, shape (n,). [m2/Hz]"""
+    known: Known | None = None
+
+
 class _Problem:
     """Loss, gradient and Fisher information at a point (state, white, colour)."""
 
-    def __init__(self, data: Periodogram, colour: Colour, base: FloatArray, known: Known | None) -> None:
-        self.data, self.base, self.known = data, base, known
+    def __init__(self, measured: Measured, colour: Colour) -> None:
+        data, known = measured.data, measured.known
+        self.data, self.base, self.known = data, measured.base, known
         self.matrix = interpolation(data.frequency)
         self.shape = colour.shape(data.frequency) if colour.is_there else None
         self.integral = colour.integral(0.5 * known.rate) if colour.is_there and known else 0.0
@@ -178,18 +187,9 @@ class _Problem:
         return rows
 
 
-def solve(
-    data: Periodogram,
-    colour: Colour,
-    base: FloatArray,
-    known: Known | None = None,
-    start: Solution | None = None,
-) -> Solution:
-    """Most likely driver and sensor for a given colour of the sensor, climbed to from one of the same colour.
-
-    `base`, shape (n,), is a density of the sensor's that is known already, at the data's frequencies. [m2/Hz]
-    """
-    problem = _Problem(data, colour, base, known)
+def solve(measured: Measured, colour: Colour, start: Solution | None = None) -> Solution:
+    """Most likely driver and sensor for a given colour of the sensor, climbed to from one of the same colour."""
+    problem = _Problem(measured, colour)
     point = problem.start() if start is None else np.array([*start.state, start.white, start.colour])[: problem.size]
     point, loss = climb(problem.at, point)
     coloured = float(point[N_STATE + 1]) if colour.is_there else -np.inf

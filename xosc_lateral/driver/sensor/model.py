@@ -9,17 +9,14 @@ References
 from __future__ import annotations
 
 from math import isfinite
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from xosc_lateral.driver.records import Record, plain
+from xosc_lateral.arrays import FloatArray
+from xosc_lateral.driver.records import Record
 from xosc_lateral.driver.sensor.likelihood import Colour
 from xosc_lateral.drives.filters import scale_frequencies
 from xosc_lateral.errors import DriverProfileError
-
-FloatArray = NDArray[np.float64]
 
 HIGHEST = 1.5
 """Runs are low-passed here on being resampled to 5 Hz, and so is what is sampled. [Hz]"""
@@ -27,6 +24,8 @@ HIGHEST = 1.5
 
 class SensorModel(Record, frozen=True):
     """The sensor's part of what was measured. Raises `DriverProfileError` if a number is negative or no number."""
+
+    later = ("second_view",)
 
     white: float
     """One-sided power density of the white part. [m2/Hz]"""
@@ -57,13 +56,6 @@ class SensorModel(Record, frozen=True):
         """Of the driver in the measured variance. [-]"""
         total = self.driver_variance + self.sensor_variance
         return self.driver_variance / total if total > 0 else 1.0
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain JSON values, as a profile's file holds them."""
-        values: dict[str, Any] = plain(self)
-        if not self.second_view:
-            del values["second_view"]  # as files had it before there were second views
-        return values
 
     def in_words(self) -> str:
         """How the measured variance is split, and what is known of the error, in a sentence."""

@@ -14,12 +14,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.drives.periodogram import Detrend, periodograms
 from xosc_lateral.errors import NotEnoughDataError
-
-FloatArray = NDArray[np.float64]
 
 WINDOWS = (102.4, 51.2, 25.6, 12.8)
 """Lengths of window, the first of which there are at least `ENOUGH`; a longer one sees slower movement. [s]"""

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from xosc_lateral.arrays import FloatArray
 
 LEAST_STEP = 0.004
 """Finer steps add less than 2e-6 m2, below any sensor's own noise. [m]"""

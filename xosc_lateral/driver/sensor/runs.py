@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.periodogram import WINDOWS
 from xosc_lateral.driver.sensor.separation import separate
 from xosc_lateral.drives.drive import Drive, Run
 from xosc_lateral.drives.resampling import STEP, resample
-
-FloatArray = NDArray[np.float64]
 
 
 def driver_runs(

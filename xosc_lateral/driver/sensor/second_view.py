@@ -21,11 +21,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.sensor.periodogram import Periodogram, climb, periodogram, windows_of
-
-FloatArray = NDArray[np.float64]
 
 LEVEL_SD = 0.5
 """Of the logarithm of the offset's error's power over the half width's, about 0 (docs/design/markings.md shows how

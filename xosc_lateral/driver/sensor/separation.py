@@ -13,11 +13,11 @@ from dataclasses import replace as replaced
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.digits import all_significant
 from xosc_lateral.driver.sensor.explanations import Explanation, explanations
-from xosc_lateral.driver.sensor.likelihood import Colour, Known, Solution, solve
+from xosc_lateral.driver.sensor.likelihood import Colour, Known, Measured, Solution, solve
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.periodogram import Periodogram, periodogram, windows_of
 from xosc_lateral.driver.sensor.quantisation import COARSEST, quantisation_step, rounding_density, uniform_variance
@@ -26,8 +26,6 @@ from xosc_lateral.driver.sensor.vehicle_bound import density
 from xosc_lateral.drives.filters import scale_frequencies
 from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.normal import NORMAL_95
-
-FloatArray = NDArray[np.float64]
 
 PLAUSIBLE = 6.0
 """Explanations whose information criterion is within this of the best count for the interval: e^-3 as likely. [-]"""
@@ -121,9 +119,9 @@ def separate(
     rounding = _rounding(data, grain, variance, per_second) if is_rounded else _no_density
     rounded_off = uniform_variance(grain) if is_rounded else 0.0
     known = None if sensor_noise is None else Known(sensor_noise, per_second, rounded_off)
-    base = rounding(data.frequency)
+    asked = Measured(data, rounding(data.frequency), known)
     view = second_view(half_widths, step) if half_widths else None
-    found = explanations(data, base, known, view, only_view=one_camera)
+    found = explanations(asked, view, only_view=one_camera)
     least = _taken(found)
     best, colour = least.solution, least.colour
     beside = _with_view(rounding, best, colour)
@@ -133,10 +131,8 @@ def separate(
     share = min(driver, max(variance - error, 0.0)) / variance if variance > 0.0 else 1.0
     plausible = [(one.solution, one.colour) for one in found if one.criterion < least.criterion + PLAUSIBLE]
     if colour.view is not None:
-        plausible += [(solve(data, one, base, known, best), one) for one in _other_views(colour, colour.view)]
-    interval = (
-        (0.0, 1.0) if too_coarse else _interval(frequency, windows, best, colour, base, known, plausible, share, data)
-    )
+        plausible += [(solve(asked, one, best), one) for one in _other_views(colour, colour.view)]
+    interval = (0.0, 1.0) if too_coarse else _interval(frequency, windows, least, asked, plausible, share)
     sensor = _sensor(best, colour, grain, share * variance, (1.0 - share) * variance, interval)
     return Separation(best.knots, sensor, beside)
 
@@ -202,7 +198,7 @@ def _rounding(data: Periodogram, grain: float, variance: float, rate: float) -> 
     level = 2.0 * error / rate  # white, to begin with
     shape: Callable[[FloatArray], FloatArray] = lambda frequency: np.full(np.shape(frequency), level)  # noqa: E731
     for _ in range(ROUNDING_ROUNDS):
-        found = solve(data, Colour(), shape(data.frequency))
+        found = solve(Measured(data, shape(data.frequency)), Colour())
         noise = min(0.5 * float(np.exp(found.white)) * rate, MOST_NOISE * (variance - error))
         spectrum = partial(density, found.knots)
         shape = rounding_density(grain, spectrum, variance - error - noise, rate=rate, noise=noise)
@@ -232,15 +228,13 @@ def _in_band(found: Solution, colour: Colour, data: Periodogram) -> float:
 def _interval(
     frequency: FloatArray,
     windows: FloatArray,
-    best: Solution,
-    colour: Colour,
-    base: FloatArray,
-    known: Known | None,
+    taken: Explanation,
+    measured: Measured,
     plausible: Sequence[tuple[Solution, Colour]],
     share: float,
-    data: Periodogram,
 ) -> tuple[float, float]:
     """95 % interval of the driver's share: over what else would explain the data, and over blocks left out."""
+    best, colour, data = taken.solution, taken.colour, measured.data
     seen = float((data.density[:-1] * np.diff(data.frequency)).sum())
     levels = np.array([_in_band(one, shape, data) for one, shape in plausible]) - _in_band(best, colour, data)
     blocks = np.array_split(np.arange(len(windows)), min(BLOCKS, len(windows)))
@@ -249,7 +243,7 @@ def _interval(
         others = np.setdiff1d(np.arange(len(windows)), block)
         if len(others):
             part = periodogram(frequency, windows[others])
-            left_out.append(_in_band(solve(part, colour, base, known, best), colour, part))
+            left_out.append(_in_band(solve(replaced(measured, data=part), colour, best), colour, part))
     error = np.sqrt((len(blocks) - 1) * np.var(left_out)) if len(left_out) > 1 else seen
     if colour.view is not None:
         error = np.hypot(error, _chance(best, colour, data))

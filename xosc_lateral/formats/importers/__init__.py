@@ -11,11 +11,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 from xosc_lateral.errors import FormatError
+from xosc_lateral.lazy import pd
 from xosc_lateral.plugins import plugins
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from xosc_lateral.formats.importers.table import Imported
 
 Importer: TypeAlias = "Callable[..., Imported | pd.DataFrame]"
@@ -38,10 +37,7 @@ GROUP = "xosc_lateral.importers"
 
 
 def find_importer(name: str) -> Importer:
-    """The reader of a format.
-
-    Raises `FormatError` if there is none.
-    """
+    """The reader of a format. Raises `FormatError` if there is none."""
     if name in IMPORTERS:
         module, _, function = IMPORTERS[name].partition(":")
         return cast("Importer", getattr(import_module(module), function))

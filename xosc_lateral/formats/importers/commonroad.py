@@ -15,24 +15,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings
 from xosc_lateral.formats.importers.lane_shapes import LaneShape, curvature_along, place_in_shapes
-from xosc_lateral.formats.importers.placed import (
-    LaneGraph,
-    ground_speed,
-    import_each,
-    import_placed,
-    travel_heading,
-)
+from xosc_lateral.formats.importers.placed import LaneGraph, import_each, import_placed
 from xosc_lateral.formats.importers.table import Imported, guarded
-from xosc_lateral.formats.importers.track_table import Tracks
+from xosc_lateral.formats.importers.track_table import Tracks, ground_speed, travel_heading
 from xosc_lateral.formats.xml import read_xml
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 LICENCE = "that of the CommonRoad scenario and of the recording that it was made from"
 
@@ -82,13 +73,11 @@ def _opened(path: Path) -> Any:
     try:
         from commonroad.common.file_reader import CommonRoadFileReader
     except ImportError as error:
-        raise FormatError(
-            "reading CommonRoad needs commonroad-io: pip install 'xosc-lateral[commonroad]'", path=path
-        ) from error
+        what = "reading CommonRoad needs commonroad-io: pip install 'xosc-lateral[commonroad]'"
+        raise FormatError(what, path=path) from error
     except TypeError as error:  # what its generated code raises under another protobuf
-        raise FormatError(
-            "commonroad-io needs protobuf 3.20, the extra `osi` a later one: use an environment for each", path=path
-        ) from error
+        what = "commonroad-io needs protobuf 3.20, the extra `osi` a later one: use an environment for each"
+        raise FormatError(what, path=path) from error
     read_xml(path)  # no entities, and no larger than ours may be
     try:
         scenario, _ = CommonRoadFileReader(str(path)).open()
@@ -99,10 +88,7 @@ def _opened(path: Path) -> Any:
 
 
 def read_obstacles(path: Path) -> Tracks:
-    """All obstacles that move along a recorded trajectory.
-
-    Raises `FormatError`, `NotEnoughDataError`.
-    """
+    """All obstacles that move along a recorded trajectory. Raises `FormatError`, `NotEnoughDataError`."""
     return _tracks(_opened(path), path)
 
 
@@ -147,7 +133,8 @@ class _Lanelet(LaneShape):
 
     def place(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, ...]:
         """See `LaneShape`."""
-        about = np.stack([x, y], axis=1)[:, None] - self.centre[None, :-1]
+        points = np.stack([x, y], axis=1)
+        about = points[:, None] - self.centre[None, :-1]
         size2 = np.maximum(self.size**2, 1e-12)
         share = np.clip((about * self.step).sum(axis=2) / size2, 0.0, 1.0)
         away = ((about - share[:, :, None] * self.step) ** 2).sum(axis=2)
@@ -159,15 +146,10 @@ class _Lanelet(LaneShape):
         direction = self.direction[k]
         normal = np.stack([-np.sin(direction), np.cos(direction)], axis=1)
         middle = 0.5 * (left + right)
-        offset = ((np.stack([x, y], axis=1) - middle) * normal).sum(axis=1)
+        offset = ((points - middle) * normal).sum(axis=1)
         width = ((left - right) * normal).sum(axis=1)
         way = self.start[k] + u[:, 0] * self.size[k]
-        beyond = self._beyond(x, y, k)
+        before = (k == 0) & ((points - self.centre[0]) @ self.step[0] < 0)
+        past = (k == len(self.size) - 1) & ((points - self.centre[-1]) @ self.step[-1] > 0)
         curvature = curvature_along(self.start, self.direction, way)
-        return np.where(beyond, np.nan, way), offset, width, direction, curvature
-
-    def _beyond(self, x: FloatArray, y: FloatArray, k: NDArray[np.intp]) -> NDArray[np.bool_]:
-        """Where a point lies before the start or past the end, shape (n,); `k`: the piece nearest to it."""
-        at_start = (k == 0) & (((np.stack([x, y], axis=1) - self.centre[0]) @ self.step[0]) < 0)
-        at_end = (k == len(self.size) - 1) & (((np.stack([x, y], axis=1) - self.centre[-1]) @ self.step[-1]) > 0)
-        return np.asarray(at_start | at_end)
+        return np.where(before | past, np.nan, way), offset, width, direction, curvature

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.drives.cleaning import RUN
+from xosc_lateral.lazy import pd
 
 RATE_WINDOW = 0.5  # [s]; the lateral speed is a central difference over this
 KEPT = "kept"
@@ -40,18 +42,10 @@ DEFAULT_CUTS = CutSettings()
 def lane_changes(
     x: FloatArray, offset: FloatArray, lane: IntArray, vehicle: IntArray, step: float, settings: CutSettings
 ) -> BoolArray:
-    """Rows from where a vehicle sets off towards another lane to where it has settled there.
+    """Rows from where a vehicle sets off towards another lane to where it has settled there; arrays of shape (n,).
 
-    Parameters
-    ----------
-    x : array, shape (n,)
-        Lateral position, continuous through lane changes; NaN where unknown. [m]
-    offset : array, shape (n,)
-        From the centre of its lane; NaN where unknown. [m]
-    lane, vehicle : array of int, shape (n,)
-        Rows sorted by vehicle and time.
-    step : float
-        Between two rows of a vehicle. [s]
+    `x`: lateral position, continuous through lane changes. [m] `offset`: from the centre of its lane. [m] Both NaN
+    where unknown; rows sorted by vehicle and time, `step` apart. [s]
     """
     changing = np.zeros(len(x), dtype=np.bool_)
     reach, margin = round(settings.longest_change / step), round(settings.margin / step)
@@ -113,6 +107,37 @@ def number_runs(state: NDArray[np.str_], lane: IntArray, vehicle: IntArray, fram
     counted = np.cumsum(begins)
     start = np.searchsorted(vehicle, vehicle, side="left")
     return np.where(kept, counted - 1 - (counted - begins)[start], -1)
+
+
+class Rows(NamedTuple):
+    """Whose rows they are, when and where; sorted by vehicle and frame, shape (n,)."""
+
+    vehicle: IntArray
+    frame: IntArray
+    lane: IntArray  # a number that changes with the lane
+    step: float  # between two frames [s]
+
+
+def cut_table(
+    columns: Mapping[str, Any],
+    rows: Rows,
+    settings: CutSettings,
+    *,
+    sideways: FloatArray,
+    reasons: Mapping[str, BoolArray],
+    kind: NDArray[Any],
+    is_truck: BoolArray,
+) -> pd.DataFrame:
+    """The drive table: these columns, classes of vehicles, numbers of kept stretches, and `state`.
+
+    `sideways`: lateral position, continuous through lane changes. [m] `reasons`: for cuts besides lane changes.
+    """
+    vehicle, frame, lane, step = rows
+    changing = lane_changes(sideways, columns["offset"], lane, vehicle, step, settings)
+    state = name_states({**reasons, "lane change": changing}, lane, vehicle, frame, step, settings)
+    runs = number_runs(state, lane, vehicle, frame)
+    more = {"vehicle_class": kind, "is_truck": is_truck.astype(np.float64), RUN: runs, "state": state}
+    return pd.DataFrame({**columns, **more})
 
 
 def _kept_runs(state: NDArray[np.str_], lane: IntArray, vehicle: IntArray, frame: IntArray) -> IntArray:

@@ -18,14 +18,16 @@ What a reader of the table has to know:
 from __future__ import annotations
 
 import io
+import re
 import zipfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.drives.cleaning import RUN
 from xosc_lateral.drives.filters import filtered, low_pass_between
 from xosc_lateral.errors import FormatError, NotEnoughDataError
@@ -41,13 +43,8 @@ from xosc_lateral.formats.importers.lanes_from_tracks import LaneCentreLine, fit
 from xosc_lateral.formats.importers.neighbours import find_neighbours
 from xosc_lateral.formats.importers.road_from_tracks import ReferenceLine, fit_reference_line
 from xosc_lateral.formats.importers.table import Imported, finished, guarded
-from xosc_lateral.formats.source import Source, open_source
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from xosc_lateral.formats.source import open_source
+from xosc_lateral.lazy import pd
 
 LANES = 2  # through lanes per direction of the A39 there; ramps and their merging lanes are left out
 STEP = 0.05  # [s]
@@ -105,8 +102,6 @@ def import_dlr_ht(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cu
 
 def read_tracks(source: Path) -> pd.DataFrame:
     """All rows, sorted by vehicle and time, with `time` [s] from the first instant and `vehicle` counted from 0."""
-    import pandas as pd
-
     frame = pd.concat([_read_csv(stream, source) for stream in _trajectory_files(source)], ignore_index=True)
     try:
         stamps = pd.to_datetime(frame["timestamp"], utc=True)
@@ -120,37 +115,29 @@ def read_tracks(source: Path) -> pd.DataFrame:
     return frame
 
 
-def _trajectory_files(source: Path) -> list[io.BufferedIOBase]:
+def _trajectory_files(source: Path) -> list[io.BytesIO]:
     """The trajectory CSV files in a CSV, a zip, or a zip in a wheel."""
     with open_source(source) as opened:
-        is_packed = zipfile.is_zipfile(opened.file)
-        opened.file.seek(0)
-        if not is_packed:
+        if not zipfile.is_zipfile(opened.file):
+            opened.file.seek(0)
             return [io.BytesIO(opened.file.read())]
-        return _packed_files(opened)
-
-
-def _packed_files(opened: Source) -> list[io.BufferedIOBase]:
-    source = opened.path
-    try:
-        archive = zipfile.ZipFile(opened.file)
-        opened.unpacked(sum(item.file_size for item in archive.infolist()))
-        inner = [name for name in archive.namelist() if "DLR-Highway-Traffic" in name and name.endswith(".zip")]
-        if inner:
-            archive = zipfile.ZipFile(io.BytesIO(archive.read(sorted(inner)[-1])))
+        try:
+            archive = zipfile.ZipFile(opened.file)
             opened.unpacked(sum(item.file_size for item in archive.infolist()))
-        names = sorted(name for name in archive.namelist() if "/trajectories" in name and name.endswith(".csv"))
-        files: list[io.BufferedIOBase] = [io.BytesIO(archive.read(name)) for name in names]
-    except zipfile.BadZipFile as error:
-        raise FormatError(f"damaged zip: {error}", path=source) from error
+            inner = [name for name in archive.namelist() if "DLR-Highway-Traffic" in name and name.endswith(".zip")]
+            if inner:
+                archive = zipfile.ZipFile(io.BytesIO(archive.read(sorted(inner)[-1])))
+                opened.unpacked(sum(item.file_size for item in archive.infolist()))
+            names = sorted(name for name in archive.namelist() if "/trajectories" in name and name.endswith(".csv"))
+            files = [io.BytesIO(archive.read(name)) for name in names]
+        except zipfile.BadZipFile as error:
+            raise FormatError(f"damaged zip: {error}", path=source) from error
     if not files:
         raise FormatError("holds no DLR Highway Traffic trajectories (trajectories_*.csv)", path=source)
     return files
 
 
-def _read_csv(stream: io.BufferedIOBase, source: Path) -> pd.DataFrame:
-    import pandas as pd
-
+def _read_csv(stream: io.BytesIO, source: Path) -> pd.DataFrame:
     with stream:
         head = stream.readline().decode("utf-8", "replace").strip().split(",")
         missing = [name for name in COLUMNS if name not in head]
@@ -162,42 +149,26 @@ def _read_csv(stream: io.BufferedIOBase, source: Path) -> pd.DataFrame:
         except ValueError as error:  # pandas' and pyarrow's parser errors are both of this kind
             raise FormatError(f"can't be read as CSV: {error}", path=source) from error
     for name in frame.columns.drop("timestamp"):
-        _check_numbers(frame[name], source)
+        numbers = pd.to_numeric(frame[name], errors="coerce").to_numpy(dtype=np.float64)
+        if not np.isfinite(numbers).all():
+            row = int(np.argmin(np.isfinite(numbers)))
+            raise FormatError(f"no number: {frame[name].iloc[row]}", path=source, line=row + 2, element=name)
     return frame
 
 
-def _check_numbers(column: pd.Series, source: Path) -> None:
-    """Refuse text and missing values, with the line of the first."""
-    import pandas as pd
-
-    numbers = pd.to_numeric(column, errors="coerce").to_numpy(dtype=np.float64)
-    if not np.isfinite(numbers).all():
-        row = int(np.argmin(np.isfinite(numbers)))
-        raise FormatError(f"no number: {column.iloc[row]}", path=source, line=row + 2, element=str(column.name))
-
-
-def travels_north(tracks: pd.DataFrame) -> NDArray[np.bool_]:
+def travels_north(tracks: pd.DataFrame) -> BoolArray:
     """Carriageway of each row, by its vehicle's mean velocity, shape (n,)."""
     mean = tracks.groupby("vehicle")["velocity_northing"].transform("mean")
     return np.asarray(mean.to_numpy() > 0.0)
 
 
-@dataclass(frozen=True, eq=False)
-class _Placed:
-    """Each row's place across the road."""
+class _Placed(NamedTuple):
+    """Each row's place across the road, shape (n,)."""
 
     lane: IntArray
     offset: FloatArray
     width: FloatArray
-    changing: NDArray[np.bool_]
-
-    @classmethod
-    def empty(cls, n: int) -> _Placed:
-        return cls(np.full(n, -1), np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=np.bool_))
-
-    def put(self, rows: IntArray, part: _Placed) -> None:
-        self.lane[rows], self.offset[rows] = part.lane, part.offset
-        self.width[rows], self.changing[rows] = part.width, part.changing
+    changing: BoolArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,9 +176,9 @@ class Carriageways:
     """The road's reference line, lane centres of both directions (right to left), and every row's place in them."""
 
     reference: ReferenceLine
-    forward: NDArray[np.bool_]
+    forward: BoolArray
     s: FloatArray
-    gap: NDArray[np.bool_]
+    gap: BoolArray
     placed: _Placed
     lanes: dict[str, list[LaneCentreLine]]
 
@@ -222,12 +193,14 @@ def find_lanes(tracks: pd.DataFrame, settings: CutSettings = DEFAULT_CUTS) -> Ca
     d = np.where(forward, d_road, -d_road)
     vehicle, height = tracks["vehicle"].to_numpy(), tracks["dimension_height"].to_numpy()
     gap = long_gaps(tracks["interpolated"].to_numpy(), vehicle, STEP, settings.max_gap)
-    placed = _Placed.empty(len(tracks))
+    n = len(tracks)
+    placed = _Placed(np.full(n, -1), np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=np.bool_))
     lanes: dict[str, list[LaneCentreLine]] = {}
     for name, mine in (("northbound", forward), ("southbound", ~forward)):
         rows = np.flatnonzero(mine)
         part, lanes[name] = _place_in_lanes(s[rows], d[rows], height[rows], vehicle[rows], gap[rows], settings)
-        placed.put(rows, part)
+        placed.lane[rows], placed.offset[rows] = part.lane, part.offset
+        placed.width[rows], placed.changing[rows] = part.width, part.changing
     return Carriageways(reference, forward, s_road, gap, placed, lanes)
 
 
@@ -240,12 +213,7 @@ def _slow(d: FloatArray, tracks: pd.DataFrame) -> FloatArray:
 
 
 def _place_in_lanes(
-    s: FloatArray,
-    d: FloatArray,
-    height: FloatArray,
-    vehicle: IntArray,
-    gap: NDArray[np.bool_],
-    settings: CutSettings,
+    s: FloatArray, d: FloatArray, height: FloatArray, vehicle: IntArray, gap: BoolArray, settings: CutSettings
 ) -> tuple[_Placed, list[LaneCentreLine]]:
     """Lane centres of one carriageway, and every row's lane and offset. Rounds, since each needs the other."""
     levels = _levels(d)
@@ -270,7 +238,7 @@ def _place_in_lanes(
 
 def _place(
     d: FloatArray, centre: FloatArray, bend: FloatArray, width: float, vehicle: IntArray, settings: CutSettings
-) -> tuple[IntArray, FloatArray, NDArray[np.bool_]]:
+) -> tuple[IntArray, FloatArray, BoolArray]:
     """Lane, offset (NaN in no lane) and whether a lane change is on."""
     lane = _nearest_lane(d, centre, width)
     offset = np.where(lane >= 0, d - centre[np.clip(lane, 0, None), np.arange(len(d))], np.nan)
@@ -303,17 +271,15 @@ def _nearest_lane(d: FloatArray, centre: FloatArray, width: float) -> IntArray:
     return np.where(away.min(axis=0) <= width * 0.55, nearest, -1)
 
 
-def _each(passage: IntArray, every: int) -> NDArray[np.bool_]:
+def _each(passage: IntArray, every: int) -> BoolArray:
     """True for every n-th row of each passage, from its first."""
     start = np.flatnonzero(np.r_[True, passage[1:] != passage[:-1]])
     position = np.arange(len(passage)) - np.repeat(start, np.diff(np.r_[start, len(passage)]))
     return np.asarray(position % every == 0)
 
 
-def _context(tracks: pd.DataFrame, placed: _Placed, s: FloatArray, forward: NDArray[np.bool_]) -> pd.DataFrame:
+def _context(tracks: pd.DataFrame, placed: _Placed, s: FloatArray, forward: BoolArray) -> pd.DataFrame:
     """The drive table's columns, for every row of the tracks."""
-    import pandas as pd
-
     kind = vehicle_classes(tracks)
     frame = np.round(tracks["time"].to_numpy() / STEP).astype(np.int64) * 2 + forward
     near = find_neighbours(
@@ -361,8 +327,6 @@ def _describe(carriageway: str, index: int, lane: LaneCentreLine) -> dict[str, o
 
 def _version(source: Path) -> str:
     """Version of the data set, as the name of the folder or zip gives it."""
-    import re
-
     names = [str(source)]
     if zipfile.is_zipfile(source):
         names += zipfile.ZipFile(source).namelist()

@@ -14,9 +14,10 @@ import numpy as np
 
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.importers.neighbours import find_neighbours
+from xosc_lateral.formats.importers.table import guarded
+from xosc_lateral.lazy import pd
 
 if TYPE_CHECKING:
-    import pandas as pd
     from lxml import etree
 
 WIDTH = 3.2
@@ -28,23 +29,14 @@ LENGTHS = {False: 5.0, True: 7.1}
 _TRUCKS = ("truck", "trailer", "bus", "coach", "lkw")
 
 
+@guarded
 def import_fcd(source: Path, *, net: str | Path | None = None, lane_width: float = WIDTH) -> pd.DataFrame:
-    """A drive for every vehicle.
+    """A drive for every vehicle of what ``--fcd-output`` wrote; it is a truck when its type's name says so.
 
-    A vehicle is a truck when its type's name says so. Raises `FormatError`, `NotEnoughDataError`: not such a file; one
-    without `posLat`; one without vehicles.
+    Raises `FormatError`, `NotEnoughDataError`: not such a file; one without `posLat`; one without vehicles.
 
-    Parameters
-    ----------
-    source : Path
-        What ``--fcd-output`` wrote, ``.xml``.
-    net : path, optional
-        The road network, ``.net.xml``, for widths and counts of lanes.
-    lane_width : float
-        Where there is no net. [m]
+    `net`: the road network, ``.net.xml``, for widths and counts of lanes. `lane_width`: without it. [m]
     """
-    import pandas as pd
-
     widths = {} if net is None else _lanes(Path(net))
     rows = list(_rows(source))
     if not rows:
@@ -82,14 +74,12 @@ def _rows(source: Path) -> Iterator[tuple[float, str, str, float, float, float, 
                 element.clear()
         elif event == "start" and not element.get("lane", "").startswith(":"):  # inside a junction
             if not found:
-                raise FormatError("a vehicle outside a timestep", path=source, line=_line(element))
+                raise _wrong("a vehicle outside a timestep", element, source)
             if element.get("posLat") is None:
-                raise FormatError(
-                    "no posLat: it is written with the sublane model and --fcd-output.attributes all",
-                    path=source, line=_line(element), element="vehicle",
-                )  # fmt: skip
+                what = "no posLat: it is written with the sublane model and --fcd-output.attributes all"
+                raise _wrong(what, element, source)
             if element.get("lane") is None or element.get("id") is None:
-                raise FormatError("no id or lane", path=source, line=_line(element), element="vehicle")
+                raise _wrong("no id or lane", element, source)
             place, side, speed = (_number(element, name, source) for name in ("pos", "posLat", "speed"))
             yield time, str(element.get("id")), str(element.get("lane")), place, side, speed, element.get("type", "")
 
@@ -117,9 +107,9 @@ def _elements(path: Path, tags: tuple[str, ...]) -> Iterator[tuple[str, etree._E
         raise FormatError(f"not XML: {error.msg}", path=path, line=error.lineno) from error
 
 
-def _line(element: etree._Element) -> int | None:
+def _wrong(what: str, element: etree._Element, path: Path) -> FormatError:
     line: Any = element.sourceline  # int or None; its stubs say otherwise
-    return None if line is None else int(line)
+    return FormatError(what, path=path, line=line, element=str(element.tag))
 
 
 def _number(element: etree._Element, name: str, path: Path) -> float:
@@ -129,5 +119,5 @@ def _number(element: etree._Element, name: str, path: Path) -> float:
     except ValueError:
         value = float("nan")
     if not np.isfinite(value):
-        raise FormatError(f"{name}={text!r}", path=path, line=_line(element), element=str(element.tag))
+        raise _wrong(f"{name}={text!r}", element, path)
     return value

@@ -6,20 +6,15 @@ import json
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.drives import drives_of_table, translated
 from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping, factor, spelled
 from xosc_lateral.formats.tables import comma_numbers, read_table, text_encoding
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-FloatArray = NDArray[np.float64]
+from xosc_lateral.lazy import pd
 
 HEADERS = {
     "time": r"time|timestamp|t|zeit|zeitstempel|sec|seconds",
@@ -62,8 +57,6 @@ def import_table(sources: Path | Sequence[Path], *, mapping: MappingLike | None 
     `mapping`: without it, headers are taken to be standard names. Raises `FormatError`, `NotEnoughDataError`: as
     `formats.drives.read_drives`: what is written here can be read.
     """
-    import pandas as pd
-
     known = as_mapping(mapping)
     made = []
     for path in [sources] if isinstance(sources, Path) else sources:
@@ -84,21 +77,24 @@ def propose_mapping(files: Sequence[Path]) -> str:
     shared = [name for name in tables[0].columns if all(name in table.columns for table in tables)]
     if not shared:
         raise FormatError("the tables have no column in common", path=files[-1])
-    values = {name: _joined([table[name] for table in tables]) for name in shared}
+    values = {name: pd.concat([table[name] for table in tables], ignore_index=True) for name in shared}
     found: dict[str, str] = {}
     for header in shared:
         bare, _ = _parts_of(header)
         name = next((name for name, words in HEADERS.items() if name not in found and _fits(words, bare)), None)
         if name is not None:
             found[name] = header
+    sides = {"distance_left", "distance_right"} <= found.keys()
+    needed = ("time",) if sides else ("time", "offset", "lane_width")
+    codes = sorted({text_encoding(path) for path in files} - {"utf-8"})
     lines = [
         f"# Proposed from {', '.join(path.name for path in files)}: read every line, correct it, save it, and give it",
         '# with --mapping FILE. NAME = "COLUMN" or "COLUMN:UNIT"; a unit with a minus turns the sign.',
-        *_how_written(files),
+        *(f"encoding = {_quoted(code)}" for code in codes[:1]),
         "",
         "[columns]",
         *(_line(name, header, values[header]) for name, header in found.items()),
-        *(f'# {name} = "?"  # needed, and not found' for name in _needed(found)),
+        *(f'# {name} = "?"  # needed, and not found' for name in needed if name not in found),
     ]
     for name, header in found.items():
         if name != "drive" and not len(_numbers(values[header])):
@@ -108,12 +104,6 @@ def propose_mapping(files: Sequence[Path]) -> str:
         lines += ["", f"# Others keep their names: {', '.join(left[:40])}"]
     lines += ["", "# [roles]  # where a column comes from, for close-loop", '# curvature = "road"', ""]
     return "\n".join(lines)
-
-
-def _joined(columns: Sequence[pd.Series]) -> pd.Series:
-    import pandas as pd
-
-    return pd.concat(columns, ignore_index=True)
 
 
 def _parts_of(header: str) -> tuple[str, str]:
@@ -159,8 +149,6 @@ def _line(name: str, header: str, column: pd.Series) -> str:
 
 
 def _numbers(column: pd.Series) -> FloatArray:
-    import pandas as pd
-
     commas = None if pd.api.types.is_numeric_dtype(column) else comma_numbers(column)
     values = pd.to_numeric(column if commas is None else commas, errors="coerce").to_numpy(dtype=np.float64)
     return np.asarray(values[np.isfinite(values)])
@@ -172,16 +160,6 @@ def _texts(name: str, column: pd.Series) -> list[str]:
         return []
     numbers = {text: int(bool(TRUCKS.search(text))) if name == "is_truck" else k for k, text in enumerate(texts)}
     return ["", f"[values.{name}]", *(f"{_quoted(text)} = {number}" for text, number in numbers.items())]
-
-
-def _needed(found: dict[str, str]) -> list[str]:
-    sides = {"distance_left", "distance_right"} <= found.keys()
-    return [name for name in ("time", *(() if sides else ("offset", "lane_width"))) if name not in found]
-
-
-def _how_written(files: Sequence[Path]) -> list[str]:
-    codes = {code for path in files if (code := text_encoding(path)) != "utf-8"}
-    return [f"encoding = {_quoted(code)}" for code in sorted(codes)[:1]]
 
 
 def _quoted(text: str) -> str:

@@ -9,11 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.formats.importers.placed import PlacedTracks
 from xosc_lateral.formats.importers.track_table import Tracks
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 LEAST_AGREEMENT = 0.7
 """Cosine between a vehicle's heading and the lane's that is taken to be driven along. [-]"""
@@ -25,14 +23,8 @@ SMOOTHED = 20.0
 class LaneShape(ABC):
     """A lane between two boundaries, in coordinates along and across its centre line.
 
-    Parameters
-    ----------
-    centre : array, shape (n, 2) or (n, 3)
-        In the direction of travel. [m]
-    boundaries : sequence of array
-        Lines about it. [m]
-    beyond : float
-        So far out of their box a point may lie in the lane. [m]
+    `centre`: in the direction of travel, shape (n, 2) or (n, 3). [m] `boundaries`: lines about it. [m] `beyond`: so far
+    out of their box a point may lie in the lane. [m]
     """
 
     def __init__(self, centre: FloatArray, boundaries: Sequence[FloatArray], beyond: float = 0.0) -> None:
@@ -66,7 +58,7 @@ def place_in_shapes(tracks: Tracks, shapes: Sequence[LaneShape], left: IntArray)
         "lane_index": np.where(inside, index[piece], np.nan),
         "lane_count": np.where(inside, count[piece], np.nan),
     }
-    return tracks.placed(piece, along, offset, width, road)
+    return PlacedTracks(tracks, piece, along, offset, width, road)
 
 
 def find_lanes(
@@ -107,16 +99,9 @@ def lanes_beside(left: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def curvature_along(start: FloatArray, direction: FloatArray, way: FloatArray) -> FloatArray:
-    """Curvature of a polyline, smoothed, shape as `way`. [1/m]
+    """Curvature of a polyline, smoothed, at some ways along it, shape as `way`. [1/m]
 
-    Parameters
-    ----------
-    start : array, shape (n + 1,)
-        Way along it to each of its points. [m]
-    direction : array, shape (n,)
-        Of its pieces, unwrapped. [rad]
-    way : array
-        Where. [m]
+    `start`: way to each of its points, shape (n + 1,). [m] `direction`: of its pieces, unwrapped, shape (n,). [rad]
     """
     middles = 0.5 * (start[1:] + start[:-1])
     bend = np.interp(way + 0.5 * SMOOTHED, middles, direction) - np.interp(way - 0.5 * SMOOTHED, middles, direction)
@@ -133,13 +118,7 @@ BEYOND = 1e-3
 
 
 class Strip(LaneShape):
-    """A lane in coordinates along and across its centre line.
-
-    Parameters
-    ----------
-    centre, left, right : array, shape (n, 3)
-        Lines in the direction of travel; the centre line may lie anywhere between the other two. [m]
-    """
+    """A lane between lines in the direction of travel, shape (n, 3); the centre may lie anywhere between. [m]"""
 
     def __init__(self, centre: FloatArray, left: FloatArray, right: FloatArray) -> None:
         from scipy.spatial import cKDTree

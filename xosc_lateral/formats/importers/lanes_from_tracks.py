@@ -24,12 +24,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.normal import MAD_TO_SD
 from xosc_lateral.rows import true_slices
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 KNOT_SPACING = 50.0  # [m]; chosen by leave-vehicles-out error on DLR HT (docs/real_data.md)
 MAX_ERROR = 0.15  # [m]; where the centre's standard error is larger (ends of the road), rows are cut
@@ -77,17 +75,10 @@ def fit_lane_centre(
 
     Raises `NotEnoughDataError` if fewer than `MIN_PASSAGES` share any 100 m.
 
-    Parameters
-    ----------
-    s, d : array, shape (n,)
-        Positions of vehicles that keep to this lane, one row a second, sorted by passage and time. [m]
-    height : array, shape (n,)
-        Of the vehicles. [m]
-    passage : array of int, shape (n,)
-        Which uninterrupted passage of which vehicle a row belongs to.
-    knot_spacing : float
-        Between the splines' knots. Longer: blind to the bends that camera calibration puts into the tracks; shorter:
-        follows single drivers. [m]
+    `s`, `d`: positions of vehicles that keep to this lane, one row a second, sorted by passage and time, shape (n,).
+    [m] `height`: of the vehicles, shape (n,). [m] `passage`: which uninterrupted passage of which vehicle a row belongs
+    to, shape (n,). `knot_spacing`: of the splines; longer: blind to the bends that camera calibration puts into the
+    tracks; shorter: follows single drivers. [m]
     """
     start, end = _covered(s, passage)
     keep = (s >= start) & (s <= end)

@@ -21,23 +21,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.drives.cleaning import RUN
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.errors import FormatError, NotEnoughDataError
-from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings, lane_changes, name_states, number_runs
+from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings, Rows, cut_table
 from xosc_lateral.formats.importers.neighbours import REACH, find_neighbours
 from xosc_lateral.formats.importers.table import Imported, finished, guarded
 from xosc_lateral.formats.tables import read_table
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from xosc_lateral.lazy import pd
 
 LICENCE = (
     "highD/exiD: leveLXData, under the licence that you signed (free for non-commercial research); whether fitted "
@@ -59,8 +53,6 @@ def import_levelx(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cu
 
     Raises `FormatError` if a file or a column is missing, or the exiD sign is undecided.
     """
-    import pandas as pd
-
     tracks_files = sorted(source.glob("*_tracks.csv")) if source.is_dir() else [source]
     if not tracks_files:
         raise FormatError("no XX_tracks.csv in this folder", path=source)
@@ -83,10 +75,7 @@ def _read_recording(path: Path, settings: CutSettings) -> tuple[pd.DataFrame, st
     """Table with `state`, layout and step of one recording."""
     tracks, tracks_meta, recording = read_recording_files(path)
     number = path.name.split("_")[0]
-    rate = cell(recording, "frameRate", path)
-    if not (rate.replace(".", "", 1).isdigit() and 1.0 <= float(rate) <= 1000.0):
-        raise FormatError(f"frameRate={rate!r}, expected 1 to 1000 per second", path=path)
-    step = 1.0 / float(rate)
+    step = 1.0 / frame_rate(recording, path)
     if "latLaneCenterOffset" in tracks.columns:
         return _from_exid(tracks, tracks_meta, number, step, path, settings), "exiD", step
     return _from_highd(tracks, tracks_meta, recording, number, step, path, settings), "highD", step
@@ -94,9 +83,14 @@ def _read_recording(path: Path, settings: CutSettings) -> tuple[pd.DataFrame, st
 
 def read_recording_files(path: Path) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
     """Tracks, their meta table and that of the recording."""
-    endings = ("_tracks.csv", "_tracksMeta.csv", "_recordingMeta.csv")
-    tracks, tracks_meta, recording = (_read(path.with_name(path.name.replace(endings[0], end))) for end in endings)
-    return tracks, tracks_meta, recording
+    tables = []
+    for ending in ("_tracks.csv", "_tracksMeta.csv", "_recordingMeta.csv"):
+        file = path.with_name(path.name.replace("_tracks.csv", ending))
+        if not file.exists():
+            what = "missing; a recording is XX_tracks.csv, XX_tracksMeta.csv and XX_recordingMeta.csv"
+            raise FormatError(what, path=file)
+        tables.append(read_table(file)[0])
+    return tables[0], tables[1], tables[2]
 
 
 def markings(recording: pd.DataFrame, side: str, path: Path) -> FloatArray:
@@ -104,19 +98,19 @@ def markings(recording: pd.DataFrame, side: str, path: Path) -> FloatArray:
     return np.array([float(part) for part in cell(recording, f"{side}LaneMarkings", path).split(";")])
 
 
-def _read(path: Path) -> pd.DataFrame:
-    if not path.exists():
-        raise FormatError(
-            "missing; a recording is XX_tracks.csv, XX_tracksMeta.csv and XX_recordingMeta.csv", path=path
-        )
-    return read_table(path)[0]
-
-
 def cell(frame: pd.DataFrame, column: str, path: Path) -> str:
     """Of a meta file's only row."""
     if column not in frame.columns or frame.empty:
         raise FormatError(f"no value of {column} in the recording's meta file", path=path)
     return str(frame[column].iloc[0])
+
+
+def frame_rate(recording: pd.DataFrame, path: Path) -> float:
+    """Of a recording. [1/s]"""
+    rate = cell(recording, "frameRate", path)
+    if not (rate.replace(".", "", 1).isdigit() and 1.0 <= float(rate) <= 1000.0):
+        raise FormatError(f"frameRate={rate!r}, expected 1 to 1000 per second", path=path)
+    return float(rate)
 
 
 def require(frame: pd.DataFrame, columns: Sequence[str], path: Path) -> None:
@@ -136,8 +130,6 @@ def _from_highd(
     path: Path,
     settings: CutSettings,
 ) -> pd.DataFrame:
-    import pandas as pd
-
     require(tracks, HIGHD_COLUMNS, path)
     tracks = tracks.sort_values(["id", "frame"], ignore_index=True)
     meta = tracks_meta.set_index("id").reindex(tracks["id"])
@@ -157,45 +149,35 @@ def _from_highd(
     lane_number = lane.astype(np.int64)
     vehicle, frame = tracks["id"].to_numpy(), tracks["frame"].to_numpy()
     kind = meta["class"].astype(str).str.lower().to_numpy()
+    is_truck = np.isin(kind, TRUCKS)
     near = find_neighbours(
         frame * 2 + rightwards,
         lane_number,
         x,
         tracks["width"].to_numpy(),
-        np.isin(kind, TRUCKS),
+        is_truck,
         lane_on_left=lane_number < count - 1,
         lane_on_right=lane_number > 0,
     )
-    reasons = {
-        "no lane": lane_number < 0,
-        "lane change": lane_changes(left, offset, lane_number, vehicle, step, settings),
+    columns = {
+        "drive": f"highd-{number}-" + tracks["id"].astype(str),
+        "time": np.round(frame * step, 4),
+        "offset": offset,
+        "lane_width": width,
+        "speed": np.abs(tracks["xVelocity"].to_numpy()),
+        "acceleration": way * tracks["xAcceleration"].to_numpy(),
+        "lane_index": lane_number,
+        "lane_count": count.astype(np.int64),
+        **near,
     }
-    state = name_states(reasons, lane_number, vehicle, frame, step, settings)
-    return pd.DataFrame(
-        {
-            "drive": f"highd-{number}-" + tracks["id"].astype(str),
-            "time": np.round(frame * step, 4),
-            "offset": offset,
-            "lane_width": width,
-            "speed": np.abs(tracks["xVelocity"].to_numpy()),
-            "acceleration": way * tracks["xAcceleration"].to_numpy(),
-            "lane_index": lane_number,
-            "lane_count": count.astype(np.int64),
-            **near,
-            "vehicle_class": kind,
-            "is_truck": np.isin(kind, TRUCKS).astype(np.float64),
-            RUN: number_runs(state, lane_number, vehicle, frame),
-            "state": state,
-        }
-    )
+    rows, reasons = Rows(vehicle, frame, lane_number, step), {"no lane": lane_number < 0}
+    return cut_table(columns, rows, settings, sideways=left, reasons=reasons, kind=kind, is_truck=is_truck)
 
 
 # ---- exiD ------------------------------------------------------------------------------------------------------------
 def _from_exid(
     tracks: pd.DataFrame, tracks_meta: pd.DataFrame, number: str, step: float, path: Path, settings: CutSettings
 ) -> pd.DataFrame:
-    import pandas as pd
-
     require(tracks, EXID_COLUMNS, path)
     tracks = tracks.sort_values(["trackId", "frame"], ignore_index=True)
     kind = tracks_meta.set_index("trackId").reindex(tracks["trackId"])["class"].astype(str).str.lower().to_numpy()
@@ -209,34 +191,22 @@ def _from_exid(
     lane = np.cumsum(jump).astype(np.int64)
     lateral = np.cumsum(np.where(jump | ~np.isfinite(step_of_offset), 0.0, step_of_offset))
     offset = offset * _left_sign(lateral, tracks, vehicle, step, path)
-    near = _exid_neighbours(tracks, np.isin(kind, TRUCKS))
-    reasons = {
-        "no vehicle": ~np.isin(kind, VEHICLES),
-        "no lane": ~known,
-        "lane change": lane_changes(lateral, offset, lane, vehicle, step, settings),
+    is_truck = np.isin(kind, TRUCKS)
+    columns = {
+        "drive": f"exid-{number}-" + tracks["trackId"].astype(str),
+        "time": np.round(frame * step, 4),
+        "offset": offset,
+        "lane_width": width,
+        "speed": tracks["lonVelocity"].to_numpy(),
+        "acceleration": tracks["lonAcceleration"].to_numpy(),
+        **_exid_neighbours(tracks, is_truck),
     }
-    state = name_states(reasons, lane, vehicle, frame, step, settings)
-    return pd.DataFrame(
-        {
-            "drive": f"exid-{number}-" + tracks["trackId"].astype(str),
-            "time": np.round(frame * step, 4),
-            "offset": offset,
-            "lane_width": width,
-            "speed": tracks["lonVelocity"].to_numpy(),
-            "acceleration": tracks["lonAcceleration"].to_numpy(),
-            **near,
-            "vehicle_class": kind,
-            "is_truck": np.isin(kind, TRUCKS).astype(np.float64),
-            RUN: number_runs(state, lane, vehicle, frame),
-            "state": state,
-        }
-    )
+    rows, reasons = Rows(vehicle, frame, lane, step), {"no vehicle": ~np.isin(kind, VEHICLES), "no lane": ~known}
+    return cut_table(columns, rows, settings, sideways=lateral, reasons=reasons, kind=kind, is_truck=is_truck)
 
 
 def _first(column: pd.Series) -> FloatArray:
     """First of the values parted by ``;``; NaN where there is none."""
-    import pandas as pd
-
     if column.dtype.kind == "f":
         return column.to_numpy(dtype=np.float64)
     first = column.astype(str).str.split(";").str[0]
@@ -246,20 +216,9 @@ def _first(column: pd.Series) -> FloatArray:
 def _left_sign(lateral: FloatArray, tracks: pd.DataFrame, vehicle: IntArray, step: float, path: Path) -> float:
     """+1 if the offset grows when a vehicle heads to the left of its lane's course, -1 if it shrinks.
 
-    The heading is taken against its own mean over 4 s, which takes the road's course out of it.
+    By the correlation of the way to the left, from the heading, with the rate of the offset; the heading is taken
+    against its own mean over 4 s, which takes the road's course out of it.
     """
-    agreement = _agreement(lateral, tracks, vehicle, step, path)
-    if not abs(agreement) > 0.1:
-        raise FormatError(
-            f"the lane's positive side is undecided: correlation of heading and offset rate is {agreement:.2f}",
-            path=path,
-            element="latLaneCenterOffset",
-        )
-    return float(np.sign(agreement))
-
-
-def _agreement(lateral: FloatArray, tracks: pd.DataFrame, vehicle: IntArray, step: float, path: Path) -> float:
-    """Correlation of the way to the left, by the heading, with the rate of the offset. [-]"""
     heading = np.unwrap(np.radians(tracks["heading"].to_numpy()))
     half = max(1, round(2.0 / step))
     inside = np.arange(half, max(half, len(vehicle) - half))
@@ -269,7 +228,10 @@ def _agreement(lateral: FloatArray, tracks: pd.DataFrame, vehicle: IntArray, ste
     towards_left = tracks["lonVelocity"].to_numpy()[inside] * _about_mean(heading, inside, half)
     rate = _about_mean(np.gradient(lateral), inside, half)
     agreement = float(np.corrcoef(towards_left, rate)[0, 1])
-    return agreement
+    if not abs(agreement) > 0.1:
+        what = f"the lane's positive side is undecided: correlation of heading and offset rate is {agreement:.2f}"
+        raise FormatError(what, path=path, element="latLaneCenterOffset")
+    return float(np.sign(agreement))
 
 
 def _about_mean(values: FloatArray, rows: IntArray, half: int) -> FloatArray:

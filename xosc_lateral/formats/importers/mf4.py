@@ -20,24 +20,21 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.importers.cuts import KEPT
 from xosc_lateral.formats.importers.table import Imported, finished, guarded
 from xosc_lateral.formats.mapping import ColumnSource, MappingLike, as_mapping, factor, is_measured, parse_map, spelled
 from xosc_lateral.formats.source import open_source
 from xosc_lateral.formats.tables import LONGEST_MESSAGE, foreign_errors
+from xosc_lateral.lazy import pd
 from xosc_lateral.limits import CLOCK_ROWS, TIME
 from xosc_lateral.segment import CONTEXT_UNITS
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-FloatArray = NDArray[np.float64]
 
 POSITIONS = (("offset", "lane_width"), ("distance_left", "distance_right"))
 LICENCE = "your own recording"
@@ -86,8 +83,6 @@ def import_mf4(
     `mapping`: more of them, saved. `step`: of the table [s]. Messages that stay away for longer than a second leave
     a gap.
     """
-    import pandas as pd
-
     files = [sources] if isinstance(sources, Path) else list(sources)
     sources_of = {**as_mapping(mapping).columns, **parse_map(channels)}
     if not any(set(pair) <= sources_of.keys() for pair in POSITIONS):
@@ -136,9 +131,8 @@ def _names(log: Any) -> list[str]:
 def _drive_names(files: Sequence[Path]) -> list[str]:
     """Stems, with the folder's name before those that occur twice."""
     stems = [file.stem for file in files]
-    if len(set(map(str, files))) < len(files):
-        twice = next(str(file) for file in files if [str(one) for one in files].count(str(file)) > 1)
-        raise FormatError("the log is named twice", path=twice)
+    if twice := [file for file in files if files.count(file) > 1]:
+        raise FormatError("the log is named twice", path=twice[0])
     return [file.stem if stems.count(file.stem) == 1 else str(file.with_suffix("")) for file in files]
 
 
@@ -242,8 +236,6 @@ def _is_quantity(name: str, unit: str) -> bool:
 
 
 def _table(signals: dict[str, Channel], source: Path, drive: str, step: float) -> pd.DataFrame:
-    import pandas as pd
-
     position = [name for pair in POSITIONS for name in pair if name in signals]
     start = max(float(signals[name].time[0]) for name in position)
     end = min(float(signals[name].time[-1]) for name in position)

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 
-REACH = 200.0  # [m]; who is farther away is none, as in `motion.context`
+REACH = 200.0  # [m]; who is farther away is none, as in `motion.around`
 LONGEST = 30.0  # [m]; no vehicle is longer (German road traffic regulations: 25.25 m)
 
 
@@ -28,19 +25,9 @@ def find_neighbours(
     Distances are free space, bumper to bumper along the road, 0 while side by side; infinite where that lane has nobody
     within `REACH`, NaN where there is no such lane [m]. `*_is_truck` is 1 or 0, and 0 where there is nobody.
 
-    Parameters
-    ----------
-    frame : array of int, shape (n,)
-        Equal for rows of the same instant (and carriageway).
-    lane : array of int, shape (n,)
-        0 = rightmost driving lane, counting up to the left; negative: in no lane.
-    s : array, shape (n,)
-        Vehicle centres along the road, growing in the direction of travel. [m]
-    length : array, shape (n,)
-        Of the vehicles. [m]
-    is_truck : array of bool, shape (n,)
-    lane_on_left, lane_on_right : array of bool, shape (n,)
-        Whether there is such a lane, driven the same way.
+    `frame`: equal for rows of the same instant (and carriageway). `lane`: 0 = rightmost driving lane, counting up to
+    the left; negative: in no lane. `s`: vehicle centres along the road, growing in the direction of travel. [m]
+    `length`: of the vehicles. [m] `lane_on_left`, `lane_on_right`: whether there is such a lane, driven the same way.
     """
     known = lane >= 0
     group = np.where(known, frame * 64 + lane, -1)

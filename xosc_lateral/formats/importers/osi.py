@@ -13,15 +13,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings
 from xosc_lateral.formats.importers.lane_shapes import place_in_shapes
-from xosc_lateral.formats.importers.placed import LaneGraph, PlacedTracks, import_each, import_placed
+from xosc_lateral.formats.importers.placed import (
+    LaneGraph,
+    PlacedTracks,
+    import_each,
+    import_placed,
+    require_lanes,
+)
 from xosc_lateral.formats.importers.table import Imported, guarded
-from xosc_lateral.formats.importers.tracks import lane_graph, place
-from xosc_lateral.formats.opendrive import read_opendrive
+from xosc_lateral.formats.importers.tracks import place_on_road
+from xosc_lateral.formats.opendrive import read_opendrive, read_road
 from xosc_lateral.formats.osi.read import Recorded, read_osi
 from xosc_lateral.formats.osi.shapes import lanes_of
 
@@ -54,22 +59,13 @@ def import_osi(
     def read(path: Path) -> Imported:
         recorded = read_osi(path, channel)
         only = None if host is None else _named(recorded, host, path)
-        placed, graph, files = _placed(recorded, path, None if road is None else Path(road))
         if several:
-            names = [f"{path.stem}:{name}" for name in placed.names]
+            names = tuple(f"{path.stem}:{name}" for name in recorded.tracks.names)
+            recorded = replace(recorded, tracks=replace(recorded.tracks, names=names))
             only = None if only is None else {f"{path.stem}:{name}" for name in only}
-            placed = replace(placed, names=names)
-        return import_placed(
-            placed,
-            graph,
-            settings,
-            keep_cut=True,
-            format="osi",
-            sources=files,
-            licence=LICENCE,
-            only=only,
-            notes=recorded.notes,
-        )
+        placed, graph, files = _placed(recorded, path, None if road is None else Path(road))
+        about = {"format": "osi", "sources": files, "licence": LICENCE, "notes": recorded.notes}
+        return import_placed(placed, graph, settings, keep_cut=True, only=only, **about)
 
     return import_each(sources, read, keep_cut=keep_cut)
 
@@ -92,34 +88,19 @@ def _named(recorded: Recorded, host: str, path: Path) -> set[str]:
 
 def _placed(recorded: Recorded, path: Path, road: Path | None) -> tuple[PlacedTracks, LaneGraph, list[Path]]:
     """Every row in its lane; what the lanes are; the files that said so."""
-    tracks = recorded.tracks
+    tracks, files, network = recorded.tracks, [path], None
     if road is not None:
-        network = read_opendrive(road)
-        files, where = [path, road], road.name
+        network, files, where = read_opendrive(road), [path, road], road.name
     elif recorded.opendrive is not None:
-        with TemporaryDirectory() as folder:
-            inside = Path(folder, f"{path.stem}.xodr")
-            inside.write_bytes(recorded.opendrive)
-            network = read_opendrive(inside)
-        files, where = [path], "the road in it"
-    else:
-        network = None
+        network, where = read_road(recorded.opendrive, path.stem), "the road in it"
     if network is not None:
-        pieces, graph = lane_graph(network)
         x, y = network.header_offset.undo(tracks.x, tracks.y)
         heading = tracks.heading - network.header_offset.heading
-        placed = place(replace(tracks, x=x, y=y, heading=heading), network, pieces)
-    else:
-        lanes = lanes_of(recorded)
-        if lanes is None:
-            raise FormatError("has no lanes with boundaries: give the road with --road FILE.xodr", path=path)
-        strips, graph = lanes
+        placed, graph = place_on_road(replace(tracks, x=x, y=y, heading=heading), network)
+    elif (lanes := lanes_of(recorded)) is not None:
+        (strips, graph), where = lanes, "the trace"
         placed = place_in_shapes(tracks, strips, graph.left)
-        files, where = [path], "the trace"
-    if not (placed.piece >= 0).any():
-        raise FormatError(
-            f"no vehicle is in a lane of {where}: x from {tracks.x.min():.1f} to {tracks.x.max():.1f} m, "
-            f"y from {tracks.y.min():.1f} to {tracks.y.max():.1f} m",
-            path=path,
-        )
+    else:
+        raise FormatError("has no lanes with boundaries: give the road with --road FILE.xodr", path=path)
+    require_lanes(placed, where, path)
     return placed, graph, files

@@ -6,23 +6,17 @@ from collections import Counter, deque
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from xosc_lateral.drives.cleaning import RUN
-from xosc_lateral.formats.importers.cuts import CutSettings, lane_changes, name_states, number_runs
+from xosc_lateral.arrays import FloatArray, IntArray
+from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.importers.cuts import CutSettings, Rows, cut_table
 from xosc_lateral.formats.importers.neighbours import find_neighbours
 from xosc_lateral.formats.importers.table import Imported, finished, hash_files, without_cut
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-
-FloatArray = NDArray[np.float64]
-
-IntArray = NDArray[np.int64]
+from xosc_lateral.formats.importers.track_table import Tracks, rate
+from xosc_lateral.lazy import pd
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,10 +45,11 @@ class LaneGraph:
             waiting = deque([(first, 0.0, 0)])
             while waiting:
                 piece, at, level = waiting.popleft()
-                if part[piece] >= 0 or _overlaps(taken.get((count, level), []), at, at + self.length[piece]):
+                end, here = at + float(self.length[piece]), taken.setdefault((count, level), [])
+                if part[piece] >= 0 or any(at < other - 1e-3 and end > begin + 1e-3 for begin, other in here):
                     continue
                 part[piece], station[piece], rank[piece] = count, at, level
-                taken.setdefault((count, level), []).append((at, at + float(self.length[piece])))
+                here.append((at, end))
                 for other, side, where in steps[piece]:
                     ahead = {0: 0.0, 1: float(self.length[piece]), -1: -float(self.length[other])}[where]
                     waiting.append((other, at + ahead, level + side))
@@ -75,51 +70,41 @@ class LaneGraph:
         return steps
 
 
-def _overlaps(spans: Sequence[tuple[float, float]], low: float, high: float) -> bool:
-    return any(low < end - 1e-3 and high > begin + 1e-3 for begin, end in spans)
-
-
 TRUCKS = ("truck", "bus", "trailer", "semitrailer", "lorry", "van_trailer", "truck_trailer")
-
-SPEED_WINDOW = 0.4
-"""Positions are differenced over this where no speed was recorded. [s]"""
 
 
 @dataclass(frozen=True, eq=False)
 class PlacedTracks:
-    """Rows of all vehicles, sorted by vehicle and time."""
+    """Tracks and where each of their rows lies; arrays of shape (n,)."""
 
-    names: Sequence[str]  # of the vehicles
-    vehicle: IntArray  # index into `names`, shape (n,)
-    time: FloatArray  # shape (n,) [s]
-    step: float  # between two rows [s]
-    piece: IntArray  # of the lane graph; -1: in no lane, shape (n,)
-    along: FloatArray  # way from the piece's start, in the direction of travel, shape (n,) [m]
-    offset: FloatArray  # offset, lane_width: NaN in no lane, shape (n,) [m]
+    tracks: Tracks
+    piece: IntArray  # of the lane graph; -1: in no lane
+    along: FloatArray  # way of x, y from the piece's start, in the direction of travel [m]
+    offset: FloatArray  # offset, lane_width: NaN in no lane [m]
     lane_width: FloatArray
-    speed: FloatArray  # shape (n,) [m/s]
-    length: FloatArray  # of the vehicle, shape (n,) [m]
-    kind: NDArray[np.str_]  # class of the vehicle in lower case; empty where not known, shape (n,)
-    # road: what the road is like there: curvature, lane_index ..., shape (n,)
-    road: Mapping[str, FloatArray] = field(default_factory=dict)
+    road: Mapping[str, FloatArray] = field(default_factory=dict)  # columns that it has there: curvature, lane_index ...
+
+
+def require_lanes(placed: PlacedTracks, where: str, path: Path) -> None:
+    """Refuse tracks that lie beside all lanes. Raises `FormatError`."""
+    if not (placed.piece >= 0).any():
+        x, y = placed.tracks.x, placed.tracks.y
+        there = f"x from {x.min():.1f} to {x.max():.1f} m, y from {y.min():.1f} to {y.max():.1f} m"
+        what = f"no row lies in a driving lane of {where}: {there}; are both in the same coordinates?"
+        raise FormatError(what, path=path)
 
 
 def import_placed(
-    tracks: PlacedTracks,
-    graph: LaneGraph,
-    settings: CutSettings,
-    *,
-    only: Collection[str] | None = None,
-    **about: Any,
+    placed: PlacedTracks, graph: LaneGraph, settings: CutSettings, *, only: Collection[str] | None = None, **about: Any
 ) -> Imported:
     """Neighbours, cuts and the record of the import; of the vehicles in `only` alone, if it is given.
 
     Raises `NotEnoughDataError` if nothing is left; further parameters are those of `table.finished`.
     """
-    table = placed_table(tracks, graph, settings)
+    table = _drive_table(placed, graph, settings)
     if only is not None:
         table = table[table["drive"].isin(only)].reset_index(drop=True)
-    return finished(table, settings=asdict(settings), step=tracks.step, **about)
+    return finished(table, settings=asdict(settings), step=placed.tracks.step, **about)
 
 
 def import_each(sources: Path | Sequence[Path], read: Callable[[Path], Imported], *, keep_cut: bool) -> Imported:
@@ -127,8 +112,6 @@ def import_each(sources: Path | Sequence[Path], read: Callable[[Path], Imported]
 
     Raises `NotEnoughDataError` if nothing is left.
     """
-    import pandas as pd
-
     files = [sources] if isinstance(sources, Path) else list(sources)
     parts = [read(file) for file in files]
     record = parts[0].provenance
@@ -149,77 +132,39 @@ def import_each(sources: Path | Sequence[Path], read: Callable[[Path], Imported]
     return without_cut(table, record, keep_cut, files[0])
 
 
-def placed_table(tracks: PlacedTracks, graph: LaneGraph, settings: CutSettings) -> pd.DataFrame:
+def _drive_table(placed: PlacedTracks, graph: LaneGraph, settings: CutSettings) -> pd.DataFrame:
     """The drive table with its column `state`."""
-    import pandas as pd
-
+    tracks, inside = placed.tracks, placed.piece >= 0
     part, station, rank = graph.layout()
-    piece, inside = np.maximum(tracks.piece, 0), tracks.piece >= 0
-    s = station[piece] + tracks.along
-    level = rank[piece] - int(rank.min())
+    piece = np.maximum(placed.piece, 0)
     instant = np.round(tracks.time / tracks.step).astype(np.int64)
     is_truck = np.isin(tracks.kind, TRUCKS)
-    group = instant * (int(part.max()) + 1) + part[piece]
     is_left = np.bincount(graph.left[graph.left >= 0], minlength=len(graph.left)) > 0  # of another piece
+    middle = placed.along if tracks.rear is None else placed.along + tracks.rear  # gaps count from there
     near = find_neighbours(
-        group,
-        np.where(inside, level, -1),
-        s,
+        instant * (int(part.max()) + 1) + part[piece],
+        np.where(inside, rank[piece] - int(rank.min()), -1),
+        station[piece] + middle,
         tracks.length,
         is_truck,
         lane_on_left=graph.left[piece] >= 0,
         lane_on_right=is_left[piece],
     )
-    lane, sideways = _own_lanes(tracks, inside)
-    reasons = {
-        "no lane": ~inside,
-        "lane change": lane_changes(sideways, tracks.offset, lane, tracks.vehicle, tracks.step, settings),
-    }
-    state = name_states(reasons, lane, tracks.vehicle, instant, tracks.step, settings)
-    return pd.DataFrame(
-        {
-            "drive": np.array(tracks.names, dtype=object)[tracks.vehicle],
-            "time": np.round(tracks.time, 4),
-            "offset": tracks.offset,
-            "lane_width": tracks.lane_width,
-            "speed": tracks.speed,
-            "acceleration": _rate(tracks.speed, tracks.vehicle, tracks.step, 1.0),
-            **tracks.road,
-            **near,
-            "vehicle_class": tracks.kind,
-            "is_truck": is_truck.astype(np.float64),
-            RUN: number_runs(state, lane, tracks.vehicle, instant),
-            "state": state,
-        }
-    )
-
-
-def _own_lanes(tracks: PlacedTracks, inside: NDArray[np.bool_]) -> tuple[IntArray, FloatArray]:
-    """A number that changes with the lane, and lateral position without the jumps: a new piece ahead is no new lane."""
-    step = np.diff(tracks.offset, prepend=tracks.offset[:1])
+    # A number that changes with the lane, and lateral position without jumps: a new piece ahead is no new lane.
+    step = np.diff(placed.offset, prepend=placed.offset[:1])
     same = np.r_[False, tracks.vehicle[1:] == tracks.vehicle[:-1]]
-    entered = np.r_[False, inside[1:] != inside[:-1]] & same
-    jump = same & (np.abs(step) > 0.5 * tracks.lane_width)
-    lane = np.cumsum(jump | entered | ~same)
+    jump = same & (np.abs(step) > 0.5 * placed.lane_width)
+    lane = np.cumsum(jump | (np.r_[False, inside[1:] != inside[:-1]] & same) | ~same).astype(np.int64)
     sideways = np.cumsum(np.where(jump | ~same | ~np.isfinite(step), 0.0, step))
-    return lane.astype(np.int64), sideways
-
-
-def ground_speed(x: FloatArray, y: FloatArray, vehicle: IntArray, step: float) -> FloatArray:
-    """Speed from positions, shape (n,). [m/s]"""
-    return np.hypot(_rate(x, vehicle, step, SPEED_WINDOW), _rate(y, vehicle, step, SPEED_WINDOW))
-
-
-def travel_heading(x: FloatArray, y: FloatArray, vehicle: IntArray, step: float) -> FloatArray:
-    """Heading from positions, shape (n,). [rad]"""
-    return np.arctan2(_rate(y, vehicle, step, SPEED_WINDOW), _rate(x, vehicle, step, SPEED_WINDOW))
-
-
-def _rate(values: FloatArray, vehicle: IntArray, step: float, window: float) -> FloatArray:
-    """Difference over a window about each row, within a vehicle's rows."""
-    first = np.searchsorted(vehicle, vehicle, side="left")
-    last = np.searchsorted(vehicle, vehicle, side="right") - 1
-    half = max(1, round(0.5 * window / step))
-    rows = np.arange(len(values))
-    low, high = np.maximum(rows - half, first), np.minimum(rows + half, last)
-    return np.asarray((values[high] - values[low]) / (np.maximum(high - low, 1) * step))
+    columns = {
+        "drive": np.array(tracks.names, dtype=object)[tracks.vehicle],
+        "time": np.round(tracks.time, 4),
+        "offset": placed.offset,
+        "lane_width": placed.lane_width,
+        "speed": tracks.speed,
+        "acceleration": rate(tracks.speed, tracks.vehicle, tracks.step, 1.0),
+        **placed.road,
+        **near,
+    }
+    rows, reasons = Rows(tracks.vehicle, instant, lane, tracks.step), {"no lane": ~inside}
+    return cut_table(columns, rows, settings, sideways=sideways, reasons=reasons, kind=tracks.kind, is_truck=is_truck)

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import NotEnoughDataError
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
-
-FloatArray = NDArray[np.float64]
 
 BIN_LENGTH = 20.0  # [m] along the road; short beside any motorway curve, long enough for tens of vehicles
 KNOT_SPACING = 300.0  # [m]; camera calibration bends the tracks at 100-300 m, the road itself only more slowly
@@ -24,21 +23,11 @@ INNER_QUANTILE = 0.9  # of the lateral position in a bin: lies in the innermost 
 
 @dataclass(frozen=True, eq=False)
 class ReferenceLine:
-    """A smooth line between the two carriageways, `s` [m] growing along the first direction of travel.
+    """A smooth line between the two carriageways, `s` [m] growing along the first direction of travel."""
 
-    Parameters
-    ----------
-    length : float
-        [m]
-    place : callable
-        s, order of derivative -> array, shape (n, 2): x, y [m] and its derivatives by s.
-    curvature : callable
-        s -> curvature [1/m], positive to the left of growing s.
-    """
-
-    length: float
-    place: Callable[[FloatArray, int], FloatArray]
-    curvature: Callable[[FloatArray], FloatArray]
+    length: float  # [m]
+    place: Callable[[FloatArray, int], FloatArray]  # s, order of derivative -> x, y [m], derived by s, shape (n, 2)
+    curvature: Callable[[FloatArray], FloatArray]  # of s, positive to the left of growing s [1/m]
 
     def project(self, xy: FloatArray, guess: FloatArray) -> tuple[FloatArray, FloatArray]:
         """`s` and lateral distance `d` [m] of points, `d` positive to the left of growing `s`.
@@ -57,18 +46,11 @@ class ReferenceLine:
 def fit_reference_line(xy: FloatArray, forward: NDArray[np.bool_]) -> tuple[ReferenceLine, FloatArray, FloatArray]:
     """Line midway between the innermost lanes of both directions, and every point's (s, d) on it.
 
-    Raises `NotEnoughDataError` if the tracks don't cover at least 1 km in both directions.
+    Raises `NotEnoughDataError` if the tracks don't cover at least 1 km in both directions. The road has to be a
+    function of its principal axis: true for a few kilometres of motorway, not for a loop.
 
-    Parameters
-    ----------
-    xy : array, shape (n, 2)
-        Positions of all vehicles, sorted by vehicle and time. [m]
-    forward : array of bool, shape (n,)
-        True where the vehicle travels in the first direction (`s` grows with it).
-
-    Notes
-    -----
-    The road has to be a function of its principal axis: true for a few kilometres of motorway, not for a loop.
+    `xy`: positions of all vehicles, sorted by vehicle and time, shape (n, 2). [m] `forward`: where the vehicle travels
+    in the first direction (`s` grows with it), shape (n,).
     """
     from scipy.interpolate import CubicSpline
 

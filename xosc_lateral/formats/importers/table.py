@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -18,21 +18,19 @@ from xosc_lateral.formats.hashes import parsed_hash
 from xosc_lateral.formats.importers.cuts import KEPT
 from xosc_lateral.formats.output_tables import harmless_frame, write_table
 from xosc_lateral.formats.tables import foreign_errors
+from xosc_lateral.lazy import pd
 from xosc_lateral.limits import TIME, Range, context_range
 from xosc_lateral.version import __version__
 
-if TYPE_CHECKING:
-    import pandas as pd
 
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ImportRecord:
     """Where a table came from and what was done to it. Lengths in m, times in s."""
 
     format: str
     source: str
     sha256: str
-    version: str
+    version: str = "unknown"
     licence: str
     settings: Mapping[str, object]
     rows: Mapping[str, int]
@@ -51,31 +49,18 @@ class Imported:
     provenance: ImportRecord
 
 
-def make_provenance(
-    table: pd.DataFrame,
-    *,
-    format: str,  # noqa: A002 (the record's own word)
-    sources: Sequence[Path],
-    licence: str,
-    settings: Mapping[str, object],
-    step: float,
-    version: str = "unknown",
-    lanes: Sequence[Mapping[str, object]] = (),
-    notes: Sequence[str] = (),
-) -> ImportRecord:
-    """Record of an import, from the table with its column `state` and rows `step` seconds apart."""
+def make_provenance(table: pd.DataFrame, *, sources: Sequence[Path], step: float, **about: Any) -> ImportRecord:
+    """Record of an import, from the table with its column `state` and rows `step` seconds apart.
+
+    `about`: the fields of `ImportRecord` that can't be counted: format, licence, settings, and more where there is.
+    """
     return ImportRecord(
-        format=format,
         source=", ".join(source.name for source in sources),
         sha256=hash_files(sources),
-        version=version,
-        licence=licence,
-        settings=settings,
         rows={str(state): int(count) for state, count in table["state"].value_counts().sort_index().items()},
         vehicles=int(table["drive"].nunique()),
         hours=round(float((table["state"] == KEPT).sum()) * step / 3600.0, 3),
-        lanes=lanes,
-        notes=notes,
+        **about,
     )
 
 
@@ -99,7 +84,7 @@ def without_cut(table: pd.DataFrame, record: ImportRecord, keep_cut: bool, sourc
     return Imported(kept.reset_index(drop=True), record)
 
 
-Importer = TypeVar("Importer", bound=Callable[..., Imported])
+Importer = TypeVar("Importer", bound="Callable[..., Imported | pd.DataFrame]")
 
 
 def guarded(read: Importer) -> Importer:
@@ -110,17 +95,17 @@ def guarded(read: Importer) -> Importer:
     """
 
     @wraps(read)
-    def within(source: Path | Sequence[Path], *args: Any, **settings: Any) -> Imported:
+    def within(source: Path | Sequence[Path], *args: Any, **settings: Any) -> Imported | pd.DataFrame:
         path = source if isinstance(source, Path) else source[0]
         with foreign_errors(path, "can't be imported"), np.errstate(all="ignore"):
             try:
-                imported = read(source, *args, **settings)
+                made = read(source, *args, **settings)
             except NotEnoughDataError as error:  # said by arithmetic that knows no files
                 if path.name in str(error):
                     raise
                 raise NotEnoughDataError(f"{path}: {error}") from error
-            _refuse_nonsense(imported.table, path)
-        return imported
+            _refuse_nonsense(made.table if isinstance(made, Imported) else made, path)
+        return made
 
     return cast(Importer, within)
 

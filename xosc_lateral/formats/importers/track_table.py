@@ -6,27 +6,22 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.errors import FormatError, NotEnoughDataError
-from xosc_lateral.formats.importers.placed import PlacedTracks, ground_speed, travel_heading
 from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping, parse_map
 from xosc_lateral.formats.source import open_source
 from xosc_lateral.formats.states import COLUMNS
-from xosc_lateral.formats.tables import foreign_errors, numbers_of, read_table, unpacked_text
+from xosc_lateral.formats.tables import foreign_errors, listed, numbers_of, read_table, unpacked_text
+from xosc_lateral.lazy import pd
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    import pandas as pd
-
-
-FloatArray = NDArray[np.float64]
-
-IntArray = NDArray[np.int64]
 
 HEADERS: Mapping[str, tuple[str, ...]] = {
     "vehicle": ("vehicle", "id", "track_id", "trackid", "vehicle_id", "object_id", "track", "drive"),
@@ -66,18 +61,29 @@ class Tracks:
     rear: FloatArray | None = None
     """How far x and y lie behind the vehicle's middle; None: they are the middle. [m]"""
 
-    def placed(
-        self,
-        piece: IntArray,
-        along: FloatArray,
-        offset: FloatArray,
-        lane_width: FloatArray,
-        road: Mapping[str, FloatArray],
-    ) -> PlacedTracks:
-        """These tracks with where each row lies; see `PlacedTracks`."""
-        who = self.names, self.vehicle, self.time, self.step
-        middle = along if self.rear is None else along + self.rear  # gaps count from there
-        return PlacedTracks(*who, piece, middle, offset, lane_width, self.speed, self.length, self.kind, road)
+
+SPEED_WINDOW = 0.4
+"""Positions are differenced over this where no speed was recorded. [s]"""
+
+
+def ground_speed(x: FloatArray, y: FloatArray, vehicle: IntArray, step: float) -> FloatArray:
+    """Speed from positions, shape (n,). [m/s]"""
+    return np.hypot(rate(x, vehicle, step, SPEED_WINDOW), rate(y, vehicle, step, SPEED_WINDOW))
+
+
+def travel_heading(x: FloatArray, y: FloatArray, vehicle: IntArray, step: float) -> FloatArray:
+    """Heading from positions, shape (n,). [rad]"""
+    return np.arctan2(rate(y, vehicle, step, SPEED_WINDOW), rate(x, vehicle, step, SPEED_WINDOW))
+
+
+def rate(values: FloatArray, vehicle: IntArray, step: float, window: float) -> FloatArray:
+    """Difference over a window about each row, within a vehicle's rows."""
+    first = np.searchsorted(vehicle, vehicle, side="left")
+    last = np.searchsorted(vehicle, vehicle, side="right") - 1
+    half = max(1, round(0.5 * window / step))
+    rows = np.arange(len(values))
+    low, high = np.maximum(rows - half, first), np.minimum(rows + half, last)
+    return np.asarray((values[high] - values[low]) / (np.maximum(high - low, 1) * step))
 
 
 def read_tracks(path: Path, columns: Sequence[str] = (), mapping: MappingLike | None = None) -> Tracks:
@@ -139,8 +145,6 @@ def _given(table: pd.DataFrame, name: str, otherwise: FloatArray) -> FloatArray:
 
 def _columns(table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequence[str]) -> pd.DataFrame:
     """The columns that are needed, under their own names, in our units."""
-    import pandas as pd
-
     mapping = {**saved.columns, **parse_map(words)}
     if unknown := mapping.keys() - HEADERS.keys():
         raise FormatError(f"--map {min(unknown)}: tracks have {', '.join(HEADERS)}", path=path)
@@ -151,12 +155,8 @@ def _columns(table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequen
         header = next((by_lower[one] for one in headers if one in by_lower), None) if source is None else source.column
         if header is None or header not in table.columns:
             if source is not None or name in ("vehicle", "time", "x", "y"):
-                raise FormatError(
-                    f"no column {header or name!r}; there are {', '.join(map(str, table.columns[:20]))} "
-                    f"(translate with --map {name}=COLUMN)",
-                    path=path,
-                    line=1,
-                )
+                there = f"there are {listed(table.columns)} (translate with --map {name}=COLUMN)"
+                raise FormatError(f"no column {header or name!r}; {there}", path=path, line=1)
             continue
         column = table[header]
         if name in ("vehicle", "vehicle_class"):
@@ -202,11 +202,12 @@ def read_esmini_log(path: Path) -> pd.DataFrame:
 
     Raises `FormatError`: a column is missing, or the table is damaged.
     """
-    import pandas as pd
-
     with open_source(path) as source, foreign_errors(path, "can't be read as a log of esmini"):
         text = unpacked_text(source)
-        names = _head(text, path)
+        head = (text.readline().decode("utf-8", "replace") for _ in range(MOST_LINES))
+        names = next((line.rstrip().rstrip(",").split(",") for line in head if line.startswith(HEAD)), None)
+        if names is None:
+            raise FormatError(f"a log of esmini without a line that begins with '{HEAD}'", path=path)
         table = pd.read_csv(text, header=None, names=range(len(names)), skipinitialspace=True, index_col=False)
     places: dict[str, dict[str, int]] = {}
     for column, name in enumerate(names):
@@ -223,11 +224,3 @@ def read_esmini_log(path: Path) -> pd.DataFrame:
     rows = pd.concat(frames, ignore_index=True)
     rows["vehicle"] = rows["vehicle"].astype(str).str.strip()
     return rows
-
-
-def _head(text: IO[bytes], path: Path) -> list[str]:
-    for _ in range(MOST_LINES):
-        line = text.readline().decode("utf-8", "replace")
-        if line.startswith(HEAD):
-            return line.rstrip().rstrip(",").split(",")
-    raise FormatError(f"a log of esmini without a line that begins with '{HEAD}'", path=path)

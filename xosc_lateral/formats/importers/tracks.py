@@ -10,19 +10,16 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings
-from xosc_lateral.formats.importers.placed import LaneGraph, PlacedTracks, import_placed
+from xosc_lateral.formats.importers.placed import LaneGraph, PlacedTracks, import_placed, require_lanes
 from xosc_lateral.formats.importers.table import Imported, guarded
 from xosc_lateral.formats.importers.track_table import Tracks, read_tracks
 from xosc_lateral.formats.mapping import MappingLike
 from xosc_lateral.formats.opendrive import read_opendrive
-from xosc_lateral.road.network import DRIVING, RoadNetwork
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from xosc_lateral.road.lanes import DRIVING, beside
+from xosc_lateral.road.network import RoadNetwork
 
 LICENCE = "your own recording"
 
@@ -54,50 +51,32 @@ def import_tracks(
     `length`, `rear`, `vehicle_class`. `mapping`: more of them, saved.
     """
     network = read_opendrive(road)
-    tracks = read_tracks(source, columns, mapping)
+    placed, graph = place_on_road(read_tracks(source, columns, mapping), network)
+    require_lanes(placed, Path(road).name, source)
+    sources = [source, Path(road)]
+    return import_placed(placed, graph, settings, keep_cut=keep_cut, format="tracks", sources=sources, licence=LICENCE)
+
+
+def place_on_road(tracks: Tracks, network: RoadNetwork) -> tuple[PlacedTracks, LaneGraph]:
+    """Every row's driving lane, and what the road is like there; x and y in the coordinates of the road's file.
+
+    Raises `FormatError`: the road has no driving lane.
+    """
     pieces, graph = lane_graph(network)
     if not pieces:
-        raise FormatError("the road has no driving lane that tracks could lie in", path=Path(road))
-    placed = place(tracks, network, pieces)
-    if not (placed.piece >= 0).any():
-        raise FormatError(
-            f"no row lies in a driving lane of {Path(road).name}: x from {tracks.x.min():.1f} to "
-            f"{tracks.x.max():.1f} m, y from {tracks.y.min():.1f} to {tracks.y.max():.1f} m; "
-            "are both in the same coordinates?",
-            path=source,
-        )
-    return import_placed(
-        placed,
-        graph,
-        settings,
-        keep_cut=keep_cut,
-        format="tracks",
-        sources=[source, Path(road)],
-        licence=LICENCE,
-    )
-
-
-def place(tracks: Tracks, network: RoadNetwork, pieces: dict[Piece, int]) -> PlacedTracks:
-    """Find every row's lane, and what the road is like there."""
+        raise FormatError("the road has no driving lane that tracks could lie in", path=network.path)
     found = network.world_to_lane(tracks.x, tracks.y, heading=tracks.heading)
-    road, lane, s = found.road, found.lane, found.s
-    inside = (found.distance <= 0.0) & (lane != 0)
-    piece = np.full(len(road), -1)
-    along = np.zeros(len(road))
-    for index in np.unique(road[inside]):
-        part = network.roads[index]
-        starts = np.array(part.section_starts)
-        mine = np.flatnonzero(inside & (road == index))
-        section = np.clip(np.searchsorted(starts, s[mine], side="right") - 1, 0, len(starts) - 1)
-        for k in np.unique(section):
-            for name in np.unique(lane[mine[section == k]]):
-                rows = mine[(section == k) & (lane[mine] == name)]
-                begin, end = part.sections[k].start, part.sections[k].end
-                forward = network.travel_direction(int(index), int(name)) > 0
-                piece[rows] = pieces.get((int(index), int(k), int(name)), -1)
-                along[rows] = s[rows] - begin if forward else end - s[rows]
+    piece, along = np.full(len(tracks.x), -1), np.zeros(len(tracks.x))
+    inside = np.flatnonzero((found.distance <= 0.0) & (found.lane != 0))
+    road, lane, s = found.road[inside], found.lane[inside], found.s[inside]
+    number = np.array([network.roads[r].section_number(at) for r, at in zip(road.tolist(), s.tolist(), strict=True)])
+    for index, k, name in sorted(set(zip(road.tolist(), number.tolist(), lane.tolist(), strict=True))):
+        mine = (road == index) & (number == k) & (lane == name)
+        section, forward = network.roads[index].sections[k], network.travel_direction(index, name) > 0
+        piece[inside[mine]] = pieces.get((index, k, name), -1)
+        along[inside[mine]] = s[mine] - section.start if forward else section.end - s[mine]
     there = np.flatnonzero(piece >= 0)
-    where = road[there], lane[there], s[there]
+    where = found.road[there], found.lane[there], found.s[there]
     lane_index, lane_count = network.lane_index(*where)
     values = {
         "lane_width": network.lane_width(*where),
@@ -107,12 +86,11 @@ def place(tracks: Tracks, network: RoadNetwork, pieces: dict[Piece, int]) -> Pla
         "crossfall": network.crossfall(*where),
         "grade": network.grade(*where),
     }
-    columns = {name: np.full(len(road), np.nan) for name in values}
+    columns = {name: np.full(len(piece), np.nan) for name in values}
     for name, known in values.items():
         columns[name][there] = known
-    width = columns.pop("lane_width")
-    offset = np.where(piece >= 0, found.offset, np.nan)
-    return tracks.placed(piece, along, offset, width, columns)
+    offset, width = np.where(piece >= 0, found.offset, np.nan), columns.pop("lane_width")
+    return PlacedTracks(tracks, piece, along, offset, width, columns), graph
 
 
 def lane_graph(network: RoadNetwork) -> tuple[dict[Piece, int], LaneGraph]:
@@ -129,15 +107,11 @@ def lane_graph(network: RoadNetwork) -> tuple[dict[Piece, int], LaneGraph]:
     following = []
     for (index, k, name), number in pieces.items():
         forward = network.travel_direction(index, name) > 0
-        beside = _beside(name, 1 if forward else -1)
-        if network.travel_direction(index, beside) == network.travel_direction(index, name):
-            left[number] = pieces.get((index, k, beside), -1)
+        other = beside(name, 1 if forward else -1)
+        if network.travel_direction(index, other) == network.travel_direction(index, name):
+            left[number] = pieces.get((index, k, other), -1)
         following.append(_following(network, pieces, index, k, name, forward))
     return pieces, LaneGraph(np.array(length), left, following)
-
-
-def _beside(lane: int, step: int) -> int:
-    return lane + step if lane + step else lane + 2 * step
 
 
 def _following(
@@ -149,7 +123,5 @@ def _following(
     step = network.advance(index, name, end, 2 * INTO_NEXT)
     if step.remaining > 0.0:
         return []
-    starts = network.roads[step.road].section_starts
-    there = int(np.clip(np.searchsorted(starts, step.s, side="right") - 1, 0, len(starts) - 1))
-    found = pieces.get((step.road, there, step.lane))
+    found = pieces.get((step.road, network.roads[step.road].section_number(step.s), step.lane))
     return [] if found is None or found == pieces[index, k, name] else [found]

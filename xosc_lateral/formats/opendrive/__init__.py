@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from xosc_lateral.formats.opendrive.reader import read_opendrive
+from xosc_lateral.formats.opendrive.reader import read_opendrive, read_road
 
-__all__ = ["read_opendrive"]
+__all__ = ["read_opendrive", "read_road"]

@@ -72,14 +72,10 @@ class RoadFile:
             self.note(f"{error.what}: {default:g} used", element)
             return default
 
-    def cubic(self, element: XmlElement) -> Cubic:
-        """Attributes a, b, c, d; absent ones are 0."""
-        return (
-            self.number(element, "a", 0.0),
-            self.number(element, "b", 0.0),
-            self.number(element, "c", 0.0),
-            self.number(element, "d", 0.0),
-        )
+    def cubic(self, element: XmlElement, axis: str = "") -> Cubic:
+        """Attributes a, b, c, d, or those of an axis (aU ...); absent ones are 0."""
+        a, b, c, d = (self.number(element, letter + axis, 0.0) for letter in "abcd")
+        return a, b, c, d
 
     def integer(self, element: XmlElement, name: str) -> int:
         """A whole number."""

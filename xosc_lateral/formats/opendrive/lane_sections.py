@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 
 from msgspec import Struct, structs
 
@@ -38,12 +39,13 @@ def read_sections(
     written = _read_all(road, length, source)
     directions = _directions(road, written, rule, source)
     sections = []
-    for i, (start, lanes, marks) in enumerate(_merge_sides(written, length)):
-        end = written[i + 1].start if i + 1 < len(written) else length
+    for section, lanes, end in zip(
+        written, _both_sides(written), [*(w.start for w in written[1:]), length], strict=True
+    ):
+        start, marks = section.start, _until(section.centre_marks, end)
+        records = [structs.replace(lane, marks=_until(lane.marks, end, start)) for lane in lanes]
         sections.append(
-            build_section(
-                lanes, start, end, lane_offset=lane_offset, directions=directions, centre_marks=_until(marks, end)
-            )
+            build_section(records, start, end, lane_offset=lane_offset, directions=directions, centre_marks=marks)
         )
     _check_lanes(road, sections, source)
     return tuple(sections), directions
@@ -138,8 +140,10 @@ def _read_marks(element: XmlElement, lane: int, start: float, source: RoadFile) 
     )
 
 
-def _until(marks: Sequence[RoadMark], end: float) -> tuple[RoadMark, ...]:
-    return tuple(mark._replace(s_end=min(mark.s_end, end)) for mark in marks if mark.s_start < end)
+def _until(marks: Sequence[RoadMark], end: float, start: float = -inf) -> tuple[RoadMark, ...]:
+    """What lies before the end and, where it is given, behind the start."""
+    inside = [mark for mark in marks if mark.s_start < end and min(mark.s_end, end) > start]
+    return tuple(mark._replace(s_start=max(mark.s_start, start), s_end=min(mark.s_end, end)) for mark in inside)
 
 
 def speed_limit(element: XmlElement, source: RoadFile) -> float:
@@ -165,43 +169,22 @@ def _directions(road: XmlElement, written: Sequence[_Written], rule: str, source
     return directions
 
 
-def _merge_sides(
-    written: Sequence[_Written], length: float
-) -> list[tuple[float, tuple[LaneRecord, ...], tuple[RoadMark, ...]]]:
-    """Sections that hold both sides: a side that a section leaves out goes on as it was.
+def _both_sides(written: Sequence[_Written]) -> list[tuple[LaneRecord, ...]]:
+    """Lanes of sections that hold both sides: a side that a section leaves out goes on as it was.
 
     The lane of a side that goes on is its own successor at the cut, and hands its real links to its last part.
     """
     parts: list[dict[str, tuple[LaneRecord, ...]]] = []
-    for i, section in enumerate(written):
+    for section in written:
         part = {}
         for side, lanes in (("left", section.left), ("right", section.right)):
-            if lanes is None:
-                before = parts[-1][side] if parts else ()
-                part[side] = tuple(structs.replace(lane, predecessors=(lane.id,)) for lane in before)
-                if i:
-                    parts[-1][side] = tuple(structs.replace(lane, successors=(lane.id,)) for lane in before)
-            else:
-                part[side] = lanes
+            before = parts[-1][side] if parts else ()
+            if lanes is None and parts:
+                parts[-1][side] = tuple(structs.replace(lane, successors=(lane.id,)) for lane in before)
+                lanes = tuple(structs.replace(lane, predecessors=(lane.id,)) for lane in before)
+            part[side] = lanes or ()
         parts.append(part)
-    return [
-        (
-            section.start,
-            tuple(_clip(lane, start, end) for lane in (*part["left"], *part["right"])),
-            section.centre_marks,
-        )
-        for section, part, start, end in zip(written, parts, *_spans(written, length), strict=True)
-    ]
-
-
-def _spans(written: Sequence[_Written], length: float) -> tuple[list[float], list[float]]:
-    starts = [section.start for section in written]
-    return starts, [*starts[1:], length]
-
-
-def _clip(lane: LaneRecord, start: float, end: float) -> LaneRecord:
-    marks = tuple(m._replace(s_start=max(m.s_start, start)) for m in _until(lane.marks, end) if m.s_end > start)
-    return structs.replace(lane, marks=marks)
+    return [(*part["left"], *part["right"]) for part in parts]
 
 
 def _check_lanes(road: XmlElement, sections: Sequence[LaneSection], source: RoadFile) -> None:

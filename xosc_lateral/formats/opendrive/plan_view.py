@@ -14,11 +14,10 @@ from math import cos, sin
 import numpy as np
 from msgspec import Struct
 
-from xosc_lateral.errors import FormatError
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.formats.opendrive.document import RoadFile, XmlElement
 from xosc_lateral.road.geometry import MAX_TURN, Arc, Line, ParamCubic, ReferenceElement, Spiral
 from xosc_lateral.road.piecewise import Cubic
-from xosc_lateral.road.positions import FloatArray
 
 PIECES = 32
 """Pieces of p(ds) per element. Field junctions: ds is then true to 1e-6 m, and p(ds) has no corner."""
@@ -35,83 +34,52 @@ def parameter_pieces(u: FloatArray, v: FloatArray, p_end: FloatArray, length: Fl
     The curve's arc length over [0, p_end] is scaled to `length`, as the reference player does: files whose length
     attribute differs from it by rounding stay continuous.
 
-    Parameters
-    ----------
-    u, v : array, shape (n, 4)
-        Coefficients of the two coordinates, lowest power first.
-    p_end, length : array, shape (n,)
-        Parameter at the end; length attribute [m].
-
-    Returns
-    -------
-    array, shape (n, PIECES, 4)
-        Cubics of ds about each piece's start.
+    `u`, `v`: coefficients of the two coordinates, lowest power first, shape (n, 4). `p_end`, `length`: parameter at the
+    end and length attribute [m], shape (n,). The result: cubics of ds about each piece's start, shape (n, PIECES, 4).
     """
+
+    def integral(begin: FloatArray, reach: FloatArray) -> FloatArray:
+        """Mean of |dx/dp| over [begin, begin + reach]."""
+        total = np.zeros_like(begin)
+        for node, weight in zip(_NODES, _WEIGHTS, strict=True):
+            total += weight * _speed(u, v, begin + node * reach)
+        return total
+
     grid = np.linspace(0.0, 1.0, PIECES + 1)
-    p = p_end[:, None] * grid
+    p, rows = p_end[:, None] * grid, np.arange(len(p_end))[:, None]
     step = (p_end / PIECES)[:, None]
-    speed = np.zeros((len(p_end), PIECES))
-    for node, weight in zip(_NODES, _WEIGHTS, strict=True):
-        speed += weight * _speed(u, v, p[:, :-1] + node * step)
-    arc = np.concatenate([np.zeros((len(p_end), 1)), np.cumsum(speed * step, axis=1)], axis=1)
+    arc = np.concatenate([np.zeros((len(p_end), 1)), np.cumsum(integral(p[:, :-1], step) * step, axis=1)], axis=1)
     total = arc[:, -1].copy()
-    straight = ~(total > 0.0)  # degenerate: the parameter runs evenly
-    scale = np.where(straight, 1.0, length / np.where(straight, 1.0, total))
-    arc = np.where(straight[:, None], length[:, None] * grid, arc * scale[:, None])
+    straight = ~(total > 0.0)[:, None]  # degenerate: the parameter runs evenly
+    scale = np.where(straight[:, 0], 1.0, length / np.where(straight[:, 0], 1.0, total))[:, None]
     target = length[:, None] * grid
+    arc = np.where(straight, target, arc * scale)
     value = np.stack([np.interp(target[i], arc[i], p[i]) for i in range(len(p_end))])
-    if not straight.all():
-        value = _refined(value, target, u, v, p_end, arc, p, scale, straight)
+    if not straight.all():  # Newton steps on arc(p) = target, from the nearest grid point below
+        below = np.clip(np.floor(value / step).astype(int), 0, PIECES - 1)
+        origin, base = p[rows, below], arc[rows, below]
+        for _ in range(4):
+            reach = value - origin
+            speed = np.maximum(_speed(u, v, value), 1e-9) * scale
+            miss = target - base - integral(origin, reach) * reach * scale
+            value = np.where(straight, value, np.clip(value + miss / speed, 0.0, p_end[:, None]))
+        value = np.maximum.accumulate(value, axis=1)
     value[:, 0], value[:, -1] = 0.0, p_end
-    return _hermite(value, _slopes(value, u, v, scale, length), length / PIECES)
+    # dp/ds at the nodes, at most three times the neighbouring secants: p(ds) never runs back (Fritsch-Carlson)
+    slope = 1.0 / (np.maximum(_speed(u, v, value), 1e-9) * scale)
+    secant = np.diff(value, axis=1) / (length / PIECES)[:, None]
+    slope[:, :-1] = np.minimum(slope[:, :-1], 3.0 * secant)
+    slope[:, 1:] = np.minimum(slope[:, 1:], 3.0 * secant)
+    # Hermite's cubics
+    h, a, b = (length / PIECES)[:, None], value[:, :-1], slope[:, :-1]
+    rise, end = value[:, 1:] - a - b * h, slope[:, 1:] - b
+    return np.stack([a, b, (3.0 * rise - end * h) / h**2, (end * h - 2.0 * rise) / h**3], axis=-1)
 
 
 def _speed(u: FloatArray, v: FloatArray, p: FloatArray) -> FloatArray:
     du = u[:, 1:2] + p * (2.0 * u[:, 2:3] + 3.0 * p * u[:, 3:4])
     dv = v[:, 1:2] + p * (2.0 * v[:, 2:3] + 3.0 * p * v[:, 3:4])
     return np.asarray(np.hypot(du, dv))
-
-
-def _refined(
-    value: FloatArray,
-    target: FloatArray,
-    u: FloatArray,
-    v: FloatArray,
-    p_end: FloatArray,
-    arc: FloatArray,
-    p: FloatArray,
-    scale: FloatArray,
-    straight: np.ndarray[tuple[int], np.dtype[np.bool_]],
-) -> FloatArray:
-    """Newton steps on arc(p) = target, from the nearest grid point below."""
-    rows = np.arange(len(p_end))[:, None]
-    below = np.clip(np.floor(value / (p_end[:, None] / PIECES)).astype(int), 0, PIECES - 1)
-    origin, base = p[rows, below], arc[rows, below]
-    for _ in range(4):
-        reach = value - origin
-        length = np.zeros_like(value)
-        for node, weight in zip(_NODES, _WEIGHTS, strict=True):
-            length += weight * _speed(u, v, origin + node * reach)
-        speed = np.maximum(_speed(u, v, value), 1e-9) * scale[:, None]
-        miss = target - base - length * reach * scale[:, None]
-        value = np.where(straight[:, None], value, np.clip(value + miss / speed, 0.0, p_end[:, None]))
-    return np.maximum.accumulate(value, axis=1)
-
-
-def _slopes(value: FloatArray, u: FloatArray, v: FloatArray, scale: FloatArray, length: FloatArray) -> FloatArray:
-    """dp/ds at the nodes, at most three times the neighbouring secants: p(ds) never runs back (Fritsch-Carlson)."""
-    slope = 1.0 / (np.maximum(_speed(u, v, value), 1e-9) * scale[:, None])
-    secant = np.diff(value, axis=1) / (length / PIECES)[:, None]
-    slope[:, :-1] = np.minimum(slope[:, :-1], 3.0 * secant)
-    slope[:, 1:] = np.minimum(slope[:, 1:], 3.0 * secant)
-    return slope
-
-
-def _hermite(value: FloatArray, slope: FloatArray, step: FloatArray) -> FloatArray:
-    h = step[:, None]
-    a, b = value[:, :-1], slope[:, :-1]
-    rise, end = value[:, 1:] - a - b * h, slope[:, 1:] - b
-    return np.stack([a, b, (3.0 * rise - end * h) / h**2, (end * h - 2.0 * rise) / h**3], axis=-1)
 
 
 def end_parameter(v: tuple[float, float, float, float], length: float) -> float:
@@ -180,21 +148,12 @@ def _element(geometry: XmlElement, length: float, source: RoadFile) -> Reference
                 v = source.cubic(shape)
                 return CubicRecord(x, y, heading, length, (0.0, 1.0, 0.0, 0.0), v, end_parameter(v, length))
             case "paramPoly3":
-                u, v = (_coefficients(shape, axis, source) for axis in "UV")
+                u, v = (source.cubic(shape, axis) for axis in "UV")
                 p_end = length if shape.get("pRange") == "arcLength" else 1.0
                 return CubicRecord(x, y, heading, length, u, v, p_end)
-    raise _unknown(geometry, source)
-
-
-def _unknown(geometry: XmlElement, source: RoadFile) -> FormatError:
     known = "line, arc, spiral, poly3, paramPoly3"
     found = ", ".join(str(child.tag) for child in geometry) or "nothing"
-    return source.error(f"no shape that is known ({known}); found {found}", geometry)
-
-
-def _coefficients(shape: XmlElement, axis: str, source: RoadFile) -> Cubic:
-    a, b, c, d = (source.number(shape, letter + axis, 0.0) for letter in "abcd")
-    return (a, b, c, d)
+    raise source.error(f"no shape that is known ({known}); found {found}", geometry)
 
 
 def _check_turn(curvature: float, length: float, shape: XmlElement, source: RoadFile) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from os import PathLike
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from xosc_lateral.formats.opendrive.document import RoadFile, XmlElement, open_document
 from xosc_lateral.formats.opendrive.lane_sections import read_sections, speed_limit
@@ -25,20 +27,9 @@ LONGEST = 1e6
 
 
 def read_opendrive(path: str | PathLike[str]) -> RoadNetwork:
-    """Read one ``.xodr``.
+    """Read one ``.xodr``; the network's `notes` name what was repaired, ignored or degenerate.
 
-    Raises `FormatError` if it is no OpenDRIVE, or can't be understood: file, line, element and value; `OSError` if it
-    can't be opened.
-
-    Parameters
-    ----------
-    path : path-like
-        The file.
-
-    Returns
-    -------
-    RoadNetwork
-        Its `notes` name what was repaired, ignored or degenerate.
+    Raises `FormatError` if it is no OpenDRIVE, or can't be understood: file, line, element and value.
     """
     root, source = open_document(path)
     elements = list(root.iterfind("road"))
@@ -49,7 +40,8 @@ def read_opendrive(path: str | PathLike[str]) -> RoadNetwork:
     lines = finish_elements(plans)
     roads = tuple(_read_road(e, plan, line, source) for e, plan, line in zip(elements, plans, lines, strict=True))
     junctions = tuple(_read_junction(element, source) for element in root.iterfind("junction"))
-    reference = root.findtext("header/geoReference")
+    reference, offset = root.findtext("header/geoReference"), root.find("header/offset")
+    shift = () if offset is None else (source.number(offset, name, 0.0) for name in ("x", "y", "z", "hdg"))
     return RoadNetwork(
         roads=roads,
         junctions=junctions,
@@ -57,15 +49,19 @@ def read_opendrive(path: str | PathLike[str]) -> RoadNetwork:
         sha256=source.sha256,
         notes=source.notes,
         geo_reference=reference.strip() if reference and reference.strip() else None,
-        header_offset=_read_header_offset(root, source),
+        header_offset=HeaderOffset(*shift),
     )
 
 
-def _read_header_offset(root: XmlElement, source: RoadFile) -> HeaderOffset:
-    element = root.find("header/offset")
-    if element is None:
-        return HeaderOffset()
-    return HeaderOffset(*(source.number(element, name, 0.0) for name in ("x", "y", "z", "hdg")))
+def read_road(data: bytes, name: str) -> RoadNetwork:
+    """Read a road that is no file of its own, and that messages call by this name.
+
+    Raises `FormatError`: see `read_opendrive`.
+    """
+    with TemporaryDirectory() as folder:
+        path = Path(folder, f"{name}.xodr")
+        path.write_bytes(data)
+        return read_opendrive(path)
 
 
 def _check_ids(elements: Sequence[XmlElement], source: RoadFile) -> None:
@@ -83,7 +79,9 @@ def _read_road(
     element: XmlElement, plan: Sequence[Record], line: tuple[ReferenceElement, ...], source: RoadFile
 ) -> Road:
     length = _length(element, plan, source)
-    rule = _rule(element, source)
+    rule = element.get("rule", "RHT").upper()
+    if rule not in ("RHT", "LHT"):
+        raise source.error(f"rule={element.get('rule')!r} is neither RHT nor LHT", element)
     _check_places(element, plan, line, source)
     sections, directions = read_sections(element, length, rule, source)
     junction = element.get("junction", "-1")
@@ -102,14 +100,6 @@ def _read_road(
         predecessor=_read_link(element, "predecessor"),
         successor=_read_link(element, "successor"),
     )
-
-
-def _rule(element: XmlElement, source: RoadFile) -> str:
-    """Which side traffic keeps to."""
-    rule = element.get("rule", "RHT").upper()
-    if rule not in ("RHT", "LHT"):
-        raise source.error(f"rule={element.get('rule')!r} is neither RHT nor LHT", element)
-    return rule
 
 
 def _check_places(

@@ -10,13 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from lxml import etree
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.formats.importers.road_from_tracks import ReferenceLine
 from xosc_lateral.formats.openscenario.write.build import decimal, sub
 from xosc_lateral.formats.output_paths import template_mark
-
-FloatArray = NDArray[np.float64]
 
 PIECE = 50.0
 """Of a curved reference line: a cubic through both ends with their directions is off by less than a millimetre on a

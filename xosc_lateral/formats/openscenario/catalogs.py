@@ -14,16 +14,14 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from glob import escape
 from pathlib import Path
 
-from lxml import etree
-
 from xosc_lateral.errors import FormatError, MissingFileError
 from xosc_lateral.formats.openscenario.declarations import entry_scope
-from xosc_lateral.formats.openscenario.element import XmlElement, local_name
+from xosc_lateral.formats.openscenario.element import XmlElement
 from xosc_lateral.formats.xml import read_document, read_xml
 from xosc_lateral.scenario.parameters import Scope
 from xosc_lateral.scenario.place import Place, Unsupported
@@ -86,7 +84,7 @@ class Boundary:
         """
         text = reference.strip()
         if not text or "\0" in text:
-            raise FormatError("empty file reference", path=place.path, line=place.line, element=place.element)
+            raise place.error("empty file reference")
         return Path(os.path.normpath(self.folder / text.replace("\\", "/")))
 
     def holds(self, path: Path) -> bool:
@@ -96,11 +94,8 @@ class Boundary:
 
     def refusal(self, reference: str, place: Place) -> FormatError:
         """The error for a reference that leads outside."""
-        return FormatError(
-            f"'{reference.strip()[:200]}' lies outside the scenario's folders; allow its folder explicitly",
-            path=place.path,
-            line=place.line,
-            element=place.element,
+        return place.error(
+            f"'{reference.strip()[:200]}' lies outside the scenario's folders; allow its folder explicitly"
         )
 
     def inside(self, reference: str, place: Place) -> Path:
@@ -139,7 +134,7 @@ class Catalogs:
     boundary: Boundary
     remarks: list[Unsupported]
     used: dict[Path, str] = field(default_factory=dict)
-    _files: dict[tuple[str, str], Path] = field(default_factory=dict)
+    _files: dict[str, Path] = field(default_factory=dict)
 
     def entry(self, reference: XmlElement) -> XmlElement:
         """The element that a CatalogReference names, in the scope of its parameters and the assigned values.
@@ -152,18 +147,18 @@ class Catalogs:
         document = read_document(path)
         if self.used.setdefault(path, document.sha256) != document.sha256:
             reference.fail(f"catalog {path} changed while the scenario was being read")
-        root = document.root
+        entries = document.root.findall("{*}Catalog/{*}*")
         # Names of entries are plain text: no scope is needed to find them.
-        found = next((XmlElement(xml, path, Scope({})) for xml in _entries(root) if xml.get("name") == name), None)
+        found = next((XmlElement(xml, path, Scope({})) for xml in entries if xml.get("name") == name), None)
         if found is None:
-            reference.fail(f"catalog '{catalog}' has no entry '{name}' (it has {_names(root)})")
+            names = ", ".join(sorted(str(xml.get("name")) for xml in entries)[:8])
+            reference.fail(f"catalog '{catalog}' has no entry '{name}' (it has {names})")
         return found.within(entry_scope(found, reference))
 
     def _file(self, catalog: str, reference: XmlElement) -> Path:
-        kind = reference.tag
-        if (kind, catalog) not in self._files:
-            self._files[kind, catalog] = self._search(catalog, reference)
-        return self._files[kind, catalog]
+        if catalog not in self._files:
+            self._files[catalog] = self._search(catalog, reference)
+        return self._files[catalog]
 
     def _search(self, catalog: str, reference: XmlElement) -> Path:
         """By file name in every location, as the reference player does; then by the name inside; then near by."""
@@ -192,7 +187,8 @@ class Catalogs:
             return near
         if refused is not None:
             raise refused
-        raise _missing(reference, catalog, folders)
+        searched = ", ".join(str(folder) for folder in dict.fromkeys(folders)) or "no folder is named"
+        raise reference.place().error(f"catalog '{catalog}' not found ({searched})", MissingFileError)
 
     def _by_name_inside(self, folders: Sequence[Path], catalog: str) -> Path | None:
         """A file whose catalog bears that name, whatever its own is."""
@@ -201,23 +197,6 @@ class Catalogs:
                 if self.boundary.holds(path) and _calls_itself(path, catalog):
                     return path
         return None
-
-
-def _missing(reference: XmlElement, catalog: str, folders: Sequence[Path]) -> MissingFileError:
-    searched = ", ".join(str(folder) for folder in dict.fromkeys(folders)) or "no folder is named"
-    place = reference.place()
-    what = f"catalog '{catalog}' not found ({searched})"
-    return MissingFileError(what, path=place.path, line=place.line, element=place.element)
-
-
-def _names(root: etree._Element) -> str:
-    return ", ".join(sorted(str(xml.get("name")) for xml in _entries(root))[:8])
-
-
-def _entries(root: etree._Element) -> Iterator[etree._Element]:
-    for catalog in root:
-        if isinstance(catalog.tag, str) and local_name(catalog) == "Catalog":
-            yield from (entry for entry in catalog if isinstance(entry.tag, str))
 
 
 def _near_by(boundary: Boundary, name: str) -> Path | None:
@@ -232,4 +211,4 @@ def _calls_itself(path: Path, name: str) -> bool:
         root, _ = read_xml(path)
     except FormatError:
         return False
-    return any(isinstance(xml.tag, str) and local_name(xml) == "Catalog" and xml.get("name") == name for xml in root)
+    return any(xml.get("name") == name for xml in root.iterfind("{*}Catalog"))

@@ -59,10 +59,7 @@ def _read_condition(element: XmlElement, context: Context) -> Condition:
     content = reader(kind, context) if reader else Unsupported(kind.tag, kind.place())
     if owner.tag == "ByEntityCondition":
         triggering = read_struct(TriggeringEntities, owner.required("TriggeringEntities"), context)
-    found = read_struct(Condition, element, context, content=content, triggering_entities=triggering)
-    if found.delay < 0:
-        element.fail(f"delay of {found.delay} s is negative")
-    return found
+    return read_struct(Condition, element, context, content=content, triggering_entities=triggering)
 
 
 def _collision(e: XmlElement, context: Context) -> CollisionCondition:

@@ -14,7 +14,7 @@ from msgspec import NODEFAULT, UNSET, Struct, structs
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.openscenario.catalogs import Catalogs
-from xosc_lateral.formats.openscenario.declarations import parameter_name
+from xosc_lateral.formats.openscenario.declarations import local_scope, parameter_name
 from xosc_lateral.formats.openscenario.element import XmlElement
 from xosc_lateral.scenario.place import Place, Unsupported, Xml
 from xosc_lateral.scenario.position import Position, Shape
@@ -77,6 +77,19 @@ class Context:
         """Note something that is read over."""
         self.remarks.append(Unsupported(element.tag, element.place(), reason))
 
+    def inline_or_entry(self, owner: XmlElement, tag: str) -> XmlElement:
+        """In the scope of its own parameters; in a catalog, what the reference assigns comes before what is declared.
+
+        `owner` holds an element of that tag or a reference to one.
+        """
+        inline = owner.child(tag)
+        if inline is not None:
+            return inline.within(local_scope(inline))
+        entry = self.catalogs.entry(owner.required("CatalogReference"))
+        if entry.tag != tag:
+            owner.fail(f"catalog entry '{entry.raw('name')}' is a {entry.tag}, not a {tag}")
+        return entry
+
     def optional_entry(self, reference: XmlElement) -> XmlElement | None:
         """Catalog entry that motion does not depend on: a missing one is remarked, not refused."""
         try:
@@ -104,12 +117,16 @@ def read_struct(kind: type[S], e: XmlElement, context: Context, /, **given: Any)
     Raises
     ------
     FormatError
-        An attribute or a child element that is missing and has no default, or is not of its type.
+        An attribute or a child element that is missing and has no default, or is not of its type; what the struct
+        itself refuses.
     """
     for name, reader in _readers(kind):
         if name not in given:
             given[name] = reader(e, context)
-    return kind(**given)
+    try:
+        return kind(**given)
+    except ValueError as error:
+        e.fail(str(error))
 
 
 def declared(*kinds: type[Struct]) -> dict[str, Reader]:

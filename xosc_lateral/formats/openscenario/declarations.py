@@ -11,6 +11,9 @@ from xosc_lateral.scenario.parameters import Scope, satisfies
 from xosc_lateral.scenario.place import Unsupported
 from xosc_lateral.scenario.scenario import Parameter
 
+NAMES = frozenset({"parameterRef", "variableRef", "parameterName"})
+"""Attributes that name a parameter instead of standing for its value."""
+
 
 def parameter_name(text: str) -> str:
     """Name without the ``$`` that references in field files carry."""
@@ -20,8 +23,7 @@ def parameter_name(text: str) -> str:
 def declared_values(owner: XmlElement) -> dict[str, str]:
     """Names and values as written; of declarations with the same name the last counts, as in the reference player."""
     values = {}
-    declarations = owner.child("ParameterDeclarations")
-    for declaration in declarations.children("ParameterDeclaration") if declarations else ():
+    for declaration in owner.listed("ParameterDeclarations", "ParameterDeclaration"):
         name = parameter_name(declaration.raw("name") or "")
         if not name:
             declaration.fail("attribute 'name' is missing")
@@ -41,13 +43,16 @@ def entry_scope(entry: XmlElement, reference: XmlElement) -> Scope:
     Assigned values are read in the scope of the reference. Names that the entry does not declare are looked up there,
     too: field catalogs use the scenario's parameters.
     """
-    assigned = {}
-    assignments = reference.child("ParameterAssignments")
-    for assignment in assignments.children("ParameterAssignment") if assignments else ():
-        assigned[parameter_name(assignment.raw("parameterRef") or "")] = assignment.text("value")
-    # A value assigned is final: a `$` in it is text.
-    final = {name: f"\\{value}" if value.startswith("$") else value for name, value in assigned.items()}
-    return Scope({**declared_values(entry), **final}, reference.scope)
+    assigned = {
+        parameter_name(assignment.raw("parameterRef") or ""): final(assignment.text("value"))
+        for assignment in reference.listed("ParameterAssignments", "ParameterAssignment")
+    }
+    return Scope({**declared_values(entry), **assigned}, reference.scope)
+
+
+def final(value: str) -> str:
+    """A value in which a leading ``$`` is text: nobody fills it in again."""
+    return f"\\{value}" if value.startswith("$") else value
 
 
 def read_declarations(
@@ -64,24 +69,32 @@ def read_declarations(
         known = ", ".join(sorted(values)[:10]) or "none"
         root.fail(f"parameter '{unknown[0]}' is not declared (declared: {known})")
     scope = Scope({**values, **overrides})
-    declarations = root.child("ParameterDeclarations")
     parameters = {}
-    for declaration in declarations.children("ParameterDeclaration") if declarations else ():
-        parameter = _read_parameter(declaration.within(scope), "parameterType", scope)
-        parameters[parameter.name] = parameter
-        broken = broken_constraint(declaration.within(scope), parameter.value)
-        if broken and parameter.name in overrides:
-            declaration.fail(f"value '{parameter.value}' violates {broken}")
+    for declaration in root.listed("ParameterDeclarations", "ParameterDeclaration"):
+        item = declaration.within(scope)
+        name, value = parameter_name(item.raw("name") or ""), value_of(item)
+        kind = item.choice("parameterType", ParameterType, ParameterType.STRING)
+        parameters[name] = Parameter(name, kind, value, item.place())
+        broken = broken_constraint(item, value)
+        if broken and name in overrides:
+            item.fail(f"value '{value}' violates {broken}")
         if broken:
-            remarks.append(Unsupported("ConstraintGroup", parameter.place, f"'{parameter.value}' violates {broken}"))
+            remarks.append(Unsupported("ConstraintGroup", item.place(), f"'{value}' violates {broken}"))
     return scope, parameters
+
+
+def value_of(declaration: XmlElement) -> str:
+    """Value of the parameter that an element declares, in its scope."""
+    try:
+        return declaration.scope.value(parameter_name(declaration.raw("name") or ""))
+    except ExpressionError as error:
+        declaration.fail(f"value: {error}")
 
 
 def read_variables(root: XmlElement) -> dict[str, Parameter]:
     """Variable declarations (1.2)."""
     variables = {}
-    declarations = root.child("VariableDeclarations")
-    for declaration in declarations.children("VariableDeclaration") if declarations else ():
+    for declaration in root.listed("VariableDeclarations", "VariableDeclaration"):
         name, value = parameter_name(declaration.text("name")), declaration.text("value", "")
         kind = declaration.choice("variableType", ParameterType, ParameterType.STRING)
         variables[name] = Parameter(name, kind, value, declaration.place())
@@ -97,13 +110,3 @@ def broken_constraint(declaration: XmlElement, value: str) -> str | None:
             return None
         groups.append(" and ".join(f"{rule} {limit}" for rule, limit in constraints))
     return " or ".join(groups) or None
-
-
-def _read_parameter(declaration: XmlElement, type_attribute: str, scope: Scope) -> Parameter:
-    name = parameter_name(declaration.raw("name") or "")
-    try:
-        value = scope.value(name)
-    except ExpressionError as error:
-        declaration.fail(f"value: {error}")
-    kind = declaration.choice(type_attribute, ParameterType, ParameterType.STRING)
-    return Parameter(name, kind, value, declaration.place())

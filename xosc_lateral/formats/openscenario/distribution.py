@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 import time
 import zlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
-from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.openscenario.catalogs import Boundary, allowed_roots
-from xosc_lateral.formats.openscenario.declarations import broken_constraint, declared_values, parameter_name
+from xosc_lateral.formats.openscenario.catalogs import Boundary, Catalogs, allowed_roots
+from xosc_lateral.formats.openscenario.context import Context, read_struct
+from xosc_lateral.formats.openscenario.declarations import broken_constraint, declared_values, parameter_name, value_of
 from xosc_lateral.formats.openscenario.element import XmlElement
 from xosc_lateral.formats.openscenario.read import open_scenario, read_header
 from xosc_lateral.formats.xml import read_xml
@@ -22,7 +24,6 @@ from xosc_lateral.limits import COMBINATIONS, DECIMAL_EXPONENT, DISTRIBUTION_TIM
 from xosc_lateral.scenario.distribution import (
     Deterministic,
     DistributionError,
-    Draw,
     Histogram,
     LogNormal,
     Normal,
@@ -34,7 +35,6 @@ from xosc_lateral.scenario.distribution import (
     ValueSets,
     Weighted,
 )
-from xosc_lateral.scenario.expressions import ExpressionError
 from xosc_lateral.scenario.parameters import Scope
 from xosc_lateral.scenario.place import Place
 
@@ -71,8 +71,7 @@ class LogicalScenario:
     def __post_init__(self) -> None:
         """Find what the scenario declares, and which of it is constrained."""
         self._declared = declared_values(self._scenario)
-        declarations = self._scenario.child("ParameterDeclarations")
-        found = declarations.children("ParameterDeclaration") if declarations else ()
+        found = self._scenario.listed("ParameterDeclarations", "ParameterDeclaration")
         self._constrained = [item for item in found if item.child("ConstraintGroup") is not None]
 
     def parameter_sets(self, seed: int = 0) -> Iterator[ParameterSet]:
@@ -90,7 +89,7 @@ class LogicalScenario:
         self.discarded, begin = 0, time.monotonic()
         limit = PARAMETER_SETS if isinstance(self.distribution, Stochastic) else COMBINATIONS
         if self.count > limit.value:
-            raise self._error(limit.refusal(self.count))
+            raise self.place.error(limit.refusal(self.count))
         if isinstance(self.distribution, Deterministic):
             for values in self.distribution:
                 if self._accepts(values):
@@ -105,7 +104,7 @@ class LogicalScenario:
     def _check_time(self, begin: float) -> None:
         took = time.monotonic() - begin
         if took > DISTRIBUTION_TIME.value:
-            raise self._error(f"{DISTRIBUTION_TIME.refusal(took)}; constraints or limits leave out nearly all")
+            raise self.place.error(f"{DISTRIBUTION_TIME.refusal(took)}; constraints or limits leave out nearly all")
 
     @property
     def count(self) -> int:
@@ -119,37 +118,24 @@ class LogicalScenario:
             try:
                 values = distribution.sample(rng)
             except DistributionError as error:
-                raise self._error(str(error)) from error
+                raise self.place.error(str(error)) from error
             if self._accepts(values):
                 return values
-        raise self._error(f"{MAX_REDRAWS} draws in a row violate the constraints of {self.scenario_file}")
+        raise self.place.error(f"{MAX_REDRAWS} draws in a row violate the constraints of {self.scenario_file}")
 
     def _accepts(self, values: ParameterSet) -> bool:
         for name in values:
             if name not in self._declared:
-                raise self._error(f"parameter '{name}' is not declared in {self.scenario_file}")
+                raise self.place.error(f"parameter '{name}' is not declared in {self.scenario_file}")
         if not self._constrained:
             return True
         scope = Scope({**self._declared, **values})
         for declaration in self._constrained:
-            name = parameter_name(declaration.raw("name") or "")
-            try:
-                broken = broken_constraint(declaration.within(scope), scope.value(name))
-            except ExpressionError as error:
-                declaration.fail(f"value: {error}")
-            if broken:
+            item = declaration.within(scope)
+            if broken_constraint(item, value_of(item)):
                 self.discarded += 1
                 return False
         return True
-
-    def _error(self, what: str) -> FormatError:
-        return FormatError(what, path=self.place.path, line=self.place.line, element=self.place.element)
-
-
-def is_distribution(path: Path | str) -> bool:
-    """Whether a file is a parameter value distribution."""
-    document, _ = read_xml(Path(path))
-    return open_scenario(document, Path(path)).child("ParameterValueDistribution") is not None
 
 
 def read_distribution(path: Path | str, *, allowed: Iterable[Path] = ()) -> LogicalScenario:
@@ -167,7 +153,7 @@ def read_distribution(path: Path | str, *, allowed: Iterable[Path] = ()) -> Logi
     path = Path(path)
     document, _ = read_xml(path)
     root = open_scenario(document, path)
-    read_header(root)
+    header = read_header(root)
     owner = root.required("ParameterValueDistribution")
     reference = owner.required("ScenarioFile")
     boundary = Boundary(path.parent, allowed_roots(path, allowed))
@@ -175,7 +161,8 @@ def read_distribution(path: Path | str, *, allowed: Iterable[Path] = ()) -> Logi
     if not scenario.is_file():
         reference.fail(f"scenario file '{reference.text('filepath')}' does not exist (looked for {scenario})")
     content = owner.required("Deterministic", "Stochastic")
-    distribution = _deterministic(content) if content.tag == "Deterministic" else _stochastic(content)
+    context = Context(header.version, Catalogs({}, boundary, []), [], {})
+    distribution = _deterministic(content) if content.tag == "Deterministic" else _stochastic(content, context)
     inner, _ = read_xml(scenario)
     return LogicalScenario(path, scenario, distribution, content.place(), open_scenario(inner, scenario))
 
@@ -236,14 +223,17 @@ def _decimal(element: XmlElement, name: str) -> Decimal:
     return value
 
 
-def _stochastic(owner: XmlElement) -> Stochastic:
+def _stochastic(owner: XmlElement, context: Context) -> Stochastic:
     runs = owner.integer("numberOfTestRuns")
     if runs < 0:
         owner.fail(f"numberOfTestRuns of {runs} is negative")
     draws = []
     for item in owner.children("StochasticDistribution"):
-        content = item.required(*_DRAWS)
-        draws.append((_name_of(item, "parameterName"), _DRAWS[content.tag](content)))
+        content = item.required(*_DRAWS, "UserDefinedDistribution")
+        if content.tag == "UserDefinedDistribution":
+            content.fail("user-defined distributions can't be drawn from")
+        draw: Any = read_struct(_DRAWS[content.tag], content, context)
+        draws.append((_name_of(item, "parameterName"), draw))
     return Stochastic(tuple(draws), runs, _seed(owner))
 
 
@@ -255,79 +245,11 @@ def _seed(owner: XmlElement) -> int | None:
     return int(value) if value == int(value) and value >= 0 else zlib.crc32(repr(value).encode())
 
 
-def _limits(owner: XmlElement) -> tuple[float, float]:
-    element = owner.child("Range")
-    if element is None:
-        return -math.inf, math.inf
-    lower, upper = element.number("lowerLimit", finite=False), element.number("upperLimit", finite=False)
-    if upper < lower:
-        element.fail(f"upperLimit {upper} is below lowerLimit {lower}")
-    return lower, upper
-
-
-def _finite_limits(owner: XmlElement) -> tuple[float, float]:
-    limits = _limits(owner)
-    if not all(map(math.isfinite, limits)):
-        owner.fail("needs a finite Range")
-    return limits
-
-
-def _weights(items: list[XmlElement], owner: XmlElement) -> tuple[float, ...]:
-    weights = tuple(item.number("weight") for item in items)
-    if not weights or min(weights) < 0 or sum(weights) <= 0:
-        owner.fail("needs weights that are not negative and not all zero")
-    return weights
-
-
-def _weighted(e: XmlElement) -> Draw:
-    items = list(e.children("Element"))
-    return Weighted(tuple(item.text("value") for item in items), _weights(items, e))
-
-
-def _histogram(e: XmlElement) -> Draw:
-    bins = list(e.children("Bin", "HistogramBin"))
-    return Histogram(tuple(_finite_limits(item) for item in bins), _weights(bins, e))
-
-
-def _uniform(e: XmlElement) -> Draw:
-    return Uniform(*_finite_limits(e))
-
-
-def _normal(e: XmlElement) -> Draw:
-    return Normal(e.number("expectedValue"), _variance(e), _limits(e))
-
-
-def _log_normal(e: XmlElement) -> Draw:
-    mean = e.number("expectedValue")
-    if mean <= 0:
-        e.fail(f"expectedValue of {mean} is not positive")
-    return LogNormal(mean, _variance(e), _limits(e))
-
-
-def _variance(e: XmlElement) -> float:
-    variance = e.number("variance")
-    if variance < 0:
-        e.fail(f"variance of {variance} is negative")
-    return variance
-
-
-def _poisson(e: XmlElement) -> Draw:
-    mean = e.number("expectedValue")
-    if not 0 <= mean <= 1e9:
-        e.fail(f"expectedValue of {mean} is not within [0, 1e9]")
-    return Poisson(mean, _limits(e))
-
-
-def _user_defined(e: XmlElement) -> Draw:
-    e.fail("user-defined distributions can't be drawn from")
-
-
-_DRAWS: dict[str, Callable[[XmlElement], Draw]] = {
-    "ProbabilityDistributionSet": _weighted,
-    "Histogram": _histogram,
-    "UniformDistribution": _uniform,
-    "NormalDistribution": _normal,
-    "LogNormalDistribution": _log_normal,
-    "PoissonDistribution": _poisson,
-    "UserDefinedDistribution": _user_defined,
+_DRAWS: Mapping[str, type[Struct]] = {
+    "ProbabilityDistributionSet": Weighted,
+    "Histogram": Histogram,
+    "UniformDistribution": Uniform,
+    "NormalDistribution": Normal,
+    "LogNormalDistribution": LogNormal,
+    "PoissonDistribution": Poisson,
 }

@@ -10,7 +10,6 @@ from typing import NoReturn, TypeVar, cast
 
 from lxml import etree
 
-from xosc_lateral.errors import FormatError
 from xosc_lateral.scenario.enums import SYNONYMS
 from xosc_lateral.scenario.expressions import ExpressionError
 from xosc_lateral.scenario.parameters import Scope
@@ -54,6 +53,11 @@ class XmlElement:
         for child in self.xml:
             if isinstance(child.tag, str) and (not tags or local_name(child) in tags):
                 yield XmlElement(child, self.path, self.scope)
+
+    def listed(self, holder: str, tag: str) -> Iterator[XmlElement]:
+        """Elements of one tag in a child that holds them; none without it."""
+        owner = self.child(holder)
+        return iter(()) if owner is None else owner.children(tag)
 
     def child(self, *tags: str) -> XmlElement | None:
         """First child of one of these tags."""
@@ -180,12 +184,34 @@ class XmlElement:
 
     def fail(self, what: str) -> NoReturn:
         """Raise a `FormatError` that names this element."""
-        raise FormatError(what, path=self.path, line=line_of(self.xml), element=self.label())
+        raise self.place().error(what)
 
 
 def local_name(xml: etree._Element) -> str:
     """Tag without namespace."""
     return str(xml.tag).rpartition("}")[2]
+
+
+def elements(xml: etree._Element, *tags: str) -> list[etree._Element]:
+    """An element and all below it, of these tags or all; no comments. A list, for what changes the tree."""
+    return list(xml.iter(*(f"{{*}}{tag}" for tag in tags or ("*",))))
+
+
+def children_of(xml: etree._Element) -> list[etree._Element]:
+    """Child elements; no comments."""
+    return [child for child in xml if isinstance(child.tag, str)]
+
+
+def child_of(xml: etree._Element, tag: str) -> etree._Element | None:
+    """First child of a tag."""
+    return xml.find(f"{{*}}{tag}")
+
+
+def parent_of(xml: etree._Element) -> etree._Element:
+    """Parent of an element that is not the root."""
+    parent = xml.getparent()
+    assert parent is not None
+    return parent
 
 
 def line_of(xml: etree._Element) -> int | None:

@@ -10,7 +10,7 @@ from xosc_lateral.errors import FormatError, MissingFileError
 from xosc_lateral.formats.openscenario.context import Context, read_struct
 from xosc_lateral.formats.openscenario.declarations import local_scope
 from xosc_lateral.formats.openscenario.element import XmlElement
-from xosc_lateral.scenario.entity import Axles, BoundingBox, Controller, Entity, Performance
+from xosc_lateral.scenario.entity import USUAL_BOX, BoundingBox, Controller, Entity, Performance
 from xosc_lateral.scenario.enums import EntityCategory, VehicleCategory
 from xosc_lateral.scenario.environment import Environment, TimeOfDay, Weather
 
@@ -61,9 +61,6 @@ def _weather(element: XmlElement, context: Context) -> Weather:
     intensity = given if intensity is None else intensity
     return read_struct(Weather, element, context, precipitation_intensity=intensity, precipitation_fraction=None)
 
-
-DEFAULT_BOX = BoundingBox(1.5, 0.0, 0.9, 5.0, 2.0, 1.8)
-"""Where a file gives none: the middle of the field's passenger cars."""
 
 USUAL_ACCELERATION = 10.0
 """Where a file leaves out a limit that the standard asks for; esmini 3.6.0 takes the same. [m/s2]"""
@@ -131,23 +128,20 @@ def _read_object(item: XmlElement, context: Context, name: str | None = None) ->
     if category is None:
         item.fail(f"catalog entry '{content.raw('name')}' is a {content.tag}, which can't be a scenario object")
     trailer, inner = _read_trailer(content, name, context)
-    box, axles = content.child("BoundingBox"), content.child("Axles")
-    entity = Entity(
+    entity = read_struct(
+        Entity,
+        content,
+        context,
         name=name,
         category=category,
         place=item.place(),
-        bounding_box=DEFAULT_BOX if box is None else _bounding_box(box, context),
         vehicle_category=_vehicle_category(content, context) if category is EntityCategory.VEHICLE else None,
-        performance=_performance(content.child("Performance"), context),
-        axles=None if axles is None else read_struct(Axles, axles, context),
         controllers=_controllers(item, context),
         object_name=content.text("name", ""),
-        kind=content.text(_KIND_ATTRIBUTE.get(content.tag, "name"), "") if content.tag in _KIND_ATTRIBUTE else "",
+        kind=content.text(_KIND_ATTRIBUTE[content.tag], "") if content.tag in _KIND_ATTRIBUTE else "",
         trailer=trailer,
         hitch_x=_coupling(content, "TrailerHitch"),
         coupler_x=_coupling(content, "TrailerCoupler"),
-        mass=content.optional_number("mass"),
-        model3d=content.optional_text("model3d") or content.optional_text("model"),
         properties=read_properties(content),
     )
     return [entity, *inner]
@@ -160,7 +154,7 @@ def _stand_in(reference: XmlElement, name: str, context: Context, error: Missing
         name=name,
         category=EntityCategory.VEHICLE,
         place=reference.place(),
-        bounding_box=DEFAULT_BOX,
+        bounding_box=USUAL_BOX,
         vehicle_category=VehicleCategory.CAR,
         object_name=reference.text("entryName"),
     )
@@ -185,9 +179,11 @@ def _read_trailer(vehicle: XmlElement, tractor: str, context: Context) -> tuple[
     owner = vehicle.child("Trailer")
     if owner is None:
         return None, []
-    reference = owner.child("TrailerRef") or owner.child("EntityRef")
+    for other in owner.children():
+        if other.tag not in ("TrailerRef", "EntityRef", "Trailer"):
+            context.remark(other, f"a trailer of '{tractor}' by a {other.tag} is not read")
+    reference = owner.child("TrailerRef", "EntityRef")
     inner = owner.child("Trailer")
-    _remark_others(owner, tractor, context)
     if reference is not None:
         return reference.text("entityRef", "") or None, []
     if inner is None:
@@ -196,18 +192,13 @@ def _read_trailer(vehicle: XmlElement, tractor: str, context: Context) -> tuple[
     return entities[0].name, entities
 
 
-def _remark_others(owner: XmlElement, tractor: str, context: Context) -> None:
-    for other in owner.children():
-        if other.tag not in ("TrailerRef", "EntityRef", "Trailer"):
-            context.remark(other, f"a trailer of '{tractor}' by a {other.tag} is not read")
-
-
 def _coupling(vehicle: XmlElement, tag: str) -> float | None:
     element = vehicle.child(tag)
     return None if element is None else element.number("dx")
 
 
-def _bounding_box(element: XmlElement, context: Context) -> BoundingBox:
+def read_bounding_box(element: XmlElement, context: Context) -> BoundingBox:
+    """None of its sizes is negative."""
     box = read_struct(BoundingBox, element, context)
     if min(box.length, box.width, box.height) < 0:
         size = element.required("Dimensions")
@@ -215,9 +206,8 @@ def _bounding_box(element: XmlElement, context: Context) -> BoundingBox:
     return box
 
 
-def _performance(element: XmlElement | None, context: Context) -> Performance:
-    if element is None:
-        return Performance()
+def read_performance(element: XmlElement, context: Context) -> Performance:
+    """Limits that the standard asks for are remarked where they are missing."""
     inf = float("inf")
     usual = {"maxSpeed": inf, "maxAcceleration": USUAL_ACCELERATION, "maxDeceleration": USUAL_ACCELERATION}
     for name in ("maxAcceleration", "maxDeceleration"):
@@ -243,25 +233,20 @@ def _controllers(item: XmlElement, context: Context) -> tuple[Controller, ...]:
 
 def read_controller(owner: XmlElement, context: Context) -> Controller | None:
     """Controller inline, from a catalog, or in an ObjectController (1.3 actions). Motion does not depend on it."""
-    nested = owner.child("ObjectController")
-    if nested is not None:
-        return read_controller(nested, context)
-    inline = owner.child("Controller")
+    owner = owner.child("ObjectController") or owner
+    inline, reference = owner.child("Controller"), owner.child("CatalogReference")
     if inline is not None:
-        scoped = inline.within(local_scope(inline))
-        return Controller(scoped.text("name", ""), inline.place(), read_properties(scoped))
-    reference = owner.child("CatalogReference")
-    if reference is None:
+        found, place = inline.within(local_scope(inline)), inline.place()
+    elif reference is not None:
+        entry, place = context.optional_entry(reference), reference.place()
+        if entry is None:
+            return Controller(reference.text("entryName"), place)
+        found = entry
+    else:
         return None
-    entry = context.optional_entry(reference)
-    if entry is None:
-        return Controller(reference.text("entryName"), reference.place())
-    return Controller(entry.text("name", ""), reference.place(), read_properties(entry))
+    return Controller(found.text("name", ""), place, read_properties(found))
 
 
 def read_properties(owner: XmlElement) -> dict[str, str]:
     """Name and value pairs of a ``Properties`` child."""
-    properties = owner.child("Properties")
-    if properties is None:
-        return {}
-    return {item.text("name", ""): item.text("value", "") for item in properties.children("Property")}
+    return {item.text("name", ""): item.text("value", "") for item in owner.listed("Properties", "Property")}

@@ -7,12 +7,16 @@ the simulator's own reader, positions relative to an object are along the world'
 
 from __future__ import annotations
 
+from typing import TypeVar
+
+from msgspec import Struct
 from msgspec.structs import replace
 
 from xosc_lateral.scenario.place import Unsupported
 from xosc_lateral.scenario.position import (
     Clothoid,
     ClothoidSpline,
+    ClothoidSplineSegment,
     LanePosition,
     Orientation,
     Position,
@@ -26,59 +30,45 @@ from xosc_lateral.scenario.position import (
     WorldPosition,
 )
 
+S = TypeVar("S", bound=Struct)
+
+_SIDEWAYS: dict[type[Struct], tuple[str, ...]] = {
+    WorldPosition: ("y", "h", "p"),
+    RelativeWorldPosition: ("dy",),
+    RoadPosition: ("t",),
+    TrajectoryPosition: ("t",),
+    RelativeRoadPosition: ("dt",),
+    RelativeLanePosition: ("offset",),
+    Orientation: ("h", "p"),
+    Clothoid: ("curvature", "curvature_prime"),
+    ClothoidSplineSegment: ("curvature_start", "curvature_end", "h_offset"),
+}
+"""What changes its sign."""
+
 
 def mirrored(position: Position) -> Position:
     """A position as written for CARLA, in right-handed coordinates; routes and trajectories in it already are."""
-    match position:
-        case WorldPosition():
-            return replace(position, y=-position.y, h=_negative(position.h), p=_negative(position.p))
-        case RelativeObjectPosition():
-            turned = _turned(position.orientation)
-            x, y, z = position.dx, -position.dy, position.dz
-            return RelativeWorldPosition(position.entity_ref, x, y, z, turned, place=position.place)
-        case RelativeWorldPosition():
-            return replace(position, dy=-position.dy, orientation=_turned(position.orientation))
-        case RoadPosition() | TrajectoryPosition():
-            return replace(position, t=-position.t, orientation=_turned(position.orientation))
-        case RelativeRoadPosition():
-            return replace(position, dt=-position.dt, orientation=_turned(position.orientation))
-        case LanePosition():
-            # To the right of the lane's own direction: the road's +t for lanes that go against it.
-            offset = -position.offset if position.lane_id < 0 else position.offset
-            return replace(position, offset=offset, orientation=_turned(position.orientation))
-        case RelativeLanePosition():
-            return replace(position, offset=-position.offset, orientation=_turned(position.orientation))
-        case Unsupported():
-            return position
-        case _:
-            return replace(position, orientation=_turned(position.orientation))
+    if isinstance(position, Unsupported):
+        return position
+    if isinstance(position, RelativeObjectPosition):
+        along = position.dx, position.dy, position.dz
+        position = RelativeWorldPosition(position.entity_ref, *along, position.orientation, place=position.place)
+    if isinstance(position, LanePosition) and position.lane_id < 0:
+        # To the right of the lane's own direction: the road's +t for lanes that go against it.
+        position = replace(position, offset=-position.offset)
+    position = _negated(position)
+    if isinstance(position, WorldPosition) or position.orientation is None:
+        return position
+    return replace(position, orientation=_negated(position.orientation))
 
 
 def mirrored_shape(shape: Shape) -> Shape:
     """A trajectory's shape, whose positions are mirrored already: its curvatures."""
-    match shape:
-        case Clothoid():
-            return replace(shape, curvature=-shape.curvature, curvature_prime=-shape.curvature_prime)
-        case ClothoidSpline():
-            segments = tuple(
-                replace(
-                    piece,
-                    curvature_start=-piece.curvature_start,
-                    curvature_end=-piece.curvature_end,
-                    h_offset=-piece.h_offset,
-                )
-                for piece in shape.segments
-            )
-            return replace(shape, segments=segments)
-        case _:
-            return shape
+    if isinstance(shape, ClothoidSpline):
+        return replace(shape, segments=tuple(map(_negated, shape.segments)))
+    return _negated(shape)
 
 
-def _turned(orientation: Orientation | None) -> Orientation | None:
-    if orientation is None:
-        return None
-    return replace(orientation, h=_negative(orientation.h), p=_negative(orientation.p))
-
-
-def _negative(angle: float | None) -> float | None:
-    return None if angle is None else -angle
+def _negated(struct: S) -> S:
+    values = {name: getattr(struct, name) for name in _SIDEWAYS.get(type(struct), ())}
+    return replace(struct, **{name: None if value is None else -value for name, value in values.items()})

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 from typing import Any
 
 from xosc_lateral.formats.openscenario.context import Context, Reader, declared, read_struct
-from xosc_lateral.formats.openscenario.declarations import local_scope
 from xosc_lateral.formats.openscenario.element import XmlElement
 from xosc_lateral.formats.openscenario.left_handed import mirrored, mirrored_shape
 from xosc_lateral.scenario.place import Unsupported
@@ -53,34 +51,18 @@ def _choice(owner: XmlElement, what: str, readers: dict[str, Reader], context: C
 
 def read_route(owner: XmlElement, context: Context) -> Route:
     """Route, given inline or from a catalog, inside `owner`."""
-    element = _inline_or_entry(owner, "Route", context)
-    route = read_struct(Route, element, context)
-    if len(route.waypoints) < 2:
-        element.fail(f"a route needs at least 2 waypoints, this one has {len(route.waypoints)}")
-    return route
+    return read_struct(Route, context.inline_or_entry(owner, "Route"), context)
 
 
 def read_trajectory(owner: XmlElement, context: Context) -> Trajectory:
     """Trajectory, given inline, in a TrajectoryRef (1.1) or from a catalog, inside `owner`."""
-    return read_struct(
-        Trajectory, _inline_or_entry(owner.child("TrajectoryRef") or owner, "Trajectory", context), context
-    )
+    inside = context.inline_or_entry(owner.child("TrajectoryRef") or owner, "Trajectory")
+    return read_struct(Trajectory, inside, context)
 
 
 def _shape(owner: XmlElement, context: Context) -> Shape:
     shape: Shape = _choice(owner, "shape", _SHAPES, context)
     return mirrored_shape(shape) if context.left_handed else shape
-
-
-def _inline_or_entry(owner: XmlElement, tag: str, context: Context) -> XmlElement:
-    """In the scope of its own parameters; in a catalog, what the reference assigns comes before what is declared."""
-    inline = owner.child(tag)
-    if inline is not None:
-        return inline.within(local_scope(inline))
-    entry = context.catalogs.entry(owner.required("CatalogReference"))
-    if entry.tag != tag:
-        owner.fail(f"catalog entry '{entry.raw('name')}' is a {entry.tag}, not a {tag}")
-    return entry
 
 
 def _road(e: XmlElement, context: Context) -> RoadPosition:
@@ -143,40 +125,10 @@ _POSITIONS: dict[str, Reader] = {
 }
 
 
-def _polyline(e: XmlElement, context: Context) -> Polyline:
-    polyline = read_struct(Polyline, e, context)
-    if len(polyline.vertices) < 2:
-        e.fail(f"a polyline needs at least 2 vertices, this one has {len(polyline.vertices)}")
-    return polyline
-
-
-def _clothoid_spline(e: XmlElement, context: Context) -> ClothoidSpline:
-    if e.child("ClothoidSplineSegment") is None:
-        e.fail("a clothoid spline needs a segment")
-    return read_struct(ClothoidSpline, e, context)
-
-
 def _nurbs(e: XmlElement, context: Context) -> Nurbs:
-    nurbs = read_struct(Nurbs, e, context, knots=tuple(knot.number("value") for knot in e.children("Knot")))
-    order, points, knots = nurbs.order, nurbs.control_points, nurbs.knots
-    if order < 2 or len(points) < order:
-        e.fail(f"order {order} with {len(points)} control points")
-    if len(knots) != len(points) + order:
-        e.fail(f"{len(knots)} knots, {len(points)} control points and order {order} need {len(points) + order}")
-    if any(after < before for before, after in pairwise(knots)):
-        e.fail("knots decrease")
-    if knots[order - 1] >= knots[len(points)]:
-        e.fail("the knots span no curve")
-    if any(point.weight <= 0 for point in points):
-        e.fail("a weight is not positive")
-    return nurbs
+    return read_struct(Nurbs, e, context, knots=tuple(knot.number("value") for knot in e.children("Knot")))
 
 
-_SHAPES: dict[str, Reader] = {
-    **declared(Clothoid),
-    "Polyline": _polyline,
-    "ClothoidSpline": _clothoid_spline,
-    "Nurbs": _nurbs,
-}
+_SHAPES: dict[str, Reader] = {**declared(Clothoid, Polyline, ClothoidSpline), "Nurbs": _nurbs}
 
 READERS: dict[object, Reader] = {Position: read_position, Shape: _shape, Route: read_route, Trajectory: read_trajectory}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Iterable, Mapping
 from pathlib import Path, PureWindowsPath
 
@@ -23,11 +22,11 @@ from xosc_lateral.scenario import (
     Scenario,
     Storyboard,
     TrafficSignalController,
-    TrafficSignalPhase,
     Unsupported,
 )
 from xosc_lateral.scenario.parameters import Scope
 from xosc_lateral.scenario.place import Place
+from xosc_lateral.scenario.scenario import TrafficSignalPhase
 
 BOOLEANS = frozenset(
     {
@@ -38,37 +37,24 @@ BOOLEANS = frozenset(
 )
 """Attributes that the standard calls Boolean, all versions."""
 
-_STANDARD = frozenset({"true", "1"})
-
 
 def remark_spellings(root: XmlElement) -> list[Unsupported]:
     """One remark for each attribute and word such as ``freespace="True"``, at its first place."""
-    first: dict[tuple[str, str], Place] = {}
-    count: Counter[tuple[str, str]] = Counter()
+    found: dict[tuple[str, str], list[etree._Element]] = {}
     for item in root.xml.iter("{*}*"):
-        _count(item, root, first, count)
-    return [
-        Unsupported(
-            place.element,
-            place,
-            f"{name}='{word}' is read as true{'' if count[name, word] == 1 else f' ({count[name, word]} times)'}; "
-            "the standard's word is 'true', and the reference player takes this one for false",
-        )
-        for (name, word), place in first.items()
-    ]
-
-
-def _count(
-    item: etree._Element, root: XmlElement, first: dict[tuple[str, str], Place], count: Counter[tuple[str, str]]
-) -> None:
-    """One element's attributes."""
-    is_truth = item.get("parameterType") == "boolean"
-    for name, value in item.attrib.items():
-        key = str(name), str(value).strip()
-        is_boolean = key[0] in BOOLEANS or (is_truth and key[0] == "value")
-        if is_boolean and means_true(key[1]) and key[1] not in _STANDARD:
-            count[key] += 1
-            first.setdefault(key, XmlElement(item, root.path, root.scope).place())
+        declares = item.get("parameterType") == "boolean"
+        for name, value in item.attrib.items():
+            word = str(value).strip()
+            is_boolean = name in BOOLEANS or (declares and name == "value")
+            if is_boolean and means_true(word) and word not in ("true", "1"):
+                found.setdefault((str(name), word), []).append(item)
+    remarks = []
+    for (name, word), items in found.items():
+        place = XmlElement(items[0], root.path, root.scope).place()
+        times = "" if len(items) == 1 else f" ({len(items)} times)"
+        why = "the standard's word is 'true', and the reference player takes this one for false"
+        remarks.append(Unsupported(place.element, place, f"{name}='{word}' is read as true{times}; {why}"))
+    return remarks
 
 
 NEWEST = (1, 3)
@@ -160,7 +146,14 @@ def read_scenario(
     )
     if header.is_left_handed:
         remarks.append(Unsupported("FileHeader", root.place(), LEFT_HANDED))
-    road_file, road_place, scene_graph, signals = _road_network(root, boundary, context, roads)
+    network = root.child("RoadNetwork")
+    logic = network.child("LogicFile", "Logics") if network else None
+    written = logic.text("filepath", "") if logic else ""
+    road_file = roads.file if network else None
+    if road_file is None and logic and written.strip():
+        road_file = _road_file(logic, written, boundary, remarks, roads)
+    found = network.listed("TrafficSignals", "TrafficSignalController") if network else ()
+    controllers = tuple(read_struct(TrafficSignalController, one, context) for one in found)
     entities = read_entities(root, context)
     storyboard = read_struct(Storyboard, root.required("Storyboard"), context)
     return Scenario(
@@ -170,9 +163,7 @@ def read_scenario(
         variables=read_variables(root),
         catalog_locations={kind: path.parent / written for kind, (written, _) in locations.items()},
         road_file=road_file,
-        road_place=road_place,
-        scene_graph_file=scene_graph,
-        traffic_signal_controllers=signals,
+        traffic_signal_controllers=controllers,
         entities=entities,
         storyboard=storyboard,
         remarks=tuple(remarks),
@@ -213,71 +204,33 @@ def _catalog_locations(root: XmlElement) -> dict[str, tuple[str, Place]]:
     return locations
 
 
-def _road_network(
-    root: XmlElement, boundary: Boundary, context: Context, roads: RoadSearch
-) -> tuple[Path | None, Place | None, str | None, tuple[TrafficSignalController, ...]]:
-    network = root.child("RoadNetwork")
-    if network is None:
-        return None, None, None, ()
-    logic = network.child("LogicFile", "Logics")
-    road: Path | None = None
-    if logic is not None and logic.text("filepath", "").strip():
-        road = _road_file(logic, boundary, context.remarks, roads)
-    elif roads.file is not None:
-        road = roads.file
-    graph = network.child("SceneGraphFile")
-    signals = network.child("TrafficSignals")
-    found = () if signals is None else signals.children("TrafficSignalController")
-    controllers = tuple(read_struct(TrafficSignalController, one, context) for one in found)
-    return road, logic.place() if logic else None, graph.text("filepath", "") if graph else None, controllers
-
-
-def _road_file(logic: XmlElement, boundary: Boundary, remarks: list[Unsupported], roads: RoadSearch) -> Path:
+def _road_file(
+    logic: XmlElement, written: str, boundary: Boundary, remarks: list[Unsupported], roads: RoadSearch
+) -> Path:
     """The road where the scenario says, or else, like the reference player, a file of that name near the scenario.
 
     Scenarios for CARLA name a town, without a suffix.
     """
-    written = logic.text("filepath")
-    if roads.file is not None:
-        return roads.file
+    place, name = logic.place(), PureWindowsPath(written.strip()).name
     try:
-        road = boundary.inside(written, logic.place())
+        road = boundary.inside(written, place)
         if road.is_file():
             return road
-        missing = FormatError(
-            f"road file '{written}' does not exist (looked for {road})",
-            path=logic.path,
-            line=logic.place().line,
-            element=logic.label(),
-        )
+        missing = place.error(f"road file '{written}' does not exist (looked for {road})")
     except FormatError as error:
         missing = error
-    name = PureWindowsPath(written.strip()).name
     if is_town(written):
         name += ".xodr"
-        missing = FormatError(
-            f"road '{written}' is not beside the scenario; name its folder by --road-path or the file by --road",
-            path=logic.path,
-            line=logic.place().line,
-            element=logic.label(),
+        missing = place.error(
+            f"road '{written}' is not beside the scenario; name its folder by --road-path or the file by --road"
         )
-    found = _road_nearby(logic, name, written, boundary, remarks, roads)
-    if found is not None:
-        return found
-    raise missing
-
-
-def _road_nearby(
-    logic: XmlElement, name: str, written: str, boundary: Boundary, remarks: list[Unsupported], roads: RoadSearch
-) -> Path | None:
-    """A file of that name beside the scenario or in the folders that were named; remarked."""
     folder = boundary.folder
     beside = [near for near in (folder, folder / "xodr", folder.parent / "xodr") if boundary.holds(near / name)]
     for near in (*beside, *roads.folders):
         if name and (near / name).is_file():
-            remarks.append(Unsupported("LogicFile", logic.place(), f"'{written}' is taken from {near / name}"))
+            remarks.append(Unsupported("LogicFile", place, f"'{written}' is taken from {near / name}"))
             return near / name
-    return None
+    raise missing
 
 
 def is_town(reference: str) -> bool:

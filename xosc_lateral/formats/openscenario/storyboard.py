@@ -7,10 +7,10 @@ from xosc_lateral.formats.openscenario.conditions import read_trigger
 from xosc_lateral.formats.openscenario.context import Context, Reader, read_struct
 from xosc_lateral.formats.openscenario.declarations import local_scope
 from xosc_lateral.formats.openscenario.element import XmlElement
-from xosc_lateral.formats.openscenario.entities import read_controller
+from xosc_lateral.formats.openscenario.entities import read_bounding_box, read_controller, read_performance
 from xosc_lateral.formats.openscenario.positions import READERS as POSITION_READERS
 from xosc_lateral.formats.openscenario.private_actions import read_transition
-from xosc_lateral.scenario.entity import Controller
+from xosc_lateral.scenario.entity import BoundingBox, Controller, Performance
 from xosc_lateral.scenario.private_actions import TransitionDynamics
 from xosc_lateral.scenario.storyboard import Actors, Event, Init, Maneuver, ManeuverGroup, Private, Story, Trigger
 
@@ -64,10 +64,12 @@ def _read_event(element: XmlElement, context: Context) -> Event:
 
 READERS: dict[object, Reader] = {
     **POSITION_READERS,
+    BoundingBox: read_bounding_box,
     Controller: read_controller,
     Event: _read_event,
     Init: _read_init,
     ManeuverGroup: _read_group,
+    Performance: read_performance,
     Story: _read_story,
     TransitionDynamics: read_transition,
     Trigger: read_trigger,

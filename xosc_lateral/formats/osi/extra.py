@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -14,10 +13,9 @@ SUFFIXES = (".mcap", ".osi")
 
 
 def osi(module: str) -> Any:
-    """A module of `osi3` or `osi_utilities`.
+    """A module of `osi3` or `osi_utilities`. Raises `XoscLateralError`: They are not installed."""
+    import logging
 
-    Raises `XoscLateralError`: They are not installed.
-    """
     try:
         found = import_module(module)
     except ImportError as error:

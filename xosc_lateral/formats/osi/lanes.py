@@ -7,15 +7,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.formats.osi.extra import osi
 from xosc_lateral.road.geometry import simplify
-from xosc_lateral.road.lanes import DRIVING, Lane, LaneSection
+from xosc_lateral.road.lanes import DRIVING, Lane, LaneSection, beside
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.road.positions import RoadMark
-
-FloatArray = NDArray[np.float64]
 
 STEP = 1.0
 """Between two points of a line before it is simplified. [m]"""
@@ -62,7 +60,6 @@ class RoadIds:
     free: int = field(init=False)
 
     def __post_init__(self) -> None:
-        """Number all lanes that have a width."""
         pieces = [
             (road, k, lane.id)
             for road, part in enumerate(self.network.roads)
@@ -105,11 +102,12 @@ def write_lanes(message: Any, ids: RoadIds) -> None:
         about.subtype = kinds.Lane.Classification.Subtype.Value(f"SUBTYPE_{SUBTYPES.get(lane.type, 'OTHER')}")
         about.centerline_is_driving_direction = True
         line = _line(network, road, name, _grid(section), 0.0)
-        _add_points(about.centerline, line if forward else line[::-1])
-        left, right = _beside(name, forward), _beside(name, not forward)
-        for other, adjacent in ((left, about.left_adjacent_lane_id), (right, about.right_adjacent_lane_id)):
-            if (road, k, other) in ids.lanes:
-                adjacent.add().value = ids.lanes[road, k, other]
+        for x, y, z in (line if forward else line[::-1]).tolist():
+            about.centerline.add(x=x, y=y, z=z)
+        for step, adjacent in ((1, about.left_adjacent_lane_id), (-1, about.right_adjacent_lane_id)):
+            other = road, k, beside(name, step if forward else -step)
+            if other in ids.lanes:
+                adjacent.add().value = ids.lanes[other]
         inner = name - 1 if name > 0 else name + 1
         edges = boundaries[road, k][inner], boundaries[road, k][name]
         left_edges, right_edges = edges if (name < 0) == forward else edges[::-1]
@@ -118,12 +116,6 @@ def write_lanes(message: Any, ids: RoadIds) -> None:
         for one in right_edges:
             about.right_lane_boundary_id.add().value = one
         _pair(about, ids, (road, k, name), lane)
-
-
-def _beside(lane: int, left: bool) -> int:
-    """The lane's neighbour on the left or right looking along s; lane 0 is none."""
-    step = 1 if left else -1
-    return lane + step if lane + step else lane + 2 * step
 
 
 def _pair(about: Any, ids: RoadIds, piece: Piece, lane: Lane) -> None:
@@ -166,11 +158,6 @@ def _line(network: RoadNetwork, road: int, lane: int, s: FloatArray, across: flo
     way = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
     kept = np.union1d(simplify(x, y, TOLERANCE), simplify(way, z, TOLERANCE))
     return np.stack([x, y, z], axis=1)[kept]
-
-
-def _add_points(points: Any, line: FloatArray) -> None:
-    for x, y, z in line.tolist():
-        points.add(x=x, y=y, z=z)
 
 
 def _boundaries(message: Any, kinds: Any, ids: RoadIds, road: int, section: LaneSection) -> dict[int, list[int]]:

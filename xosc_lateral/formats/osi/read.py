@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -11,21 +12,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.errors import FormatError, NotEnoughDataError
-from xosc_lateral.formats.importers.placed import ground_speed, travel_heading
-from xosc_lateral.formats.importers.track_table import USUAL_LENGTH, Tracks
+from xosc_lateral.formats.importers.track_table import USUAL_LENGTH, Tracks, ground_speed, travel_heading
 from xosc_lateral.formats.osi.extra import osi
 from xosc_lateral.formats.osi.trace import Trace
 from xosc_lateral.motion.nominal import axes
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 KINDS = {
     **dict.fromkeys(("SMALL_CAR", "COMPACT_CAR", "CAR", "MEDIUM_CAR", "LUXURY_CAR"), "car"),
     **{"DELIVERY_VAN": "van", "VAN": "van", "HEAVY_TRUCK": "truck", "SEMITRACTOR": "truck", "MOTORBIKE": "motorcycle"},
 }
 """`VehicleClassification.Type` -> vehicle class; others by their own names."""
+
+THINGS = ("lane", "lane_boundary", "logical_lane", "logical_lane_boundary")
+"""Fields of a `GroundTruth` that are kept besides moving objects: lanes in both encodings."""
 
 LEAP = 3.0
 """Farther than twice what it drives in a step, and by this much: not the same vehicle any more. [m]"""
@@ -41,10 +42,7 @@ class Recorded:
     # tracks: x and y are those of the ground below the rear axle where the trace says where that is, else below
     # the middle
     tracks: Tracks
-    lanes: dict[int, Any]  # lanes, boundaries, logical_lanes, logical_boundaries: messages by identifier, as first said
-    boundaries: dict[int, Any]
-    logical_lanes: dict[int, Any]
-    logical_boundaries: dict[int, Any]
+    things: Mapping[str, Mapping[int, Any]]  # of `THINGS`: messages by identifier, as first said
     hosts: tuple[str, ...]  # names of all host vehicles
     numbers: dict[str, str]  # name -> identifier
     notes: list[str]
@@ -70,10 +68,7 @@ class _Collected:
     values: array[float] = field(default_factory=lambda: array("d"))
     names: dict[int, str] = field(default_factory=dict)
     kinds: dict[int, str] = field(default_factory=dict)
-    lanes: dict[int, Any] = field(default_factory=dict)
-    boundaries: dict[int, Any] = field(default_factory=dict)
-    logical_lanes: dict[int, Any] = field(default_factory=dict)
-    logical_boundaries: dict[int, Any] = field(default_factory=dict)
+    things: dict[str, dict[int, Any]] = field(default_factory=lambda: {name: {} for name in THINGS})
     hosts: dict[int, None] = field(default_factory=dict)
     left_out: Counter[str] = field(default_factory=Counter)
     messages: int = 0
@@ -91,13 +86,8 @@ class _Collected:
             self.hosts[message.host_vehicle_id.value] = None
         for one in message.moving_object:
             self._vehicle(one, 1e-9 * (nanoseconds - self.zero), number)
-        for known, said in (
-            (self.lanes, message.lane),
-            (self.boundaries, message.lane_boundary),
-            (self.logical_lanes, message.logical_lane),
-            (self.logical_boundaries, message.logical_lane_boundary),
-        ):
-            for thing in said:
+        for name, known in self.things.items():
+            for thing in getattr(message, name):
                 if thing.id.value not in known:
                     kept = known[thing.id.value] = type(thing)()
                     kept.CopyFrom(thing)  # a part would keep the whole message
@@ -154,8 +144,7 @@ class _Collected:
         if len(hosts) > 1:
             notes.append(f"several host vehicles: {', '.join(hosts)}")
         numbers = {name: str(number) for number, name in self.names.items()}
-        things = self.lanes, self.boundaries, self.logical_lanes, self.logical_boundaries
-        return Recorded(tracks, *things, hosts, numbers, notes)
+        return Recorded(tracks, self.things, hosts, numbers, notes)
 
     def _split(
         self, rows: FloatArray, same: NDArray[np.bool_], step: float, notes: list[str]

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.formats.importers.lane_shapes import Strip, middle
 from xosc_lateral.formats.importers.placed import LaneGraph
 from xosc_lateral.formats.osi.extra import osi
 from xosc_lateral.formats.osi.read import Recorded
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -54,10 +52,10 @@ def _way(strip: Strip) -> FloatArray:
 
 def _physical(recorded: Recorded) -> Iterable[_Lane]:
     kinds = osi("osi3.osi_lane_pb2").Lane.Classification
-    edges = recorded.boundaries
+    lanes, edges = recorded.things["lane"], recorded.things["lane_boundary"]
     # writers of proto3 leave out what is false: a lane that says nothing is driven backwards, unless none says anything
-    known = any(lane.classification.HasField("centerline_is_driving_direction") for lane in recorded.lanes.values())
-    for number, lane in recorded.lanes.items():
+    known = any(lane.classification.HasField("centerline_is_driving_direction") for lane in lanes.values())
+    for number, lane in lanes.items():
         about = lane.classification
         if about.type not in (kinds.TYPE_DRIVING, kinds.TYPE_INTERSECTION):
             continue
@@ -87,8 +85,8 @@ def _logical(recorded: Recorded) -> Iterable[_Lane]:
         kinds.Type.Value(f"TYPE_{name}")
         for name in ("NORMAL", "EXIT", "ENTRY", "ONRAMP", "OFFRAMP", "CONNECTINGRAMP", "UNKNOWN")
     }
-    edges = recorded.logical_boundaries
-    for number, lane in recorded.logical_lanes.items():
+    lanes, edges = recorded.things["logical_lane"], recorded.things["logical_lane_boundary"]
+    for number, lane in lanes.items():
         if lane.type not in driven:
             continue
         left, right = (

@@ -26,9 +26,8 @@ class Trace:
 
     def __init__(self, path: Path, channel: str | None = None) -> None:
         if path.suffix.lower() not in READ:
-            raise FormatError(
-                f"an OSI trace ends in {', '.join(SUFFIXES)}, one of omega-prime in .parquet too", path=path
-            )
+            what = f"an OSI trace ends in {', '.join(SUFFIXES)}, one of omega-prime in .parquet too"
+            raise FormatError(what, path=path)
         check_regular(path)
         if path.stat().st_size == 0:
             raise FormatError("is empty", path=path)

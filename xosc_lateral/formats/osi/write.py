@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.atomic import replace_atomically
 from xosc_lateral.formats.osi.extra import SUFFIXES, osi
@@ -25,28 +25,14 @@ from xosc_lateral.scenario.enums import EntityCategory, VehicleCategory
 from xosc_lateral.scenario.private_actions import LightStateAction
 from xosc_lateral.version import __version__
 
-FloatArray = NDArray[np.float64]
-
 TOPIC = "ground_truth"
 VERSION = (3, 8, 0)
 """Of OSI, that is written."""
 
 NANOSECONDS = 1_000_000_000
 
-KINDS: Mapping[VehicleCategory, str] = {
-    VehicleCategory.BICYCLE: "BICYCLE",
-    VehicleCategory.BUS: "BUS",
-    VehicleCategory.CAR: "MEDIUM_CAR",
-    VehicleCategory.MOTORBIKE: "MOTORBIKE",
-    VehicleCategory.SEMITRAILER: "SEMITRAILER",
-    VehicleCategory.TRAILER: "TRAILER",
-    VehicleCategory.TRAIN: "TRAIN",
-    VehicleCategory.TRAM: "TRAM",
-    VehicleCategory.TRUCK: "HEAVY_TRUCK",
-    VehicleCategory.VAN: "DELIVERY_VAN",
-}
-"""Category of OpenSCENARIO -> `VehicleClassification.Type`."""
-
+KINDS = {VehicleCategory.CAR: "MEDIUM_CAR", VehicleCategory.TRUCK: "HEAVY_TRUCK", VehicleCategory.VAN: "DELIVERY_VAN"}
+"""Category of OpenSCENARIO -> `VehicleClassification.Type`; others have the same name."""
 
 LIGHTS: Mapping[str, tuple[tuple[str, str], ...]] = {
     "brakeLights": (("brake_light_state", "BRAKE_LIGHT_STATE_NORMAL"),),
@@ -75,24 +61,13 @@ def write_osi(
     host: str | None = None,
     description: str = "",
 ) -> Path:
-    """Write a trace; same motion, same bytes.
+    """Write a trace, ``.mcap``, or ``.osi`` (messages alone); same motion, same bytes.
 
-    Raises `FormatError`: Another suffix; `XoscLateralError`: The extra `osi` is not installed; `OSError`: The file
+    Raises `FormatError`: another suffix; `XoscLateralError`: the extra `osi` is not installed; `OSError`: the file
     can't be written; it is as it was then.
 
-    Parameters
-    ----------
-    path : path
-        ``.mcap``, or ``.osi`` (messages alone).
-    motion : NominalMotion
-    network : RoadNetwork
-        That it was played on.
-    trajectories : sequence of WorldTrajectory, optional
-        One per entity, in its order, where they are not the nominal ones.
-    host : str, optional
-        Entity that is the host vehicle; without it the trace has none.
-    description : str
-        For the metadata of the file.
+    `trajectories`: one per entity, in its order, where they are not the nominal ones. `host`: entity that is the host
+    vehicle; without it the trace has none. `description`: for the metadata of the file.
     """
     if path.suffix.lower() not in SUFFIXES:
         raise FormatError(f"an OSI trace ends in {' or '.join(SUFFIXES)}", path=path)
@@ -107,45 +82,34 @@ def host_of(motion: NominalMotion, under_test: Iterable[str]) -> str | None:
 
 
 def _save(path: Path, messages: Iterator[Any], description: str) -> None:
-    writers = osi("osi_utilities")
-    is_mcap = path.suffix.lower() == ".mcap"
+    writers, is_mcap = osi("osi_utilities"), path.suffix.lower() == ".mcap"
     writer = writers.MultiTraceWriter() if is_mcap else writers.SingleTraceWriter()
-    if not writer.open(path, **({"metadata": _metadata(description)} if is_mcap else {})):
+    version, protobuf = ".".join(map(str, VERSION)), str(osi("google.protobuf").__version__)
+    # without the time of writing, so that the same motion gives the same bytes
+    metadata = {
+        "version": "1.0.0",
+        "min_osi_version": version,
+        "max_osi_version": version,
+        "min_protobuf_version": protobuf,
+        "max_protobuf_version": protobuf,
+        "description": description,
+        "authors": f"xosc-lateral {__version__}",
+        "data_sources": "OpenSCENARIO, played by xosc-lateral",
+        "zero_time": "",
+    }
+    if not writer.open(path, **({"metadata": metadata} if is_mcap else {})):
         raise OSError(f"{path}: can't be opened for writing")
     with writer:
         if is_mcap:
             about = {
-                "net.asam.osi.trace.channel.osi_version": _version(),
-                "net.asam.osi.trace.channel.protobuf_version": _protobuf(),
+                "net.asam.osi.trace.channel.osi_version": version,
+                "net.asam.osi.trace.channel.protobuf_version": protobuf,
                 "net.asam.osi.trace.channel.description": "ground truth, one message per step",
             }
             writer.add_channel(TOPIC, osi("osi3.osi_groundtruth_pb2").GroundTruth, about)
         for message in messages:
             if not writer.write_message(message, TOPIC):
                 raise OSError(f"{path}: can't be written to")
-
-
-def _metadata(description: str) -> dict[str, str]:
-    """Without the time of writing, so that the same motion gives the same bytes."""
-    return {
-        "version": "1.0.0",
-        "min_osi_version": _version(),
-        "max_osi_version": _version(),
-        "min_protobuf_version": _protobuf(),
-        "max_protobuf_version": _protobuf(),
-        "description": description,
-        "authors": f"xosc-lateral {__version__}",
-        "data_sources": "OpenSCENARIO, played by xosc-lateral",
-        "zero_time": "",
-    }
-
-
-def _version() -> str:
-    return ".".join(map(str, VERSION))
-
-
-def _protobuf() -> str:
-    return str(osi("google.protobuf").__version__)
 
 
 def ground_truths(
@@ -257,13 +221,8 @@ def _lights(motion: NominalMotion, entity: EntityMotion) -> list[tuple[float, An
     for one in sorted(played, key=lambda one: one.start):
         for name, lit in LIGHTS.get(one.action.light, ()):
             off = f"{lit.partition('_STATE_')[0]}_STATE_OFF"
-            setattr(
-                state,
-                name,
-                kinds.LightState.DESCRIPTOR.fields_by_name[name]
-                .enum_type.values_by_name[off if one.action.mode == "off" else lit]
-                .number,
-            )
+            states = kinds.LightState.DESCRIPTOR.fields_by_name[name].enum_type.values_by_name
+            setattr(state, name, states[off if one.action.mode == "off" else lit].number)
         kept = kinds.LightState()
         kept.CopyFrom(state)
         found.append((one.start, kept))
@@ -288,7 +247,7 @@ def _template(entity: Entity, number: int) -> Any:
         made.type = kinds.TYPE_OTHER
     else:
         made.type = kinds.TYPE_VEHICLE
-        kind = "OTHER" if entity.vehicle_category is None else KINDS[entity.vehicle_category]
+        kind = "OTHER" if (category := entity.vehicle_category) is None else KINDS.get(category, category.name)
         made.vehicle_classification.type = kinds.VehicleClassification.Type.Value(f"TYPE_{kind}")
         made.vehicle_classification.has_trailer = entity.trailer is not None
         _axle_places(made.vehicle_attributes, entity)

@@ -11,21 +11,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 from msgspec import structs
 
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect, Linear
+from xosc_lateral.driver.seeds import generator
 from xosc_lateral.identification.dictionary import NULL_DRAWS, beside
-from xosc_lateral.identification.regression import Fitted
+from xosc_lateral.identification.model import Description, Fitted, Outcome, Stage
+from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.significance import MANY_DRIVES, LoopSeed, as_one_degree, upper_tail
-from xosc_lateral.identification.terms.base import Description, Outcome, Stage
 from xosc_lateral.identification.terms.column import ColumnTerm, of_kind
-from xosc_lateral.identification.timeline import BoolArray, FloatArray
-
-if TYPE_CHECKING:
-    from xosc_lateral.identification.selection import Search
 
 # Response time of an effect between drives: what a drive usually meets, as far as a run can know it. [s]
 USUAL_S = 60.0
@@ -46,8 +44,8 @@ class BetweenTerm(ColumnTerm):
     kind: ClassVar[str] = "location"
     stages: ClassVar[tuple[Stage, ...]] = (Stage.BETWEEN_DRIVES,)
     weight: ClassVar[float] = 5.0
-    least_drives: ClassVar[int] = MANY_DRIVES
     seen_held_out: ClassVar[bool] = False
+    within_drives: ClassVar[bool] = False
     acts: ClassVar[Acts] = Acts.LOCATION
     what: ClassVar[str] = "place that a drive keeps"
     group: ClassVar[str] = "mean"
@@ -79,7 +77,7 @@ class BetweenTerm(ColumnTerm):
             np.stack(usual, axis=1),
             np.array([candidate.cost for candidate in candidates]),
             [candidate.columns[0] for candidate in candidates],
-            search.rng(LoopSeed.BETWEEN),
+            generator(search.seed, LoopSeed.BETWEEN),
         )
         terms = [cls.of(structs.replace(candidates[index].effect, lag_s=0.0, response_s=USUAL_S)) for index in members]
         return Outcome(terms[0], tuple(term.columns[0] for term in terms), p_value, together=tuple(terms[1:]))

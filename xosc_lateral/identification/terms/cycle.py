@@ -8,19 +8,17 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import Cycle, Effect
-from xosc_lateral.identification.regression import MIN_DRIFT_S, Coarse, Fitted
+from xosc_lateral.identification.model import Description, Fitted, Outcome, Stage, Term
 from xosc_lateral.identification.residual import OSCILLATION
+from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.significance import LEAST
-from xosc_lateral.identification.terms.base import Description, Outcome, Stage, Term
-from xosc_lateral.identification.timeline import FloatArray
-
-if TYPE_CHECKING:
-    from xosc_lateral.identification.selection import Search
+from xosc_lateral.identification.timeline import MIN_DRIFT_S, Coarse
 
 PERIODS_S = (4.0, 60.0)  # Periods that are tested. [s]
 # Neighbouring frequencies taken together: a cycle keeps its phase for the whole drive, or for a part. [-]

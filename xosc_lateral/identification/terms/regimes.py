@@ -15,22 +15,21 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.driver.effects import Effect, Regimes
+from xosc_lateral.driver.seeds import generator
 from xosc_lateral.identification.dictionary import beside, in_another_order
-from xosc_lateral.identification.innovations import SLOW_S, fine_squares, log_sizes, quick_squares, slow_squares
-from xosc_lateral.identification.regression import Coarse, Fitted
+from xosc_lateral.identification.model import Description, Fitted, Outcome, Removal, Stage, Term
+from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.significance import HEAVY_TAIL_SHARE, LoopSeed, upper_tail
-from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term
-from xosc_lateral.identification.terms.column import known_log_scale, what_a_column_may_do, what_columns_do
-from xosc_lateral.identification.timeline import BoolArray, FloatArray, on_fine_grid
+from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, quick_squares, slow_squares
+from xosc_lateral.identification.terms.spread import known_log_scale, what_a_column_may_do, what_columns_do
+from xosc_lateral.identification.timeline import Coarse, on_fine_grid
 from xosc_lateral.jit import njit
-
-if TYPE_CHECKING:
-    from xosc_lateral.identification.selection import Search
 
 
 @njit
@@ -137,7 +136,7 @@ class RegimesTerm(Term):
         # what a column does to the size in another shape than the one that was found is no regime
         columns = what_columns_do(search, fitted), what_a_column_may_do(search, fitted)[0]
         known = np.concatenate([known_log_scale(fitted), *columns], axis=1)
-        squares, rng = quick_squares(fitted).standardised, search.rng(LoopSeed.REGIMES)
+        squares, rng = quick_squares(fitted).standardised, generator(search.seed, LoopSeed.REGIMES)
         p_value = probability_of_persistence(squares, coarse.valid, known, rng)
         return Outcome(cls(fit_regimes(fitted.innovations, coarse.valid)), (), p_value)
 
@@ -175,12 +174,8 @@ def probability_of_persistence(
 ) -> float:
     """Probability that loudness which lasts for no longer than `CLUSTER_S` shows as much persistence.
 
-    Parameters
-    ----------
-    squares : array, shape (n,)
-        Of white rows, one per second, mean 0; 0 where invalid.
-    known : array, shape (n, k)
-        What is known to go with the size; taken out of the squares.
+    `squares`, shape (n,): of white rows, one per second, mean 0; 0 where invalid; `known`, shape (n, k): what is known
+    to go with the size; taken out of the squares.
     """
     if known.shape[1]:
         basis = np.linalg.qr((known - known[valid].mean(axis=0)) * valid[:, None])[0]

@@ -12,12 +12,13 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import Effect, Step, TimeSmooth
-from xosc_lateral.identification.innovations import SLOW_S, fine_squares, log_sizes, quick_squares, slow_squares
+from xosc_lateral.driver.seeds import generator
 from xosc_lateral.identification.low_frequencies import (
     MEAN_SHORTEST_S,
     ORDERS,
@@ -34,14 +35,13 @@ from xosc_lateral.identification.low_frequencies import (
     step_moments,
     without_known,
 )
-from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
+from xosc_lateral.identification.model import Description, Fitted, Outcome, Removal, Stage, Term
+from xosc_lateral.identification.regression import fit_model
+from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.significance import LoopSeed
-from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term
-from xosc_lateral.identification.terms.column import what_a_column_may_do, what_columns_do
-from xosc_lateral.identification.timeline import FloatArray
-
-if TYPE_CHECKING:
-    from xosc_lateral.identification.selection import Search
+from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, quick_squares, slow_squares
+from xosc_lateral.identification.terms.spread import what_a_column_may_do, what_columns_do
+from xosc_lateral.identification.timeline import COARSE, Coarse
 
 STEP_PARAMETERS = 2  # Of a step: its height and its moment.
 SURER = 0.01  # Where it is surer than the best column by this factor, what that column may do is left to time. [-]
@@ -52,6 +52,11 @@ class _MeanByTime(Term):
 
     component: ClassVar[str] = "time_mean"
     weight: ClassVar[float] = 3.0
+
+    @property
+    def kind_key(self) -> str:
+        """Two kinds share the component."""
+        return self.kind
 
     def probability_beside(self, search: Search, fitted: Fitted) -> float:
         """p-value of the mean by time, whichever of the two it looks like beside the terms fitted."""
@@ -90,7 +95,7 @@ class StepTerm(_MeanByTime):
         slow, waves, jumps = (
             low_frequencies(one, coarse, coarse.valid, MEAN_SHORTEST_S) for one in (rows[:, None], waves, jumps)
         )
-        p_value = mean_probability(slow[:, 0], waves, jumps, search.rng(LoopSeed.LOW_FREQUENCY))
+        p_value = mean_probability(slow[:, 0], waves, jumps, generator(search.seed, LoopSeed.LOW_FREQUENCY))
         if not len(moments):
             return Outcome(TimeMeanTerm(), (), p_value)
         unit = jumps / np.maximum(np.linalg.norm(jumps, axis=0), 1e-12)
@@ -118,6 +123,10 @@ class StepTerm(_MeanByTime):
         )
         return (step,)
 
+    def quantity(self, coarse: Coarse, effects: tuple[Effect, ...]) -> FloatArray:
+        """0 before, 1 after."""
+        return (np.arange(len(coarse.timeline)) >= self.at * COARSE).astype(float)
+
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Height and moment."""
         effect = effects[0]
@@ -142,12 +151,15 @@ class TimeMeanTerm(_MeanByTime):
         sizes, errors = penalised(fitted.sizes[part], fitted.covariance[part, part])
         return (_smooth(fitted.coarse, location=tuple(sizes), location_errors=tuple(errors)),)
 
+    def quantity(self, coarse: Coarse, effects: tuple[Effect, ...]) -> FloatArray:
+        """The curve."""
+        assert isinstance(effects[0], TimeSmooth)
+        return effects[0].path(effects[0].location, coarse.timeline.time)
+
     def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
         """As the profile has it."""
-        effect, timeline = effects[0], fitted.coarse.timeline
-        assert isinstance(effect, TimeSmooth)
-        path = effect.path(effect.location, timeline.time)
-        removal.location += path - path[timeline.valid].mean()
+        path = self.quantity(fitted.coarse, effects)
+        removal.location += path - path[fitted.coarse.timeline.valid].mean()
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Change between its extremes, in the order of time."""
@@ -224,12 +236,16 @@ class TimeSpreadTerm(Term):
             fine = penalised(fine, np.diag(np.square(fine_errors)))[0]
         return (_smooth(coarse, spread=tuple(sizes), spread_errors=tuple(errors), fine=tuple(fine)),)
 
+    def quantity(self, coarse: Coarse, effects: tuple[Effect, ...]) -> FloatArray:
+        """The curve of the spread."""
+        assert isinstance(effects[0], TimeSmooth)
+        return effects[0].path(effects[0].spread, coarse.timeline.time)
+
     def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
         """A plain function of time."""
-        effect, time = effects[0], fitted.coarse.timeline.time
-        assert isinstance(effect, TimeSmooth)
-        removal.spread += effect.path(effect.spread, time)
-        removal.fine += effect.path(effect.fine, time)
+        assert isinstance(effects[0], TimeSmooth)
+        removal.spread += self.quantity(fitted.coarse, effects)
+        removal.fine += effects[0].path(effects[0].fine, fitted.coarse.timeline.time)
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Factor between its extremes, in the order of time."""

@@ -13,14 +13,12 @@ from math import hypot, nan
 
 import numpy as np
 from msgspec import Struct
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.playback.angles import wrap
 from xosc_lateral.playback.paths.base import Path, PathPoint
 from xosc_lateral.playback.paths.polyline import Corner, PolylinePath
 from xosc_lateral.playback.transition import EPSILON
-
-FloatArray = NDArray[np.float64]
 
 SAMPLE = 1.0
 """Length of the control polygon per sample. [m]"""

@@ -8,7 +8,7 @@ from typing import Any
 
 from msgspec import Struct
 
-from xosc_lateral.errors import PlaybackError, UnsupportedElementError
+from xosc_lateral.errors import FormatError, PlaybackError, UnsupportedElementError
 from xosc_lateral.playback.paths.base import Path
 from xosc_lateral.playback.paths.clothoid import ClothoidPath, TimedClothoid
 from xosc_lateral.playback.paths.nurbs import Control, NurbsPath, clamped_knots
@@ -56,9 +56,9 @@ class Layout(Struct, frozen=True):
         """Say that the trajectory is not followed as written."""
         self.simulation.note(what, self.place)
 
-    def error(self, what: str) -> PlaybackError:
+    def error(self, what: str) -> FormatError:
         """That it can't be followed."""
-        return self.place.error(PlaybackError, what)
+        return self.place.error(what, PlaybackError)
 
 
 def _polyline(shape: Polyline, layout: Layout) -> Path:
@@ -182,7 +182,7 @@ def path_of(
     """A trajectory laid out in the world as it is now; `pose_of` tells where a position is."""
     shape = trajectory.shape
     if isinstance(shape, Unsupported):
-        raise shape.place.error(UnsupportedElementError, shape.reason or f"a {shape.kind} can't be followed")
+        raise shape.place.error(shape.reason or f"a {shape.kind} can't be followed", UnsupportedElementError)
     return SHAPES[type(shape)](shape, Layout(simulation, pose_of, trajectory.place, follower, follow, speed))
 
 

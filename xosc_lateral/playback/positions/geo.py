@@ -25,7 +25,7 @@ def geo_position(position: GeoPosition, simulation: Simulation) -> Placement:
     try:
         x, y = project(simulation.network.geo_reference, position.latitude, position.longitude)
     except ProjectionError as error:
-        raise position.place.error(PlaybackError, str(error)) from error
+        raise position.place.error(str(error), PlaybackError) from error
     offset = simulation.network.header_offset
     x, y = offset.undo(x, y)
     z = nan if position.altitude is None else position.altitude - offset.z

@@ -35,7 +35,7 @@ def road_index(position: LanePosition | RoadPosition, simulation: Simulation) ->
     ids = simulation.network.road_ids
     if position.road_id not in ids:
         known = ", ".join(ids[:8]) or "none"
-        raise position.place.error(PlaybackError, f"there is no road '{position.road_id}' (roads: {known})")
+        raise position.place.error(f"there is no road '{position.road_id}' (roads: {known})", PlaybackError)
     return simulation.network.index_of(position.road_id)
 
 
@@ -55,7 +55,7 @@ def lane_placement(
     if not network.has_lane_at(road, lane, s):
         there = ", ".join(str(info.id) for info in network.lanes_at(road, s))
         what = f"road '{network.road_ids[road]}' has no lane {lane} at s = {s:g} m (lanes: {there})"
-        raise position.place.error(PlaybackError, what)
+        raise position.place.error(what, PlaybackError)
     against = along_lane and network.travel_direction(road, lane) < 0
     return _placement(position, simulation, road, lane, s, offset_t, against=against)
 
@@ -130,7 +130,7 @@ def on_road(position: RelativeLanePosition | RelativeRoadPosition, simulation: S
     state.locate()
     if state.road == NOWHERE:
         what = f"'{state.name}' is on no road, so there is no place beside it in road coordinates"
-        raise position.place.error(PlaybackError, what)
+        raise position.place.error(what, PlaybackError)
     return state
 
 

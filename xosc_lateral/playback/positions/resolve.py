@@ -50,7 +50,7 @@ def resolve(position: Position, simulation: Simulation, *, route: RouteGuide | N
     route of that other one.
     """
     if isinstance(position, Unsupported):
-        raise position.place.error(UnsupportedElementError, position.reason or f"{position.kind} can't be played")
+        raise position.place.error(position.reason or f"{position.kind} can't be played", UnsupportedElementError)
     if isinstance(position, RelativeLanePosition | RelativeRoadPosition):
         return POSITIONS[type(position)](position, simulation, route)
     return POSITIONS[type(position)](position, simulation)
@@ -200,14 +200,14 @@ def route_position(position: RoutePosition, simulation: Simulation) -> Placement
     """The way along the route counts from its first waypoint; an entity on it is where it is."""
     network, where = simulation.network, position.in_route
     if position.route is None or where is None:
-        raise position.place.error(PlaybackError, "names no route or no place on it")
+        raise position.place.error("names no route or no place on it", PlaybackError)
     if isinstance(where, FromCurrentEntity):
         state = simulation.entity(where.entity_ref, position.place)
         state.locate()
         return state.place._replace(pose=state.pose if state.road == NOWHERE else None)
     route = route_guide(position.route, simulation)
     if route is None:
-        raise position.place.error(PlaybackError, f"no way leads along route '{position.route.name}'")
+        raise position.place.error(f"no way leads along route '{position.route.name}'", PlaybackError)
     road, s, direction = route.at(where.path_s)
     if direction < 0:
         simulation.note(

@@ -15,16 +15,10 @@
     },
   });
 
-  function unpack(column) {
-    const bytes = Uint8Array.from(atob(column.d), (each) => each.charCodeAt(0)), view = new DataView(bytes.buffer);
-    const values = new Float64Array(bytes.length / column.w + 1);
-    let whole = column.b;
-    values[0] = whole * column.r;
-    for (let i = 1; i < values.length; i++) {
-      whole += column.w === 2 ? view.getInt16(2 * (i - 1), true) : view.getInt32(4 * (i - 1), true);
-      values[i] = whole * column.r;
-    }
-    return values;
+  /* Columns hold differences between successive values, in units of their resolution. */
+  function unpack({ r, d }) {
+    let whole = 0;
+    return Float64Array.from(d, (step) => (whole += step) * r);
   }
 
   function make(tag, attributes = {}, ...children) {
@@ -276,8 +270,9 @@
       for (const vehicle of this.vehicles) {
         const frame = vehicle.frame(clock.time);
         if (!frame) continue;
-        const outline = vehicle.corners(vehicle.drawn, frame).map((point) => this.toScreen(point));
-        this.boxes.push({ vehicle, frame, outline });
+        const onScreen = (path) => vehicle.corners(path, frame).map((point) => this.toScreen(point));
+        const outline = onScreen(vehicle.drawn), ghost = vehicle.enriched && this.showGhosts ? onScreen(vehicle.nominal) : null;
+        this.boxes.push({ vehicle, frame, outline, top: Math.min(...[...outline, ...(ghost ?? [])].map(([, y]) => y)) });
         trace(outline);
         context.fillStyle = this.series[vehicle.number % 12];
         context.strokeStyle = this.colors.paper;
@@ -295,8 +290,8 @@
           context.fillStyle = "rgba(10, 20, 30, .5)"; // the windscreen
           context.fill();
         }
-        if (vehicle.enriched && this.showGhosts) {
-          trace(vehicle.corners(vehicle.nominal, frame).map((point) => this.toScreen(point)));
+        if (ghost) {
+          trace(ghost);
           context.lineWidth = 1.2;
           context.strokeStyle = this.colors.ghost;
           context.setLineDash([4, 3]);
@@ -320,9 +315,9 @@
       context.font = `600 12px ${this.colors.sans}`;
       context.textAlign = "center";
       const taken = [];
-      for (const { vehicle, outline } of this.boxes) {
+      for (const { vehicle, outline, top } of this.boxes) {
         const [x] = middle(outline), width = context.measureText(vehicle.name).width / 2 + 2;
-        let y = Math.min(...outline.map((p) => p[1])) - 4;
+        let y = top - 4;
         while (taken.some(([left, right, base]) => x + width > left && x - width < right && Math.abs(base - y) < 14)) y -= 14;
         taken.push([x - width, x + width, y]);
         this.write(context, vehicle.name, x, y);
@@ -447,7 +442,6 @@
         ["speed", `${speed.toFixed(1)} m/s (${(3.6 * speed).toFixed(0)} km/h)`],
         ...(vehicle.added ? [["from nominal", sided(vehicle.value(vehicle.added, frame))]] : []),
         ...(road ? [["nominal offset", sided(vehicle.value(vehicle.offset, frame))], ["lane", `${lane} of road ${road}`]] : []),
-        ["lateral acceleration", `${vehicle.value(vehicle.drawn.a, frame).toFixed(2)} m/s²`],
       ];
       const list = make("dl", {}, ...rows.flatMap(([name, value]) => [make("dt", {}, name), make("dd", {}, value)]));
       this.tip.replaceChildren(make("strong", {}, vehicle.name), list);

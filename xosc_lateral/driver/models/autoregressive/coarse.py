@@ -15,12 +15,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.jit_kernel import JitKernel, worth_compiling
 from xosc_lateral.driver.records import Record, frozen_array, set_once
 from xosc_lateral.drives.filters import filtered, low_pass
 from xosc_lateral.errors import DriverProfileError
-
-FloatArray = NDArray[np.float64]
 
 BORDER = 0.4
 """Slower movement is coarse: what a driver steers, while sensor and vehicle add the rest. [Hz]"""

@@ -18,8 +18,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from msgspec.structs import replace
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.digits import all_significant, significant
 from xosc_lateral.driver.models.autoregressive.coarse import FREQUENCIES, Autoregression, largest_root, split_bands
 from xosc_lateral.driver.models.autoregressive.fit_coarse import fit_coarse, fit_spectrum
@@ -28,8 +28,6 @@ from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
 from xosc_lateral.driver.models.autoregressive.settings import DEFAULT_SETTINGS, FitSettings
 from xosc_lateral.driver.models.autoregressive.volatility import Volatility
 from xosc_lateral.errors import NotEnoughDataError
-
-FloatArray = NDArray[np.float64]
 
 DIGITS = 5
 """Significant digits kept of a fitted number: a hundredth of its standard error and less. What another processor gives

@@ -16,8 +16,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from msgspec.structs import replace
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.models.autoregressive.coarse import (
     COARSE_EVERY,
     FREQUENCIES,
@@ -30,8 +30,6 @@ from xosc_lateral.driver.models.autoregressive.coarse import (
 from xosc_lateral.driver.models.autoregressive.settings import FitSettings
 from xosc_lateral.driver.models.noise import NOISE_VARIANCE, ShapedNoise
 from xosc_lateral.drives.periodogram import Detrend, periodograms
-
-FloatArray = NDArray[np.float64]
 
 RIDGE = 1e-7
 """Share of the mean square that is added to the normal equations' diagonal. [-]"""

@@ -16,8 +16,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from msgspec.structs import replace
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.models.autoregressive.coarse import (
     BORDER,
     COARSE_EVERY,
@@ -31,8 +31,6 @@ from xosc_lateral.driver.models.autoregressive.settings import FitSettings
 from xosc_lateral.driver.models.autoregressive.volatility import Volatility, averaged_covariance
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.drives.periodogram import Detrend, periodograms
-
-FloatArray = NDArray[np.float64]
 
 SIMULATED, SNIPPETS_EACH = 4000, 3
 """Drivers that a round simulates at once, and snippets of each: what chance does to the mean log spread of so many is

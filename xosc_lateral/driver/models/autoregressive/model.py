@@ -19,34 +19,30 @@ References
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import ClassVar
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
-from xosc_lateral.driver.models.autoregressive.coarse import COARSE_EVERY, TICKS, Autoregression, building_low_pass
+from xosc_lateral.arrays import FloatArray
+from xosc_lateral.driver.models.autoregressive.coarse import COARSE_EVERY, TICKS
+from xosc_lateral.driver.models.autoregressive.parameters import (
+    AutoregressiveParameters,
+    DriverState,
+    draw_drivers,
+)
 from xosc_lateral.driver.models.autoregressive.parts import (
     CoarsePart,
     CoarseState,
-    DriverState,
     Factors,
     FactorState,
     FinePart,
     FineState,
     begin_factors,
-    draw_drivers,
 )
-from xosc_lateral.driver.models.autoregressive.volatility import Volatility
-from xosc_lateral.driver.models.base import CoreModel, Start
+from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.models.mean_reversion import ClockState, take_at_rate
-from xosc_lateral.driver.models.noise import NOISE_VARIANCE, ShapedNoise
 from xosc_lateral.driver.seeds import AutoregressiveSeed, generator
-from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.errors import DriverProfileError
-
-FloatArray = NDArray[np.float64]
 
 KNEE = 0.8
 """Coarse movement is bent from this share of the way between the mean and a limit on. [-]"""
@@ -71,11 +67,7 @@ class AutoregressiveState(msgspec.Struct):
     """One driver, arrays without an axis of drivers."""
 
 
-START_LAGS = 300
-"""Steps after which a drive has forgotten the offset that it was made to start at: 60 s. [-]"""
-
-
-class AutoregressiveModel(CoreModel, frozen=True, eq=False, dict=True):
+class AutoregressiveModel(AutoregressiveParameters, frozen=True, eq=False, dict=True):
     """Parameters of the model, and what follows from them.
 
     Raises `DriverProfileError` if a number is out of its range.
@@ -100,63 +92,6 @@ class AutoregressiveModel(CoreModel, frozen=True, eq=False, dict=True):
     """
 
     State: ClassVar[type] = AutoregressiveState
-
-    mean: float
-    between_drivers: float
-    limits: tuple[float, float]
-    coarse: Autoregression
-    fine: ShapedNoise
-    coarse_volatility: Volatility
-    fine_volatility: Volatility
-    correlation: float
-    step: float = STEP
-
-    def __post_init__(self) -> None:
-        low, high = self.limits
-        if not -1.0 <= low < self.mean < high <= 1.0:
-            raise DriverProfileError(f"mean {self.mean} outside the limits {low} and {high}, or these beyond -1 and 1")
-        if not (0.0 <= self.between_drivers < 1.0 and -1.0 <= self.correlation <= 1.0):
-            raise DriverProfileError(f"between drivers {self.between_drivers}, correlation {self.correlation}")
-
-    @cached_property
-    def kernel(self) -> FloatArray:
-        """Kernel of the fine noise, shape (n_taps,). [lane widths]"""
-        return self.fine.kernel
-
-    @cached_property
-    def coarse_covariance(self) -> FloatArray:
-        """Of the coarse movement about the driver's mean at lags of 0.2 s, mean over the phases of a coarse step.
-
-        Shape (START_LAGS,). [lane widths squared]
-        """
-        n_ticks = START_LAGS // COARSE_EVERY + 20
-        ticks = self.coarse.covariance(n_ticks)
-        spread = np.zeros(2 * n_ticks * COARSE_EVERY - 1)
-        middle = n_ticks * COARSE_EVERY - 1
-        spread[middle::COARSE_EVERY][:n_ticks] = ticks
-        spread[middle::-COARSE_EVERY][:n_ticks] = ticks
-        kernel = building_low_pass()
-        both = np.convolve(kernel, kernel) / COARSE_EVERY
-        return np.asarray(np.convolve(spread, both, "same")[middle : middle + START_LAGS])
-
-    @cached_property
-    def fine_covariance(self) -> FloatArray:
-        """Of the fine movement at lags of 0.2 s, shape (START_LAGS,). [lane widths squared]"""
-        kernel = self.kernel
-        full = np.convolve(kernel, kernel)[len(kernel) - 1 :] * NOISE_VARIANCE
-        result = np.zeros(START_LAGS)
-        result[: len(full)] = full[:START_LAGS]
-        return result
-
-    @cached_property
-    def start_factor(self) -> FloatArray:
-        """Lower triangle that turns white noise into a stationary past, shape (order, order). [lane widths]"""
-        order = self.coarse.order
-        covariance = self.coarse.covariance(order)
-        if not covariance[0] > 0.0:  # coarse movement that is none has a past of none
-            return np.zeros((order, order))
-        matrix = covariance[np.abs(np.subtract.outer(np.arange(order), np.arange(order)))]
-        return np.asarray(np.linalg.cholesky(matrix + 1e-9 * covariance[0] * np.eye(order)))
 
     def stream(
         self, seed: np.random.SeedSequence, start: Start | None = None, *, drivers: int | None = None
@@ -239,7 +174,7 @@ class AutoregressiveStream:
         return values
 
 
-def _bends(model: AutoregressiveModel, first: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _bends(model: AutoregressiveParameters, first: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Knees and limits, each of shape (2, drivers); both lie beyond where a drive starts."""
     knees, limits = np.empty((2, len(first))), np.empty((2, len(first)))
     for row, (limit, side) in enumerate(zip(model.limits, (-1.0, 1.0), strict=True)):

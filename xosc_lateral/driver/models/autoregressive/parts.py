@@ -1,31 +1,18 @@
-"""The two parts of the movement, made in blocks of one coarse step and taken in any number, and drivers drawn from the
-population that a model stands for.
-
-References
-----------
-.. [1] D. B. Rubin, "Using the SIR algorithm to simulate posterior distributions", Bayesian Statistics 3, 1988.
-"""
+"""The two parts of the movement, made in blocks of one coarse step and taken in any number."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.driver.linear_filters import convolve, recur
 from xosc_lateral.driver.models.autoregressive.coarse import COARSE_EVERY, TICKS, interpolate
+from xosc_lateral.driver.models.autoregressive.parameters import AutoregressiveParameters, DriverState
 from xosc_lateral.driver.models.autoregressive.volatility import SLOW_CORRELATION_TIME
-from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.seeds import AutoregressiveSeed, generator
-
-if TYPE_CHECKING:
-    from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-
 
 COARSE, FINE = 0, 1
 """Index of a part wherever both stand side by side."""
@@ -50,7 +37,7 @@ class FactorState(msgspec.Struct):
 class Factors:
     """Factors with a mean square of 1; each part takes its own in pieces of its own."""
 
-    def __init__(self, model: AutoregressiveModel, state: FactorState) -> None:
+    def __init__(self, model: AutoregressiveParameters, state: FactorState) -> None:
         self.state = state
         step = model.step * COARSE_EVERY
         parts = (model.coarse_volatility, model.fine_volatility)
@@ -98,7 +85,7 @@ class _Pair:
         return np.asarray(series[:, 1:])
 
 
-def begin_factors(model: AutoregressiveModel, seed: np.random.SeedSequence, drivers: int) -> FactorState:
+def begin_factors(model: AutoregressiveParameters, seed: np.random.SeedSequence, drivers: int) -> FactorState:
     """Stationary from the start."""
 
     def begin(key: int, name: str) -> PairState:
@@ -196,7 +183,9 @@ class _Part:
 class CoarsePart(_Part):
     """Coarse movement about the driver's mean; its first block belongs to coarse step `TICKS`."""
 
-    def __init__(self, model: AutoregressiveModel, driver: DriverState, state: CoarseState, factors: Factors) -> None:
+    def __init__(
+        self, model: AutoregressiveParameters, driver: DriverState, state: CoarseState, factors: Factors
+    ) -> None:
         self.state: CoarseState = state
         self._model, self._driver, self._factors = model, driver, factors
 
@@ -218,7 +207,9 @@ class CoarsePart(_Part):
 class FinePart(_Part):
     """Fine movement; its first value is centred half a kernel after step 0."""
 
-    def __init__(self, model: AutoregressiveModel, driver: DriverState, state: FineState, factors: Factors) -> None:
+    def __init__(
+        self, model: AutoregressiveParameters, driver: DriverState, state: FineState, factors: Factors
+    ) -> None:
         self.state: FineState = state
         self._kernel, self._driver, self._factors = model.kernel, driver, factors
 
@@ -238,49 +229,3 @@ class FinePart(_Part):
         noise = np.concatenate([state.noise, self._volatile_noise(-(-lacks // COARSE_EVERY))])
         state.noise = noise[n:]
         return convolve(noise[: n + len(self._kernel) - 1], self._kernel) * self._driver.fine
-
-
-CANDIDATES = 64
-"""Drivers that one is chosen from, by how likely each is at the offset to start at. [-]"""
-
-
-class DriverState(msgspec.Struct):
-    """What drivers keep for a whole drive, shape (drivers,): the mean [lane widths], factors on both parts [-]."""
-
-    mean: FloatArray
-    coarse: FloatArray
-    fine: FloatArray
-
-
-def draw_drivers(model: AutoregressiveModel, start: Start | None, rng: np.random.Generator, n: int) -> DriverState:
-    """Draw n drivers from the population; given a start, each from those found there."""
-    coarse_normal, fine_normal = rng.standard_normal((2, n, CANDIDATES))
-    coarse = _factor(model.coarse_volatility.between, coarse_normal)
-    mixed = model.correlation * coarse_normal + np.sqrt(1.0 - model.correlation**2) * fine_normal
-    fine = _factor(model.fine_volatility.between, mixed)
-    mean_normal, choice = rng.standard_normal(n), rng.random(n)
-    if start is None:
-        return DriverState(model.mean + model.between_drivers * mean_normal, coarse[:, 0].copy(), fine[:, 0].copy())
-    between = model.between_drivers**2
-    coarse_variance = (start.spread * coarse) ** 2 * model.coarse_covariance[0]
-    moving = coarse_variance + (start.fine * fine) ** 2 * model.fine_covariance[0]
-    away = np.broadcast_to(np.asarray(start.rel_offset) - model.mean, n)
-    weight = np.cumsum(_likelihood(away[:, None], between + moving), axis=1)
-    k = np.sum(weight < weight[:, -1:] * choice[:, None], axis=1)
-    rows = np.arange(n)
-    share = between / (between + moving[rows, k]) if between > 0.0 else np.zeros(n)
-    mean = model.mean + share * away + np.sqrt(between * (1.0 - share)) * mean_normal
-    return DriverState(mean, coarse[rows, k], fine[rows, k])
-
-
-def _likelihood(away: FloatArray, variance: FloatArray) -> FloatArray:
-    """Of a normal variable, relative to the likeliest candidate's; shape of `variance`."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        log_weight = -0.5 * np.log(variance) - 0.5 * away**2 / variance
-        relative = np.nan_to_num(log_weight - log_weight.max(axis=1, keepdims=True), nan=0.0)
-    return np.asarray(np.exp(relative))
-
-
-def _factor(variance: float, normal: FloatArray) -> FloatArray:
-    """Log-normal factors of mean square 1."""
-    return np.asarray(np.exp(np.sqrt(variance) * normal - variance))

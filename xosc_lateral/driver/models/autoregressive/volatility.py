@@ -14,12 +14,10 @@ from math import isfinite
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.records import Record
 from xosc_lateral.errors import DriverProfileError
-
-FloatArray = NDArray[np.float64]
 
 SLOW_CORRELATION_TIME = 300.0
 """Of the part that varies within minutes. [s]"""

@@ -11,15 +11,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.linear_filters import convolve
 from xosc_lateral.driver.models.noise import fit_shaped_noise
 from xosc_lateral.driver.models.two_level.markov import N_BINS, MarkovChain, bin_of
 from xosc_lateral.driver.models.two_level.model import PAPER_SETTINGS, TwoLevelModel, TwoLevelSettings
 from xosc_lateral.errors import NotEnoughDataError
-
-FloatArray = NDArray[np.float64]
 
 
 def split_levels(rel_offset: FloatArray, settings: TwoLevelSettings = PAPER_SETTINGS) -> tuple[FloatArray, FloatArray]:

@@ -16,12 +16,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.errors import DriverProfileError
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 def open_traps(counts: IntArray) -> IntArray:
@@ -41,7 +38,7 @@ def _nearest(bins: IntArray, goals: IntArray) -> IntArray:
     return np.asarray(goals[np.abs(bins[:, None] - goals[None, :]).argmin(axis=1)])
 
 
-def _reachable(counts: IntArray, start: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _reachable(counts: IntArray, start: BoolArray) -> BoolArray:
     """Bins that the chain can get to from `start` (itself included)."""
     found = start.copy()
     while True:
@@ -51,7 +48,7 @@ def _reachable(counts: IntArray, start: NDArray[np.bool_]) -> NDArray[np.bool_]:
         found = more
 
 
-def _main_part(counts: IntArray) -> NDArray[np.bool_]:
+def _main_part(counts: IntArray) -> BoolArray:
     """The set of bins that all lead to one another in which most time was spent."""
     best, most = np.zeros(len(counts), dtype=np.bool_), -1
     left = counts.sum(axis=0) + counts.sum(axis=1) > 0
@@ -106,7 +103,7 @@ class MarkovChain:
         return np.asarray(counts / counts.sum(axis=1, keepdims=True))
 
     @property
-    def support(self) -> NDArray[np.bool_]:
+    def support(self) -> BoolArray:
         """Bins that were visited, shape (n_bins,). [-]"""
         return np.asarray((self.counts.sum(axis=0) + self.counts.sum(axis=1)) > 0)
 
@@ -137,19 +134,13 @@ def bin_of(rel_offset: FloatArray, n_bins: int = N_BINS) -> IntArray:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class AliasTable:
-    """A chain made ready for sampling: one uniform number and two look-ups per step [1]_.
-
-    Parameters
-    ----------
-    keep : array, shape (n_bins * n_bins,)
-        Column k of row i stands for bin k below this fraction of its width ...
-    other : array of int, shape (n_bins * n_bins,)
-        ... and for this bin above it.
-    """
+    """A chain made ready for sampling: one uniform number and two look-ups per step [1]_."""
 
     n_bins: int
     keep: FloatArray
+    """Shape (n_bins * n_bins,). Column k of row i stands for bin k below this fraction of its width ..."""
     other: IntArray
+    """Shape (n_bins * n_bins,). ... and for this bin above it."""
 
     @classmethod
     def of(cls, transition: FloatArray) -> AliasTable:

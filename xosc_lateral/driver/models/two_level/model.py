@@ -16,8 +16,8 @@ from typing import ClassVar
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.driver.jit_kernel import JitKernel
 from xosc_lateral.driver.linear_filters import convolve
 from xosc_lateral.driver.models.base import CoreModel, Start
@@ -28,9 +28,6 @@ from xosc_lateral.driver.records import Record, frozen_array, set_once
 from xosc_lateral.driver.seeds import TwoLevelSeed, generator
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import DriverProfileError
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 class TwoLevelSettings(Record, frozen=True):

@@ -13,9 +13,12 @@ import numpy as np
 from lxml import etree
 from numpy.typing import NDArray
 
+from xosc_lateral.formats.openscenario.element import parent_of
 from xosc_lateral.scenario.enums import Priority
 
 Version = tuple[int, int]
+Pose = tuple[float, float, float, float, float, float]
+"""x, y, z [m], heading, pitch, roll [rad]."""
 
 
 def named(version: Version) -> str:
@@ -53,8 +56,11 @@ def decimals(values: NDArray[np.float64], digits: Sequence[int]) -> tuple[str, .
     return tuple(found)
 
 
-def sub(parent: etree._Element, tag: str, **attributes: str) -> etree._Element:
-    """Append a child."""
+def sub(parent: etree._Element, path: str, **attributes: str) -> etree._Element:
+    """Append a child, or one below the other (``PrivateAction/TeleportAction``), the last with the attributes."""
+    *above, tag = path.split("/")
+    for outer in above:
+        parent = etree.SubElement(parent, outer)
     return etree.SubElement(parent, tag, attributes)
 
 
@@ -96,24 +102,23 @@ def time_trigger(owner: etree._Element, tag: str, moment: float, version: Versio
     steps of 1 ms or more.
     """
     trigger = sub(owner, tag)
-    by_value = _by_value(trigger, moment)
-    if version >= (1, 1):
-        sub(by_value, "SimulationTimeCondition", value=decimal(moment, 6), rule="greaterOrEqual")
-    else:
-        sub(by_value, "SimulationTimeCondition", value=decimal(moment - 1e-3, 6), rule="greaterThan")
+    by_value = condition(sub(trigger, "ConditionGroup"), f"time {decimal(moment, 3)}", "ByValueCondition")
+    rule, moment = ("greaterOrEqual", moment) if version >= (1, 1) else ("greaterThan", moment - 1e-3)
+    sub(by_value, "SimulationTimeCondition", value=decimal(moment, 6), rule=rule)
     return trigger
 
 
-def _by_value(trigger: etree._Element, moment: float) -> etree._Element:
-    """The only condition of a trigger."""
-    condition = sub(
-        sub(trigger, "ConditionGroup"),
-        "Condition",
-        name=f"time {decimal(moment, 3)}",
-        delay="0",
-        conditionEdge="none",
-    )
-    return sub(condition, "ByValueCondition")
+def condition(group: etree._Element, name: str, kind: str, *, delay: str = "0", edge: str = "none") -> etree._Element:
+    """Add a condition; what it looks at goes into what comes back, its element of that kind."""
+    return sub(sub(group, "Condition", name=name, delay=delay, conditionEdge=edge), kind)
+
+
+def entity_condition(group: etree._Element, name: str, entity: str, *, edge: str = "none") -> etree._Element:
+    """Add a condition on an entity; what is asked of it goes into what comes back."""
+    by_entity = condition(group, name, "ByEntityCondition", edge=edge)
+    triggering = sub(by_entity, "TriggeringEntities", triggeringEntitiesRule="any")
+    sub(triggering, "EntityRef", entityRef=entity)
+    return sub(by_entity, "EntityCondition")
 
 
 def state_condition(
@@ -121,36 +126,23 @@ def state_condition(
 ) -> None:
     """Add a condition on the state of a storyboard element."""
     name = f"{state} after {decimal(delay, 3)}"
-    condition = sub(group, "Condition", name=name, delay=decimal(delay, 6), conditionEdge=edge)
-    sub(
-        sub(condition, "ByValueCondition"),
-        "StoryboardElementStateCondition",
-        storyboardElementType=kind,
-        storyboardElementRef=reference,
-        state=state,
-    )
+    by_value = condition(group, name, "ByValueCondition", delay=decimal(delay, 6), edge=edge)
+    what = {"storyboardElementType": kind, "storyboardElementRef": reference, "state": state}
+    sub(by_value, "StoryboardElementStateCondition", **what)
 
 
 def speed_step(owner: etree._Element, speed: float) -> None:
     """Speed at once, as the content of a private action."""
-    action = sub(sub(owner, "LongitudinalAction"), "SpeedAction")
+    action = sub(owner, "LongitudinalAction/SpeedAction")
     sub(action, "SpeedActionDynamics", dynamicsShape="step", dynamicsDimension="time", value="0")
-    sub(sub(action, "SpeedActionTarget"), "AbsoluteTargetSpeed", value=decimal(speed, 5))
+    sub(action, "SpeedActionTarget/AbsoluteTargetSpeed", value=decimal(speed, 5))
 
 
-def world_position(owner: etree._Element, pose: tuple[float, float, float, float, float, float]) -> None:
-    """Position with x, y, z [m] and heading, pitch, roll [rad]."""
-    x, y, z, h, p, r = pose
-    sub(
-        sub(owner, "Position"),
-        "WorldPosition",
-        x=decimal(x, 5),
-        y=decimal(y, 5),
-        z=decimal(z, 5),
-        h=decimal(h, 6),
-        p=decimal(p, 6),
-        r=decimal(r, 6),
-    )
+def world_position(owner: etree._Element, pose: Pose) -> None:
+    """Position in the world."""
+    x, y, z = (decimal(value, 5) for value in pose[:3])
+    h, p, r = (decimal(angle, 6) for angle in pose[3:])
+    sub(owner, "Position/WorldPosition", x=x, y=y, z=z, h=h, p=p, r=r)
 
 
 def indentation(root: etree._Element) -> str:
@@ -172,6 +164,12 @@ def insert_indented(parent: etree._Element, index: int, element: etree._Element)
         parent[-1].tail = own
     element.tail = closing if index >= len(parent) else own
     parent.insert(index, element)
+
+
+def insert_after(neighbour: etree._Element, element: etree._Element) -> None:
+    """Insert a new element right after another one."""
+    parent = parent_of(neighbour)
+    insert_indented(parent, parent.index(neighbour) + 1, element)
 
 
 def document(root: etree._Element) -> bytes:

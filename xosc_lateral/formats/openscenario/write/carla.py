@@ -27,20 +27,19 @@ from math import cos, sin
 
 import numpy as np
 from lxml import etree
-from numpy.typing import NDArray
 
-from xosc_lateral.formats.openscenario.element import local_name
+from xosc_lateral.arrays import FloatArray
+from xosc_lateral.formats.openscenario.element import elements, local_name
 from xosc_lateral.formats.openscenario.write import build
+from xosc_lateral.formats.openscenario.write.draft import Draft
 from xosc_lateral.formats.openscenario.write.losses import Losses, remove
 from xosc_lateral.formats.openscenario.write.moving import Moving, add_vertices, wrapped
-from xosc_lateral.formats.openscenario.write.non_motion_actions import Pose
+from xosc_lateral.formats.openscenario.write.older import add_missing_overrides
 from xosc_lateral.formats.openscenario.write.path_pieces import VERTEX_SPACING, PathPiece, vertex_times
-from xosc_lateral.formats.openscenario.write.vertices import Vertices
+from xosc_lateral.formats.openscenario.write.vertices import TimedVertices
 from xosc_lateral.motion.nominal import Activity, NominalMotion
 from xosc_lateral.scenario import Entity, Scenario
 from xosc_lateral.scenario.enums import EntityCategory, Priority
-
-FloatArray = NDArray[np.float64]
 
 CONTROL = "vehicle_velocity_control"
 """Its only control that keeps to the times of waypoints and does not move them to the lane (since 0.9.16)."""
@@ -56,10 +55,9 @@ _FULL_SUN = 100_000.0
 _SIGNALS = ("id=", "pos=")
 """How it is told a traffic light."""
 _NO_BLUEPRINT = ("trailer", "semitrailer", "train", "tram")
-_PEDALS = ("Throttle", "Brake", "Clutch", "ParkingBrake", "SteeringWheel")
 
 
-def start_of(item: Moving) -> tuple[Pose, float]:
+def start_of(item: Moving) -> tuple[build.Pose, float]:
     """Pose and speed at the start, where an entity that appears later waits: all are there from the start."""
     found = item.start
     if found is None:
@@ -68,11 +66,12 @@ def start_of(item: Moving) -> tuple[Pose, float]:
     return pose, max(speed, 0.0)
 
 
-def add_drives(maneuver: etree._Element, item: Moving, vertices: Vertices, *, flat: bool) -> None:
-    """Add an event for every drive of an entity: from where it is placed to where it is placed anew.
+def add_drives(act: etree._Element, name: str, item: Moving, draft: Draft) -> None:
+    """Add a maneuver with an event for every drive of an entity: from where it is placed to where it is placed anew.
 
-    `flat`: without pitch, as everywhere in a scenario whose coordinates are not CARLA's own.
+    Without pitch, as everywhere in a scenario whose coordinates are not CARLA's own.
     """
+    maneuver = build.maneuver(act, name, item.name)
     for number, pieces in enumerate(_drives(item.pieces), start=1):
         name = f"{item.name} trajectory {number}"
         event = build.event(maneuver, name, Priority.OVERRIDE, VERSION)
@@ -82,11 +81,11 @@ def add_drives(maneuver: etree._Element, item: Moving, vertices: Vertices, *, fl
             place = build.private_action(event, f"{name} place")
             build.world_position(build.sub(place, "TeleportAction"), item.pose(pieces[0].first))
         times, columns = _vertices(item, pieces, begin)
-        if flat:
+        if not draft.scenario.header.is_left_handed:
             columns[4] = np.zeros_like(columns[4])
         columns = [times, *columns[:3], wrapped(columns[3]), *columns[4:]]
-        of_block = partial(_of_block, columns)
-        add_vertices(build.private_action(event, name), name, vertices, VERSION, len(times), of_block)
+        vertices = TimedVertices(len(times), partial(_of_block, columns))
+        add_vertices(build.private_action(event, name), name, draft, vertices)
         build.time_trigger(event, "StartTrigger", begin, VERSION)
 
 
@@ -132,7 +131,7 @@ def _moments(item: Moving, pieces: Sequence[PathPiece], begin: float) -> FloatAr
     return np.asarray(moments)
 
 
-def fit_carla(losses: Losses, scenario: Scenario, motion: NominalMotion, converted: Sequence[str]) -> None:
+def fit_carla(losses: Losses, draft: Draft, converted: Sequence[str]) -> None:
     """Make a written scenario of version 1.0 one that ScenarioRunner plays.
 
     Raises
@@ -140,10 +139,10 @@ def fit_carla(losses: Losses, scenario: Scenario, motion: NominalMotion, convert
     FormatError
         No road: it would not know where to play.
     """
-    root = losses.root
+    root, scenario, motion = draft.root, draft.scenario, draft.motion
     if not any(item.get("filepath") for item in root.iter("{*}LogicFile")):
         losses.refuse(root, "scenarios without a road", hint="; name one in RoadNetwork/LogicFile")
-    for item in list(root.iter("{*}TrafficSignals")):
+    for item in elements(root, "TrafficSignals"):
         if not scenario.header.is_left_handed:
             losses.element(item, "ScenarioRunner takes the first phase of the first controller for all")
     _leave_out_unknown(losses, scenario)
@@ -166,7 +165,7 @@ def fit_carla(losses: Losses, scenario: Scenario, motion: NominalMotion, convert
 def _leave_out_unknown(losses: Losses, scenario: Scenario) -> None:
     ours = scenario.header.is_left_handed
     for story in losses.root.iter("{*}Story"):
-        for item in [item for item in story.iter("{*}*") if local_name(item) in _UNKNOWN]:
+        for item in elements(story, *_UNKNOWN):
             tag = local_name(item)
             known = ours or (tag == "TrafficSignalStateAction" and (item.get("name") or "").startswith(_SIGNALS))
             if not known or tag in ("VisibilityAction", "TrafficAction"):
@@ -192,8 +191,9 @@ def _note_ways(losses: Losses, motion: NominalMotion, name: str) -> None:
         )
     if (entity.speed[there] < 0.0).any():
         losses.note(f"'{name}' drives backwards, and is turned round by ScenarioRunner")
-    for item in [item for item in losses.root.iter("{*}EntityAction") if item.get("entityRef") == name]:
-        losses.action(item, "ScenarioRunner needs every car that it controls from start to end")
+    for item in elements(losses.root, "EntityAction"):
+        if item.get("entityRef") == name:
+            losses.action(item, "ScenarioRunner needs every car that it controls from start to end")
 
 
 def _entities(losses: Losses, scenario: Scenario, converted: Sequence[str]) -> None:
@@ -260,10 +260,7 @@ def _assign_controls(root: etree._Element, entities: Sequence[Entity]) -> None:
 def _control() -> etree._Element:
     action = etree.Element("PrivateAction")
     both = build.sub(action, "ControllerAction")
-    controller = build.sub(build.sub(both, "AssignControllerAction"), "Controller", name=CONTROL)
-    build.sub(build.sub(controller, "Properties"), "Property", name="module", value=CONTROL)
-    override = build.sub(both, "OverrideControllerValueAction")
-    for pedal in _PEDALS:
-        build.sub(override, pedal, value="0", active="false")
-    build.sub(override, "Gear", number="0", active="false")
+    controller = build.sub(both, "AssignControllerAction/Controller", name=CONTROL)
+    build.sub(controller, "Properties/Property", name="module", value=CONTROL)
+    add_missing_overrides(both)
     return action

@@ -21,31 +21,24 @@ import numpy as np
 from lxml import etree
 from msgspec.structs import replace
 
-from xosc_lateral.formats.openscenario.element import local_name
-from xosc_lateral.formats.openscenario.provenance import mark, write_sealed
+from xosc_lateral.formats.openscenario.element import parent_of
 from xosc_lateral.formats.openscenario.write import build
-from xosc_lateral.formats.openscenario.write.fit import fit
-from xosc_lateral.formats.openscenario.write.lateral_actions import LATERAL, LateralAction, awaited, lateral_actions
+from xosc_lateral.formats.openscenario.write.draft import Draft, WrittenScenario
+from xosc_lateral.formats.openscenario.write.fit import finish
+from xosc_lateral.formats.openscenario.write.lateral_actions import LateralAction, awaited, lateral_actions
 from xosc_lateral.formats.openscenario.write.literal import inline_maneuvers, name_literally
-from xosc_lateral.formats.openscenario.write.moving import Moving
+from xosc_lateral.formats.openscenario.write.moving import moving_entities
 from xosc_lateral.formats.openscenario.write.offset_chain import LEAST_CHANGE, SLACK, OffsetChain, leading, ramps
 from xosc_lateral.formats.openscenario.write.ramp_targets import Ramp, acceleration
-from xosc_lateral.formats.openscenario.write.replaced_maneuvers import ReplacedManeuvers, put_last
-from xosc_lateral.formats.openscenario.write.result import (
-    WrittenScenario,
-    check_convertible,
-    global_scope,
-    override_parameters,
-)
+from xosc_lateral.formats.openscenario.write.replaced_maneuvers import ReplacedManeuvers
 from xosc_lateral.formats.openscenario.write.target import STANDARD, TargetPlayer
-from xosc_lateral.formats.openscenario.write.vertices import Vertices, rewrite_paths
-from xosc_lateral.formats.xml import parse_xml
 from xosc_lateral.motion.nominal import NominalMotion, PlayedAction
 from xosc_lateral.motion.segments import MINIMUM_SPEED
 from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.scenario import Scenario
 from xosc_lateral.scenario.dependence import Dependence
 from xosc_lateral.scenario.enums import Priority
+from xosc_lateral.scenario.private_actions import LATERAL
 
 CHAIN = "xosc-lateral offsets"
 AT_ONCE = 0.1
@@ -81,6 +74,8 @@ def write_lane_offset_scenario(
 ) -> WrittenScenario:
     """Write the scenario with its maneuvers as they are and lane offset actions added.
 
+    `output`, `provenance`, `summary`, `save`, `target`, and what is raised: see `write_trajectory_scenario`.
+
     Parameters
     ----------
     scenario : Scenario
@@ -89,36 +84,14 @@ def write_lane_offset_scenario(
         The run: says which lateral action comes before and after each chain.
     chains : sequence of OffsetChain
         In order of time for each entity.
-    output : path
-    provenance : mapping
-        JSON values: goes into the file as it is.
-    summary : str
-        A few words of it for the file header's description.
-    save : bool
-        Write it; else the bytes are only handed back.
-    target : TargetPlayer
-        Player and version that it is made for.
     trajectories : mapping of str to WorldTrajectory, optional
         Entities that follow trajectories in place of their maneuvers: none that a chain is for.
     depends : Dependence, optional
         What depends on vehicles under test.
-
-    Raises
-    ------
-    FormatError
-        The scenario was converted before, or can't be expressed for the target.
-    OSError
-        The output can't be written; nothing is left half-written.
-    ValueError
-        A chain holds NaN.
     """
-    output = Path(output)
-    root = parse_xml(scenario.source, scenario.path)
-    check_convertible(root, scenario, motion)
-    paths = trajectories or {}
-    moving = {one.name: Moving(one, paths[one.name], motion) for one in motion.entities if one.name in paths}
-    maneuvers = ReplacedManeuvers(root, scenario, motion, moving)
-    version, vertices = target.version_for(scenario), Vertices(scenario.source)
+    draft = Draft(scenario, motion, target)
+    moving = moving_entities(draft, trajectories or {})
+    maneuvers = ReplacedManeuvers(draft, moving)
     story = build.story("xosc-lateral")
     lateral = lateral_actions(scenario)
     for chain in chains:
@@ -126,43 +99,31 @@ def write_lane_offset_scenario(
             raise ValueError(f"offsets of '{chain.entity}' are not finite")
     for entity in dict.fromkeys(chain.entity for chain in chains):
         own = [chain for chain in chains if chain.entity == entity and ramps(chain)]
-        _Acts(story, entity, motion, lateral.get(entity, ()), version).add(own, depends)
-    _put_into(root, story, scenario, chains)
-    scope, referred = global_scope(scenario), _referred(story)
-    name_literally(root, scenario.path, scope, referred)
-    inline_maneuvers(root, scenario, scope, referred)
-    removed, frozen = maneuvers.replace(scope, version, vertices) if moving else ([], [])
-    override_parameters(root, scenario)
-    notes = (*frozen, *fit(root, scenario, motion, target, scope))
-    rewrite_paths(root, scenario, output, scope)
-    mark(root, provenance, summary)
-    pieces = vertices.document(root) if moving else [build.document(root)]
-    sha256, content, data = write_sealed(output, pieces, save=save)
-    names = tuple(dict.fromkeys([*moving, *(chain.entity for chain in chains)]))
-    return WrittenScenario(output, sha256, content, names, tuple(removed), data, notes)
-
-
-def _put_into(root: etree._Element, story: etree._Element, scenario: Scenario, chains: Sequence[OffsetChain]) -> None:
-    """Our story among the scenario's."""
-    storyboard = next(element for element in root if local_name(element) == "Storyboard")
-    _place_aside(storyboard, scenario, chains)
+        _Acts(story, entity, draft, lateral.get(entity, ())).add(own, depends)
+    _place_aside(draft, chains)
     if len(story):
         # Last: a lane change that starts in the same frame has started before ours are looked at.
-        put_last(root, story)
+        draft.put_last(story)
+    referred = _referred(story)
+    name_literally(draft.root, scenario.path, draft.scope, referred)
+    inline_maneuvers(draft, referred)
+    maneuvers.replace()
+    names = tuple(dict.fromkeys([*moving, *(chain.entity for chain in chains)]))
+    return finish(draft, Path(output), names, reactive=True, provenance=provenance, summary=summary, save=save)
 
 
-def _place_aside(storyboard: etree._Element, scenario: Scenario, chains: Sequence[OffsetChain]) -> None:
+def _place_aside(draft: Draft, chains: Sequence[OffsetChain]) -> None:
     """Put those whose offsets begin with the scenario down there, after all else that places them."""
     placed = {
         chain.entity: found[0].origin if (found := ramps(chain)) else chain.start_t
         for chain in chains
         if chain.is_placed
     }
-    owners = storyboard.findall("{*}Init/{*}Actions/{*}Private")
+    owners = draft.init_actions.findall("{*}Private")
     # The reader's order is the file's: names need no parameters filled in again.
     last = {
         private.entity_ref: owner
-        for owner, private in zip(owners, scenario.storyboard.init.privates, strict=True)
+        for owner, private in zip(owners, draft.scenario.storyboard.init.privates, strict=True)
         if private.entity_ref in placed
     }
     for entity, owner in last.items():
@@ -180,16 +141,9 @@ def _referred(story: etree._Element) -> set[str]:
 class _Acts:
     """The acts of one entity, and its lateral actions."""
 
-    def __init__(
-        self,
-        story: etree._Element,
-        entity: str,
-        motion: NominalMotion,
-        items: Sequence[LateralAction],
-        version: build.Version,
-    ) -> None:
-        self._story, self._entity, self._items, self._version = story, entity, items, version
-        self._played = [one for one in motion.actions if one.actor == entity and _is_lateral(one)]
+    def __init__(self, story: etree._Element, entity: str, draft: Draft, items: Sequence[LateralAction]) -> None:
+        self._story, self._entity, self._items, self._version = story, entity, items, draft.version
+        self._played = [one for one in draft.motion.actions if one.actor == entity and _is_lateral(one)]
         self._by_path = {item.path: item for item in items}
         self._last = dict[tuple[str, ...] | None, str]()  # act after each lateral action, and the last one of all
 
@@ -207,8 +161,9 @@ class _Acts:
                 self._start_after(act, self._by_path[cause])
             else:
                 self._start_when_faster(act, before)
-            ring = self._go_round(events, chain) if _may_go_round(chain) else False
-            clocked = ring and k + 1 < len(chains) and self._is_clocked(chains[k + 1])
+            if _may_go_round(chain):
+                self._go_round(events, chain)
+            clocked = _may_go_round(chain) and k + 1 < len(chains) and self._is_clocked(chains[k + 1])
             following = f"{CHAIN} {len(self._story) + 1}" if clocked else None
             self._stop(act, {played.path for played in before}, following)
             self._last[cause] = self._last[None] = str(act.get("name"))
@@ -253,27 +208,22 @@ class _Acts:
             elif is_clocked:
                 build.time_trigger(event, "StartTrigger", max(ramp.start, PLACED), self._version)
             else:
-                group = build.sub(build.sub(event, "StartTrigger"), "ConditionGroup")
+                group = build.sub(event, "StartTrigger/ConditionGroup")
                 build.state_condition(group, "act", name, "runningState", max(ramp.start - begin, FIRST))
             events.append(event)
         return act, events
 
-    def _go_round(self, events: Sequence[etree._Element], chain: OffsetChain) -> bool:
+    def _go_round(self, events: Sequence[etree._Element], chain: OffsetChain) -> None:
         """After the last event one leads back to where the first did, unless the car is about to be too slow."""
         first, second, last = ramps(chain)[0], ramps(chain)[1], ramps(chain)[-1]
         name = str(events[0].get("name")).rpartition(".")[0]
-        owner = events[0].getparent()
-        assert owner is not None
-        back = build.event(owner, f"{name}.{len(events) + 1}", Priority.OVERRIDE, self._version)
+        back = build.event(parent_of(events[0]), f"{name}.{len(events) + 1}", Priority.OVERRIDE, self._version)
         _add_ramp(back, f"{name}.{len(events) + 1} action", leading(last.target, first.target, chain))
         group = _add_link(build.sub(back, "StartTrigger"), events[-1], PAUSE)
         _add_speed(group, self._entity, MINIMUM_SPEED, "none")
-        _add_link(
-            next(item for item in events[1] if local_name(item) == "StartTrigger"), back, second.start - first.end
-        )
+        _add_link(events[1].findall("StartTrigger")[0], back, second.start - first.end)
         for event in (*events[1:], back):
             event.set("maximumExecutionCount", str(TURNS))
-        return True
 
     def _start_after(self, act: etree._Element, item: LateralAction) -> None:
         """When it ends, not when it is stopped midway: who is keeps his heading."""
@@ -291,7 +241,7 @@ class _Acts:
 
     def _start_when_faster(self, act: etree._Element, before: Sequence[PlayedAction]) -> None:
         """Again, if it was fast enough before."""
-        group = build.sub(build.sub(act, "StartTrigger"), "ConditionGroup")
+        group = build.sub(act, "StartTrigger/ConditionGroup")
         if None in self._last:
             build.state_condition(group, "act", self._last[None], "completeState", 0.0)
         elif before and not (item := self._by_path[before[-1].path]).repeats:
@@ -329,13 +279,8 @@ def _add_link(trigger: etree._Element, event: etree._Element, gap: float) -> etr
 
 def _add_speed(group: etree._Element, entity: str, speed: float, edge: str) -> None:
     """The car is faster; `edge` "falling": it no longer is."""
-    condition = build.sub(group, "Condition", name=f"speed {edge}", delay="0", conditionEdge=edge)
-    by_entity = build.sub(condition, "ByEntityCondition")
-    triggering = build.sub(by_entity, "TriggeringEntities", triggeringEntitiesRule="any")
-    build.sub(triggering, "EntityRef", entityRef=entity)
-    build.sub(
-        build.sub(by_entity, "EntityCondition"), "SpeedCondition", value=build.decimal(speed, 4), rule="greaterThan"
-    )
+    asked = build.entity_condition(group, f"speed {edge}", entity, edge=edge)
+    build.sub(asked, "SpeedCondition", value=build.decimal(speed, 4), rule="greaterThan")
 
 
 def _add_ramp(event: etree._Element, name: str, ramp: Ramp) -> None:
@@ -351,10 +296,9 @@ def _add_ramp(event: etree._Element, name: str, ramp: Ramp) -> None:
 
 def _lane_offset(owner: etree._Element, dynamics: Mapping[str, str], offset_t: float) -> None:
     """To an offset along +t. [m]"""
-    action = build.sub(build.sub(owner, "LateralAction"), "LaneOffsetAction", continuous="false")
+    action = build.sub(owner, "LateralAction/LaneOffsetAction", continuous="false")
     build.sub(action, "LaneOffsetActionDynamics", **dynamics)
-    target = build.sub(action, "LaneOffsetTarget")
-    build.sub(target, "AbsoluteTargetLaneOffset", value=build.decimal(offset_t, 4))
+    build.sub(action, "LaneOffsetTarget/AbsoluteTargetLaneOffset", value=build.decimal(offset_t, 4))
 
 
 def _is_lateral(played: PlayedAction) -> bool:

@@ -7,19 +7,11 @@ from collections.abc import Collection, Iterator, Mapping
 from math import inf
 
 from msgspec import Struct
-from msgspec.structs import replace
 
 from xosc_lateral.motion.nominal import NominalMotion
-from xosc_lateral.scenario import Action, Event, Scenario
+from xosc_lateral.scenario import Scenario
 from xosc_lateral.scenario.dependence import Dependence
-from xosc_lateral.scenario.private_actions import (
-    FollowTrajectoryAction,
-    LaneChangeAction,
-    LaneOffsetAction,
-    LateralDistanceAction,
-)
-
-LATERAL = (LaneChangeAction, LaneOffsetAction, LateralDistanceAction, FollowTrajectoryAction)
+from xosc_lateral.scenario.private_actions import LATERAL
 
 
 class LateralAction(Struct, frozen=True):
@@ -38,12 +30,15 @@ def lateral_actions(scenario: Scenario) -> dict[str, tuple[LateralAction, ...]]:
     """Lateral actions of events, by entity, in file order."""
     names = Counter(_names(scenario))
     by_entity: dict[str, dict[LateralAction, None]] = {}
-    for above, event, action, actors, repeats in _event_actions(scenario):
-        if isinstance(action.content, LATERAL):
-            found = _referable((*above, event.name, action.name), len(event.actions) == 1, names)
-            found = replace(found, repeats=repeats)
-            for actor in actors:
-                by_entity.setdefault(actor, {})[found] = None
+    for story, act, group in scenario.storyboard.groups():
+        for maneuver, event in group.events():
+            repeats = group.maximum_execution_count > 1 or event.maximum_execution_count > 1
+            for action in event.actions:
+                if isinstance(action.content, LATERAL):
+                    path = (story.name, act.name, group.name, maneuver.name, event.name, action.name)
+                    found = LateralAction(path, *_reference(path, len(event.actions) == 1, names), repeats)
+                    for actor in group.actors.entity_refs:
+                        by_entity.setdefault(actor, {})[found] = None
     return {entity: tuple(actions) for entity, actions in by_entity.items()}
 
 
@@ -60,29 +55,16 @@ def overruled_until(items: Collection[LateralAction], motion: NominalMotion) -> 
     return max((inf if item.repeats else last.get(item.path, inf) for item in items), default=-inf)
 
 
-def _referable(path: tuple[str, ...], is_alone: bool, names: Mapping[str, int]) -> LateralAction:
+def _reference(path: tuple[str, ...], is_alone: bool, names: Mapping[str, int]) -> tuple[str, str]:
     """By its own name where no other element has it, else by its event's, else by the whole path.
 
     An action without a name, which the standard doesn't allow and some tools write, has only its event's.
     """
     if path[-1] and names[path[-1]] == 1:
-        return LateralAction(path, "action", path[-1])
+        return "action", path[-1]
     if (is_alone or not path[-1]) and names[path[-2]] == 1:
-        return LateralAction(path, "event", path[-2])
-    return LateralAction(path, "action", "::".join(path))
-
-
-def _event_actions(scenario: Scenario) -> Iterator[tuple[tuple[str, ...], Event, Action, tuple[str, ...], bool]]:
-    """Every action of every event, with the names above the event, the actors, and whether it may run again."""
-    for story in scenario.storyboard.stories:
-        for act in story.acts:
-            for group in act.maneuver_groups:
-                for maneuver in group.maneuvers:
-                    for event in maneuver.events:
-                        for action in event.actions:
-                            above = (story.name, act.name, group.name, maneuver.name)
-                            again = group.maximum_execution_count > 1 or event.maximum_execution_count > 1
-                            yield above, event, action, group.actors.entity_refs, again
+        return "event", path[-2]
+    return "action", "::".join(path)
 
 
 def _names(scenario: Scenario) -> Iterator[str]:

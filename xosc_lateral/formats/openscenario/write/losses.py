@@ -107,7 +107,7 @@ class Losses:
         self.note(f"{where}: {local_name(element)} left out ({why})")
         if self.reactive and event is not None:
             action[:] = []
-            build.sub(build.sub(action, "UserDefinedAction"), "CustomCommandAction", type="nothing")
+            build.sub(action, "UserDefinedAction/CustomCommandAction", type="nothing")
         else:
             _remove_upward(action)
 

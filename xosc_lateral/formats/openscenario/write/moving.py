@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from lxml import etree
 from msgspec import structs
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.formats.openscenario.write import build
-from xosc_lateral.formats.openscenario.write.non_motion_actions import Pose
+from xosc_lateral.formats.openscenario.write.build import Pose
+from xosc_lateral.formats.openscenario.write.draft import Draft
 from xosc_lateral.formats.openscenario.write.path_pieces import (
     LEAST_SPACING,
     VERTEX_SPACING,
@@ -20,17 +21,14 @@ from xosc_lateral.formats.openscenario.write.path_pieces import (
     cut_path,
     vertex_times,
 )
-from xosc_lateral.formats.openscenario.write.vertices import TimedVertices, Vertices
+from xosc_lateral.formats.openscenario.write.vertices import ColumnsOf, TimedVertices
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.rows import blocks, columns, give_back, kept
 from xosc_lateral.scenario.enums import Priority
 
-FloatArray = NDArray[np.float64]
-
 MOTION_SINCE = (1, 4)
 """Version from which a vertex may say how fast the entity is there."""
-
 
 CATCH_UP = 20.0
 """Over so many times as long as a heading is late it catches up before a path is over: 5 % faster than it turns. [-]"""
@@ -77,6 +75,24 @@ class Moving:
         return float(self.path.time[piece.first - 1 if piece.placed else piece.first])
 
 
+def moving_entities(draft: Draft, trajectories: Mapping[str, WorldTrajectory]) -> dict[str, Moving]:
+    """Entities that follow trajectories, in the order of the run; mirrored where the scenario is left-handed."""
+    found = {}
+    for entity in draft.motion.entities:
+        if entity.name in trajectories:
+            path = trajectories[entity.name]
+            path = _mirrored(path) if draft.scenario.header.is_left_handed else path
+            found[entity.name] = Moving(entity, path, draft.motion)
+    return found
+
+
+def _mirrored(path: WorldTrajectory) -> WorldTrajectory:
+    """In the left-handed coordinates of a scenario written for CARLA."""
+    n, turned = len(path.time), (path.y, path.heading, path.pitch)
+    y, heading, pitch = columns(n, ([-values[rows] for values in turned] for rows in blocks(n)))
+    return replace(path, y=y, heading=heading, pitch=pitch)
+
+
 def _stopping_in_time(path: WorldTrajectory, pieces: Sequence[PathPiece]) -> tuple[WorldTrajectory, list[PathPiece]]:
     """Sudden stops whose last step is too short for a vertex of its own: it would slow the one before.
 
@@ -120,58 +136,47 @@ def _check(entity: EntityMotion, path: WorldTrajectory) -> None:
     if any(len(values) != len(entity.time) for values in arrays):
         raise ValueError(f"trajectory of '{entity.name}' does not have the {len(entity.time)} rows of its motion")
     for rows in blocks(len(entity.time)):
-        active = (entity.activity[rows] & Activity.ACTIVE) != 0
-        if any(not np.isfinite(values[rows][active]).all() for values in arrays):
+        away = (entity.activity[rows] & Activity.ACTIVE) == 0
+        if any(not (np.isfinite(values[rows]) | away).all() for values in arrays):
             raise ValueError(f"trajectory of '{entity.name}' is not finite")
 
 
-def add_trajectories(maneuver: etree._Element, item: Moving, version: build.Version, vertices: Vertices) -> None:
-    """Add an event for every piece of an entity, and one for every stop."""
+def add_trajectories(act: etree._Element, name: str, item: Moving, draft: Draft) -> None:
+    """Add a maneuver of that name with an event for every piece of an entity, and one for every stop."""
+    maneuver = build.maneuver(act, name, item.name)
     for number, piece in enumerate(item.pieces, start=1):
         rows = slice(piece.first, piece.last + 1)
         times = vertex_times(item.path.time[rows], item.path.x[rows], item.path.y[rows])
         name = f"{item.name} trajectory {number}"
-        event = build.event(maneuver, name, Priority.OVERRIDE, version)
+        event = build.event(maneuver, name, Priority.OVERRIDE, draft.version)
         if len(times) < 2:
-            _add_hop(event, name, item, piece, version)
+            _add_hop(event, name, item, piece, draft)
             continue
         if piece.placed:
             place = build.private_action(event, f"{name} place")
             build.world_position(build.sub(place, "TeleportAction"), item.pose(piece.first))
-        _add_trajectory(build.private_action(event, name), name, item.path, piece, times, version, vertices)
-        build.time_trigger(event, "StartTrigger", item.trigger_time(piece), version)
+        vertices = TimedVertices(len(times), _columns_of(item.path, rows, times, draft.version))
+        add_vertices(build.private_action(event, name), name, draft, vertices)
+        build.time_trigger(event, "StartTrigger", item.trigger_time(piece), draft.version)
         if piece.stops:
-            _add_stand(maneuver, item, piece, number, version)
+            name = f"{item.name} stand {number}"
+            stand = build.event(maneuver, name, Priority.OVERRIDE, draft.version)
+            build.speed_step(build.private_action(stand, name), 0.0)
+            build.time_trigger(stand, "StartTrigger", float(item.path.time[piece.last]), draft.version)
 
 
-def _add_stand(maneuver: etree._Element, item: Moving, piece: PathPiece, number: int, version: build.Version) -> None:
-    """An event that stops it where a piece ends."""
-    name = f"{item.name} stand {number}"
-    stand = build.event(maneuver, name, Priority.OVERRIDE, version)
-    build.speed_step(build.private_action(stand, name), 0.0)
-    build.time_trigger(stand, "StartTrigger", float(item.path.time[piece.last]), version)
-
-
-def _add_hop(event: etree._Element, name: str, item: Moving, piece: PathPiece, version: build.Version) -> None:
+def _add_hop(event: etree._Element, name: str, item: Moving, piece: PathPiece, draft: Draft) -> None:
     """A piece too short for two vertices: the entity is put where it ends."""
     place = build.private_action(event, f"{name} place")
     build.world_position(build.sub(place, "TeleportAction"), item.pose(piece.last))
     speed = 0.0 if piece.stops else float(item.path.speed[piece.last])
     build.speed_step(build.private_action(event, f"{name} speed"), speed)
     start = item.trigger_time(piece) if piece.placed else float(item.path.time[piece.last])
-    build.time_trigger(event, "StartTrigger", start, version)
+    build.time_trigger(event, "StartTrigger", start, draft.version)
 
 
-def _add_trajectory(
-    owner: etree._Element,
-    name: str,
-    path: WorldTrajectory,
-    piece: PathPiece,
-    times: FloatArray,
-    version: build.Version,
-    vertices: Vertices,
-) -> None:
-    rows = slice(piece.first, piece.last + 1)
+def _columns_of(path: WorldTrajectory, rows: slice, times: FloatArray, version: build.Version) -> ColumnsOf:
+    """Columns of the vertices at some times, which have the headings of a little later."""
     time, speed, heading = path.time[rows], path.speed[rows], _unwrapped(path.heading[rows])
     arrays = [values[rows] for values in (path.x, path.y, path.z, path.pitch, path.roll)]
     times, later = kept(times), kept(_heading_times(times))
@@ -187,7 +192,7 @@ def _add_trajectory(
             found += [np.interp(times[part], time[around], values) for values in (speed[around], rates)]
         return found
 
-    add_vertices(owner, name, vertices, version, len(times), columns_of)
+    return columns_of
 
 
 def _around(time: FloatArray, moments: FloatArray) -> slice:
@@ -236,41 +241,20 @@ def _heading_times(times: FloatArray) -> FloatArray:
     catches up slowly, for there the path is over at once.
     """
     gaps = np.diff(times)
-    usual = 0.5 * float(np.median(gaps))
+    around = (len(gaps) - 1) // 2, len(gaps) // 2
+    usual = 0.5 * float(np.partition(gaps, around)[[*around]].mean())  # median; numpy's would load `numpy.ma`
     middle = times + np.minimum(0.5 * np.append(gaps, 0.0), usual)
     late = usual * np.minimum((times[-1] - middle) / (CATCH_UP * usual), 1.0)
     return np.asarray(np.minimum(middle - late, times[-1]))
 
 
-def add_vertices(
-    owner: etree._Element,
-    name: str,
-    vertices: Vertices,
-    version: build.Version,
-    count: int,
-    columns_of: Callable[[slice], Sequence[FloatArray]],
-) -> None:
-    """Add a FollowTrajectoryAction along a polyline.
-
-    Parameters
-    ----------
-    owner : element
-        A PrivateAction.
-    name : str
-        Of the trajectory.
-    vertices : Vertices
-        Of the document: takes those of this trajectory.
-    version : Version
-    count, columns_of : int, callable
-        See `TimedVertices`; speed and acceleration from version 1.4 on.
-    """
-    follow = build.sub(build.sub(owner, "RoutingAction"), "FollowTrajectoryAction")
-    holder = follow if version < (1, 1) else build.sub(follow, "TrajectoryRef")
+def add_vertices(owner: etree._Element, name: str, draft: Draft, vertices: TimedVertices) -> None:
+    """Add a FollowTrajectoryAction along a polyline to a PrivateAction."""
+    follow = build.sub(owner, "RoutingAction/FollowTrajectoryAction")
+    holder = follow if draft.version < (1, 1) else build.sub(follow, "TrajectoryRef")
     trajectory = build.sub(holder, "Trajectory", name=name, closed="false")
-    polyline = build.sub(build.sub(trajectory, "Shape"), "Polyline")
-    vertices.add(polyline, TimedVertices(count, columns_of))
-    timing = build.sub(follow, "TimeReference")
-    build.sub(timing, "Timing", domainAbsoluteRelative="absolute", scale="1", offset="0")
+    draft.vertices.add(build.sub(trajectory, "Shape/Polyline"), vertices)
+    build.sub(follow, "TimeReference/Timing", domainAbsoluteRelative="absolute", scale="1", offset="0")
     build.sub(follow, "TrajectoryFollowingMode", followingMode="position")
 
 

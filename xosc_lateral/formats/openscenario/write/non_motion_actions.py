@@ -3,55 +3,23 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Collection, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
 
 from lxml import etree
 
-from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.openscenario.element import at_node, local_name
+from xosc_lateral.formats.openscenario.declarations import NAMES, final
+from xosc_lateral.formats.openscenario.element import elements, local_name
 from xosc_lateral.formats.openscenario.write import build
-from xosc_lateral.formats.openscenario.write.result import final
-from xosc_lateral.formats.xml import read_document
+from xosc_lateral.formats.openscenario.write.draft import Draft, source_of
 from xosc_lateral.motion.nominal import PlayedAction
 from xosc_lateral.scenario import Action, Scenario
 from xosc_lateral.scenario.enums import Priority
 from xosc_lateral.scenario.expressions import ExpressionError
-from xosc_lateral.scenario.global_actions import AddEntityAction, ParameterModifyAction, ParameterSetAction
+from xosc_lateral.scenario.global_actions import ParameterModifyAction, ParameterSetAction
 from xosc_lateral.scenario.parameters import Scope
-from xosc_lateral.scenario.private_actions import (
-    AcquirePositionAction,
-    ActivateControllerAction,
-    AssignControllerAction,
-    AssignRouteAction,
-    FollowTrajectoryAction,
-    LaneChangeAction,
-    LaneOffsetAction,
-    LateralDistanceAction,
-    LongitudinalDistanceAction,
-    OverrideControllerValueAction,
-    SpeedAction,
-    SpeedProfileAction,
-    SynchronizeAction,
-    TeleportAction,
-)
-
-MOTION = (
-    TeleportAction,
-    SpeedAction,
-    SpeedProfileAction,
-    LongitudinalDistanceAction,
-    LaneChangeAction,
-    LaneOffsetAction,
-    LateralDistanceAction,
-    SynchronizeAction,
-    FollowTrajectoryAction,
-    AssignRouteAction,
-    AcquirePositionAction,
-)
-CONTROLLER = (AssignControllerAction, ActivateControllerAction, OverrideControllerValueAction)
-
-Pose = tuple[float, float, float, float, float, float]
+from xosc_lateral.scenario.place import Place, Unsupported
+from xosc_lateral.scenario.private_actions import CONTROLLER, MOTION
 
 
 def is_replaced(action: Action, actor: str | None, converted: Collection[str]) -> bool:
@@ -59,48 +27,41 @@ def is_replaced(action: Action, actor: str | None, converted: Collection[str]) -
     return actor in converted and isinstance(action.content, MOTION + CONTROLLER)
 
 
-def add_non_motion_actions(
-    act: etree._Element,
-    played: Sequence[PlayedAction],
-    poses: dict[int, Pose],
-    scenario: Scenario,
-    root: etree._Element,
-    scope: Scope,
-    version: build.Version,
+def add_kept_actions(
+    story: etree._Element, name: str, draft: Draft, played: Sequence[PlayedAction], poses: Mapping[int, build.Pose]
 ) -> None:
-    """Add one event for each action, in the order of the run.
+    """Add an act with one event for each action, in the order of the run; none for no actions.
 
     Parameters
     ----------
-    act : element
-        Gets a maneuver group for each run of actions with the same actor, so that the order holds across actors, too.
+    story : element
+        Gets an act of that name, with a maneuver group for each run of actions with the same actor, so that the order
+        holds across actors, too.
     played : sequence of PlayedAction
         Actions of events that are not replaced.
     poses : mapping of int to tuple
         For an AddEntityAction, by index in `played`: where the entity appears on its written path.
-    scenario : Scenario
-    root : element
-        Unchanged parse of the scenario's bytes: actions are copied from it.
-    scope : Scope
-        Global parameters.
-    version : Version
-        Of the output.
     """
+    if not played:
+        return
+    act = build.sub(story, "Act", name=name)
     maneuver: etree._Element | None = None
     actor: str | None = None
     for index, item in enumerate(played):
         if maneuver is None or item.actor != actor:
             actor = item.actor
             maneuver = build.maneuver(act, f"kept {index + 1}", actor)
-        name = item.action.name or local_name(source_of(item.action, scenario, root))
-        event = build.event(maneuver, f"kept {index + 1}: {name}", Priority.PARALLEL, version)
-        action = build.sub(event, "Action", name=name)
-        action.append(_copied(item.action, scenario, root, scope))
+        source = source_of(item.action, draft.scenario, draft.untouched)
+        named = item.action.name or local_name(source)
+        event = build.event(maneuver, f"kept {index + 1}: {named}", Priority.PARALLEL, draft.version)
+        action = build.sub(event, "Action", name=named)
+        action.append(_copied(source, item.action.scope, draft.scope))
         if index in poses:
-            add = next(element for element in action.iter() if local_name(element) == "AddEntityAction")
+            (add,) = elements(action, "AddEntityAction")
             add[:] = []
             build.world_position(add, poses[index])
-        build.time_trigger(event, "StartTrigger", item.start, version)
+        build.time_trigger(event, "StartTrigger", item.start, draft.version)
+    build.time_trigger(act, "StartTrigger", 0.0, draft.version)
 
 
 def dropped_reason(action: Action, scenario: Scenario) -> str | None:
@@ -113,45 +74,28 @@ def dropped_reason(action: Action, scenario: Scenario) -> str | None:
     return None
 
 
-def is_placing(action: Action) -> bool:
-    """An entity appears: its position has to be the one on its written path."""
-    return isinstance(action.content, AddEntityAction)
+def note_dropped(draft: Draft, played: Iterable[PlayedAction], moving: Collection[str]) -> None:
+    """Name the actions that are neither motion nor kept, with reasons, each place once."""
+    found: dict[tuple[Place, str | None], Unsupported] = {}
+    for item in played:
+        reason = dropped_reason(item.action, draft.scenario) if item.path != ("Init",) else None
+        if isinstance(item.action.content, CONTROLLER) and item.actor in moving:
+            reason = f"'{item.actor}' follows a trajectory"
+        if reason is not None:
+            place = item.action.place
+            found[place, item.actor] = Unsupported(type(item.action.content).__name__, place, reason)
+    draft.removed += found.values()
 
 
-def source_of(action: Action, scenario: Scenario, root: etree._Element) -> etree._Element:
-    """The element that an action was read from: in the scenario, whose unchanged parse `root` is, or in a catalog."""
-    if action.place.path == str(scenario.path):
-        return at_node(root, action.place.node)
-    path = Path(action.place.path)
-    document = read_document(path)
-    if scenario.input_hashes.get(path, document.sha256) != document.sha256:
-        raise FormatError("changed during the conversion", path=path)
-    catalog = document.root
-    return at_node(catalog, action.place.node)
-
-
-def _copied(action: Action, scenario: Scenario, root: etree._Element, scope: Scope) -> etree._Element:
+def _copied(source: etree._Element, mine: Mapping[str, str], scope: Scope) -> etree._Element:
     """Copy with the parameters of story, maneuver and catalog filled in; global ones stay parameters."""
-    element = copy.deepcopy(source_of(action, scenario, root))
+    element = copy.deepcopy(source)
     element.tail = None
-    if not action.scope:
-        return element
-    local = Scope({name: final(value) for name, value in action.scope.items()}, scope)
-    for item in element.iter("{*}*"):  # no comments
-        _fill_attributes(item, action.scope, local)
+    local = Scope({name: final(value) for name, value in mine.items()}, scope)
+    for item in elements(element) if mine else ():
+        for attribute, value in item.attrib.items():
+            text = str(value)
+            if text.startswith("$") and attribute not in NAMES and any(f"${name}" in text for name in mine):
+                with suppress(ExpressionError):
+                    item.set(attribute, local.fill(text))
     return element
-
-
-def _fill_attributes(item: etree._Element, mine: Mapping[str, str], local: Scope) -> None:
-    """Those that mention parameters of the action's own."""
-    for attribute, value in item.attrib.items():
-        text = str(value)
-        if text.startswith("$") and attribute not in ("parameterRef", "variableRef") and _mentions(text, mine):
-            try:
-                item.set(attribute, local.fill(text))
-            except ExpressionError:
-                continue
-
-
-def _mentions(text: str, names: Collection[str]) -> bool:
-    return any(f"${name}" in text for name in names)

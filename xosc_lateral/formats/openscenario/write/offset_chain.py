@@ -20,12 +20,11 @@ from msgspec import Struct, field
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.formats.openscenario.write.ramp_targets import Ramp, acceleration, fitted, largest_change, slowing
 from xosc_lateral.motion.nominal import Activity, EntityMotion
 from xosc_lateral.motion.segments import MINIMUM_SPEED, SegmentSpan
 from xosc_lateral.road import RoadNetwork
-
-FloatArray = NDArray[np.float64]
 
 SETTLING_TIME = 2.0
 """From the nominal offset at a segment's start to the sampled one, where the turn allows it. [s]"""

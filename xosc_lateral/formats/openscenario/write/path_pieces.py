@@ -16,11 +16,9 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
+from xosc_lateral.arrays import BoolArray, FloatArray
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.rows import blocks, give_back, rows_where, scratch, slices_where
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 VERTEX_STEP = 0.1
 """Time between vertices where distance and bends allow it. [s]"""
@@ -291,7 +289,7 @@ def _head(time: FloatArray, way: FloatArray, until: float, step: float) -> Float
     """Vertices up to where those of the tail begin; evenly, since a player turns the car within half a gap."""
     times = [time[:1]]
     step = (until - float(time[0])) / max(1, round((until - float(time[0])) / step))
-    count = 16
+    count = 512
     while True:
         # As long as neither bound counts many at once, the more the longer that holds.
         even = np.add.accumulate(np.array([times[-1][-1], *[step] * count]))
@@ -315,7 +313,7 @@ def _tail(time: FloatArray, way: FloatArray, step: float) -> list[float]:
         target = _way_at(times[-1], time, way) - VERTEX_SPACING
         if target <= VERTEX_SPACING:
             break
-        previous = _time_at(target, time, way)
+        previous = float(np.interp(target, way, time))
         if times[-1] - previous <= step:
             break
         times.append(previous)
@@ -324,7 +322,3 @@ def _tail(time: FloatArray, way: FloatArray, step: float) -> list[float]:
 
 def _way_at(moment: float, time: FloatArray, way: FloatArray) -> float:
     return float(np.interp(moment, time, way))
-
-
-def _time_at(distance: float, time: FloatArray, way: FloatArray) -> float:
-    return float(np.interp(distance, way, time)) if distance <= way[-1] else float("inf")

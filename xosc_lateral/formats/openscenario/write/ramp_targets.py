@@ -20,10 +20,10 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import ArrayLike, NDArray
 
+from xosc_lateral.arrays import FloatArray
+
 if TYPE_CHECKING:
     from scipy.sparse import coo_array
-
-FloatArray = NDArray[np.float64]
 
 FRAME = 0.01
 """A lane offset action stands still in the first frame of the reference player. [s]"""

@@ -7,32 +7,29 @@ but for conditions on the state of what is gone: they get the time at which the 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 from lxml import etree
 from msgspec import Struct
 
-from xosc_lateral.errors import FormatError, locate
-from xosc_lateral.formats.openscenario.element import at_node, local_name
+from xosc_lateral.errors import locate
+from xosc_lateral.formats.openscenario.element import at_node, child_of
 from xosc_lateral.formats.openscenario.write import build
+from xosc_lateral.formats.openscenario.write.draft import Draft
 from xosc_lateral.formats.openscenario.write.entities import remove_controllers, rewrite_init
 from xosc_lateral.formats.openscenario.write.moving import Moving, add_trajectories
 from xosc_lateral.formats.openscenario.write.non_motion_actions import (
-    CONTROLLER,
-    add_non_motion_actions,
+    add_kept_actions,
     dropped_reason,
     is_replaced,
+    note_dropped,
 )
-from xosc_lateral.formats.openscenario.write.vertices import Vertices
-from xosc_lateral.formats.xml import parse_xml
-from xosc_lateral.motion.nominal import NominalMotion, PlayedAction
+from xosc_lateral.motion.nominal import PlayedAction
 from xosc_lateral.scenario import Act, ManeuverGroup, Scenario
 from xosc_lateral.scenario.conditions import StoryboardElementStateCondition
 from xosc_lateral.scenario.dependence import actors_of, conditions_of, refers_to
 from xosc_lateral.scenario.enums import StoryboardElementState
 from xosc_lateral.scenario.global_actions import AddEntityAction, DeleteEntityAction
-from xosc_lateral.scenario.parameters import Scope
-from xosc_lateral.scenario.place import Unsupported
 from xosc_lateral.scenario.private_actions import ConnectTrailerAction
 from xosc_lateral.scenario.storyboard import Condition
 
@@ -60,28 +57,26 @@ class Group(Struct, frozen=True):
 
     def conditions(self) -> Iterator[Condition]:
         """By which its events start."""
-        for maneuver in self.group.maneuvers:
-            for event in maneuver.events:
-                yield from conditions_of(event.start_trigger)
+        for _, event in self.group.events():
+            yield from conditions_of(event.start_trigger)
 
-    def elements(self) -> Iterator[Path]:
+    def element_of(self, content: StoryboardElementStateCondition) -> Path | None:
+        """What a condition is about, if that is in the group or around it."""
+        return next((path for path in self._elements() if refers_to(content, path)), None)
+
+    def _elements(self) -> Iterator[Path]:
         """The story, the act and the group, and all that is in the group."""
         yield from (self.path[:1], self.path[:2], self.path)
-        for maneuver in self.group.maneuvers:
-            yield (*self.path, maneuver.name)
-            for event in maneuver.events:
-                yield (*self.path, maneuver.name, event.name)
-                yield from ((*self.path, maneuver.name, event.name, action.name) for action in event.actions)
+        yield from ((*self.path, maneuver.name) for maneuver in self.group.maneuvers)
+        for maneuver, event in self.group.events():
+            path = (*self.path, maneuver.name, event.name)
+            yield from (path, *((*path, action.name) for action in event.actions))
 
 
 def groups_of(scenario: Scenario) -> list[Group]:
     """All maneuver groups, in file order."""
-    return [
-        Group((story.name, act.name, group.name), act, group)
-        for story in scenario.storyboard.stories
-        for act in story.acts
-        for group in act.maneuver_groups
-    ]
+    groups = scenario.storyboard.groups()
+    return [Group((story.name, act.name, group.name), act, group) for story, act, group in groups]
 
 
 def replaced_groups(scenario: Scenario, entities: Collection[str]) -> list[Group]:
@@ -109,7 +104,7 @@ def separable(scenario: Scenario, wanted: Collection[str]) -> frozenset[str]:
         gone = replaced_groups(scenario, found)
         for condition in _kept_conditions(scenario, gone):
             for one in gone:
-                if any(refers_to(condition, path) for path in one.elements()):
+                if one.element_of(condition) is not None:
                     found -= one.actors
         if found == before:
             return frozenset(found)
@@ -118,15 +113,14 @@ def separable(scenario: Scenario, wanted: Collection[str]) -> frozenset[str]:
 def _coupled(scenario: Scenario) -> set[str]:
     found = {name for entity in scenario.entities if entity.trailer for name in (entity.name, entity.trailer)}
     for one in groups_of(scenario):
-        for maneuver in one.group.maneuvers:
-            for event in maneuver.events:
-                if one.group.actors.select_triggering_entities:
-                    found |= set(actors_of(one.act, one.group, event))
-                for action in event.actions:
-                    if isinstance(action.content, AddEntityAction | DeleteEntityAction):
-                        found.add(action.content.entity_ref)
-                    elif isinstance(action.content, ConnectTrailerAction):
-                        found |= {action.content.trailer_ref, *one.actors}
+        for _, event in one.group.events():
+            if one.group.actors.select_triggering_entities:
+                found |= set(actors_of(one.act, one.group, event))
+            for action in event.actions:
+                if isinstance(action.content, AddEntityAction | DeleteEntityAction):
+                    found.add(action.content.entity_ref)
+                elif isinstance(action.content, ConnectTrailerAction):
+                    found |= {action.content.trailer_ref, *one.actors}
     return found
 
 
@@ -143,91 +137,74 @@ def _kept_conditions(scenario: Scenario, gone: Collection[Group]) -> list[Storyb
 
 
 class ReplacedManeuvers:
-    """What is to be taken out of a scenario's tree: found before anything in it is changed.
+    """What is to be taken out of a draft: found before anything in it is changed.
 
     Parameters
     ----------
-    root : element
-        A parse of the scenario's bytes.
-    scenario : Scenario
-    motion : NominalMotion
+    draft : Draft
+        As yet unchanged.
     moving : mapping of str to Moving
         Entities that follow trajectories.
     """
 
-    def __init__(
-        self, root: etree._Element, scenario: Scenario, motion: NominalMotion, moving: Mapping[str, Moving]
-    ) -> None:
-        self._root, self._scenario, self._motion, self._moving = root, scenario, motion, moving
-        self._gone = replaced_groups(scenario, moving)
-        gone = {one.path for one in self._gone}
-        self._groups = [at_node(root, one.group.place.node) for one in self._gone]
+    def __init__(self, draft: Draft, moving: Mapping[str, Moving]) -> None:
+        self._draft, self._moving = draft, moving
+        gone = replaced_groups(draft.scenario, moving)
+        self._gone = {one.path for one in gone}
+        self._groups = [at_node(draft.root, one.group.place.node) for one in gone]
         self._shared = [
             (
-                at_node(root, one.group.actors.place.node),
+                at_node(draft.root, one.group.actors.place.node),
                 [name for name in one.group.actors.entity_refs if name not in moving],
             )
-            for one in groups_of(scenario)
-            if one.path not in gone and one.actors & set(moving)
+            for one in groups_of(draft.scenario)
+            if one.path not in self._gone and one.actors & set(moving)
         ]
         self._frozen = [
-            (content, self._element(content), one)
-            for content in _kept_conditions(scenario, self._gone)
-            for one in self._gone
-            if any(refers_to(content, path) for path in one.elements())
+            (content, self._element(content), path)
+            for content in _kept_conditions(draft.scenario, gone)
+            for one in gone
+            if (path := one.element_of(content)) is not None
         ]
 
     def _element(self, content: StoryboardElementStateCondition) -> etree._Element:
-        place = content.place
-        if place.path != str(self._scenario.path):
-            raise FormatError(
-                f"waits for '{content.element_ref}', which a trajectory stands for: take --mode auto or lane-offset",
-                path=place.path,
-                line=place.line,
-                element=place.element,
+        if content.place.path != str(self._draft.scenario.path):
+            raise content.place.error(
+                f"waits for '{content.element_ref}', which a trajectory stands for: take --mode auto or lane-offset"
             )
-        return at_node(self._root, place.node)
+        return at_node(self._draft.root, content.place.node)
 
-    def replace(self, scope: Scope, version: build.Version, vertices: Vertices) -> tuple[list[Unsupported], list[str]]:
-        """Take maneuvers, controllers and starts out and put trajectories in; what was removed, and notes."""
-        removed = remove_controllers(self._root, self._scenario, self._moving)
-        removed += self._dropped()
+    def replace(self) -> None:
+        """Take maneuvers, controllers and starts out and put trajectories in."""
+        if not self._moving:
+            return
+        remove_controllers(self._draft, self._moving)
+        theirs = [played for played in self._draft.motion.actions if self._is_theirs(played)]
+        note_dropped(self._draft, theirs, self._moving)
         notes = [note for note in map(self._freeze, self._frozen) if note]
-        rewrite_init(self._root, self._scenario, {name: item.start for name, item in self._moving.items()})
+        self._draft.notes += dict.fromkeys(notes)
+        rewrite_init(self._draft, {name: item.start for name, item in self._moving.items()})
         self._take_out()
-        self._put_in(scope, version, vertices)
-        return removed, list(dict.fromkeys(notes))
+        self._put_in([played for played in theirs if self._is_kept(played)])
 
-    def _freeze(self, frozen: tuple[StoryboardElementStateCondition, etree._Element, Group]) -> str:
-        content, element, one = frozen
+    def _freeze(self, frozen: tuple[StoryboardElementStateCondition, etree._Element, Path]) -> str:
+        content, element, path = frozen
         owner = element.getparent()
         if owner is None:
             return ""  # done, for another group
-        moment = self._reached(content, one)
+        moment = self._reached(content, path)
         owner.remove(element)
         build.sub(owner, "SimulationTimeCondition", value=build.decimal(moment, 6), rule="greaterThan")
         when = "never" if moment >= NEVER else f"at {moment:.2f} s"
         what = f"waited for '{content.element_ref}', which a trajectory stands for: now {when}, as in the nominal run"
         return locate(what, path=content.place.path, line=content.place.line, element=content.place.element)
 
-    def _reached(self, content: StoryboardElementStateCondition, one: Group) -> float:
-        path = next(path for path in one.elements() if refers_to(content, path))
-        played = [item for item in self._motion.actions if item.path[: len(path)] == path]
+    def _reached(self, content: StoryboardElementStateCondition, path: Path) -> float:
+        played = [item for item in self._draft.motion.actions if item.path[: len(path)] == path]
         if content.state in _STARTS:
             return min((item.start for item in played), default=NEVER)
-        if content.state in _ENDS:
-            ends = [NEVER if item.end is None else item.end for item in played]
-            return max(ends, default=NEVER)
-        return NEVER
-
-    def _dropped(self) -> list[Unsupported]:
-        found: dict[object, Unsupported] = {}
-        for played in self._motion.actions:
-            content = played.action.content
-            if isinstance(content, CONTROLLER) and played.actor in self._moving:
-                reason = f"'{played.actor}' follows a trajectory"
-                found[played.action.place] = Unsupported(type(content).__name__, played.action.place, reason)
-        return list(found.values())
+        ends = [NEVER if item.end is None else item.end for item in played if content.state in _ENDS]
+        return max(ends, default=NEVER)
 
     def _take_out(self) -> None:
         for actors, names in self._shared:
@@ -237,29 +214,25 @@ class ReplacedManeuvers:
         for group in self._groups:
             _remove(group, ("ManeuverGroup", "Act"))
 
-    def _put_in(self, scope: Scope, version: build.Version, vertices: Vertices) -> None:
+    def _put_in(self, kept: Sequence[PlayedAction]) -> None:
         story = build.story(STORY)
-        gone = {one.path for one in self._gone}
-        kept = [played for played in self._motion.actions if self._is_kept(played, gone)]
-        if kept:
-            act = build.sub(story, "Act", name=f"{STORY} kept actions")
-            untouched = parse_xml(self._scenario.source, self._scenario.path)
-            add_non_motion_actions(act, kept, {}, self._scenario, untouched, scope, version)
-            build.time_trigger(act, "StartTrigger", 0.0, version)
+        add_kept_actions(story, f"{STORY} kept actions", self._draft, kept, {})
         items = [item for item in self._moving.values() if item.pieces]
         if items:
             act = build.sub(story, "Act", name=f"{STORY} act")
             for item in items:
-                add_trajectories(build.maneuver(act, f"{STORY} {item.name}", item.name), item, version, vertices)
-            build.time_trigger(act, "StartTrigger", 0.0, version)
+                add_trajectories(act, f"{STORY} {item.name}", item, self._draft)
+            build.time_trigger(act, "StartTrigger", 0.0, self._draft.version)
         if len(story):
-            put_last(self._root, story)
+            self._draft.put_last(story)
 
-    def _is_kept(self, played: PlayedAction, gone: Collection[Path]) -> bool:
-        theirs = played.path[:3] in gone or (played.actor in self._moving and played.path != ("Init",))
-        if not theirs or is_replaced(played.action, played.actor, self._moving):
+    def _is_theirs(self, played: PlayedAction) -> bool:
+        return played.path[:3] in self._gone or played.actor in self._moving
+
+    def _is_kept(self, played: PlayedAction) -> bool:
+        if played.path == ("Init",) or is_replaced(played.action, played.actor, self._moving):
             return False
-        return dropped_reason(played.action, self._scenario) is None
+        return dropped_reason(played.action, self._draft.scenario) is None
 
 
 def _remove(element: etree._Element, kinds: tuple[str, ...]) -> None:
@@ -268,12 +241,5 @@ def _remove(element: etree._Element, kinds: tuple[str, ...]) -> None:
     if owner is None:
         return
     owner.remove(element)
-    if kinds and not any(isinstance(item.tag, str) and local_name(item) == kinds[0] for item in owner):
+    if kinds and child_of(owner, kinds[0]) is None:
         _remove(owner, kinds[1:])
-
-
-def put_last(root: etree._Element, story: etree._Element) -> None:
-    """A story after all others."""
-    storyboard = next(element for element in root if local_name(element) == "Storyboard")
-    stop = next((element for element in storyboard if local_name(element) == "StopTrigger"), None)
-    build.insert_indented(storyboard, len(storyboard) if stop is None else storyboard.index(stop), story)

@@ -2,48 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from lxml import etree
-from numpy.typing import NDArray
 
-from xosc_lateral.formats.openscenario.element import local_name
-from xosc_lateral.formats.openscenario.provenance import mark, write_sealed
+from xosc_lateral.formats.openscenario.element import child_of
 from xosc_lateral.formats.openscenario.write import build
 from xosc_lateral.formats.openscenario.write.carla import add_drives, start_of
+from xosc_lateral.formats.openscenario.write.draft import Draft, WrittenScenario, source_of
 from xosc_lateral.formats.openscenario.write.entities import remove_controllers, rewrite_init
-from xosc_lateral.formats.openscenario.write.fit import fit
-from xosc_lateral.formats.openscenario.write.moving import Moving, add_trajectories
+from xosc_lateral.formats.openscenario.write.fit import finish
+from xosc_lateral.formats.openscenario.write.moving import Moving, add_trajectories, moving_entities
 from xosc_lateral.formats.openscenario.write.non_motion_actions import (
-    CONTROLLER,
-    add_non_motion_actions,
+    add_kept_actions,
     dropped_reason,
-    is_placing,
     is_replaced,
-)
-from xosc_lateral.formats.openscenario.write.result import (
-    WrittenScenario,
-    check_convertible,
-    global_scope,
-    override_parameters,
+    note_dropped,
 )
 from xosc_lateral.formats.openscenario.write.target import STANDARD, Player, TargetPlayer
-from xosc_lateral.formats.openscenario.write.vertices import Vertices, rewrite_paths
+from xosc_lateral.formats.openscenario.write.versions import newer_than
 from xosc_lateral.formats.xml import parse_xml
 from xosc_lateral.motion.nominal import NominalMotion, PlayedAction
 from xosc_lateral.motion.trajectory import WorldTrajectory
-from xosc_lateral.rows import blocks, columns
 from xosc_lateral.scenario import Scenario
 from xosc_lateral.scenario.conditions import SimulationTimeCondition
-from xosc_lateral.scenario.parameters import Scope
-from xosc_lateral.scenario.place import Unsupported
-from xosc_lateral.scenario.private_actions import ConnectTrailerAction
-
-FloatArray = NDArray[np.float64]
+from xosc_lateral.scenario.dependence import conditions_of
+from xosc_lateral.scenario.global_actions import AddEntityAction
+from xosc_lateral.scenario.private_actions import MOTION, ConnectTrailerAction
 
 STORY = "xosc-lateral"
 TRAILERS_SINCE = (1, 3)
@@ -93,176 +80,110 @@ def write_trajectory_scenario(
     ValueError
         A trajectory holds NaN or does not fit the motion.
     """
-    output = Path(output)
-    root = parse_xml(scenario.source, scenario.path)
-    check_convertible(root, scenario, motion)
-    scope = global_scope(scenario)
-    version = target.version_for(scenario)
-    alone = target.adapts(scenario) and version < TRAILERS_SINCE
-    pulled = set() if alone else _trailers(scenario, motion)
-    if scenario.header.is_left_handed:
-        trajectories = {name: _mirrored(path) for name, path in trajectories.items()}
-    moving = {
-        entity.name: Moving(entity, trajectories[entity.name], motion)
-        for entity in motion.entities
-        if entity.name in trajectories and entity.name not in pulled
-    }
-    removed = _dropped(scenario, motion, moving)
-    removed += remove_controllers(root, scenario, moving)
-    starts = {name: item.start for name, item in moving.items()}
-    if target.player is Player.CARLA:
-        starts = {name: start_of(item) for name, item in moving.items()}
-    rewrite_init(root, scenario, starts)
-    vertices = Vertices(scenario.source)
-    _replace_stories(root, scenario, motion, moving, scope, target, vertices)
-    _replace_stop_trigger(root, scenario, motion, version)
-    override_parameters(root, scenario)
-    notes = fit(root, scenario, motion, target, scope, tuple(moving))
-    rewrite_paths(root, scenario, output, scope)
-    mark(root, provenance, summary)
-    pieces = vertices.document(root)
-    sha256, content, data = write_sealed(output, pieces, save=save)
-    return WrittenScenario(output, sha256, content, tuple(moving), tuple(removed), data, notes)
-
-
-def _trailers(scenario: Scenario, motion: NominalMotion) -> set[str]:
-    """Entities that are pulled at some time: the player moves them itself."""
-    coupled = {played.action.content.trailer_ref for played in motion.actions if _connects(played)}
-    return {entity.trailer for entity in scenario.entities if entity.trailer is not None} | coupled
-
-
-def _connects(played: PlayedAction) -> bool:
-    return isinstance(played.action.content, ConnectTrailerAction)
-
-
-def _replace_stories(
-    root: etree._Element,
-    scenario: Scenario,
-    motion: NominalMotion,
-    moving: Mapping[str, Moving],
-    scope: Scope,
-    target: TargetPlayer,
-    vertices: Vertices,
-) -> None:
-    storyboard = _child(root, "Storyboard")
-    index = _take_away(storyboard)
-    story = _new_story(scenario, motion, moving, scope, target, vertices)
+    draft = Draft(scenario, motion, target)
+    alone = target.adapts(scenario) and draft.version < TRAILERS_SINCE
+    pulled = set() if alone else pulled_entities(scenario, motion)
+    moving = moving_entities(draft, {name: path for name, path in trajectories.items() if name not in pulled})
+    note_dropped(draft, motion.actions, moving)
+    remove_controllers(draft, moving)
+    for_carla = target.player is Player.CARLA
+    rewrite_init(draft, {name: start_of(item) if for_carla else item.start for name, item in moving.items()})
+    index = _take_away(draft.storyboard)
+    story = _new_story(draft, moving)
     if len(story):
-        build.insert_indented(storyboard, index, story)
+        build.insert_indented(draft.storyboard, index, story)
+    _replace_stop_trigger(draft)
+    return finish(draft, Path(output), tuple(moving), reactive=False, provenance=provenance, summary=summary, save=save)
+
+
+def pulled_entities(scenario: Scenario, motion: NominalMotion) -> set[str]:
+    """Entities that are pulled at some time: the player moves them itself."""
+    contents = (played.action.content for played in motion.actions)
+    coupled = {content.trailer_ref for content in contents if isinstance(content, ConnectTrailerAction)}
+    return {entity.trailer for entity in scenario.entities if entity.trailer is not None} | coupled
 
 
 def _take_away(storyboard: etree._Element) -> int:
     """Stories; their comments stay. Where the next one belongs."""
-    stories = [element for element in storyboard if local_name(element) == "Story"]
-    index = storyboard.index(_child(storyboard, "Init")) + 1
+    stories, init = storyboard.findall("{*}Story"), child_of(storyboard, "Init")
+    assert init is not None
+    index = storyboard.index(init) + 1
     comments = [comment for old in stories for comment in old.iter(etree.Comment)]
     for old in stories:
         storyboard.remove(old)
     for comment in comments:
-        kept = etree.Comment(comment.text)
-        build.insert_indented(storyboard, index, kept)
+        build.insert_indented(storyboard, index, etree.Comment(comment.text))
         index += 1
     return index
 
 
-def _new_story(
-    scenario: Scenario,
-    motion: NominalMotion,
-    moving: Mapping[str, Moving],
-    scope: Scope,
-    target: TargetPlayer,
-    vertices: Vertices,
-) -> etree._Element:
+def _new_story(draft: Draft, moving: Mapping[str, Moving]) -> etree._Element:
     story = build.story(STORY)
-    version = target.version_for(scenario)
-    kept = [played for played in motion.actions if _is_non_motion(played, scenario, moving)]
-    if kept:
-        # Before the trajectories: an entity has to be there before it moves.
-        _add_kept(story, kept, scenario, moving, scope, version)
+    kept = [played for played in draft.motion.actions if _is_kept(played, draft.scenario, moving)]
+    # Before the trajectories: an entity has to be there before it moves.
+    poses = {
+        index: moving[content.entity_ref].pose_after(played.start)
+        for index, played in enumerate(kept)
+        if isinstance(content := played.action.content, AddEntityAction) and content.entity_ref in moving
+    }
+    add_kept_actions(story, f"{STORY} kept actions", draft, kept, poses)
     with_pieces = [item for item in moving.values() if item.pieces]
     # Up to 1.1 there has to be a story, even if nothing happens in it.
-    if with_pieces or (not kept and version < (1, 2)):
+    if with_pieces or (not kept and draft.version < (1, 2)):
         act = build.sub(story, "Act", name=f"{STORY} trajectories")
+        add = add_drives if draft.target.player is Player.CARLA else add_trajectories
         for item in with_pieces:
-            maneuver = build.maneuver(act, f"{STORY} {item.name}", item.name)
-            if target.player is Player.CARLA:
-                add_drives(maneuver, item, vertices, flat=not scenario.header.is_left_handed)
-            else:
-                add_trajectories(maneuver, item, version, vertices)
+            add(act, f"{STORY} {item.name}", item, draft)
         if not with_pieces:
             build.maneuver_group(act, f"{STORY} nothing", None)
-        build.time_trigger(act, "StartTrigger", 0.0, version)
+        build.time_trigger(act, "StartTrigger", 0.0, draft.version)
     return story
 
 
-def _add_kept(
-    story: etree._Element,
-    kept: Sequence[PlayedAction],
-    scenario: Scenario,
-    moving: Mapping[str, Moving],
-    scope: Scope,
-    version: tuple[int, int],
-) -> None:
-    """What is not motion, in an act of its own."""
-    act = build.sub(story, "Act", name=f"{STORY} kept actions")
-    poses = {
-        index: moving[played.action.content.entity_ref].pose_after(played.start)
-        for index, played in enumerate(kept)
-        if is_placing(played.action) and played.action.content.entity_ref in moving
-    }
-    add_non_motion_actions(act, kept, poses, scenario, parse_xml(scenario.source, scenario.path), scope, version)
-    build.time_trigger(act, "StartTrigger", 0.0, version)
+def _is_kept(played: PlayedAction, scenario: Scenario, moving: Mapping[str, Moving]) -> bool:
+    """Actions of init stay where they are."""
+    is_motion = is_replaced(played.action, played.actor, moving)
+    return not (played.path == ("Init",) or is_motion or dropped_reason(played.action, scenario))
 
 
-def _is_non_motion(played: PlayedAction, scenario: Scenario, moving: Mapping[str, Moving]) -> bool:
-    if played.path == ("Init",):
-        return False  # stays where it is
-    return not is_replaced(played.action, played.actor, moving) and dropped_reason(played.action, scenario) is None
-
-
-def _replace_stop_trigger(
-    root: etree._Element, scenario: Scenario, motion: NominalMotion, version: build.Version
-) -> None:
+def _replace_stop_trigger(draft: Draft) -> None:
     """The played end, unless the scenario ended itself by nothing but the time."""
-    storyboard = _child(root, "Storyboard")
-    old = next((element for element in storyboard if local_name(element) == "StopTrigger"), None)
-    if old is not None and motion.ended_by == STOP_TRIGGER and _is_by_time_only(scenario):
+    old, read = child_of(draft.storyboard, "StopTrigger"), draft.scenario.storyboard.stop_trigger
+    by_time = all(isinstance(condition.content, SimulationTimeCondition) for condition in conditions_of(read))
+    if old is not None and draft.motion.ended_by == STOP_TRIGGER and read is not None and by_time:
         return
     if old is not None:
-        storyboard.remove(old)
-    holder = etree.Element("holder")
-    trigger = build.time_trigger(holder, "StopTrigger", motion.end_time, version)
-    build.insert_indented(storyboard, len(storyboard), trigger)
+        draft.storyboard.remove(old)
+    trigger = build.time_trigger(etree.Element("holder"), "StopTrigger", draft.motion.end_time, draft.version)
+    build.insert_indented(draft.storyboard, len(draft.storyboard), trigger)
 
 
-def _is_by_time_only(scenario: Scenario) -> bool:
-    trigger = scenario.storyboard.stop_trigger
-    return trigger is not None and all(
-        isinstance(condition.content, SimulationTimeCondition)
-        for group in trigger.groups
-        for condition in group.conditions
-    )
+def motion_unknown_to(
+    version: build.Version, scenario: Scenario, motion: NominalMotion, entities: Collection[str]
+) -> dict[str, str]:
+    """Entities with a maneuver that a version does not know, and which.
 
-
-def _dropped(scenario: Scenario, motion: NominalMotion, moving: Mapping[str, Moving]) -> list[Unsupported]:
-    """Actions that are neither motion nor kept, with reasons, each place once."""
-    found: dict[Any, Unsupported] = {}
+    Parameters
+    ----------
+    version : Version
+    scenario : Scenario
+    motion : NominalMotion
+        Its run.
+    entities : collection of str
+        Those to look at.
+    """
+    if version >= scenario.header.version:
+        return {}
+    root = parse_xml(scenario.source, scenario.path)
+    found: dict[str, str] = {}
     for played in motion.actions:
-        content = played.action.content
-        reason = dropped_reason(played.action, scenario) if played.path != ("Init",) else None
-        if isinstance(content, CONTROLLER) and played.actor in moving:
-            reason = f"'{played.actor}' follows a trajectory"
-        if reason is not None:
-            found[played.action.place, played.actor] = Unsupported(type(content).__name__, played.action.place, reason)
-    return list(found.values())
-
-
-def _child(parent: etree._Element, tag: str) -> etree._Element:
-    return next(element for element in parent if isinstance(element.tag, str) and local_name(element) == tag)
-
-
-def _mirrored(path: WorldTrajectory) -> WorldTrajectory:
-    """In the left-handed coordinates of a scenario written for CARLA."""
-    n, turned = len(path.time), (path.y, path.heading, path.pitch)
-    y, heading, pitch = columns(n, ([-values[rows] for values in turned] for rows in blocks(n)))
-    return replace(path, y=y, heading=heading, pitch=pitch)
+        actor, content = played.actor, played.action.content
+        if actor is None or actor not in entities or actor in found or not isinstance(content, MOTION):
+            continue
+        what = newer_than(source_of(played.action, scenario, root), version)
+        if what is not None:
+            found[actor] = f"version {build.named(version)} has no {what}"
+    if version < TRAILERS_SINCE:
+        trailers = sorted(pulled_entities(scenario, motion) & set(entities))
+        found |= dict.fromkeys(trailers, f"version {build.named(version)} has no Trailer")
+    return found

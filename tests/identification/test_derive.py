@@ -13,8 +13,9 @@ from xosc_lateral.cli import main
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.errors import DriverProfileError
-from xosc_lateral.pipeline import derive as deriving
-from xosc_lateral.pipeline.derive import PRESETS, Asked, derive
+from xosc_lateral.identification import derive as deriving
+from xosc_lateral.identification.derive import derive
+from xosc_lateral.identification.stated_figures import PRESETS, Asked
 from xosc_lateral.segment import Segment
 
 

@@ -10,13 +10,13 @@ they miss, and the result measured again with other seeds: those are the figures
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from msgspec import structs
-from numpy.typing import NDArray
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.drivability import SELDOM, strain
 from xosc_lateral.driver.effects import Acts, Adapted, ColumnEffect, Population
 from xosc_lateral.driver.effects.base import FACTOR_LIMIT
@@ -24,9 +24,8 @@ from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.evaluation.lane_keeping import HIGHWAY_SPEED, LaneKeeping, highway_drives, lane_keeping
-from xosc_lateral.motion.segments import MINIMUM_SPEED
-
-FloatArray = NDArray[np.float64]
+from xosc_lateral.identification.stated_figures import Asked, Preset
+from xosc_lateral.version import __version__
 
 TOLERANCE = 0.02
 """Figures are reached within this share of what was asked; a mean within it of the standard deviation. [-]"""
@@ -43,108 +42,6 @@ CORRECTIONS = 4
 
 TRUCK_HALF_WIDTH = 1.275
 """Half the largest width of a lorry in the European Union (Directive 96/53/EC, annex I: 2.55 m). [m]"""
-
-
-@dataclass(frozen=True, slots=True)
-class Asked:
-    """Figures that a driver is to have; None: the base's.
-
-    - `sdlp`: standard deviation of lateral position, as the highway driving test has it. [m]
-    - `sdlp_change`: the same, as a difference from the base's. [m]
-    - `mean`: mean offset, positive left. [m]
-    - `restlessness`: standard deviation of lateral speed. [m/s]
-    - `memory`: after which a deviation is correlated with itself by 1/e. [s]
-    - `near_line`: share of time with a side of the vehicle within 0.2 m of a marking, or beyond it. [-]
-    - `speed`: at which the figures hold. [m/s]
-    - `vehicle`: "truck": what the base knows of trucks
-    """
-
-    sdlp: float | None = None
-    sdlp_change: float | None = None
-    mean: float | None = None
-    restlessness: float | None = None
-    memory: float | None = None
-    near_line: float | None = None
-    speed: float | None = None
-    vehicle: str | None = None
-
-    def check(self) -> None:
-        """Refuse what no driver has."""
-        for name, unit in (("sdlp", " m"), ("restlessness", " m/s"), ("memory", " s"), ("near_line", "")):
-            value = getattr(self, name)
-            if value is not None and not 0.0 < value < np.inf:
-                raise DriverProfileError(f"{name.replace('_', ' ')} of {value:g}{unit}: it is above 0")
-        if self.near_line is not None and self.near_line >= 1.0:
-            raise DriverProfileError(f"near line {self.near_line:g}: a share of the time is below 1")
-        if self.sdlp is not None and self.sdlp_change is not None:
-            raise DriverProfileError("an SDLP and a change of it: one of both")
-        if self.speed is not None and not MINIMUM_SPEED <= self.speed < 100.0:
-            raise DriverProfileError(
-                f"speed of {self.speed:g} m/s: profiles say nothing below {MINIMUM_SPEED:.1f} m/s, or from 100 m/s on"
-            )
-        if self.vehicle not in (None, "truck"):
-            raise DriverProfileError(f"class {self.vehicle!r}: expected truck")
-        if self.mean is not None and not np.isfinite(self.mean):
-            raise DriverProfileError(f"mean of {self.mean:g} m")
-
-    @property
-    def figures(self) -> dict[str, float]:
-        """Those that are stated, by name."""
-        values = {name: getattr(self, name) for name in ("sdlp", "mean", "restlessness", "memory", "near_line")}
-        return {name: value for name, value in values.items() if value is not None}
-
-    @property
-    def size_is_given(self) -> bool:
-        """Whether the size of the movement follows from other figures than the time near a marking."""
-        return self.sdlp is not None or (self.restlessness is not None and self.memory is not None)
-
-
-@dataclass(frozen=True, slots=True)
-class Preset:
-    """A state of a driver that a source gives figures of."""
-
-    name: str
-    what: str
-    asked: Asked
-    source: str
-    doi: str
-
-
-PRESETS = (
-    Preset(
-        "alcohol-0.5",
-        "0.5 g/l of alcohol in the blood: SDLP 2.5 cm larger (95 % interval 2.0 to 2.9), 182 drivers, on the road",
-        Asked(sdlp_change=0.025),
-        "S. Jongen et al., A pooled analysis of on-the-road highway driving studies in actual traffic measuring "
-        "standard deviation of lateral position while driving at a blood alcohol concentration of 0.5 g/L, "
-        "Psychopharmacology 234, 2017, pp. 837-844",
-        "10.1007/s00213-016-4519-z",
-    ),
-    Preset(
-        "drowsy",
-        "after a night without sleep: SDLP 3.1 cm larger, 24 drivers, on the road",
-        Asked(sdlp_change=0.031),
-        "S. Jongen et al., Sensitivity and validity of psychometric tests for assessing driving impairment: effects of "
-        "sleep deprivation, PLoS ONE 10(2), 2015, e0117045",
-        "10.1371/journal.pone.0117045",
-    ),
-    Preset(
-        "truck",
-        "what the base's own recording says of trucks",
-        Asked(vehicle="truck"),
-        "DLR Highway Traffic v1.1.0, where the base is a shipped population",
-        "10.5281/zenodo.14012005",
-    ),
-)
-"""Only what a source states; each is a difference from the base, whose figures are those of the sober and rested."""
-
-
-def preset_called(name: str) -> Preset:
-    """A preset by name."""
-    for preset in PRESETS:
-        if preset.name == name:
-            return preset
-    raise DriverProfileError(f"no preset {name!r}; there are {', '.join(preset.name for preset in PRESETS)}")
 
 
 class Derived(NamedTuple):
@@ -360,16 +257,12 @@ def _described(
     preset: Preset | None,
 ) -> DriverProfile:
     """With a provenance that says from what it was derived, what was asked and reached."""
-    from xosc_lateral.formats.profiles import profile_hash
-    from xosc_lateral.version import __version__
-
     stated = asked.figures
     reach = {name: round(getattr(reached, name), 5) for name in stated}
     words = [f"{name.replace('_', ' ')} {value:.4g} (reached {reach[name]:.4g})" for name, value in stated.items()]
     notes = f"Derived from {base.name}: {', '.join(words) or 'as its base'}, at {speed:.3g} m/s."
     fit: dict[str, object] = {
         "derived_from": base.name,
-        "sha256": profile_hash(base),
         "asked": stated if asked.vehicle is None else {**stated, "vehicle": asked.vehicle},
         "reached": reach,
         "speed": round(speed, 3),

@@ -1,16 +1,21 @@
-"""How unsure a size is because shape, lag and time constant of the response were estimated with it."""
+"""The mean by a column, and how unsure its size is because shape, lag and time constant were estimated with it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from msgspec import structs
 
-from xosc_lateral.driver.effects import ColumnEffect, Linear, Piecewise, Product, Proximity, Saturating, Threshold
+from xosc_lateral.arrays import FloatArray
+from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect, Product, Proximity
+from xosc_lateral.identification.autocorrelation import Problem
 from xosc_lateral.identification.candidates import shapes_of
+from xosc_lateral.identification.column_search import SearchedTerm
 from xosc_lateral.identification.columns import Column, read_column
 from xosc_lateral.identification.dictionary import beside
+from xosc_lateral.identification.model import Fitted, Stage, Term
 from xosc_lateral.identification.refinement import (
     FINE_RESPONSES,
     LAG_STEPS,
@@ -20,48 +25,8 @@ from xosc_lateral.identification.refinement import (
     other_scales,
     running_sums,
 )
-from xosc_lateral.identification.regression import Coarse, Fitted
-from xosc_lateral.identification.timeline import FloatArray
-
-
-def driving_range(coarse: Coarse, effect: ColumnEffect) -> tuple[FloatArray, FloatArray]:
-    """Quantity [own unit] at the low and at the high end of what drives the effect, shape (k,) each.
-
-    That is the 5 % and the 95 % quantile while road-following: of the column, where a single number drives it; of the
-    product; of the strength, for angles and levels. The extremes where both quantiles are the same (a switch that is on
-    for less than 5 % of the time).
-    """
-    inside = coarse.timeline.valid
-    if isinstance(effect, Linear | Threshold | Saturating | Piecewise):
-        seen = coarse.context[effect.column][inside]
-        ends = _ends(seen[np.isfinite(seen)])
-        low, high = effect.quantity({effect.column: ends})
-        if np.any(low != high):
-            return low, high
-    quantity = effect.seen({column: coarse.context[column][inside] for column in effect.columns})
-    quantity = quantity[np.isfinite(quantity).all(axis=1)]
-    if quantity.shape[1] == 1:
-        low, high = _ends(quantity[:, 0])
-        return np.array([low]), np.array([high])
-    return _by_strength(quantity, effect.coefficients)
-
-
-def _by_strength(quantity: FloatArray, coefficients: Sequence[float]) -> tuple[FloatArray, FloatArray]:
-    """Rows of the weak and of the strong end, shape (k,) each. [own unit]"""
-    order = np.argsort(quantity @ np.asarray(coefficients))
-    return quantity[order[int(0.05 * len(order))]], quantity[order[min(len(order) - 1, int(0.95 * len(order)))]]
-
-
-def span(coarse: Coarse, effect: ColumnEffect) -> float:
-    """Change of strength between the two ends of the driving range; [m] or natural logarithm."""
-    low, high = driving_range(coarse, effect)
-    return float((high - low) @ np.asarray(effect.coefficients))
-
-
-def _ends(values: FloatArray) -> FloatArray:
-    low, high = np.quantile(values, [0.05, 0.95])
-    return np.array([low, high] if high > low else [values.min(), values.max()])
-
+from xosc_lateral.identification.terms.column import driving_range
+from xosc_lateral.identification.timeline import Coarse, coarse_mean
 
 NEAR_S = 2.0  # Lags that differ from the estimate by up to this are compared. [s]
 # Scales that are compared, as shares of the estimate, 7 % apart: between two that refinement tries, 40 % apart, the
@@ -69,6 +34,49 @@ NEAR_S = 2.0  # Lags that differ from the estimate by up to this are compared. [
 NEAR_SCALES = tuple(np.geomspace(0.5, 2.0, 21).tolist())
 # 95 % quantile of chi-square with one degree of freedom: the interval gives up half as much log-likelihood. [-]
 CHI_SQUARE = 3.84
+
+
+@dataclass(frozen=True, eq=False)
+class MeanTerm(SearchedTerm):
+    """Mean offset by a column: generalised least squares on whitened offsets."""
+
+    component: ClassVar[str] = "mean"
+    kind: ClassVar[str] = "location"
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.MEAN, Stage.MEAN_AGAIN)
+    weight: ClassVar[float] = 5.0
+    acts: ClassVar[Acts] = Acts.LOCATION
+    what: ClassVar[str] = "mean offset"
+    group: ClassVar[str] = "mean"
+
+    def mean_columns(self, coarse: Coarse) -> FloatArray:
+        """The response, shape (n, k). [unit of the quantity]"""
+        return coarse.response(self.effect, keep=True)
+
+    def fine_mean_columns(self, coarse: Coarse) -> FloatArray:
+        """The response as the profile gives it: steps of a second would be noise."""
+        response = coarse.fine_response(self.effect)
+        return np.asarray(response - coarse_mean(response)[coarse.valid].mean(axis=0))
+
+    def may_be_explained_by(self, later: Term, coarse: Coarse) -> bool:
+        """What changes the spread: the null keeps how loud the movement is, not where."""
+        return bool(later.scale_columns(coarse).shape[1]) or later.known_scale(coarse) is not None
+
+    @classmethod
+    def problem(cls, fitted: Fitted) -> Problem:
+        """Whitened offsets."""
+        return Problem(fitted.whitener, fitted.coarse.offset, fitted.columns)
+
+    @classmethod
+    def reweighted(cls, fitted: Fitted, after: Fitted) -> Problem:
+        """Whitened by what is left in `after`: an effect that is still in the offsets looks like memory."""
+        return Problem(after.whitener, fitted.coarse.offset, fitted.columns)
+
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """From the joint fit; shrunk as if timing and shape were known, with errors for what is not."""
+        part = fitted.mean_part(self)
+        errors = np.sqrt(np.maximum(np.diag(fitted.covariance)[part], 0.0))
+        effect = self.sized(fitted.coarse, Acts.LOCATION, fitted.sizes[part], errors)
+        return (structs.replace(effect, errors=tuple(widening(fitted, effect, part) * errors)),)
 
 
 def widening(fitted: Fitted, effect: ColumnEffect, part: slice) -> float:
@@ -79,13 +87,7 @@ def widening(fitted: Fitted, effect: ColumnEffect, part: slice) -> float:
     it reaches with all of them known. The likelihood is that of independent rows, scaled to the variance that stretches
     of a minute show [2]_.
 
-    Parameters
-    ----------
-    fitted : Fitted
-    effect : ColumnEffect
-        With coefficients.
-    part : slice
-        Its columns of the mean.
+    `effect`: with coefficients; `part`: its columns of the mean.
 
     References
     ----------

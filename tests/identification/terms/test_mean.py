@@ -11,8 +11,7 @@ from xosc_lateral.driver.effects import Acts, Factor, Form, Linear, Product
 from xosc_lateral.driver.effects.response import respond
 from xosc_lateral.identification.dictionary import beside, respond_by_second
 from xosc_lateral.identification.regression import fit_model
-from xosc_lateral.identification.terms.column import MeanTerm
-from xosc_lateral.identification.timing import NEAR_SCALES, _profile, _shapes, widening
+from xosc_lateral.identification.terms.mean import NEAR_SCALES, MeanTerm, _profile, _shapes, widening
 
 
 @pytest.mark.parametrize("response_s", [0.6, 1.5, 4.0])

@@ -1,20 +1,27 @@
-"""What a term of the model can do: columns, test, estimate, remove, describe."""
+"""The model of a drive: its terms, and what a fit of them gives.
+
+offset = level of the drive + mean terms + scale * movement, the movement an autoregression at 1 Hz, log scale = level
+of the drive + scale terms.
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import TYPE_CHECKING, ClassVar, Self
+from functools import cached_property
+from typing import ClassVar, Self
 
 import numpy as np
 
+from xosc_lateral.arrays import FloatArray
 from xosc_lateral.driver.effects import Effect
-from xosc_lateral.identification.regression import Coarse, Fitted
-from xosc_lateral.identification.timeline import FloatArray, on_fine_grid
-
-if TYPE_CHECKING:
-    from xosc_lateral.identification.selection import Search
+from xosc_lateral.identification.autocorrelation import Whitener
+from xosc_lateral.identification.innovations import innovations
+from xosc_lateral.identification.refinement import Alternatives
+from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.timeline import Coarse, on_fine_grid
 
 
 class Stage(IntEnum):
@@ -80,7 +87,6 @@ class Term(ABC):
     # Among those of a stage: smaller ones are asked first, and first where two are equally sure; then by name. [-]
     place: ClassVar[int] = 0
     weight: ClassVar[float]  # Of its component in the error budget; one for each kind of hidden effect. [-]
-    least_drives: ClassVar[int] = 1  # In a table in which it is tested.
     # Whether the mean or the innovations' scale follow terms of this class on held-out rows: not the latent path of a
     # cycle, nor what changes the slow movement alone.
     seen_held_out: ClassVar[bool] = True
@@ -91,14 +97,19 @@ class Term(ABC):
         return ()
 
     @property
+    def alike(self) -> Alternatives:
+        """Columns of each other effect that explains as much."""
+        return ()
+
+    @property
     def predictable(self) -> bool:
         """Whether the model's likelihood of rows that it was not fitted on can tell this term from nothing."""
         return self.seen_held_out
 
     @property
     def kind_key(self) -> str:
-        """Component, or kind where two kinds share one: names its groups of summary statistics."""
-        return self.kind if self.component == "time_mean" else self.component
+        """Names its groups of summary statistics."""
+        return self.component
 
     def mean_columns(self, coarse: Coarse) -> FloatArray:
         """Columns of the mean, shape (n, k). [any unit]"""
@@ -125,6 +136,14 @@ class Term(ABC):
         return bool(later.columns) and not self.columns
 
     @classmethod
+    def passes(cls, search: Search, p_value: float, fitted: Fitted) -> bool:
+        """Whether the best that was found of its component is good enough to be added to the terms fitted."""
+        if p_value <= search.levels[cls.component]:
+            return True
+        there = sum(term.component == cls.component for term in fitted.terms)
+        return search.wanted is not None and there < search.wanted.get(cls.component, 0)
+
+    @classmethod
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
         """Test for one more term of this kind beside those fitted; None: there is no candidate."""
         return None
@@ -143,6 +162,10 @@ class Term(ABC):
         coarse, path = fitted.coarse, latent_path(self, fitted)
         removal.location += on_fine_grid(path - path[coarse.valid].mean(), coarse.timeline)
 
+    def quantity(self, coarse: Coarse, effects: tuple[Effect, ...]) -> FloatArray | None:
+        """What the residual is compared by, on the 0.2 s grid, shape (fine n,); None: nothing of its own."""
+        return None
+
     @abstractmethod
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Size and words; `key` names its group of summary statistics."""
@@ -155,3 +178,69 @@ class Term(ABC):
 def latent_path(term: Term, fitted: Fitted) -> FloatArray:
     """A term's part of the mean as fitted, shape (n,). [m]"""
     return np.asarray(term.mean_columns(fitted.coarse) @ fitted.sizes[fitted.mean_part(term)])
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """Terms with sizes, and what is left."""
+
+    coarse: Coarse
+    terms: tuple[Term, ...]
+    whitener: Whitener
+    columns: FloatArray  # shape (n, k): Of the mean, term by term.
+    sizes: FloatArray  # shape (k,): [m] per unit.
+    covariance: FloatArray  # shape (k, k): [m] per unit.
+    levels: FloatArray  # shape (drives,): Mean offset of every drive where all mean terms are at their mean. [m]
+    log_sizes: FloatArray  # shape (j,): Natural logarithm per unit.
+    log_covariance: FloatArray  # shape (j, j): Natural logarithm per unit.
+    movement: FloatArray  # shape (n,): Offset less level and mean terms, over the scale; 0 where invalid. [m]
+    starts: FloatArray  # shape (order + 1,): Factor on the errors of the first rows of runs, for the likelihood.
+    log_likelihood: float  # Gaussian, of the valid rows.
+
+    @property
+    def scale(self) -> FloatArray:
+        """Factor on the movement, > 0, shape (n,). [-]"""
+        return self.whitener.scale
+
+    @cached_property
+    def innovations(self) -> FloatArray:
+        """Whitened by the movement as it is seen, without a floor: how large it is just now. Shape (n,), variance 1."""
+        coarse = self.coarse
+        moved = coarse.offset - self.levels[coarse.drive]
+        rows = innovations(moved, self.columns @ self.sizes, coarse.valid, coarse.drive, self.scale)
+        variance = float(rows @ rows) / max(1, int(coarse.valid.sum()) - len(self.sizes))
+        return np.asarray(rows / np.sqrt(max(variance, 1e-300)))
+
+    @property
+    def explained(self) -> FloatArray:
+        """Levels and mean terms on the 0.2 s grid, shape (fine n,). [m]"""
+        timeline = self.coarse.timeline
+        columns = joined([term.fine_mean_columns(self.coarse) for term in self.terms], len(timeline))
+        return columns @ self.sizes + self.levels[timeline.drive]
+
+    @cached_property
+    def estimates(self) -> Mapping[str, tuple[Term, tuple[Effect, ...]]]:
+        """Every term and what the profile gets for it, by component and number ("mean 0", "step 0")."""
+        found: dict[str, tuple[Term, tuple[Effect, ...]]] = {}
+        for term in self.terms:
+            number = sum(1 for key in found if key.rpartition(" ")[0] == term.kind_key)
+            found[f"{term.kind_key} {number}"] = (term, term.estimate(self))
+        return found
+
+    def mean_part(self, term: Term) -> slice:
+        """Where a term's coefficients of the mean are."""
+        return self._part(term, [other.mean_columns(self.coarse).shape[1] for other in self.terms])
+
+    def scale_part(self, term: Term) -> slice:
+        """Where a term's coefficients of the log scale are."""
+        return self._part(term, [other.scale_columns(self.coarse).shape[1] for other in self.terms])
+
+    def _part(self, term: Term, widths: Sequence[int]) -> slice:
+        index = next(i for i, other in enumerate(self.terms) if other is term)
+        first = sum(widths[:index])
+        return slice(first, first + widths[index])
+
+
+def joined(blocks: Sequence[FloatArray], n: int) -> FloatArray:
+    """Columns side by side, shape (n, k); none of none."""
+    return np.concatenate(blocks, axis=1) if blocks else np.zeros((n, 0))
