@@ -141,13 +141,13 @@ class Measure(Struct, frozen=True):
         """Whether it needs road coordinates."""
         return self.kind is not RelativeDistanceType.EUCLIDIAN and self.system in _ALONG_ROADS
 
-    def between(self, state: EntityState, target: Spot | EntityState) -> float | None:
-        """From an entity to a spot or to another entity. [m]
+    def between(self, state: EntityState, target: Spot | EntityState) -> float:
+        """From an entity to a spot, or to another entity with all trailers that both draw; `FAR` without a way. [m]"""
+        found = self.to_spot(state, target) if isinstance(target, Spot) else self._to_train(state, target)
+        return FAR if found is None else found
 
-        Free space is that of the nearest two of both vehicles and all trailers that they draw.
-        """
-        if isinstance(target, Spot):
-            return self.to_spot(state, target)
+    def _to_train(self, state: EntityState, target: EntityState) -> float | None:
+        """Free space is that of the nearest two."""
         pairs = [(own, theirs) for own in _train(state) for theirs in _train(target)]
         if not self.freespace or len(pairs) == 1:
             return self.to_entity(state, target)

@@ -171,9 +171,14 @@ class EntityState:
     def pose(self) -> Pose:
         """World pose. [m], [rad]"""
         if self._pose is None:
-            if self.free_pose is not None and not _is_whole(self.free_pose):
-                self.locate()
-            self._pose = world_pose(self.network, self.place)
+            if self.free_pose is None:
+                self._pose = _pose_on_road(
+                    self.network, self.road, self.lane, self.s, self.offset_t, self.relative_heading
+                )
+            else:
+                if not _is_whole(self.free_pose):
+                    self.locate()
+                self._pose = world_pose(self.network, self.place)
         return self._pose
 
     @property
@@ -272,17 +277,7 @@ def world_pose(network: RoadNetwork, place: Placement) -> Pose:
     free = place.pose
     if free is not None and _is_whole(free):
         return free
-    if place.road == NOWHERE:
-        road = _ORIGIN
-    else:
-        offset = network.offset_from_offset_t(place.road, place.lane, place.offset_t)
-        road = network.pose_at(place.road, place.lane, place.s, offset)
-        turn, pitch, roll = wrap(place.relative_heading), road.pitch, road.roll
-        if network.travel_direction(place.road, place.lane) < 0:
-            turn -= pi
-        if turn and (pitch or roll):  # about the normal of the surface
-            turn, pitch, roll = turned_in_surface(turn, pitch, roll)
-        road = Pose(road.x, road.y, road.z, wrap(road.heading + turn) if turn else road.heading, pitch, roll)
+    road = _ORIGIN if place.road == NOWHERE else _pose_on_road(network, *place[:4], wrap(place.relative_heading))
     if free is None:
         return road
     z, pitch, roll = (
@@ -290,6 +285,19 @@ def world_pose(network: RoadNetwork, place: Placement) -> Pose:
         for given, own in ((free.z, road.z), (free.pitch, road.pitch), (free.roll, road.roll))
     )
     return Pose(free.x, free.y, z, free.heading, pitch, roll)
+
+
+def _pose_on_road(
+    network: RoadNetwork, road: int, lane: int, s: float, offset_t: float, relative_heading: float
+) -> Pose:
+    pose = network.pose_at(road, lane, s, network.offset_from_offset_t(road, lane, offset_t))
+    turn = relative_heading if network.travel_direction(road, lane) > 0 else relative_heading - pi
+    if not turn:
+        return pose
+    pitch, roll = pose.pitch, pose.roll
+    if pitch or roll:  # about the normal of the surface
+        turn, pitch, roll = turned_in_surface(turn, pitch, roll)
+    return Pose(pose.x, pose.y, pose.z, wrap(pose.heading + turn), pitch, roll)
 
 
 def _is_whole(free: Pose) -> bool:

@@ -14,6 +14,8 @@ from xosc_lateral.playback.trigger import RunningTrigger
 from xosc_lateral.scenario.enums import Priority, StoryboardElementType
 from xosc_lateral.scenario.enums import StoryboardElementState as State
 
+_RUNNING, _STANDBY = State.RUNNING, State.STANDBY  # looked at in every frame, and an enum's members are slow to find
+
 Watcher = Callable[[State, State | None], None]
 """Told of a change: the state, and the transition that led to it (none to standby)."""
 
@@ -47,7 +49,7 @@ class StoryboardElement:
     @property
     def is_running(self) -> bool:
         """Whether it runs now."""
-        return self.state is State.RUNNING
+        return self.state is _RUNNING
 
     # ---- the tree ----------------------------------------------------------------------------------------------------
     def settle(self, path: tuple[str, ...] = ()) -> None:
@@ -83,17 +85,17 @@ class StoryboardElement:
 
     def evaluate_triggers(self, time: float) -> None:
         """One pass over the triggers of this element and, when it runs, of its children."""
-        if self.is_running and self.stop_trigger is not None and self.stop_trigger.evaluate(time):
+        if self.state is _RUNNING and self.stop_trigger is not None and self.stop_trigger.evaluate(time):
             self.stop()
-        if self.state is State.STANDBY and (self.start_trigger is None or self.start_trigger.evaluate(time)):
+        if self.state is _STANDBY and (self.start_trigger is None or self.start_trigger.evaluate(time)):
             self.start()
-        if self.is_running:
+        if self.state is _RUNNING:
             for child in self.children:
                 child.evaluate_triggers(time)
 
     def step(self, time: float, step: float) -> None:
         """Let running actions move their actors for one frame from `time` on. [s]"""
-        if self.is_running:
+        if self.state is _RUNNING:
             for child in self.children:
                 child.step(time, step)
 

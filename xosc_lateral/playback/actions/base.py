@@ -78,9 +78,11 @@ class RunningAction(StoryboardElement):
 
     def step(self, time: float, step: float) -> None:
         """Act for one frame. [s]"""
-        if self.is_running and self._is_refused:
+        if not self.is_running:
+            return
+        if self._is_refused:
             self.end()
-        elif self.is_running:
+        else:
             self._act(time, step)
 
     def change(self, state: State, transition: State | None) -> None:

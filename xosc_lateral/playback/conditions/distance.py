@@ -1,11 +1,19 @@
-"""Conditions on distances: to a position, to an entity, headway in time, and contact."""
+"""Conditions on distances: to a position, to an entity, headway and time to collision, and contact.
+
+References
+----------
+.. [1] J. C. Hayward, "Near-miss determination through use of a scale of danger", Highway Research Record 384, 1972:
+       time to collision.
+"""
 
 from __future__ import annotations
+
+from math import copysign, hypot
 
 from xosc_lateral.playback.angles import difference
 from xosc_lateral.playback.boxes import overlap
 from xosc_lateral.playback.conditions.base import EntityCheck, EntityChecks
-from xosc_lateral.playback.distances import FAR, Measure, Spot, apart
+from xosc_lateral.playback.distances import Measure, Spot, apart
 from xosc_lateral.playback.positions.resolve import pose_of, spot_at
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
@@ -18,6 +26,7 @@ from xosc_lateral.scenario.conditions import (
     ReachPositionCondition,
     RelativeDistanceCondition,
     TimeHeadwayCondition,
+    TimeToCollisionCondition,
 )
 from xosc_lateral.scenario.enums import CoordinateSystem, RelativeDistanceType, RoutingAlgorithm
 
@@ -47,12 +56,11 @@ def measure_of(content: Measured | RelativeDistanceCondition, simulation: Simula
 
 
 def _amount(measure: Measure, state: EntityState, target: Spot | EntityState) -> float:
-    """Never negative; huge where no road leads there. [m]"""
+    """Never negative. [m]"""
     if measure.kind is RelativeDistanceType.EUCLIDIAN and not measure.freespace:
         place = target.plane if isinstance(target, EntityState) else target
         return apart(state, place.x, place.y)
-    distance = measure.between(state, target)
-    return FAR if distance is None else abs(distance)
+    return abs(measure.between(state, target))
 
 
 def prepare_distance(content: DistanceCondition, simulation: Simulation) -> EntityCheck:
@@ -102,10 +110,37 @@ def prepare_time_headway(content: TimeHeadwayCondition, simulation: Simulation) 
         if not other.active or state.speed < EPSILON:
             return False
         distance = measure.between(state, other)
-        distance = FAR if distance is None else distance
         return distance >= 0.0 and holds(distance / state.speed, content.rule, content.value)
 
     return check
+
+
+def prepare_time_to_collision(content: TimeToCollisionCondition, simulation: Simulation) -> EntityCheck:
+    """Not defined, hence false, when they don't come closer. [s]"""
+    measure, target = measure_of(content, simulation), content.target
+    if isinstance(target, str):
+        other = simulation.entity(target, content.place)
+        simulation.derives_motion = True
+        return lambda state: (
+            other.active and _collides(measure.between(state, other), _closing_speed(state, other), content)
+        )
+    spot = spot_at(target, simulation)
+    return lambda state: _collides(measure.between(state, spot()), state.speed, content)
+
+
+def _collides(distance: float, closing: float, content: TimeToCollisionCondition) -> bool:
+    if abs(distance) < EPSILON or abs(closing) < EPSILON or distance / closing < 0.0:
+        return False
+    return holds(distance / closing, content.rule, content.value)
+
+
+def _closing_speed(state: EntityState, other: EntityState) -> float:
+    """Own velocity along the other's velocity, minus the other's speed; own speed when the other stands. [m/s]"""
+    vx, vy, _ = other.velocity
+    if abs(vx) < EPSILON and abs(vy) < EPSILON:
+        return state.speed
+    along = (state.velocity[0] * vx + state.velocity[1] * vy) / hypot(vx, vy)
+    return copysign(1.0, state.speed) * copysign(1.0, along) * (along - abs(other.speed))
 
 
 def prepare_collision(content: CollisionCondition, simulation: Simulation) -> EntityCheck:
@@ -122,5 +157,6 @@ CHECKS: EntityChecks = {
     RelativeDistanceCondition: prepare_relative_distance,
     ReachPositionCondition: prepare_reach_position,
     TimeHeadwayCondition: prepare_time_headway,
+    TimeToCollisionCondition: prepare_time_to_collision,
     CollisionCondition: prepare_collision,
 }

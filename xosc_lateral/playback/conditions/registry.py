@@ -8,7 +8,6 @@ from xosc_lateral.playback.conditions import (
     motion,
     relative_clearance,
     storyboard_element_state,
-    time_to_collision,
     value,
 )
 from xosc_lateral.playback.conditions.base import EntityCheck, EntityChecks, ValueChecks
@@ -21,7 +20,7 @@ from xosc_lateral.scenario.enums import TriggeringEntitiesRule
 
 ENTITY_CHECKS: EntityChecks = {
     content: check
-    for family in (angle, distance, motion, relative_clearance, time_to_collision)
+    for family in (angle, distance, motion, relative_clearance)
     for content, check in family.CHECKS.items()
 }
 VALUE_CHECKS: ValueChecks = {
