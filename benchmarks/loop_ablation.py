@@ -75,7 +75,7 @@ def without_kinds(*kinds: type) -> list[Any]:
 
 PARTS: dict[str, Callable[[], list[Any]]] = {
     "the whole": lambda: [],
-    "3 cm of noise": lambda: [patch.object(regression, "FLOOR", 0.0)],
+    "3 cm of noise": lambda: [patch.object(regression, "MEASUREMENT_NOISE", 0.0)],
     "responses smoothed as seen": lambda: [
         patch.object(innovations, "smoothed_as_seen", lambda moved, seen, *rest: seen)
     ],

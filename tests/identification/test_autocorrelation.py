@@ -100,12 +100,12 @@ def test_levels_of_short_drives_do_not_make_the_process_look_forgetful() -> None
     assert better.deviations[-1] == pytest.approx(1.0, rel=0.03)
 
 
-def test_a_floor_is_white_noise_beside_what_is_seen() -> None:
-    n, floor = 50_000, 0.8
+def test_the_noise_is_white_and_beside_what_is_seen() -> None:
+    n, noise = 50_000, 0.8
     seen = second_order(n, 5)
-    noisy = seen + floor * np.random.default_rng(6).normal(size=n)
+    noisy = seen + noise * np.random.default_rng(6).normal(size=n)
     valid = np.ones(n, dtype=bool)
-    told = fit_autoregression(seen, valid, 4, longest=16, floor=floor)
+    found = fit_autoregression(seen, valid, 4, longest=16, noise=noise)
     made = fit_autoregression(noisy, valid, 4, longest=16)
-    assert told.lags[-1] == pytest.approx(made.lags[-1], abs=6 / np.sqrt(n))
-    assert told.deviations[-1] == pytest.approx(made.deviations[-1], rel=4 / np.sqrt(2 * n))
+    assert found.lags[-1] == pytest.approx(made.lags[-1], abs=6 / np.sqrt(n))
+    assert found.deviations[-1] == pytest.approx(made.deviations[-1], rel=4 / np.sqrt(2 * n))

@@ -112,7 +112,7 @@ def test_the_unit_of_the_offset_scales_the_sizes_and_nothing_else(
     factor: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     one = fit_model(planted(5), (mean_term(),))
-    monkeypatch.setattr(regression, "FLOOR", abs(factor) * regression.FLOOR)
+    monkeypatch.setattr(regression, "MEASUREMENT_NOISE", abs(factor) * regression.MEASUREMENT_NOISE)
     other = fit_model(planted(5, scale=factor), (mean_term(),))
     np.testing.assert_allclose(other.sizes, factor * one.sizes, rtol=1e-6)
     np.testing.assert_allclose(other.innovations, np.sign(factor) * one.innovations, atol=1e-6)

@@ -176,7 +176,7 @@ def test_an_error_at_the_floor_is_not_called_unexplained(result: LoopResult) -> 
     scored = result.scored
     at_floor = lack_of_fit_of(scored.real, scored.before, scored.real, scored.halves)
     assert not at_floor.clear
-    assert "do not exceed the floor" in lack_of_fit_words(replace(result, lack_of_fit=at_floor))
+    assert "do not exceed the difference between halves" in lack_of_fit_words(replace(result, lack_of_fit=at_floor))
 
 
 def test_the_json_keeps_to_the_schema_and_adds_the_meaning(result: LoopResult, table: Path) -> None:

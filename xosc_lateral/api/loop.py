@@ -151,7 +151,8 @@ class ClosedLoop(Result):
     def headline(self) -> str:
         """One line."""
         found = ", ".join(self.findings) or "no effect added"
-        return f"{found}; error {self.error_before:.4f} -> {self.error_after:.4f} m (floor {self.floor:.4f} m)"
+        error = f"error {self.error_before:.4f} -> {self.error_after:.4f} m"
+        return f"{found}; {error} ({self.floor:.4f} m between halves of the drives)"
 
     def __str__(self) -> str:
         from xosc_lateral.report.loop import loop_text

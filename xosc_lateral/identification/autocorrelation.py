@@ -93,7 +93,7 @@ def moving_sum(weights: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def fit_autoregression(
-    values: FloatArray, valid: BoolArray, order: int, *, longest: int | None = None, floor: float = 0.0
+    values: FloatArray, valid: BoolArray, order: int, *, longest: int | None = None, noise: float = 0.0
 ) -> MovementProcess:
     """Least squares over all rows that have the whole memory in their own run.
 
@@ -106,7 +106,7 @@ def fit_autoregression(
         Past values that have a coefficient each; lowered when the runs are too short for it.
     longest : int, optional
         Past values that are seen as means of stretches that double in length; `order` without.
-    floor : float
+    noise : float
         Standard deviation of white noise that the process has beside what `values` show. In regressions it is a ridge.
     """
     position = positions_in_run(valid)
@@ -126,14 +126,14 @@ def fit_autoregression(
     past = [values[rows - lag] for lag in range(1, order + 1)]
     past += [(sums[rows - low] - sums[rows - high]) / (high - low) for low, high in pairwise(edges)]
     design, now = np.stack(past, axis=1), values[rows]
-    # of what each past value or mean is made of, the floor's share
-    noise = floor**2 / np.array([1.0] * order + [high - low for low, high in pairwise(edges)])
+    # the variance of that noise in each past value or mean
+    shares = noise**2 / np.array([1.0] * order + [high - low for low, high in pairwise(edges)])
     gram = design.T @ design
     gram[np.diag_indices(len(gram))] *= 1.0 + 1e-9
-    gram[np.diag_indices(len(gram))] += len(rows) * noise
+    gram[np.diag_indices(len(gram))] += len(rows) * shares
     sizes = np.linalg.lstsq(gram, design.T @ now, rcond=None)[0]
     variance = float(np.mean((now - design @ sizes) ** 2)) * len(rows) / max(1, len(rows) - len(sizes))
-    variance += floor**2 + float(noise @ sizes**2)
+    variance += noise**2 + float(shares @ sizes**2)
     lags = [sizes[:order]]
     lags += [
         np.full(high - low, size / (high - low))

@@ -28,7 +28,7 @@ def own_levels(squares: FloatArray, valid: BoolArray, drive: IntArray) -> FloatA
 
 
 def _whitener(movement: FloatArray, valid: BoolArray, drive: IntArray, scale: FloatArray) -> Whitener:
-    """What turns movement over scale, 0 where invalid, into independent rows as it is seen: without a floor."""
+    """What turns movement over scale, 0 where invalid, into independent rows, without measurement noise."""
     return Whitener(fit_autoregression(movement, valid, ORDER, longest=LONGEST), valid, drive, scale)
 
 

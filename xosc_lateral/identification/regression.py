@@ -22,8 +22,8 @@ from xosc_lateral.identification.timeline import CLUSTER_S, Coarse, means_by_dri
 
 # White noise that the model of a drive has beside what it shows: no table knows the lane better (in the motorway
 # recording the standard error of a lane's centre is 0.03 m; docs/real_data.md). Providers smooth their tracks,
-# responses and all; without a floor an effect is sized where the smoothing left nothing of it. [m]
-FLOOR = 0.03
+# responses and all; without this noise an effect is sized where the smoothing left nothing of it. [m]
+MEASUREMENT_NOISE = 0.03
 # Scale terms together change the movement by at most this factor's logarithm, 20 either way: scoring steps of a factor
 # that the movement contradicts grow without end. [-]
 MOST_LOG_SCALE = 3.0
@@ -48,7 +48,7 @@ def fit_model(coarse: Coarse, terms: Sequence[Term]) -> Fitted:
     for _ in range(ROUNDS):
         scale = np.exp(scales @ log_sizes + known) * spread[drive]
         movement = np.where(valid, (coarse.offset - columns @ sizes - levels[drive]) / scale, 0.0)
-        process = fit_autoregression(movement, valid, ORDER, longest=LONGEST, floor=FLOOR)
+        process = fit_autoregression(movement, valid, ORDER, longest=LONGEST, noise=MEASUREMENT_NOISE)
         if not coarse.lasts:
             process = unbiased(process, valid, drive, ORDER, longest=LONGEST)
         whitener = Whitener(process, valid, drive, scale)

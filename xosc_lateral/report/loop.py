@@ -31,7 +31,10 @@ from xosc_lateral.report.violins import LABELS, violin_figure
 
 NAMED_DRIVES = 3  # So many drives are named in the title; more are counted.
 LEFT_ROWS = 8  # Rows of the table of what is left.
-FAR, CLOSE = 2.0, 1.2  # Ratios to the floor from which a number is marked bad, and up to which it is marked good. [-]
+FAR, CLOSE = (
+    2.0,
+    1.2,
+)  # Ratios to halves of the drives from which a number is marked bad, and up to which it is marked good. [-]
 
 
 def loop_text(result: LoopResult) -> str:
@@ -42,7 +45,7 @@ def loop_text(result: LoopResult) -> str:
     for item in result.identified.usable.feedback:
         sure = "possibly a" if item.doubtful else "a"
         lines.append(f"{item.column}: {sure} consequence of the car's movement, not used as a cause")
-    error = f"{result.error_before:.4f} m before, {result.error_after:.4f} m after (floor {result.floor:.4f} m)"
+    error = f"{result.error_before:.4f} m before, {result.error_after:.4f} m after ({result.floor:.4f} m between halves of the drives)"
     lines.append(f"held-out error {error}")
     lines.append(lack_of_fit_words(result))
     return "\n".join(lines)
@@ -122,8 +125,8 @@ HOW_TO_READ = (
     "Error: the root mean square of measured minus expected over all groups of statistics, on blocks that were used "
     "neither to choose nor to fit the base, the effects or their sizes. The expectation is the mean of {n_runs} "
     "simulated runs of the profile under the same context.",
-    "Floor: the same difference between random halves of the measured blocks and all of them. At the floor, no mean, "
-    "spread or frequency band tells the profile from the driver.",
+    "Between halves: the same difference between random halves of the measured blocks and all of them. At that size, no "
+    "mean, spread or frequency band distinguishes the profile from the driver.",
     "p-value: how often a table without this effect would show one as strong. It is family-wise: all columns, lags "
     "and shapes that were tested count. Below {certain} it is extrapolated; read it as certain.",
     "Lag: negative if the driver looks ahead. Response: time constant of a first-order lag, after which about two "
@@ -196,8 +199,8 @@ def _add_residuals(page: Page, result: LoopResult) -> None:
     page.table(
         [_group_row(group, result) for group in groups],
         f"The {len(groups)} of {len(result.lack_of_fit.groups)} groups of statistics with the largest residual above "
-        "the floor: root mean square of measured minus expected [mm]. All groups are in report.json.",
-        formats={"before": ".1f", "after": ".1f", "floor": ".1f", "after / floor": ".2f"},
+        "that between halves: root mean square of measured minus expected [mm]. All groups are in report.json.",
+        formats={"before": ".1f", "after": ".1f", "between halves": ".1f", "ratio": ".2f"},
         tones={k: "bad" for k, group in enumerate(groups) if group.after > FAR * group.floor},
     )
 
@@ -213,8 +216,8 @@ def _add_movement(page: Page, result: LoopResult) -> None:
     )
     page.figure(
         spectrum_figure(result),
-        "Power spectral density within held-out blocks. Where a profile's curve lies in the band, its movement cannot "
-        "be told from the measured one at that frequency.",
+        "Power spectral density within held-out blocks. Where a profile's curve lies in the band, its movement is "
+        "like the measured one at that frequency.",
         "Spectra, measured, before and after.",
     )
     scores, seconds = result.scores, (SNIPPET_ROWS - 1) * result.coarse.timeline.step
@@ -224,11 +227,11 @@ def _add_movement(page: Page, result: LoopResult) -> None:
     before, after, floor = scores.before.by_metric, scores.after.by_metric, scores.floor.by_metric
     page.table(
         [
-            {"metric": LABELS[name], "before": before[name], "after": after[name], "floor": floor[name]}
+            {"metric": LABELS[name], "before": before[name], "after": after[name], "between halves": floor[name]}
             for name in before
         ],
         f"Ten metrics of snippets of {seconds:g} s: distance from the measured ones, in standard deviations of these",
-        formats={"before": ".3f", "after": ".3f", "floor": ".3f"},
+        formats={"before": ".3f", "after": ".3f", "between halves": ".3f"},
         tones={k: _tone(after[name], floor[name]) for k, name in enumerate(before)},
     )
     page.figure(
@@ -244,7 +247,7 @@ def _numbers(result: LoopResult) -> list[KeyFigure]:
     return [
         KeyFigure(f"{1000 * result.error_before:.1f} mm", "error before", "of the base profile"),
         KeyFigure(f"{1000 * result.error_after:.1f} mm", "error after", "of the refined profile", tone=tone),
-        KeyFigure(f"{1000 * result.floor:.1f} mm", "floor", "of random halves of the drives against all of them"),
+        KeyFigure(f"{1000 * result.floor:.1f} mm", "between halves", "random halves of the drives against all of them"),
     ]
 
 
@@ -267,8 +270,8 @@ def _group_row(group: GroupError, result: LoopResult) -> dict[str, object]:
         "group": group_words(group.name, result),
         "before": 1000.0 * group.before,
         "after": 1000.0 * group.after,
-        "floor": 1000.0 * group.floor,
-        "after / floor": group.after / group.floor if group.floor > 0 else None,
+        "between halves": 1000.0 * group.floor,
+        "ratio": group.after / group.floor if group.floor > 0 else None,
     }
 
 

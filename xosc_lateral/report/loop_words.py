@@ -207,21 +207,21 @@ def lack_of_fit_words(result: LoopResult) -> str:
     left = result.lack_of_fit
     if left.unexplained == 0.0:
         return (
-            "Taken together, the residuals do not exceed the floor: what the profile still misses cannot be told from "
-            "chance on these drives."
+            "Taken together, the residuals do not exceed the difference between halves of the drives: what the profile "
+            "still misses is within chance."
         )
     if not left.clear:
         return (
-            "The remaining residual is not significant: the error after is above the floor, but "
+            "The remaining residual is not significant: the error after is above that between halves, but "
             f"{100 * left.p_value:.0f}{GAP}% of random halves of these drives differ as much from the whole."
         )
     where = ", ".join(
-        f"{group_words(group.name, result)} ({_mm(group.after)}, floor {_mm(group.floor)})"
+        f"{group_words(group.name, result)} ({_mm(group.after)}, between halves {_mm(group.floor)})"
         for group in left.where[:NAMED_GROUPS]
     )
     return (
         f"Unexplained residual of {_mm(left.unexplained)}: the error after ({_mm(result.error_after)}) lies "
-        f"clearly above the floor ({_mm(result.floor)}), and no effect was found that explains the rest."
+        f"clearly above that between halves ({_mm(result.floor)}), and no effect was found that explains the rest."
         + (f" It stands out in: {where}." if where else "")
     )
 

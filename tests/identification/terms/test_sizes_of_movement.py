@@ -89,7 +89,7 @@ def test_metres_or_centimetres_are_the_same_factor(monkeypatch: pytest.MonkeyPat
     own = movement(np.random.default_rng(12), SECONDS) * np.exp(LOG_SIZE * x)
     sizes = []
     for factor in (1.0, 100.0):
-        monkeypatch.setattr(regression, "FLOOR", 0.03 * factor)
+        monkeypatch.setattr(regression, "MEASUREMENT_NOISE", 0.03 * factor)
         fitted = fit_model(coarse_of(factor * own, {"x": x}), (term(SpreadTerm),))
         sizes.append(estimate(fitted)[0].coefficients[0])
     assert sizes[0] == pytest.approx(sizes[1], rel=1e-5)
