@@ -204,7 +204,7 @@ class Fitted:
 
     @cached_property
     def innovations(self) -> FloatArray:
-        """Whitened by the movement as it is seen, without measurement noise: how large it is just now. Shape (n,), variance 1."""
+        """Whitened by the movement without measurement noise: how large it is just now. Shape (n,), variance 1."""
         coarse = self.coarse
         moved = coarse.offset - self.levels[coarse.drive]
         rows = innovations(moved, self.columns @ self.sizes, coarse.valid, coarse.drive, self.scale)

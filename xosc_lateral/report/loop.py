@@ -45,8 +45,8 @@ def loop_text(result: LoopResult) -> str:
     for item in result.identified.usable.feedback:
         sure = "possibly a" if item.doubtful else "a"
         lines.append(f"{item.column}: {sure} consequence of the car's movement, not used as a cause")
-    error = f"{result.error_before:.4f} m before, {result.error_after:.4f} m after ({result.floor:.4f} m between halves of the drives)"
-    lines.append(f"held-out error {error}")
+    error = f"held-out error {result.error_before:.4f} m before, {result.error_after:.4f} m after"
+    lines.append(f"{error} ({result.floor:.4f} m between halves of the drives)")
     lines.append(lack_of_fit_words(result))
     return "\n".join(lines)
 
@@ -125,8 +125,8 @@ HOW_TO_READ = (
     "Error: the root mean square of measured minus expected over all groups of statistics, on blocks that were used "
     "neither to choose nor to fit the base, the effects or their sizes. The expectation is the mean of {n_runs} "
     "simulated runs of the profile under the same context.",
-    "Between halves: the same difference between random halves of the measured blocks and all of them. At that size, no "
-    "mean, spread or frequency band distinguishes the profile from the driver.",
+    "Between halves: the same difference between random halves of the measured blocks and all of them. At that size, "
+    "no mean, spread or frequency band distinguishes the profile from the driver.",
     "p-value: how often a table without this effect would show one as strong. It is family-wise: all columns, lags "
     "and shapes that were tested count. Below {certain} it is extrapolated; read it as certain.",
     "Lag: negative if the driver looks ahead. Response: time constant of a first-order lag, after which about two "
