@@ -123,6 +123,17 @@ def test_parameters_that_double_each_other_end_in_a_line(tmp_path, capsys):
     assert "characters of a parameter's value" in line
 
 
+def test_a_maneuver_s_parameter_of_another_that_is_not_declared_is_one_line(tmp_path, capsys):
+    declared = '<ParameterDeclaration name="own" parameterType="string" value="${$nobody+1}"/>'
+    written = (Path(__file__).parents[1] / "data" / "xosc" / "valid" / "plain.xosc").read_text(encoding="utf-8")
+    text, count = re.subn(
+        r"(<Maneuver [^>]*>)", rf"\1<ParameterDeclarations>{declared}</ParameterDeclarations>", written
+    )
+    assert count
+    line = refused(["segments", write_scenario(tmp_path, text)], capsys)
+    assert "'nobody' is not declared" in line
+
+
 def test_too_little_data_names_the_file(drive, tmp_path, capsys):
     lines = drive.read_text().splitlines()
     drive.write_text("\n".join(lines[:60]) + "\n")

@@ -9,6 +9,7 @@ from xosc_lateral.formats.openscenario.element import XmlElement
 from xosc_lateral.formats.openscenario.entities import read_environment
 from xosc_lateral.formats.openscenario.positions import read_position
 from xosc_lateral.formats.openscenario.private_actions import PRIVATE_ACTIONS
+from xosc_lateral.scenario.expressions import ExpressionError
 from xosc_lateral.scenario.global_actions import (
     AddEntityAction,
     DeleteEntityAction,
@@ -47,7 +48,10 @@ def read_actions(owner: XmlElement, name: str, context: Context) -> list[Action]
     """
     private = owner.tag == "PrivateAction"
     readers = PRIVATE_ACTIONS if private else GLOBAL_ACTIONS
-    scope = owner.scope.local_values()
+    try:
+        scope = owner.scope.local_values()
+    except ExpressionError as error:
+        owner.fail(f"parameters that are declared around it: {error}")
     contents = [owner] if owner.tag == "UserDefinedAction" else list(_contents(owner))
     if not contents:
         context.remark(owner, "contains no action: played as nothing")
