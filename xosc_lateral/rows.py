@@ -16,10 +16,10 @@ import sys
 import tempfile
 import weakref
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -73,22 +73,24 @@ class _Store:
     def grown(self, size: int) -> mmap.mmap:
         """A piece of the file that is gone with what lies in it."""
         size = -(-size // mmap.PAGESIZE) * mmap.PAGESIZE
-        try:
-            file = tempfile.TemporaryFile(dir=self.folder)  # noqa: SIM115 - open as long as the chunk is mapped
-            os.posix_fallocate(file.fileno(), 0, size)  # a full disk is an error here, and not a signal later
-            chunk = mmap.mmap(file.fileno(), size)
-        except OSError as error:
-            if error.errno == errno.ENOMEM:
-                raise MemoryError from error  # a limit of this process (`RLIMIT_AS`)
-            what = f"{error.strerror}, and {size / 1e6:.0f} MB are needed there for the rows of a long run"
-            raise OSError(error.errno, what, str(self.folder)) from error
+        with ExitStack() as opened:
+            try:
+                file = opened.enter_context(tempfile.TemporaryFile(dir=self.folder))
+                os.posix_fallocate(file.fileno(), 0, size)  # a full disk is an error here, and not a signal later
+                chunk = mmap.mmap(file.fileno(), size)
+            except OSError as error:
+                if error.errno == errno.ENOMEM:
+                    raise MemoryError from error  # a limit of this process (`RLIMIT_AS`)
+                what = f"{error.strerror}, and {size / 1e6:.0f} MB are needed there for the rows of a long run"
+                raise OSError(error.errno, what, str(self.folder)) from error
+            weakref.finalize(chunk, opened.pop_all().close)
         self._size += size
-        _chunks[chunk] = np.frombuffer(chunk, np.uint8).ctypes.data, file
+        _chunks[chunk] = np.frombuffer(chunk, np.uint8).ctypes.data, file.fileno()
         return chunk
 
 
-# Of all runs whose columns somebody still has: where they are in memory, and their files.
-_chunks = weakref.WeakKeyDictionary[mmap.mmap, tuple[int, IO[bytes]]]()
+# Of all runs whose columns somebody still has: where they are in memory, and the numbers of their files.
+_chunks = weakref.WeakKeyDictionary[mmap.mmap, tuple[int, int]]()
 _others = 0  # pages of other files: libraries [byte]
 _rows = 0  # since they were looked at
 _store: ContextVar[_Store | None] = ContextVar("store", default=None)
@@ -132,10 +134,10 @@ def put(column: NDArray[Any], rows: slice, values: NDArray[Any]) -> None:
     """`column[rows] = values`; where a column is in the file that takes an eighth of the time."""
     if _chunks:
         address = column.ctypes.data
-        for chunk, (begin, file) in _chunks.items():
+        for chunk, (begin, number) in _chunks.items():
             if begin <= address < begin + len(chunk):
                 data = np.ascontiguousarray(values, dtype=column.dtype)
-                os.pwrite(file.fileno(), data.data, address - begin + rows.start * column.strides[0])
+                os.pwrite(number, data.data, address - begin + rows.start * column.strides[0])
                 return
     column[rows] = values
 
