@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, Unpack
 from xosc_lateral.api.result import PathLike, Result
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.output_paths import claim, output_folder
+from xosc_lateral.lazy import pd
 from xosc_lateral.limits import JOB_MEMORY, JOB_TIMEOUT
 from xosc_lateral.pipeline.batch import JobOutcome, JobState
 from xosc_lateral.pipeline.batch import convert_many as outcomes_of
@@ -23,8 +24,6 @@ from xosc_lateral.pipeline.request import frame_requests
 from xosc_lateral.pipeline.settings import ConvertKeywords, ConvertSettings
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     ScenariosLike = PathLike | pd.DataFrame | Sequence[PathLike]
 
 
@@ -195,8 +194,6 @@ class BatchResult(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """One row per output: the manifest's columns, with `state` and `seconds`."""
-        import pandas as pd
-
         return pd.DataFrame(self._rows())
 
     def to_dict(self) -> dict[str, Any]:

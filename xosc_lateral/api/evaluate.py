@@ -19,10 +19,9 @@ from xosc_lateral.api.result import (
     write_page,
 )
 from xosc_lateral.formats.mapping import MappingLike
+from xosc_lateral.lazy import pd
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from xosc_lateral.driver.profile import DriverProfile
     from xosc_lateral.evaluation.realism import Realism
     from xosc_lateral.evaluation.scores import ProfileScores
@@ -106,8 +105,6 @@ class Evaluation(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """One row per metric and snippet length: `seconds`, `metric`, `distance`, `floor`, `ratio`."""
-        import pandas as pd
-
         rows = [
             {"seconds": one.seconds, "metric": name, "distance": distance, "floor": one.floor.by_metric[name]}
             for one in (self._scores.snippets, self._scores.long_snippets)

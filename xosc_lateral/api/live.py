@@ -11,10 +11,9 @@ from xosc_lateral.api.result import PathLike, Paths, ProfileLike, Result, given_
 from xosc_lateral.enrich.result import Neighbours
 from xosc_lateral.errors import SimulationError
 from xosc_lateral.formats.output_paths import claim, output_file
+from xosc_lateral.lazy import pd
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from xosc_lateral.live.scene import Scene
     from xosc_lateral.scenario.entity import Entity
 
@@ -189,8 +188,6 @@ class LiveRun(Result):
         events: Sequence[tuple[float, str, int]] = (),
         scene: Scene | None = None,
     ) -> None:
-        import pandas as pd
-
         self._rows = pd.DataFrame(rows, columns=list(ROW))
         self._settings, self._scene = dict(settings), scene
         self.warnings = tuple(warnings)

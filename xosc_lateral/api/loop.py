@@ -19,10 +19,9 @@ from xosc_lateral.api.result import (
 )
 from xosc_lateral.formats.mapping import MappingLike
 from xosc_lateral.formats.output_paths import claim, output_folder
+from xosc_lateral.lazy import pd
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from xosc_lateral.driver.profile import DriverProfile
     from xosc_lateral.identification.close import LoopResult
     from xosc_lateral.report.figure import Figure
@@ -161,8 +160,6 @@ class ClosedLoop(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """One row per finding: `effect`, `kind`, `columns`, `lag_s`, `response_s`, `shape`, `size_m`, `p_value`, ..."""
-        import pandas as pd
-
         names = ["effect", "kind", "columns", "lag_s", "response_s", "shape", "size_m", "p_value"]
         return pd.DataFrame(self.to_dict()["findings"], columns=[*names, "error_before", "error_after"])
 

@@ -12,13 +12,12 @@ from xosc_lateral.api.result import PathLike, Paths, Result, as_paths, write_pag
 from xosc_lateral.formats.hashes import parsed_hashes
 from xosc_lateral.formats.openscenario.read import RoadSearch
 from xosc_lateral.formats.output_paths import claim, output_file
+from xosc_lateral.lazy import pd
 from xosc_lateral.motion.segments import SegmentRow, cut_segments
 from xosc_lateral.pipeline.load import Played, play_scenario
 from xosc_lateral.pipeline.settings import STEP
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from xosc_lateral.report.figure import Figure
 
 
@@ -239,8 +238,6 @@ class Segments(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """One row per segment: `entity`, `start`, `end` [s], `road_following`, `why`, `road`, `lane`."""
-        import pandas as pd
-
         names = ("entity", "start", "end", "road_following", "why", "road", "lane")
         return pd.DataFrame([[getattr(row, name) for name in names] for row in self._rows], columns=list(names))
 

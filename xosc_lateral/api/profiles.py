@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 from xosc_lateral.api.result import PathLike, Paths, ProfileLike, Result, as_paths, given_profile, write_page
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.output_paths import claim, output_file, output_folder
+from xosc_lateral.lazy import pd
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from xosc_lateral.driver.profile import DriverProfile
     from xosc_lateral.evaluation.profile_comparison import Compared
     from xosc_lateral.formats.profiles import Entry
@@ -252,8 +251,6 @@ class ProfileList(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """One row per file."""
-        import pandas as pd
-
         return pd.DataFrame(self.to_dict()["profiles"])
 
     def to_dict(self) -> dict[str, Any]:
@@ -282,8 +279,6 @@ class ProfileComparison(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """Mean distance of the ten metrics of each profile (row) from each (column), in standard deviations."""
-        import pandas as pd
-
         names = self._compared.names
         return pd.DataFrame(self._compared.distance, index=names, columns=names)
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Any, Unpack
 
 from xosc_lateral.api.result import PathLike, Result
 from xosc_lateral.formats.mapping import MappingLike
 from xosc_lateral.formats.output_paths import claim, output_folder
+from xosc_lateral.lazy import pd
 from xosc_lateral.pipeline.options import spelled_out, values_of
 from xosc_lateral.pipeline.reconstruct import (
     Reconstructed,
@@ -17,9 +18,6 @@ from xosc_lateral.pipeline.reconstruct import (
     fitted_profiles,
     reconstruct_recording,
 )
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 @spelled_out(ReconstructSettings)
@@ -102,8 +100,6 @@ class Reconstruction(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """One row per vehicle: when it is there, its maneuvers, residuals and driver."""
-        import pandas as pd
-
         return pd.DataFrame(self.to_dict()["vehicles"])
 
     def to_dict(self) -> dict[str, Any]:

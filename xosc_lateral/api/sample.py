@@ -19,10 +19,9 @@ from xosc_lateral.api.result import (
 )
 from xosc_lateral.formats.mapping import MappingLike
 from xosc_lateral.formats.output_paths import claim, output_file
+from xosc_lateral.lazy import pd
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from xosc_lateral.driver.profile import DriverProfile
     from xosc_lateral.driver.sampled_offsets import SampledOffsets
     from xosc_lateral.drives.drive import Drive
@@ -143,7 +142,6 @@ class Offsets(Result):
     def to_frame(self) -> pd.DataFrame:
         """Columns `drive`, `time` [s], `offset` [m]; of snippets also `snippet` and `offset_real` [m]."""
         import numpy as np
-        import pandas as pd
 
         is_snippet = "snippet_s" in self._settings
         names = ["drive", "snippet", "time", "offset", "offset_real"] if is_snippet else ["drive", "time", "offset"]

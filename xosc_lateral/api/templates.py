@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 from xosc_lateral.api.result import PathLike, Result
 from xosc_lateral.formats.output_paths import claim, output_folder, template_mark
+from xosc_lateral.lazy import pd
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
-
-    import pandas as pd
 
     from xosc_lateral.templates import AnyTemplate
     from xosc_lateral.templates.parameter import Parameter
@@ -93,8 +92,6 @@ class TemplateList(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """One row per template and setting: `template`, `name`, `default`, `unit`, `allowed`, `what`."""
-        import pandas as pd
-
         names = ("name", "shown_default", "unit", "allowed", "what")
         rows = [
             [template.name, *(getattr(one, name) for name in names)]

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from xosc_lateral.api.result import PathLike, Paths, Result, as_paths
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.output_paths import claim, output_file, output_folder
+from xosc_lateral.lazy import pd
 from xosc_lateral.pipeline import verify as checks
 from xosc_lateral.pipeline.settings import ConvertSettings
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 class Verification(Result):
@@ -39,8 +37,6 @@ class Verification(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """One row per output: `output`, `problem` (the first one's kind; empty: none), `what`."""
-        import pandas as pd
-
         first = [one.problems[0] if one.problems else ("", "") for one in self.checked]
         rows = [
             {"output": str(one.output), "problem": str(kind), "what": what}

@@ -18,6 +18,7 @@ from xosc_lateral.formats.openscenario.write.reconstructed import Triggers, reco
 from xosc_lateral.formats.output_tables import write_frame
 from xosc_lateral.formats.profiles import find_profile, list_profiles, profile_bytes, read_profile
 from xosc_lateral.formats.recordings import RecordedTraffic
+from xosc_lateral.lazy import pd
 from xosc_lateral.pipeline import options as say
 from xosc_lateral.pipeline.drivers import AUTO_PROFILE
 from xosc_lateral.pipeline.options import option
@@ -224,8 +225,6 @@ def _window_model(path: Path, _changed: int) -> WindowModel:
 
 def drivers_table(made: Reconstructed, path: Path) -> None:
     """Write the table of one row that `convert` takes: the scenario, who is under test, and everybody's profile."""
-    import pandas as pd
-
     drivers = {plan.name: driver.profile for plan, driver in zip(made.plans, made.drivers, strict=True)}
     driven = {name: profile for name, profile in drivers.items() if profile and name != made.host}
     cells = {"scenario": f"{made.traffic.name}.xosc"} | ({} if made.host is None else {"ego": made.host})

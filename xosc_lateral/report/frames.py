@@ -7,21 +7,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from xosc_lateral.lazy import pd
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.report.chart import MEASURED, SAMPLED
 from xosc_lateral.report.figure import Figure
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from xosc_lateral.driver.sampled_offsets import SampledOffsets
     from xosc_lateral.enrich.result import Enriched
 
 
 def conversion_frame(enriched: Enriched) -> pd.DataFrame:
     """One row per entity and step of those that exist then, ordered by time and then as in the scenario."""
-    import pandas as pd
-
     ids = np.array([*enriched.network.road_ids, ""], dtype=object)
     frames = []
     for number, entity in enumerate(enriched.entities):
