@@ -6,7 +6,7 @@ import json
 import math
 import sys
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, is_dataclass
 from enum import StrEnum
 from functools import partial, wraps
 from inspect import Parameter, Signature, signature
@@ -18,6 +18,7 @@ import typer
 if TYPE_CHECKING:
     from xosc_lateral.api.result import Result
     from xosc_lateral.formats.mapping import TableMapping
+    from xosc_lateral.pipeline.options import Option
 
 Verb = TypeVar("Verb", bound=Callable[..., Any])
 
@@ -187,22 +188,22 @@ class Written(Said):
     force: Force = False
 
 
-def flags_of(settings: type, name: str) -> tuple[str, ...]:
+def flags_of(name: str, option: Option) -> tuple[str, ...]:
     """How a setting is called on the command line."""
-    from xosc_lateral.pipeline.options import options_of
-
-    return options_of(settings)[name].flags or (f"--{name.replace('_', '-')}",)
+    return option.flags or (f"--{name.replace('_', '-')}",)
 
 
 def _parameters(settings: type) -> list[Parameter]:
     """An option for each setting."""
+    from xosc_lateral.pipeline.options import settable
+
     found = []
-    for item in fields(settings):
-        if (option := item.metadata.get("option")) is not None:
-            words = typer.Option(*flags_of(settings, item.name), **option.words)
-            kind = SHARED.get(item.name) or Annotated[option.kind, words]
-            default = None if type(None) in get_args(get_args(kind)[0]) else item.default
-            found.append(Parameter(item.name, Parameter.KEYWORD_ONLY, default=default, annotation=kind))
+    for item in settable(settings):
+        option: Option = item.metadata["option"]
+        words = typer.Option(*flags_of(item.name, option), **option.words)
+        kind = SHARED.get(item.name) or Annotated[option.kind, words]
+        default = None if type(None) in get_args(get_args(kind)[0]) else item.default
+        found.append(Parameter(item.name, Parameter.KEYWORD_ONLY, default=default, annotation=kind))
     return found
 
 
@@ -216,7 +217,7 @@ def _read(settings: type, /, **said: Any) -> dict[str, Any]:
         try:
             options[name].read(value)
         except ValueError as error:
-            raise typer.BadParameter(str(error), param_hint=flags_of(settings, name)[0]) from error
+            raise typer.BadParameter(str(error), param_hint=flags_of(name, options[name])[0]) from error
     return given
 
 

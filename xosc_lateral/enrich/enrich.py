@@ -241,7 +241,7 @@ def _draw(blank: _Drawn, driver: DriverProfile, seed: np.random.SeedSequence, wi
         check_offsets(offset, segment.lane_width[segment.inside], who, segment.time[segment.inside])
         error = kept(sensor_error(sensor, offset, SAMPLE_STEP, seed, part=len(samples)))
         samples.append(_Sample(span, knots, kept(offset), error, beyond))
-    return replace(blank, seen=blank.seen.without_segments, samples=tuple(samples))
+    return replace(blank, seen=blank.seen._replace(segments=()), samples=tuple(samples))
 
 
 def _apart(

@@ -69,11 +69,6 @@ class Seen(NamedTuple):
     alone: frozenset[str] = frozenset()
     """Sides on which that is known of the driver himself: nothing is borrowed."""
 
-    @property
-    def without_segments(self) -> Seen:
-        """What is to be known when offsets have been sampled."""
-        return self._replace(segments=())
-
 
 NOTHING_SEEN = Seen()
 

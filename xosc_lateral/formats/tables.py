@@ -9,17 +9,19 @@ import json
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
 from xosc_lateral.arrays import FloatArray
 from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.hashes import parsed_hash
-from xosc_lateral.formats.mapping import TableMapping
 from xosc_lateral.formats.source import Source, open_source
 from xosc_lateral.lazy import pd
 from xosc_lateral.limits import TABLE_CELLS, TABLE_COLUMNS
+
+if TYPE_CHECKING:
+    from xosc_lateral.formats.mapping import TableMapping
 
 _COMMA_NUMBER = r"\s*[+-]?(?:\d{1,3}(?:\.\d{3})+|\d*)(?:,\d+)?(?:[eE][+-]?\d+)?\s*"
 
@@ -124,9 +126,6 @@ def indicators(name: str, column: pd.Series, drives: pd.Series | None, most: int
 PARQUET = ".parquet"
 TABLE_SUFFIXES = (".csv", ".csv.gz", PARQUET)
 
-AS_IT_IS = TableMapping()
-"""Nothing is known of how a table is written."""
-
 LONGEST_MESSAGE = 300
 """Of what a library says about a file; some quote half of it."""
 
@@ -135,7 +134,7 @@ _CHUNK = 1 << 20
 _DOUBLE = 8
 
 
-def read_table(path: Path, mapping: TableMapping = AS_IT_IS) -> tuple[pd.DataFrame, str]:
+def read_table(path: Path, mapping: TableMapping | None = None) -> tuple[pd.DataFrame, str]:
     """Read a CSV, CSV.gz or Parquet file as it is; a mapping may say how text is written.
 
     Raises `FormatError` when it isn't one, or is beyond the limits.
@@ -145,7 +144,10 @@ def read_table(path: Path, mapping: TableMapping = AS_IT_IS) -> tuple[pd.DataFra
     name = path.name.lower()
     if not name.endswith(TABLE_SUFFIXES):
         raise FormatError(f"not a drive table: expected a name ending in {', '.join(TABLE_SUFFIXES)}", path=path)
-    table = _read(path, mapping.encoding, mapping.separator, decimal=mapping.decimal, low_memory=False)
+    if mapping is None:
+        table = _read(path, low_memory=False)
+    else:
+        table = _read(path, mapping.encoding, mapping.separator, decimal=mapping.decimal, low_memory=False)
     return table, parsed_hash(path)
 
 

@@ -6,7 +6,7 @@ import inspect
 import json
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import MISSING, Field, dataclass, field, fields
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
@@ -87,9 +87,14 @@ def option(
     return field(default=default, metadata=metadata)
 
 
+def settable(settings: type) -> list[Field[Any]]:
+    """The fields of some settings that users can set."""
+    return [item for item in fields(settings) if "option" in item.metadata]
+
+
 def options_of(settings: type) -> dict[str, Option]:
     """What users can set of some settings, by name."""
-    return {item.name: item.metadata["option"] for item in fields(settings) if "option" in item.metadata}
+    return {item.name: item.metadata["option"] for item in settable(settings)}
 
 
 def values_of(settings: type, said: Mapping[str, Any]) -> dict[str, Any]:
@@ -117,8 +122,7 @@ def spelled_out(settings: type) -> Callable[[Verb], Verb]:
                 default=None if item.default is MISSING else item.default,
                 annotation=item.type,
             )
-            for item in fields(settings)
-            if "option" in item.metadata
+            for item in settable(settings)
         ]
         verb.__signature__ = signature.replace(parameters=[*own, *named])  # type: ignore[attr-defined]
         return verb

@@ -21,7 +21,7 @@ from xosc_lateral.formats.recordings import RecordedTraffic
 from xosc_lateral.lazy import pd
 from xosc_lateral.pipeline import options as say
 from xosc_lateral.pipeline.drivers import AUTO_PROFILE
-from xosc_lateral.pipeline.options import option
+from xosc_lateral.pipeline.options import Paths, option
 from xosc_lateral.reconstruction.drivers import ChosenDriver, WindowModel, choose_driver, drive_of, in_lane_offsets
 from xosc_lateral.reconstruction.encounters import Encounter, encounters, relative_triggers
 from xosc_lateral.reconstruction.plan import Residuals, VehiclePlan, plan_vehicles, residuals_of
@@ -122,7 +122,7 @@ class ReconstructKeywords(TypedDict, total=False):
     relative: bool
     exact: bool
     fit: bool
-    library: str | Path | Collection[str | Path]
+    library: Paths
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -19,7 +19,7 @@ from xosc_lateral.formats.configuration import SETTINGS, configuration
 from xosc_lateral.formats.openscenario.read import RoadSearch
 from xosc_lateral.formats.openscenario.write.target import Player, TargetPlayer, target
 from xosc_lateral.pipeline import options as say
-from xosc_lateral.pipeline.options import Option, option
+from xosc_lateral.pipeline.options import Option, PathLike, Paths, ProfileLike, option
 
 if TYPE_CHECKING:
     from xosc_lateral.driver.profile import DriverProfile
@@ -226,21 +226,21 @@ OPTIONS: Mapping[str, Option] = say.options_of(ConvertSettings)
 class ConvertKeywords(TypedDict, total=False):
     """The same names for type checkers, with what a call may be given."""
 
-    profile: str | Path | DriverProfile
+    profile: ProfileLike
     seed: int
-    entity: Mapping[str, str | Path | DriverProfile] | None
+    entity: Mapping[str, ProfileLike] | None
     only: Collection[str] | None
     ego: Collection[str] | None
     neighbours: Literal["profile", "borrow", "none"] | None
-    context: str | Path | None
+    context: PathLike | None
     parameters: Mapping[str, object] | None
-    library: str | Path | Collection[str | Path]
+    library: Paths
     mode: Literal["auto", "trajectory", "lane-offset"]
     player: Literal["standard", "esmini", "carla"]
     version: str | None
-    allow: str | Path | Collection[str | Path]
-    road: str | Path | None
-    road_path: str | Path | Collection[str | Path]
+    allow: Paths
+    road: PathLike | None
+    road_path: Paths
     attempts: int
     time_limit: float | None
     with_sensor: bool
