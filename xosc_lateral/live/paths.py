@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.arrays import BoolArray, FloatArray
+from xosc_lateral.motion.around import smooth_step
 from xosc_lateral.motion.context import STEERING
-from xosc_lateral.motion.deviation import SETTLING_TIME, settle
+from xosc_lateral.motion.deviation import SETTLING_TIME, settle, smoother_step
 from xosc_lateral.motion.segments import MINIMUM_SPEED
 
 TURN = 0.03
@@ -122,7 +123,7 @@ def _pace(speed: FloatArray) -> FloatArray:
     """
     u = np.abs(speed) / MINIMUM_SPEED
     u = np.where(u > 1.0 - 1e-6, 1.0, u)  # 11.1111 m/s are meant as 40 km/h
-    return np.asarray(u**2 * (3.0 - 2.0 * u))
+    return smooth_step(u)
 
 
 def _move_aside(state: NDArray[Any], passed: FloatArray) -> None:
@@ -153,7 +154,7 @@ def _settle(state: NDArray[Any], passed: FloatArray) -> FloatArray:
     done = active & (share >= 1.0)
     state["share"], state["over"] = np.where(active, share, 0.0), np.where(done, 0.0, state["over"])
     u = np.clip(share, 0.0, 1.0)
-    level = 1.0 - u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+    level = 1.0 - smoother_step(u)
     by_level = -30.0 * u**2 * (1.0 - u) ** 2 / over
     by_slope = 1.0 - 18.0 * u**2 + 32.0 * u**3 - 15.0 * u**4
     rest = state["from"] * level + settle(u * over, over, state["from_rate"], 0.0)

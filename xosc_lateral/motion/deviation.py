@@ -129,7 +129,7 @@ class Deviation(Struct, frozen=True, eq=False):
         if here is None or there is None:
             level = np.full_like(distance, (here or there)[0])  # type: ignore[index]
         else:
-            share = _smooth_step((distance - before.knots[-1]) / gap)  # type: ignore[union-attr]
+            share = smoother_step((distance - before.knots[-1]) / gap)  # type: ignore[union-attr]
             level = here[0] + (there[0] - here[0]) * share
         if before and here:
             reach = min(self.settling[k][1], gap)
@@ -152,7 +152,7 @@ def deviation_through(segments: Sequence[SampledDeviation]) -> Deviation:
     )
 
 
-def _smooth_step(u: FloatArray) -> FloatArray:
+def smoother_step(u: FloatArray) -> FloatArray:
     """0 to 1 with vanishing first and second derivatives at both ends."""
     u = np.clip(u, 0.0, 1.0)
     return np.asarray(u**3 * (10.0 - 15.0 * u + 6.0 * u**2))
