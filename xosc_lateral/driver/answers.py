@@ -172,7 +172,7 @@ def _within_drives(runs: Sequence[Run], near: Mapping[str, Sequence[FloatArray]]
     table = _centred(table, groups)
     observed, design = table[:, 0], table[:, 1:]
     distinct, cluster = np.unique(number, axis=0, return_inverse=True)
-    slopes, covariance = clustered_least_squares(design, observed, cluster.ravel())
+    slopes, covariance = cluster_robust_slopes(design, observed, cluster.ravel())
     blocks, free = len(distinct), max(len(observed) - len(numbers) - design.shape[1], 1)
     covariance *= blocks / max(blocks - 1, 1) * len(observed) / free
     known = np.diag(design.T @ design)[:sides] > 1e-6
@@ -180,18 +180,20 @@ def _within_drives(runs: Sequence[Run], near: Mapping[str, Sequence[FloatArray]]
     return np.where(known, slopes[:sides], 0.0), errors
 
 
-def clustered_least_squares(
-    design: FloatArray, observed: FloatArray, cluster: IntArray
-) -> tuple[FloatArray, FloatArray]:
+def cluster_robust_slopes(design: FloatArray, observed: FloatArray, cluster: IntArray) -> tuple[FloatArray, FloatArray]:
     """Slopes, shape (k,), of observations, shape (n,), by a design, shape (n, k), and their covariance, shape (k, k).
 
     The covariance is robust against whatever the observations of one cluster, 0, 1, 2 ..., share.
     """
     inverse = np.linalg.pinv(design.T @ design)
     slopes = inverse @ design.T @ observed
-    scores = design * (observed - design @ slopes)[:, None]
-    by_cluster = np.column_stack([np.bincount(cluster, column) for column in scores.T])
-    return slopes, inverse @ (by_cluster.T @ by_cluster) @ inverse
+    scores = cluster_sums(design * (observed - design @ slopes)[:, None], cluster)
+    return slopes, inverse @ (scores.T @ scores) @ inverse
+
+
+def cluster_sums(rows: FloatArray, cluster: IntArray) -> FloatArray:
+    """Sums of rows, shape (n, k), over each cluster 0, 1, 2 ..., shape (clusters, k)."""
+    return np.column_stack([np.bincount(cluster, column) for column in rows.T])
 
 
 def _centred(table: FloatArray, groups: IntArray) -> FloatArray:

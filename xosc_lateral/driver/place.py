@@ -15,7 +15,7 @@ from msgspec.structs import replace as with_fields
 
 from xosc_lateral.arrays import FloatArray, IntArray
 from xosc_lateral.digits import all_significant
-from xosc_lateral.driver.answers import NEIGHBOURS, SCALE, clustered_least_squares, most_beside, neighbour_shapes
+from xosc_lateral.driver.answers import NEIGHBOURS, SCALE, cluster_robust_slopes, most_beside, neighbour_shapes
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Levels, Linear, Piecewise, Proximity
 from xosc_lateral.driver.models.autoregressive.coarse import split_bands
 from xosc_lateral.drives.drive import Run
@@ -191,7 +191,7 @@ def _regressed(observed: FloatArray, quantities: FloatArray, drive: IntArray) ->
     theta = (1.0 - np.sqrt(within / (within + counts * between + 1e-30)))[drive]
     columns = [column - theta * (np.bincount(drive, column) / counts)[drive] for column in (*design.T, observed)]
     x, y = np.column_stack(columns[:-1]), columns[-1]
-    slopes, covariance = clustered_least_squares(x, y, drive)
+    slopes, covariance = cluster_robust_slopes(x, y, drive)
     return slopes[1:], covariance[1:, 1:]
 
 

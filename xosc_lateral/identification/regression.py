@@ -15,6 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from xosc_lateral.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.driver.answers import cluster_sums
 from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression, start_factors, unbiased
 from xosc_lateral.identification.innovations import CLIP, LONGEST, ORDER, own_levels
 from xosc_lateral.identification.model import Fitted, Term, joined
@@ -96,8 +97,7 @@ def clustered_least_squares(
         return np.zeros(0), np.zeros((0, 0))
     inverse = np.linalg.pinv(design.T @ design)
     sizes = inverse @ (design.T @ observed)
-    scores = design * (observed - design @ sizes)[:, None]
-    scores = np.stack([np.bincount(cluster, column) for column in scores.T], axis=1)
+    scores = cluster_sums(design * (observed - design @ sizes)[:, None], cluster)
     clusters = int(np.count_nonzero(scores.any(axis=1)))
     freedom = clusters / max(1, clusters - 1) * (len(observed) - 1) / max(1, len(observed) - design.shape[1])
     return sizes, np.asarray(inverse @ (scores.T @ scores) @ inverse * freedom, dtype=np.float64)
