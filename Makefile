@@ -51,7 +51,7 @@ test: style
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal
 
 # Under a minute, in one process: everything but what fits, converts, plays, imports or mutates for long.
-FAST := $(addprefix tests/,road scenario motion drives formats templates enrich test_layers.py)
+FAST := $(addprefix tests/,world/road world/scenario world/motion world/surroundings drivers/drives files test_layers.py)
 fast: $(DEV_STAMP)
 	$(BIN)/python -m pytest -q $(FAST) -m 'not slow' -k 'not importers and not fuzz and not corpus'
 
@@ -71,7 +71,7 @@ docs: $(DOCS_STAMP)
 
 # JSON Schema of profile files, from the types.
 schema: $(STAMP)
-	$(BIN)/python -c "import json; from xosc_lateral.driver.profile import profile_schema; from xosc_lateral.formats.profiles import SCHEMA; SCHEMA.write_text(json.dumps(profile_schema(), indent=1, ensure_ascii=False) + chr(10))"
+	$(BIN)/python -c "import json; from xosc_lateral.drivers.model.profile import profile_schema; from xosc_lateral.files.profiles import SCHEMA; SCHEMA.write_text(json.dumps(profile_schema(), indent=1, ensure_ascii=False) + chr(10))"
 
 # The shipped driver profiles, rebuilt from the public recording (50 MB from PyPI): byte for byte what is in the tree. What
 # the closed loop made stays as it is; `make refined` makes it anew.

@@ -24,9 +24,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from xosc_lateral.errors import XoscLateralError
-from xosc_lateral.motion.nominal import Activity
-from xosc_lateral.pipeline.load import Played, play_scenario
+from xosc_lateral.base.errors import XoscLateralError
+from xosc_lateral.workflows.conversion.load import Played, play_scenario
+from xosc_lateral.world.motion.nominal import Activity
 
 FARTHEST = 0.10
 """[m]"""

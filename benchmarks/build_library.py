@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.library import build_library
-from xosc_lateral.formats.profiles import write_profile
+from xosc_lateral.files.profiles import write_profile
 
 
 def main(argv: Sequence[str] | None = None) -> None:

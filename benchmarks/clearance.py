@@ -19,10 +19,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.formats.drives import read_drives
-from xosc_lateral.formats.profiles import read_profile
-from xosc_lateral.identification.residual import simulated_runs
-from xosc_lateral.identification.timeline import Timeline, join_drives
+from xosc_lateral.drivers.loop.residual import simulated_runs
+from xosc_lateral.drivers.loop.timeline import Timeline, join_drives
+from xosc_lateral.files.drives import read_drives
+from xosc_lateral.files.profiles import read_profile
 
 FloatArray = NDArray[np.float64]
 

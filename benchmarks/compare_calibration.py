@@ -12,10 +12,10 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from benchmarks.fair_measure import halves
-from xosc_lateral.driver.fitting import fit_profile
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.evaluation.profile_comparison import compare
-from xosc_lateral.formats.drives import read_drives
+from xosc_lateral.drivers.evaluation.profile_comparison import compare
+from xosc_lateral.drivers.fitting.fitting import fit_profile
+from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.files.drives import read_drives
 
 FIRST_SPLIT = 400
 """Seed of the first random halves of the vehicles."""

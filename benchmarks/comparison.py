@@ -12,9 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.evaluation.distances import Distances, metric_distances, wasserstein
-from xosc_lateral.evaluation.metrics import METRICS, cut_snippets, free_runs, snippet_metrics
+from xosc_lateral.drivers.evaluation.distances import Distances, metric_distances, wasserstein
+from xosc_lateral.drivers.evaluation.metrics import METRICS, cut_snippets, free_runs, snippet_metrics
+from xosc_lateral.drivers.model.profile import DriverProfile
 
 FloatArray = NDArray[np.float64]
 

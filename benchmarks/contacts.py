@@ -16,11 +16,11 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.markers import show
-from xosc_lateral.api.templates import write_template
-from xosc_lateral.enrich.enrich import enrich
-from xosc_lateral.pipeline.drivers import choose_drivers
-from xosc_lateral.pipeline.load import play_scenario
-from xosc_lateral.pipeline.settings import ConvertSettings
+from xosc_lateral.workflows.conversion.drivers import choose_drivers
+from xosc_lateral.workflows.conversion.enrich import enrich
+from xosc_lateral.workflows.conversion.load import play_scenario
+from xosc_lateral.workflows.conversion.settings import ConvertSettings
+from xosc_lateral.workflows.playing.templates import write_template
 
 QUANTILES = (0.0, 0.01, 0.1, 0.5)
 

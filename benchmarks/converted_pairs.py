@@ -27,8 +27,8 @@ from benchmarks.clearance import BANDS, FAR, Clearance, band_name, resampled, wi
 from benchmarks.markers import write_between_markers
 from benchmarks.pair_scenarios import FAST, ROADS, SLOW, Driven, Road, write_scenario
 from benchmarks.storyboard import Vehicle
-from xosc_lateral.formats.drives import read_drives
-from xosc_lateral.identification.timeline import join_drives
+from xosc_lateral.drivers.loop.timeline import join_drives
+from xosc_lateral.files.drives import read_drives
 
 FloatArray = NDArray[np.float64]
 

@@ -21,18 +21,18 @@ from numpy.typing import NDArray
 
 from examples.driver_simulator import simulate_drive
 from tests.profiles import as_drive
-from xosc_lateral.driver.models.autoregressive import fit as fitting
-from xosc_lateral.driver.models.autoregressive import fit_coarse
-from xosc_lateral.driver.models.autoregressive.coarse import Autoregression, stabilise
-from xosc_lateral.driver.models.autoregressive.fit_coarse import fit_autoregression
-from xosc_lateral.driver.models.autoregressive.fit_matching import simulate
-from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
-from xosc_lateral.drives.cuts import PAPER_RULES, all_runs
-from xosc_lateral.drives.drive import Drive
-from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.evaluation.distances import snippet_distances
-from xosc_lateral.formats.drives import read_drives
-from xosc_lateral.identification.timeline import Timeline, join_drives, local_mean
+from xosc_lateral.drivers.drives.cuts import PAPER_RULES, all_runs
+from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.evaluation.distances import snippet_distances
+from xosc_lateral.drivers.fitting.models.autoregressive import fit as fitting
+from xosc_lateral.drivers.fitting.models.autoregressive import fit_coarse
+from xosc_lateral.drivers.fitting.models.autoregressive.fit_coarse import fit_autoregression
+from xosc_lateral.drivers.fitting.models.autoregressive.fit_matching import simulate
+from xosc_lateral.drivers.loop.timeline import Timeline, join_drives, local_mean
+from xosc_lateral.drivers.model.core.autoregressive.coarse import Autoregression, stabilise
+from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
+from xosc_lateral.files.drives import read_drives
 
 FloatArray = NDArray[np.float64]
 Fit = Callable[[Sequence[FloatArray]], AutoregressiveModel]

@@ -11,7 +11,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from xosc_lateral.formats.importers.dlr_ht import STEP, fit_reference_line, import_dlr_ht, read_tracks, travels_north
+from xosc_lateral.workflows.recordings.importers.dlr_ht import (
+    STEP,
+    fit_reference_line,
+    import_dlr_ht,
+    read_tracks,
+    travels_north,
+)
 
 
 def along_road(tracks: pd.DataFrame) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.float64]]:

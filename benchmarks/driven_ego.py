@@ -36,7 +36,7 @@ import xosc_lateral as xl
 from benchmarks.in_player import STEP, Span, sharpest, within
 from benchmarks.made.reactive import reactive_scenarios
 from benchmarks.player_outputs import LATERAL, OURS, actions
-from xosc_lateral.motion.segments import MINIMUM_SPEED
+from xosc_lateral.world.motion.segments import MINIMUM_SPEED
 
 FACTORS = (0.8, 1.0, 1.2)
 WINDOW = 1.0

@@ -16,11 +16,11 @@ import numpy as np
 from benchmarks.comparison import driver_distances
 from benchmarks.library import sliding_snippets, split_in_time
 from benchmarks.markers import show
-from xosc_lateral.driver.fitting import fit_runs
-from xosc_lateral.drives.cuts import all_runs
-from xosc_lateral.drives.drive import Run
-from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.formats.drives import read_drives
+from xosc_lateral.drivers.drives.cuts import all_runs
+from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.fitting.fitting import fit_runs
+from xosc_lateral.files.drives import read_drives
 
 
 def main() -> None:

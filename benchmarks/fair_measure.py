@@ -17,13 +17,13 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.markers import show
-from xosc_lateral.driver.fitting import fit_profile
-from xosc_lateral.driver.models.base import ModelKind
-from xosc_lateral.drives.cuts import all_runs
-from xosc_lateral.drives.drive import Drive
-from xosc_lateral.evaluation.realism import ConditionScores, Realism, score_realism
-from xosc_lateral.formats.drives import read_drives
-from xosc_lateral.report.realism import FAMILIES
+from xosc_lateral.drivers.drives.cuts import all_runs
+from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.evaluation.realism import ConditionScores, Realism, score_realism
+from xosc_lateral.drivers.fitting.fitting import fit_profile
+from xosc_lateral.drivers.model.core.base import ModelKind
+from xosc_lateral.files.drives import read_drives
+from xosc_lateral.workflows.profiles.realism_text import FAMILIES
 
 
 def halves(drives: Sequence[Drive], seed: int) -> tuple[list[Drive], list[Drive]]:

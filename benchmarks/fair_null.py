@@ -20,14 +20,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.markers import show
-from xosc_lateral.driver.fitting import fit_population, fit_profile
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.drives.cuts import all_runs
-from xosc_lateral.drives.drive import Run
-from xosc_lateral.evaluation.classifier import TwoSampleResult, classifier_two_sample_test, context_features
-from xosc_lateral.evaluation.filters import below_half_hertz, thinned
-from xosc_lateral.evaluation.snippets import Snippets, sample_runs, snippets_of
-from xosc_lateral.formats.drives import read_drives
+from xosc_lateral.drivers.drives.cuts import all_runs
+from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.evaluation.classifier import TwoSampleResult, classifier_two_sample_test, context_features
+from xosc_lateral.drivers.evaluation.filters import below_half_hertz, thinned
+from xosc_lateral.drivers.evaluation.snippets import Snippets, sample_runs, snippets_of
+from xosc_lateral.drivers.fitting.fitting import fit_population, fit_profile
+from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.files.drives import read_drives
 
 FloatArray = NDArray[np.float64]
 

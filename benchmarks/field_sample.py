@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.agreement import difference, own_rows, reference_rows, scenarios
-from xosc_lateral.errors import XoscLateralError
-from xosc_lateral.pipeline.load import Played, play_scenario
+from xosc_lateral.base.errors import XoscLateralError
+from xosc_lateral.workflows.conversion.load import Played, play_scenario
 
 STEP, LIMIT = 0.02, 60.0
 """Of the runs. [s]"""

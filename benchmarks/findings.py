@@ -11,7 +11,7 @@ from pathlib import Path
 
 from lxml import etree
 
-from xosc_lateral.formats.xml import parse_xml
+from xosc_lateral.files.xml import parse_xml
 
 XSD = Path(__file__).parents[1] / "tests" / "data" / "xsd"
 FILES = {0: "1.0.0", 1: "1.1.1", 2: "1.2.0", 3: "1.3.0"}

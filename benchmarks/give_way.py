@@ -16,14 +16,14 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from benchmarks.markers import show
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.sampled_offsets import sample_context
-from xosc_lateral.enrich.give_way import wider
-from xosc_lateral.enrich.seen import NEIGHBOURS
-from xosc_lateral.formats.drives import drives_of_table
-from xosc_lateral.formats.importers import dlr_ht
-from xosc_lateral.formats.importers.road_from_tracks import fit_reference_line
-from xosc_lateral.formats.profiles import read_profile
+from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.drivers.model.sampled_offsets import sample_context
+from xosc_lateral.files.drives import drives_of_table
+from xosc_lateral.files.profiles import read_profile
+from xosc_lateral.workflows.conversion.give_way import wider
+from xosc_lateral.workflows.conversion.seen import NEIGHBOURS
+from xosc_lateral.workflows.recordings.importers import dlr_ht
+from xosc_lateral.world.road.road_from_tracks import fit_reference_line
 
 FloatArray = NDArray[np.float64]
 

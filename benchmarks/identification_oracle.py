@@ -9,11 +9,11 @@ import pandas as pd
 
 from benchmarks.identification_cases import as_provided
 from benchmarks.identification_drives import parts_of, unit, with_mean
-from xosc_lateral.formats.drives import drives_of_table
-from xosc_lateral.identification.dictionary import LEAST_SHIFT_S
-from xosc_lateral.identification.regression import fit_model
-from xosc_lateral.identification.significance import MANY_DRIVES
-from xosc_lateral.identification.timeline import Coarse, join_drives
+from xosc_lateral.drivers.loop.dictionary import LEAST_SHIFT_S
+from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop.significance import MANY_DRIVES
+from xosc_lateral.drivers.loop.timeline import Coarse, join_drives
+from xosc_lateral.files.drives import drives_of_table
 
 Values = np.ndarray
 

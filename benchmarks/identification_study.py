@@ -24,9 +24,9 @@ from benchmarks.identification_cases import PROTOCOL, SETS, cases, planted_drive
 from benchmarks.identification_oracle import coarse_of, oracle, oracle_between
 from benchmarks.identification_tables import calibration, summary, table
 from benchmarks.outcome_lines import append_outcome, read_outcomes
-from xosc_lateral.identification.identify import VETOED, identify
-from xosc_lateral.identification.selection import ERROR_BUDGET, TERMS
-from xosc_lateral.identification.timeline import Coarse, coarse_mean
+from xosc_lateral.drivers.loop.identify import VETOED, identify
+from xosc_lateral.drivers.loop.selection import ERROR_BUDGET, TERMS
+from xosc_lateral.drivers.loop.timeline import Coarse, coarse_mean
 
 
 def run(case: dict[str, Any], protocol: dict[str, Any], seconds: float) -> dict[str, Any]:

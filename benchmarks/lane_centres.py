@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.markers import show
-from xosc_lateral.formats.importers import dlr_ht, lanes_from_tracks
-from xosc_lateral.formats.importers.cuts import KEPT
-from xosc_lateral.formats.importers.road_from_tracks import fit_reference_line
+from xosc_lateral.workflows.recordings import lanes_from_tracks
+from xosc_lateral.workflows.recordings.cuts import KEPT
+from xosc_lateral.workflows.recordings.importers import dlr_ht
+from xosc_lateral.world.road.road_from_tracks import fit_reference_line
 
 FloatArray = NDArray[np.float64]
 SPACINGS = (25.0, 50.0, 100.0, 150.0, 250.0, 400.0)  # [m]

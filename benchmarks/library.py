@@ -22,23 +22,23 @@ from numpy.typing import NDArray
 
 from benchmarks.comparison import driver_distances
 from benchmarks.refined import NOTES, refine_population, refined_profile
-from xosc_lateral.driver.fitting import fit_population, fit_runs
-from xosc_lateral.driver.profile import POPULATION as ANSWERS
-from xosc_lateral.driver.profile import DriverProfile, Metadata, Provenance
-from xosc_lateral.driver.sensor.model import SensorModel
-from xosc_lateral.driver.sensor.runs import driver_runs
-from xosc_lateral.drives.cuts import all_runs
-from xosc_lateral.drives.drive import Drive, Run
-from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.evaluation.metrics import snippet_metrics, summary_of
-from xosc_lateral.evaluation.record import scores_to_dict
-from xosc_lateral.evaluation.scores import SNIPPET, score_profile
-from xosc_lateral.evaluation.snippets import snippets_of
-from xosc_lateral.formats.drives import read_drives
-from xosc_lateral.formats.hashes import parsed_hash
-from xosc_lateral.formats.importers.dlr_ht import LICENCE, import_dlr_ht
-from xosc_lateral.formats.importers.table import write_imported
+from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.drivers.drives.cuts import all_runs
+from xosc_lateral.drivers.drives.drive import Drive, Run
+from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.evaluation.metrics import snippet_metrics, summary_of
+from xosc_lateral.drivers.evaluation.record import scores_to_dict
+from xosc_lateral.drivers.evaluation.scores import SNIPPET, score_profile
+from xosc_lateral.drivers.evaluation.snippets import snippets_of
+from xosc_lateral.drivers.fitting.fitting import fit_population, fit_runs
+from xosc_lateral.drivers.fitting.sensor.runs import driver_runs
+from xosc_lateral.drivers.model.profile import POPULATION as ANSWERS
+from xosc_lateral.drivers.model.profile import DriverProfile, Metadata, Provenance
+from xosc_lateral.drivers.model.sensor.model import SensorModel
+from xosc_lateral.files.drives import read_drives
+from xosc_lateral.files.hashes import parsed_hash
+from xosc_lateral.workflows.recordings.importers.dlr_ht import LICENCE, import_dlr_ht
+from xosc_lateral.workflows.recordings.importers.table import write_imported
 
 FloatArray = NDArray[np.float64]
 

@@ -20,8 +20,8 @@ import numpy as np
 import pandas as pd
 
 import xosc_lateral as xl
-from tests.live.sumo_run import write_run
-from xosc_lateral.live.sumo import SumoTraffic, start
+from tests.workflows.live.sumo_run import write_run
+from xosc_lateral.workflows.live.sumo import SumoTraffic, start
 
 STEP, NEAR, WIDTH = 0.2, 0.3, {0.0: 1.8, 1.0: 2.4}
 ALIGNED = 0.45

@@ -21,8 +21,7 @@ from threadpoolctl import threadpool_limits
 from benchmarks import simulated as plants
 from benchmarks.identification_cases import PROTOCOL, cases, planted_drive
 from benchmarks.simulated import preview_driver
-from xosc_lateral.formats.drives import drives_of_table
-from xosc_lateral.identification import (
+from xosc_lateral.drivers.loop import (
     candidates,
     column_search,
     dictionary,
@@ -32,11 +31,12 @@ from xosc_lateral.identification import (
     regression,
     selection,
 )
-from xosc_lateral.identification.identify import usable_columns
-from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.terms import spread
-from xosc_lateral.identification.terms.spread import SlowSpreadTerm
-from xosc_lateral.identification.timeline import Coarse, join_drives
+from xosc_lateral.drivers.loop.identify import usable_columns
+from xosc_lateral.drivers.loop.search import Search
+from xosc_lateral.drivers.loop.terms import spread
+from xosc_lateral.drivers.loop.terms.spread import SlowSpreadTerm
+from xosc_lateral.drivers.loop.timeline import Coarse, join_drives
+from xosc_lateral.files.drives import drives_of_table
 
 Named = tuple[frozenset[str], ...]
 Drive = tuple[str, pd.DataFrame, Named, bool]

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import t
 
-from xosc_lateral.formats.drives import read_drives
-from xosc_lateral.identification.cross_validation import held_out_gain
-from xosc_lateral.identification.identify import identify
-from xosc_lateral.identification.model import Term
-from xosc_lateral.identification.regression import fit_model
-from xosc_lateral.identification.timeline import Coarse, join_drives
+from xosc_lateral.drivers.loop.cross_validation import held_out_gain
+from xosc_lateral.drivers.loop.identify import identify
+from xosc_lateral.drivers.loop.model import Term
+from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop.timeline import Coarse, join_drives
+from xosc_lateral.files.drives import read_drives
 
 
 def main() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from xosc_lateral.formats.atomic import write_atomically
+from xosc_lateral.files.atomic import write_atomically
 
 
 def write_between_markers(path: Path, text: str, marker: str) -> None:

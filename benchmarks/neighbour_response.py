@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.markers import show
-from xosc_lateral.driver.answers import NEIGHBOURS
-from xosc_lateral.driver.effects import Acts, Proximity
-from xosc_lateral.drives.cuts import all_runs
-from xosc_lateral.drives.drive import Run
-from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.formats.drives import read_drives
+from xosc_lateral.drivers.drives.cuts import all_runs
+from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.fitting.answers import NEIGHBOURS
+from xosc_lateral.drivers.model.effects import Acts, Proximity
+from xosc_lateral.files.drives import read_drives
 
 FloatArray = NDArray[np.float64]
 

@@ -15,12 +15,12 @@ from pathlib import Path
 
 from benchmarks.fair_null import slow_test
 from benchmarks.markers import show
-from xosc_lateral.drives.cuts import all_runs
-from xosc_lateral.drives.filters import filtered, low_pass_between
-from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.evaluation.filters import HIGHEST, below_half_hertz
-from xosc_lateral.evaluation.snippets import snippets_of
-from xosc_lateral.formats.drives import read_drives
+from xosc_lateral.drivers.drives.cuts import all_runs
+from xosc_lateral.drivers.drives.filters import filtered, low_pass_between
+from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.evaluation.filters import HIGHEST, below_half_hertz
+from xosc_lateral.drivers.evaluation.snippets import snippets_of
+from xosc_lateral.files.drives import read_drives
 
 LENGTHS = (10.0, 30.0, 60.0)
 """Of snippets. [s]"""

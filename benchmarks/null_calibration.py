@@ -20,11 +20,11 @@ from benchmarks.identification_cases import PROTOCOL
 from benchmarks.identification_drives import long_drive, smoothed_tracks
 from benchmarks.identification_oracle import coarse_of
 from benchmarks.outcome_lines import append_outcome, read_outcomes
-from xosc_lateral.identification import dictionary
-from xosc_lateral.identification.identify import usable_columns
-from xosc_lateral.identification.regression import fit_model
-from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.selection import ERROR_BUDGET, STAGES
+from xosc_lateral.drivers.loop import dictionary
+from xosc_lateral.drivers.loop.identify import usable_columns
+from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop.search import Search
+from xosc_lateral.drivers.loop.selection import ERROR_BUDGET, STAGES
 
 FIRST_SEED = 310_000
 """Of drives that serve for nothing else; those from 300,000 on were what the null was mended with."""

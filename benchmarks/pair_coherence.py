@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from benchmarks.dlr_stretches import Recording
 from benchmarks.markers import show
-from xosc_lateral.formats.importers.dlr_ht import STEP
+from xosc_lateral.workflows.recordings.importers.dlr_ht import STEP
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

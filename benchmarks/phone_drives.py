@@ -28,21 +28,21 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from benchmarks.markers import show
-from xosc_lateral.driver.drivability import drivable, strain
-from xosc_lateral.driver.fitting import fit_population, fit_profile
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.sampling import sample_offsets
-from xosc_lateral.driver.sensor import likelihood
-from xosc_lateral.driver.sensor.runs import driver_runs
-from xosc_lateral.drives import markings
-from xosc_lateral.drives.cleaning import RUN
-from xosc_lateral.drives.cuts import cut_runs
-from xosc_lateral.drives.drive import Drive, Run
-from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.evaluation.profile_comparison import compare
-from xosc_lateral.formats.drives import drives_of_table
-from xosc_lateral.identification.close import close_loop
-from xosc_lateral.segment import Segment
+from xosc_lateral.base.segment import Segment
+from xosc_lateral.drivers.drives import markings
+from xosc_lateral.drivers.drives.cleaning import RUN
+from xosc_lateral.drivers.drives.cuts import cut_runs
+from xosc_lateral.drivers.drives.drive import Drive, Run
+from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.evaluation.profile_comparison import compare
+from xosc_lateral.drivers.fitting.fitting import fit_population, fit_profile
+from xosc_lateral.drivers.fitting.sensor import likelihood
+from xosc_lateral.drivers.fitting.sensor.runs import driver_runs
+from xosc_lateral.drivers.loop.close import close_loop
+from xosc_lateral.drivers.model.drivability import drivable, strain
+from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.drivers.model.sampling import sample_offsets
+from xosc_lateral.files.drives import drives_of_table
 
 FloatArray = NDArray[np.float64]
 

@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 
 from benchmarks.fair_measure import halves
 from benchmarks.markers import show
-from xosc_lateral.driver.fitting import fit_profile
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.drives.cuts import all_runs
-from xosc_lateral.drives.drive import Run
-from xosc_lateral.drives.periodogram import Detrend, periodograms
-from xosc_lateral.evaluation.snippets import sample_runs
-from xosc_lateral.formats.drives import read_drives
+from xosc_lateral.drivers.drives.cuts import all_runs
+from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.drives.periodogram import Detrend, periodograms
+from xosc_lateral.drivers.evaluation.snippets import sample_runs
+from xosc_lateral.drivers.fitting.fitting import fit_profile
+from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.files.drives import read_drives
 
 FloatArray = NDArray[np.float64]
 SECONDS = 30.0

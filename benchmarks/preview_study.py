@@ -15,13 +15,13 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from benchmarks.simulated import preview_driver
-from xosc_lateral.drives.drive import Drive
-from xosc_lateral.formats.drives import drives_of_table
-from xosc_lateral.identification.close import LoopResult, close_loop
-from xosc_lateral.identification.identify import usable_columns
-from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.selection import ERROR_BUDGET, Accepted, select
-from xosc_lateral.identification.timeline import Coarse, join_drives
+from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.loop.close import LoopResult, close_loop
+from xosc_lateral.drivers.loop.identify import usable_columns
+from xosc_lateral.drivers.loop.search import Search
+from xosc_lateral.drivers.loop.selection import ERROR_BUDGET, Accepted, select
+from xosc_lateral.drivers.loop.timeline import Coarse, join_drives
+from xosc_lateral.files.drives import drives_of_table
 
 BENDS = {"curvature", "crossfall", "speed"}
 """By which what bends do may be named: crossfall goes along with curvature, and speed changes how the car turns."""

@@ -24,11 +24,16 @@ from numpy.typing import NDArray
 
 import xosc_lateral as xl
 from benchmarks import agreement
-from xosc_lateral.formats.importers import dlr_ht
-from xosc_lateral.formats.recordings import RecordedTraffic, read_recording
-from xosc_lateral.motion.nominal import Activity, NominalMotion
-from xosc_lateral.pipeline.load import play_scenario
-from xosc_lateral.pipeline.reconstruct import Reconstructed, ReconstructSettings, drivers_table, reconstruct_recording
+from xosc_lateral.workflows.conversion.load import play_scenario
+from xosc_lateral.workflows.recordings.importers import dlr_ht
+from xosc_lateral.workflows.recordings.reconstruct import (
+    Reconstructed,
+    ReconstructSettings,
+    drivers_table,
+    reconstruct_recording,
+)
+from xosc_lateral.workflows.recordings.recordings import RecordedTraffic, read_recording
+from xosc_lateral.world.motion.nominal import Activity, NominalMotion
 
 FloatArray = NDArray[np.float64]
 

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from msgspec.structs import replace
 
 from benchmarks.rounding import rounded_effect, rounded_number
-from xosc_lateral.driver.fitting import fit_profile
-from xosc_lateral.driver.models.base import ModelKind
-from xosc_lateral.driver.profile import DriverProfile, Provenance
-from xosc_lateral.drives.drive import Drive
-from xosc_lateral.identification.close import LoopResult, close_loop
+from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.fitting.fitting import fit_profile
+from xosc_lateral.drivers.loop.close import LoopResult, close_loop
+from xosc_lateral.drivers.model.core.base import ModelKind
+from xosc_lateral.drivers.model.profile import DriverProfile, Provenance
 
 NAME = "motorway-refined"
 NOTES = (

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.markers import show
-from xosc_lateral.driver.models.autoregressive.fit import fit_autoregressive
-from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
-from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.formats.profiles import find_profile, read_profile
+from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.fitting.models.autoregressive.fit import fit_autoregressive
+from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
+from xosc_lateral.files.profiles import find_profile, read_profile
 
 FloatArray = NDArray[np.float64]
 KINDS = {"300 runs of a minute": (300, 60.0), "40 runs of ten minutes": (40, 600.0)}

@@ -8,8 +8,8 @@ from typing import Any, TypeVar
 import msgspec
 import numpy as np
 
-from xosc_lateral.digits import significant
-from xosc_lateral.driver.effects.base import Effect
+from xosc_lateral.base.digits import significant
+from xosc_lateral.drivers.model.effects.base import Effect
 
 E = TypeVar("E", bound=Effect)
 

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 
 from benchmarks.markers import show
 from benchmarks.sensor_split import CALM, GUSTS, RATIOS, ROUNDED, SEEDS, STEP, drives_of, errors, in_runs
-from xosc_lateral.drives.cuts import cut_runs
-from xosc_lateral.drives.drive import Drive
-from xosc_lateral.drives.periodogram import Detrend, periodograms
+from xosc_lateral.drivers.drives.cuts import cut_runs
+from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.drives.periodogram import Detrend, periodograms
 
 FloatArray = NDArray[np.float64]
 

@@ -23,14 +23,14 @@ from scipy.signal import butter, lfilter, sosfilt, sosfiltfilt
 
 from benchmarks.markers import show
 from examples.driver_simulator.simulator import simulate_drive
-from xosc_lateral.driver.fitting import fit_runs
-from xosc_lateral.driver.sensor.separation import separate
-from xosc_lateral.drives.cuts import cut_runs
-from xosc_lateral.drives.drive import Drive, Run
-from xosc_lateral.drives.resampling import resample
-from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.evaluation.snippets import sample_runs
-from xosc_lateral.formats.drives import read_drives
+from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.drivers.drives.cuts import cut_runs
+from xosc_lateral.drivers.drives.drive import Drive, Run
+from xosc_lateral.drivers.drives.resampling import resample
+from xosc_lateral.drivers.evaluation.snippets import sample_runs
+from xosc_lateral.drivers.fitting.fitting import fit_runs
+from xosc_lateral.drivers.fitting.sensor.separation import separate
+from xosc_lateral.files.drives import read_drives
 
 SEEDS = {"design": (100, 101), "validation": (110, 111), "test": (120, 121), "report": (130, 131)}
 RATIOS = (0.3, 1.0, 3.0)

@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from xosc_lateral.driver.models.two_level.fit import fit_two_level
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.sampling import sample_offsets
-from xosc_lateral.driver.stream import OffsetStream
-from xosc_lateral.formats.profiles import read_profile
-from xosc_lateral.segment import Segment
+from xosc_lateral.base.segment import Segment
+from xosc_lateral.drivers.fitting.models.two_level.fit import fit_two_level
+from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.drivers.model.sampling import sample_offsets
+from xosc_lateral.drivers.model.stream import OffsetStream
+from xosc_lateral.files.profiles import read_profile
 
 MODEL_STEP = 0.2
 
@@ -69,7 +69,7 @@ def main() -> None:
 
 
 def made_profile() -> DriverProfile:
-    from xosc_lateral.driver.effects import Acts, Drift, Linear, Nearness, Regimes
+    from xosc_lateral.drivers.model.effects import Acts, Drift, Linear, Nearness, Regimes
 
     rng = np.random.default_rng(5)
     run = np.convolve(rng.normal(size=20_000), np.ones(25) / 60.0, mode="same")

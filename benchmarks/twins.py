@@ -26,22 +26,22 @@ from benchmarks.markers import show
 from benchmarks.r157.study.encounters import Target
 from benchmarks.r157.study.verdicts import GAPS, MODELS, limits, verdicts_of
 from benchmarks.reconstruction import WINDOW, write
-from xosc_lateral.drives.drive import Run
-from xosc_lateral.enrich.consequences import Gap, gaps_of
-from xosc_lateral.enrich.enrich import enrich
-from xosc_lateral.enrich.result import Enriched
-from xosc_lateral.evaluation.filters import below_half_hertz
-from xosc_lateral.evaluation.snippets import Snippets, snippets_of
-from xosc_lateral.formats.profiles import read_profile
-from xosc_lateral.formats.recordings import read_recording
-from xosc_lateral.motion.nominal import Activity
-from xosc_lateral.pipeline.load import Played, play_scenario
-from xosc_lateral.pipeline.reconstruct import Reconstructed, ReconstructSettings, reconstruct_recording
-from xosc_lateral.reconstruction.drivers import STEP, in_lane_offsets
-from xosc_lateral.reconstruction.encounters import Encounter
-from xosc_lateral.reconstruction.plan import VehiclePlan
-from xosc_lateral.report.reconstruction import recorded_path
-from xosc_lateral.road.network import RoadNetwork
+from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.evaluation.filters import below_half_hertz
+from xosc_lateral.drivers.evaluation.snippets import Snippets, snippets_of
+from xosc_lateral.files.profiles import read_profile
+from xosc_lateral.workflows.conversion.consequences import Gap, gaps_of
+from xosc_lateral.workflows.conversion.enrich import enrich
+from xosc_lateral.workflows.conversion.load import Played, play_scenario
+from xosc_lateral.workflows.conversion.result import Enriched
+from xosc_lateral.workflows.recordings.drivers import STEP, in_lane_offsets
+from xosc_lateral.workflows.recordings.encounters import Encounter
+from xosc_lateral.workflows.recordings.page import recorded_path
+from xosc_lateral.workflows.recordings.plan import VehiclePlan
+from xosc_lateral.workflows.recordings.reconstruct import Reconstructed, ReconstructSettings, reconstruct_recording
+from xosc_lateral.workflows.recordings.recordings import read_recording
+from xosc_lateral.world.motion.nominal import Activity
+from xosc_lateral.world.road.network import RoadNetwork
 
 FloatArray = NDArray[np.float64]
 

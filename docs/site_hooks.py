@@ -48,7 +48,7 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
 
 def limits() -> str:
     """Every limit of input files, as the code has it."""
-    from xosc_lateral.limits import limits_table
+    from xosc_lateral.base.limits import limits_table
 
     intro = "Beyond one of these, one line says so. Only `--job-timeout` and `--job-memory` can be changed."
     return f"# Limits of input files\n\n{intro}\n\n{limits_table()}\n"

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 import xosc_lateral as xl
-from xosc_lateral.driver.effects import Acts, Linear
+from xosc_lateral.drivers.model.effects import Acts, Linear
 
 RADIUS = 700.0  # of the bends [m]
 TO_THE_INSIDE = 0.3  # in such a bend [m]

@@ -7,12 +7,12 @@ from functools import lru_cache
 import numpy as np
 
 from examples.driver_simulator.simulator import simulate_drive
-from xosc_lateral.driver.effects import ColumnEffect, Effect, EffectTerms, HiddenEffect, any_effect
-from xosc_lateral.driver.effects.base import step_of, terms_of
-from xosc_lateral.driver.fitting import fit_profile
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.records import read_as
-from xosc_lateral.drives.drive import Drive
+from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.fitting.fitting import fit_profile
+from xosc_lateral.drivers.model.effects import ColumnEffect, Effect, EffectTerms, HiddenEffect, any_effect
+from xosc_lateral.drivers.model.effects.base import step_of, terms_of
+from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.drivers.model.records import read_as
 
 
 def effect_from_dict(values: dict[str, object]) -> Effect:

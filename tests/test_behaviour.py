@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import xosc_lateral as xl
-from xosc_lateral.version import BEHAVIOUR
+from xosc_lateral.base.version import BEHAVIOUR
 
 GOLDEN = Path(__file__).parent / "data" / "behaviour.json"
 

@@ -10,11 +10,11 @@ from types import ModuleType
 
 import pytest
 
-import xosc_lateral.plugins as discovery
-from xosc_lateral.driver import effects
-from xosc_lateral.driver.effects import ColumnEffect, Effect, HiddenEffect
-from xosc_lateral.identification.selection import TERMS
-from xosc_lateral.plugins import defined_in
+import xosc_lateral.base.plugins as discovery
+from xosc_lateral.base.plugins import defined_in
+from xosc_lateral.drivers.loop.selection import TERMS
+from xosc_lateral.drivers.model import effects
+from xosc_lateral.drivers.model.effects import ColumnEffect, Effect, HiddenEffect
 
 NAME = "made_for_discovery"
 

@@ -12,7 +12,7 @@ import pytest
 EXAMPLES = sorted((Path(__file__).resolve().parents[1] / "examples").glob("*.py"))
 NOTEBOOK = EXAMPLES[0].parent / "tour.ipynb"
 
-PROMISED = ("xosc_lateral", "xosc_lateral.driver.effects")
+PROMISED = ("xosc_lateral", "xosc_lateral.drivers.model.effects")
 """Modules that docs/api.md and docs/plugins.md name."""
 
 

@@ -1,4 +1,4 @@
-"""The layout of CONTRIBUTING holds: imports point to lower layers only."""
+"""The layout of CONTRIBUTING holds: imports point to lower ranks only."""
 
 from __future__ import annotations
 
@@ -9,38 +9,8 @@ import pytest
 
 PACKAGE = Path(__file__).resolve().parents[1] / "xosc_lateral"
 
-LAYERS = {
-    "arrays": 0,
-    "errors": 0,
-    "version": 0,
-    "plugins": 0,
-    "lazy": 0,
-    "shipped": 0,
-    "segment": 0,
-    "limits": 0,
-    "jit": 0,
-    "rows": 0,
-    "normal": 0,
-    "digits": 0,
-    "road": 1,
-    "scenario": 1,
-    "motion": 2,
-    "drives": 2,
-    "driver": 3,
-    "playback": 3,
-    "enrich": 4,
-    "evaluation": 4,
-    "identification": 5,
-    "reconstruction": 5,
-    "formats": 6,
-    "templates": 6,
-    "live": 7,
-    "report": 8,
-    "pipeline": 9,
-    "api": 10,
-    "cli": 11,
-}
-"""Layer of each part; parts of one layer don't know each other."""
+RANKS = {"base": 0, "world": 1, "drivers": 1, "files": 2, "workflows": 3, "cli": 4}
+"""Rank of each top folder; those of one rank do not know each other."""
 
 
 def imports_of(path: Path) -> set[str]:
@@ -61,19 +31,19 @@ def imports_of(path: Path) -> set[str]:
 
 
 @pytest.mark.parametrize("part", [path.name for path in sorted(PACKAGE.iterdir()) if (path / "__init__.py").exists()])
-def test_imports_point_to_lower_layers(part: str) -> None:
+def test_imports_point_to_lower_ranks(part: str) -> None:
     wrong = {
         f"{path.relative_to(PACKAGE)} imports {name}"
         for path in (PACKAGE / part).rglob("*.py")
         for name in imports_of(path)
-        if name != part and LAYERS[name] >= LAYERS[part]
+        if name != part and RANKS[name] >= RANKS[part]
     }
     assert not wrong
 
 
-def test_every_part_has_its_layer() -> None:
+def test_every_part_has_its_rank() -> None:
     parts = {path.stem for path in PACKAGE.iterdir() if path.suffix == ".py" or (path / "__init__.py").exists()}
-    assert parts - {"__init__", "__main__", "resources"} == set(LAYERS)
+    assert parts - {"__init__", "__main__", "resources"} == set(RANKS)
 
 
 # ---- no circles between modules --------------------------------------------------------------------------------------

@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from xosc_lateral.limits import CONTEXT_RANGES, FILE_SIZE, limits_table
-from xosc_lateral.segment import CONTEXT_UNITS
+from xosc_lateral.base.limits import CONTEXT_RANGES, FILE_SIZE, limits_table
+from xosc_lateral.base.segment import CONTEXT_UNITS
 
 
 def test_the_table_has_every_limit_and_context() -> None:

@@ -13,7 +13,7 @@ from benchmarks.made.actions import ACTIONS
 from benchmarks.made.conditions import CONDITIONS
 from benchmarks.made.roads import ROADS
 from benchmarks.made.scenario import LAST, made
-from xosc_lateral.pipeline.load import play_scenario
+from xosc_lateral.workflows.conversion.load import play_scenario
 
 SCHEMA = Path(__file__).parent / "data" / "xsd" / "OpenSCENARIO-1.3.0.xsd"
 

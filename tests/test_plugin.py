@@ -19,7 +19,7 @@ import sys
 import numpy as np
 import pandas as pd
 import xosc_lateral as xl
-from xosc_lateral.driver.effects import Acts
+from xosc_lateral.drivers.model.effects import Acts
 from xosc_lateral_acme.ripple import Ripple
 
 table = pd.read_csv(sys.argv[1])

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import xosc_lateral as xl
-from xosc_lateral import rows
+from xosc_lateral.base import rows
+from xosc_lateral.base.rows import true_slices
+from xosc_lateral.base.segment import Segment
 from xosc_lateral.cli import main
-from xosc_lateral.enrich import enrich
-from xosc_lateral.rows import true_slices
-from xosc_lateral.segment import Segment
+from xosc_lateral.workflows.conversion import enrich
 
 
 @pytest.mark.parametrize(

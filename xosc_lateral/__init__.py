@@ -5,52 +5,52 @@ Everything listed in `__all__` is promised (`docs/api.md`) and loaded when it is
 
 from __future__ import annotations
 
-from xosc_lateral.version import __version__
+from xosc_lateral.base.version import __version__
 
 TYPE_CHECKING = False  # importing `typing` for it would take longer than all the rest
 
 _HOME = {
-    "convert": "api.convert",
-    "convert_many": "api.batch",
-    "reconstruct": "api.reconstruct",
-    "verify": "api.verify",
-    "reproduce": "api.verify",
-    "play": "api.play",
-    "segments": "api.play",
-    "fit": "api.fit",
-    "sample": "api.sample",
-    "evaluate": "api.evaluate",
-    "close_loop": "api.loop",
-    "read_drives": "api.fit",
-    "import_drives": "api.importing",
-    "read_profile": "api.profiles",
-    "write_profile": "api.profiles",
-    "list_profiles": "api.profiles",
-    "compare_profiles": "api.profiles",
-    "list_templates": "api.templates",
-    "write_template": "api.templates",
-    "live_esmini": "api.live",
-    "live_sumo": "api.live",
-    "Traffic": "live.traffic",
-    "Moment": "live.traffic",
-    "EsminiTraffic": "live.esmini",
-    "SumoTraffic": "live.sumo",
-    "export_fmu": "live.fmu",
-    "LiveRun": "api.live",
-    "OffsetStream": "driver.stream",
-    "DriverProfile": "driver.profile",
-    "Drive": "drives.drive",
-    "Conversion": "api.convert",
-    "Reconstruction": "api.reconstruct",
-    "ConvertSettings": "pipeline.settings",
-    "BatchResult": "api.batch",
-    "Verification": "api.verify",
-    "Playback": "api.play",
-    "Segments": "api.play",
-    "Offsets": "api.sample",
-    "Evaluation": "api.evaluate",
-    "ClosedLoop": "api.loop",
-    "ImportedDrives": "api.importing",
+    "convert": "workflows.conversion.call",
+    "convert_many": "workflows.batch.call",
+    "reconstruct": "workflows.recordings.call",
+    "verify": "workflows.batch.verify_call",
+    "reproduce": "workflows.batch.verify_call",
+    "play": "workflows.playing.call",
+    "segments": "workflows.playing.call",
+    "fit": "workflows.profiles.fit",
+    "sample": "workflows.profiles.sample",
+    "evaluate": "workflows.profiles.evaluate",
+    "close_loop": "workflows.profiles.loop",
+    "read_drives": "workflows.profiles.fit",
+    "import_drives": "workflows.recordings.importing",
+    "read_profile": "workflows.profiles.profiles",
+    "write_profile": "workflows.profiles.profiles",
+    "list_profiles": "workflows.profiles.profiles",
+    "compare_profiles": "workflows.profiles.profiles",
+    "list_templates": "workflows.playing.templates",
+    "write_template": "workflows.playing.templates",
+    "live_esmini": "workflows.live.call",
+    "live_sumo": "workflows.live.call",
+    "Traffic": "workflows.live.traffic",
+    "Moment": "workflows.live.traffic",
+    "EsminiTraffic": "workflows.live.esmini",
+    "SumoTraffic": "workflows.live.sumo",
+    "export_fmu": "workflows.live.fmu",
+    "LiveRun": "workflows.live.call",
+    "OffsetStream": "drivers.model.stream",
+    "DriverProfile": "drivers.model.profile",
+    "Drive": "drivers.drives.drive",
+    "Conversion": "workflows.conversion.call",
+    "Reconstruction": "workflows.recordings.call",
+    "ConvertSettings": "workflows.conversion.settings",
+    "BatchResult": "workflows.batch.call",
+    "Verification": "workflows.batch.verify_call",
+    "Playback": "workflows.playing.call",
+    "Segments": "workflows.playing.call",
+    "Offsets": "workflows.profiles.sample",
+    "Evaluation": "workflows.profiles.evaluate",
+    "ClosedLoop": "workflows.profiles.loop",
+    "ImportedDrives": "workflows.recordings.importing",
     "XoscLateralError": "errors",
     "FormatError": "errors",
     "PlaybackError": "errors",
@@ -112,23 +112,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
 ]
 
 if TYPE_CHECKING:
-    from xosc_lateral.api.batch import BatchResult, convert_many
-    from xosc_lateral.api.convert import Conversion, convert
-    from xosc_lateral.api.evaluate import Evaluation, evaluate
-    from xosc_lateral.api.fit import fit, read_drives
-    from xosc_lateral.api.importing import ImportedDrives, import_drives
-    from xosc_lateral.api.live import LiveRun, live_esmini, live_sumo
-    from xosc_lateral.api.loop import ClosedLoop, close_loop
-    from xosc_lateral.api.play import Playback, Segments, play, segments
-    from xosc_lateral.api.profiles import compare_profiles, list_profiles, read_profile, write_profile
-    from xosc_lateral.api.reconstruct import Reconstruction, reconstruct
-    from xosc_lateral.api.sample import Offsets, sample
-    from xosc_lateral.api.templates import list_templates, write_template
-    from xosc_lateral.api.verify import Verification, reproduce, verify
-    from xosc_lateral.driver.profile import DriverProfile
-    from xosc_lateral.driver.stream import OffsetStream
-    from xosc_lateral.drives.drive import Drive
-    from xosc_lateral.errors import (
+    from xosc_lateral.base.errors import (
         DriverProfileError,
         FormatError,
         NotEnoughDataError,
@@ -136,11 +120,27 @@ if TYPE_CHECKING:
         SimulationError,
         XoscLateralError,
     )
-    from xosc_lateral.live.esmini import EsminiTraffic
-    from xosc_lateral.live.fmu import export_fmu
-    from xosc_lateral.live.sumo import SumoTraffic
-    from xosc_lateral.live.traffic import Moment, Traffic
-    from xosc_lateral.pipeline.settings import ConvertSettings
+    from xosc_lateral.drivers.drives.drive import Drive
+    from xosc_lateral.drivers.model.profile import DriverProfile
+    from xosc_lateral.drivers.model.stream import OffsetStream
+    from xosc_lateral.workflows.batch.call import BatchResult, convert_many
+    from xosc_lateral.workflows.batch.verify_call import Verification, reproduce, verify
+    from xosc_lateral.workflows.conversion.call import Conversion, convert
+    from xosc_lateral.workflows.conversion.settings import ConvertSettings
+    from xosc_lateral.workflows.live.call import LiveRun, live_esmini, live_sumo
+    from xosc_lateral.workflows.live.esmini import EsminiTraffic
+    from xosc_lateral.workflows.live.fmu import export_fmu
+    from xosc_lateral.workflows.live.sumo import SumoTraffic
+    from xosc_lateral.workflows.live.traffic import Moment, Traffic
+    from xosc_lateral.workflows.playing.call import Playback, Segments, play, segments
+    from xosc_lateral.workflows.playing.templates import list_templates, write_template
+    from xosc_lateral.workflows.profiles.evaluate import Evaluation, evaluate
+    from xosc_lateral.workflows.profiles.fit import fit, read_drives
+    from xosc_lateral.workflows.profiles.loop import ClosedLoop, close_loop
+    from xosc_lateral.workflows.profiles.profiles import compare_profiles, list_profiles, read_profile, write_profile
+    from xosc_lateral.workflows.profiles.sample import Offsets, sample
+    from xosc_lateral.workflows.recordings.call import Reconstruction, reconstruct
+    from xosc_lateral.workflows.recordings.importing import ImportedDrives, import_drives
 
 
 def __getattr__(name: str) -> object:

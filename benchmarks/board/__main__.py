@@ -17,12 +17,12 @@ from benchmarks.board.benchmark import benchmark_realism
 from benchmarks.board.models.catalogue import MODELS
 from benchmarks.board.record import board_record
 from benchmarks.board.text import board_markdown, board_text
-from xosc_lateral.drives.cuts import all_runs
-from xosc_lateral.formats.atomic import write_atomically
-from xosc_lateral.formats.drives import read_drives
-from xosc_lateral.formats.hashes import parsed_hashes
-from xosc_lateral.formats.mapping import parse_map
-from xosc_lateral.formats.profiles import read_profile
+from xosc_lateral.drivers.drives.cuts import all_runs
+from xosc_lateral.files.atomic import write_atomically
+from xosc_lateral.files.drives import read_drives
+from xosc_lateral.files.hashes import parsed_hashes
+from xosc_lateral.files.mapping import parse_map
+from xosc_lateral.files.profiles import read_profile
 
 
 def main(argv: Sequence[str] | None = None) -> None:

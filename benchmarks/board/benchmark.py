@@ -17,9 +17,9 @@ from benchmarks.board.result import Board
 from benchmarks.board.sampled_half import SampledHalf, sample_half
 from benchmarks.board.summary import make_board
 from benchmarks.board.units import halves, units_of
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.drives.drive import Run
-from xosc_lateral.errors import NotEnoughDataError, XoscLateralError
+from xosc_lateral.base.errors import NotEnoughDataError, XoscLateralError
+from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.model.profile import DriverProfile
 
 FloatArray = NDArray[np.float64]
 Progress = Callable[[float, str], None]

@@ -9,8 +9,8 @@ from typing import ClassVar
 from benchmarks.board.models.base import LateralModel
 from benchmarks.board.models.catalogue import MODELS
 from benchmarks.board.models.profiles import ProfileModel
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.drives.drive import Run
+from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.model.profile import DriverProfile
 
 AS_IT_IS = "not fitted on these drives' halves: sampled as the file has it"
 

@@ -8,17 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.drives.drive import Run
-from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.evaluation.measures import (
+from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.evaluation.measures import (
     FLOOR_DRAWS,
     Features,
     features_of,
     real_against_real,
     windows_with_the_same_start,
 )
-from xosc_lateral.evaluation.parts import LENGTHS, SnippetCondition
-from xosc_lateral.evaluation.snippets import Snippets, snippets_of
+from xosc_lateral.drivers.evaluation.parts import LENGTHS, SnippetCondition
+from xosc_lateral.drivers.evaluation.snippets import Snippets, snippets_of
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -11,10 +11,10 @@ from benchmarks.board.half import Half, floors, pooled
 from benchmarks.board.ranked import SHORT, ranked_numbers
 from benchmarks.board.result import ModelScore
 from benchmarks.board.sampled_half import SampledHalf
-from xosc_lateral.evaluation.classifier import classifier_two_sample_test
-from xosc_lateral.evaluation.distances import PROPER, proper_scores
-from xosc_lateral.evaluation.measures import UNITS, differences, named_distances
-from xosc_lateral.evaluation.parts import SnippetCondition
+from xosc_lateral.drivers.evaluation.classifier import classifier_two_sample_test
+from xosc_lateral.drivers.evaluation.distances import PROPER, proper_scores
+from xosc_lateral.drivers.evaluation.measures import UNITS, differences, named_distances
+from xosc_lateral.drivers.evaluation.parts import SnippetCondition
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from xosc_lateral.evaluation.measures import FAMILIES
-from xosc_lateral.evaluation.parts import SnippetCondition
+from xosc_lateral.drivers.evaluation.measures import FAMILIES
+from xosc_lateral.drivers.evaluation.parts import SnippetCondition
 
 SHORT, LONG = 10.0, 30.0
 """Windows that count: the paper's, and long enough to see drivers come back. [s]"""

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from benchmarks.board.half import DRAWS, Half, floors
 from benchmarks.board.ranked import SHORT, ranked_numbers
 from benchmarks.board.sampled_half import SampledHalf
-from xosc_lateral.evaluation.measures import differences
-from xosc_lateral.evaluation.parts import SnippetCondition
+from xosc_lateral.drivers.evaluation.measures import differences
+from xosc_lateral.drivers.evaluation.parts import SnippetCondition
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from xosc_lateral.digits import significant
-from xosc_lateral.version import __version__
+from xosc_lateral.base.digits import significant
+from xosc_lateral.base.version import __version__
 
 if TYPE_CHECKING:
     from benchmarks.board.result import Board, ModelScore, Row
-    from xosc_lateral.evaluation.realism import VarianceParts
+    from xosc_lateral.drivers.evaluation.realism import VarianceParts
 from benchmarks.board.text import method_text
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.evaluation.realism import VarianceParts
+from xosc_lateral.drivers.evaluation.realism import VarianceParts
 
 FloatArray = NDArray[np.float64]
 

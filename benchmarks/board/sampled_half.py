@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from benchmarks.board.half import DRAWS, ENSEMBLE, Half
 from benchmarks.board.models.base import LateralModel
-from xosc_lateral.driver.sampled_offsets import segment_of
-from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.evaluation.measures import Features, features_of
-from xosc_lateral.evaluation.parts import SnippetCondition
-from xosc_lateral.evaluation.realism import VarianceParts, variance_parts
-from xosc_lateral.evaluation.snippets import Snippets
+from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.evaluation.measures import Features, features_of
+from xosc_lateral.drivers.evaluation.parts import SnippetCondition
+from xosc_lateral.drivers.evaluation.realism import VarianceParts, variance_parts
+from xosc_lateral.drivers.evaluation.snippets import Snippets
+from xosc_lateral.drivers.model.sampled_offsets import segment_of
 
 FloatArray = NDArray[np.float64]
 

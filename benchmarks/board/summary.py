@@ -13,11 +13,11 @@ from benchmarks.board.ranked import SHORT, ranked_numbers
 from benchmarks.board.ranking import QUANTILES, agreeing, differing_pairs, kendall_tau, rank_groups, ranks
 from benchmarks.board.result import Board, ModelScore, Row
 from benchmarks.board.sampled_half import SampledHalf
-from xosc_lateral.drives.drive import Run
-from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.evaluation.measures import LAGS, autocorrelation_of, resolved_bands
-from xosc_lateral.evaluation.realism import variance_parts
-from xosc_lateral.evaluation.snippets import BLOCK, FEW_DRIVES
+from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.evaluation.measures import LAGS, autocorrelation_of, resolved_bands
+from xosc_lateral.drivers.evaluation.realism import variance_parts
+from xosc_lateral.drivers.evaluation.snippets import BLOCK, FEW_DRIVES
 
 FloatArray = NDArray[np.float64]
 Parts = Sequence[tuple[Half, Mapping[str, SampledHalf]]]

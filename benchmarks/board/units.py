@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.drives.drive import Run
-from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.evaluation.snippets import BLOCK, FEW_DRIVES
+from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.evaluation.snippets import BLOCK, FEW_DRIVES
 
 FloatArray = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from benchmarks.made.conditions import CONDITIONS
 from benchmarks.made.roads import ROADS
 from benchmarks.made.stage import Stage
 from benchmarks.made.xml import element
-from xosc_lateral.formats.opendrive import read_opendrive
+from xosc_lateral.files.opendrive import read_opendrive
 
 LAST = 14.0
 """When a scenario ends. [s]"""

@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.made.roads import Map
 from benchmarks.made.xml import element
-from xosc_lateral.road import RoadNetwork
+from xosc_lateral.world.road import RoadNetwork
 
 T = TypeVar("T")
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.evaluation.lane_keeping import WANDERING_ZONE
+from xosc_lateral.drivers.evaluation.lane_keeping import WANDERING_ZONE
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

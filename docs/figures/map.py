@@ -7,24 +7,15 @@ from collections import defaultdict
 from html import escape
 from pathlib import Path
 
-from tests.test_layers import LAYERS, PACKAGE, imports_of
+from tests.test_layers import PACKAGE, RANKS, imports_of
 
 TEXT = {
-    "road": "lanes and geometry",
-    "scenario": "storyboard model",
-    "motion": "nominal motion, segments",
-    "drives": "measured drives, runs",
-    "playback": "the player",
-    "driver": "models, effects, sampling",
-    "enrich": "offsets for played segments",
-    "evaluation": "metrics, classifiers",
-    "identification": "what a profile lacks",
-    "formats": "every file in and out",
-    "templates": "builders of scenarios",
-    "report": "text, JSON, HTML",
-    "pipeline": "from files to files, batches",
-    "api": "a verb per file",
-    "cli": "argument names",
+    "base": "errors, limits, arrays, rows",
+    "world": "plays a scenario",
+    "drivers": "know how people drive",
+    "files": "read and write",
+    "workflows": "a room for every verb",
+    "cli": "names the verbs",
 }
 WIDTH, HEIGHT, GAP_X, GAP_Y, MARGIN = 190, 44, 24, 40, 16  # [px]
 FONT = "font-family='sans-serif'"
@@ -57,14 +48,14 @@ def drawing(graph: dict[str, set[str]]) -> str:
     """The map as SVG."""
     rows: dict[int, list[str]] = defaultdict(list)
     for name in sorted(graph):
-        rows[LAYERS[name]].append(name)
-    layers = sorted(rows)
+        rows[RANKS[name]].append(name)
+    ranks = sorted(rows)
     across = max(len(row) for row in rows.values())
-    total = 2 * MARGIN + across * WIDTH + (across - 1) * GAP_X, 2 * MARGIN + len(layers) * (HEIGHT + GAP_Y) - GAP_Y
+    total = 2 * MARGIN + across * WIDTH + (across - 1) * GAP_X, 2 * MARGIN + len(ranks) * (HEIGHT + GAP_Y) - GAP_Y
     corner = {}
-    for k, layer in enumerate(layers):
-        left = (total[0] - len(rows[layer]) * WIDTH - (len(rows[layer]) - 1) * GAP_X) / 2
-        for i, name in enumerate(rows[layer]):
+    for k, rank in enumerate(ranks):
+        left = (total[0] - len(rows[rank]) * WIDTH - (len(rows[rank]) - 1) * GAP_X) / 2
+        for i, name in enumerate(rows[rank]):
             corner[name] = left + i * (WIDTH + GAP_X), MARGIN + k * (HEIGHT + GAP_Y)
     lines = [
         f"<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 {total[0]:g} {total[1]:g}' width='{total[0]:g}'>",

@@ -7,9 +7,9 @@ import sys
 import numpy as np
 from scipy.fft import dct
 
-from xosc_lateral.identification.low_frequencies import SHORTEST_S, SPREAD_ORDERS
-from xosc_lateral.report.chart import MUTED, ORANGE
-from xosc_lateral.report.figure import Figure
+from xosc_lateral.drivers.loop.low_frequencies import SHORTEST_S, SPREAD_ORDERS
+from xosc_lateral.files.pages.chart import MUTED, ORANGE
+from xosc_lateral.files.pages.figure import Figure
 
 SECONDS = 3000
 

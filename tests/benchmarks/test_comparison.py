@@ -7,9 +7,9 @@ import pytest
 from msgspec.structs import replace
 
 from benchmarks.comparison import compare_profiles
-from tests.driver.models.made_models import POPULATION, STEADY
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.evaluation.metrics import free_runs, summarise
+from tests.drivers.model.core.made_models import POPULATION, STEADY
+from xosc_lateral.drivers.evaluation.metrics import free_runs, summarise
+from xosc_lateral.drivers.model.profile import DriverProfile
 
 
 def test_a_sine_is_summed_up_by_its_closed_forms() -> None:

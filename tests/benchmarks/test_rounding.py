@@ -6,9 +6,9 @@ import numpy as np
 
 from benchmarks.refined import rounded_profile
 from benchmarks.rounding import rounded_effect
-from xosc_lateral.driver.effects import Acts, Levels, Product, Saturating
-from xosc_lateral.driver.effects.product import Factor
-from xosc_lateral.formats.profiles import read_profile
+from xosc_lateral.drivers.model.effects import Acts, Levels, Product, Saturating
+from xosc_lateral.drivers.model.effects.product import Factor
+from xosc_lateral.files.profiles import read_profile
 
 
 def test_numbers_keep_six_digits_wherever_they_stand() -> None:

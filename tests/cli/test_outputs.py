@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from xosc_lateral.base.shipped import shipped_folder
 from xosc_lateral.cli import main
-from xosc_lateral.shipped import shipped_folder
 
 
 @pytest.fixture

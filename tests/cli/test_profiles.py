@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import xosc_lateral as xl
-from xosc_lateral.api.profiles import add_profile
 from xosc_lateral.cli import main
+from xosc_lateral.workflows.profiles.profiles import add_profile
 
 BASES = ("motorway", "motorway-vehicle-1", "motorway-vehicle-2", "motorway-vehicle-3")
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from xosc_lateral.errors import XoscLateralError
-from xosc_lateral.limits import DISTANCES, context_range
+from xosc_lateral.base.errors import XoscLateralError
+from xosc_lateral.base.limits import DISTANCES, context_range
 
 
 class NonsenseError(AssertionError):

@@ -18,27 +18,27 @@ import pandas as pd
 from examples.driver_simulator import simulate_drive
 from tests.faults.reader import NonsenseError, Reader, sane
 from tests.faults.recordings import RECORDINGS
-from tests.formats.made_scenario import ROAD, declarations, entity, parameter, scenario_text, vehicle
+from tests.files.made_scenario import ROAD, declarations, entity, parameter, scenario_text, vehicle
 from tests.profiles import simulated_profile
-from xosc_lateral.api.result import given_drives, given_profile, naming
-from xosc_lateral.driver.sampled_offsets import sample_free
-from xosc_lateral.driver.stream import OffsetStream
-from xosc_lateral.drives.cuts import all_runs
-from xosc_lateral.errors import DriverProfileError
-from xosc_lateral.formats.context_table import read_context
-from xosc_lateral.formats.openscenario.distribution import read_distribution
-from xosc_lateral.formats.openscenario.provenance import facts_in
-from xosc_lateral.formats.openscenario.read import read_scenario
-from xosc_lateral.formats.profiles import list_profiles, profile_bytes, read_profile
-from xosc_lateral.limits import context_range
-from xosc_lateral.pipeline.convert import convert_scenario
-from xosc_lateral.pipeline.jobs import plan_batch
-from xosc_lateral.pipeline.journal import Journal
-from xosc_lateral.pipeline.manifest import MANIFEST, ManifestRow, read_manifest, write_manifest
-from xosc_lateral.pipeline.settings import ConvertSettings, OutputMode
-from xosc_lateral.pipeline.verify import reproduce, verify
-from xosc_lateral.report.cards import card_text
-from xosc_lateral.report.conversion import facts
+from xosc_lateral.base.errors import DriverProfileError
+from xosc_lateral.base.limits import context_range
+from xosc_lateral.drivers.drives.cuts import all_runs
+from xosc_lateral.drivers.model.sampled_offsets import sample_free
+from xosc_lateral.drivers.model.stream import OffsetStream
+from xosc_lateral.files.context_table import read_context
+from xosc_lateral.files.openscenario.distribution import read_distribution
+from xosc_lateral.files.openscenario.provenance import facts_in
+from xosc_lateral.files.openscenario.read import read_scenario
+from xosc_lateral.files.profiles import list_profiles, profile_bytes, read_profile
+from xosc_lateral.workflows.batch.jobs import plan_batch
+from xosc_lateral.workflows.batch.journal import Journal
+from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, read_manifest, write_manifest
+from xosc_lateral.workflows.batch.verify import reproduce, verify
+from xosc_lateral.workflows.conversion.convert import convert_scenario
+from xosc_lateral.workflows.conversion.settings import ConvertSettings, OutputMode
+from xosc_lateral.workflows.conversion.text import facts
+from xosc_lateral.workflows.profiles.cards import card_text
+from xosc_lateral.workflows.result import given_drives, given_profile, naming
 
 
 # ---- tables ----------------------------------------------------------------------------------------------------------
@@ -217,7 +217,7 @@ def _configuration_files(folder: Path) -> Iterable[Path]:
 
 
 def _use_configuration(path: Path) -> None:
-    with mock.patch("xosc_lateral.formats.configuration.configuration_file", return_value=path):
+    with mock.patch("xosc_lateral.files.configuration.configuration_file", return_value=path):
         ConvertSettings.of()
         list_profiles()
 

@@ -13,18 +13,18 @@ import pytest
 
 from examples.driver_simulator import simulate_drive
 from tests.faults.readers import manifest_row
-from tests.formats.made_scenario import scenario_text, write_scenario
+from tests.files.made_scenario import scenario_text, write_scenario
 from tests.profiles import simulated_profile
 from xosc_lateral import write_template
+from xosc_lateral.base.shipped import shipped_folder
 from xosc_lateral.cli import main
-from xosc_lateral.driver.stream import OffsetStream
-from xosc_lateral.formats.profiles import profile_bytes
-from xosc_lateral.pipeline.batch import STATE
-from xosc_lateral.pipeline.journal import Journal, folder_lock
-from xosc_lateral.pipeline.manifest import MANIFEST, read_manifest
-from xosc_lateral.scenario.distribution import Deterministic, ValueSets
-from xosc_lateral.scenario.place import Place
-from xosc_lateral.shipped import shipped_folder
+from xosc_lateral.drivers.model.stream import OffsetStream
+from xosc_lateral.files.profiles import profile_bytes
+from xosc_lateral.workflows.batch.batch import STATE
+from xosc_lateral.workflows.batch.journal import Journal, folder_lock
+from xosc_lateral.workflows.batch.manifest import MANIFEST, read_manifest
+from xosc_lateral.world.scenario.distribution import Deterministic, ValueSets
+from xosc_lateral.world.scenario.place import Place
 
 
 @pytest.fixture

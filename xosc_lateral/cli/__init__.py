@@ -13,9 +13,9 @@ from typing import Annotated, Any, cast
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from xosc_lateral.errors import FormatError, XoscLateralError
-from xosc_lateral.formats.source import guarding_inputs
-from xosc_lateral.version import __version__
+from xosc_lateral.base.errors import FormatError, XoscLateralError
+from xosc_lateral.base.version import __version__
+from xosc_lateral.files.source import guarding_inputs
 
 VERBS = {
     "convert": "Make scenarios lifelike: one, several, a folder.",

@@ -62,9 +62,9 @@ def close_loop(
 ) -> None:
     """Find what a profile fails to reproduce, trace it to effects, add them, and score the result on held-out data."""
     from xosc_lateral import close_loop, write_profile
-    from xosc_lateral.api.loop import ClosedLoop
-    from xosc_lateral.api.profiles import PROFILE_SUFFIXES
-    from xosc_lateral.formats.output_paths import claim, output_file, output_folder
+    from xosc_lateral.files.output_paths import claim, output_file, output_folder
+    from xosc_lateral.workflows.profiles.loop import ClosedLoop
+    from xosc_lateral.workflows.profiles.profiles import PROFILE_SUFFIXES
 
     written = output_file(output, "refined.json", PROFILE_SUFFIXES)
     claim([written, *ClosedLoop.report_files(output_folder(report))], tables, force=said.force)

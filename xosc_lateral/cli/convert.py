@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand
 
+from xosc_lateral.base.limits import JOB_MEMORY, JOB_TIMEOUT
 from xosc_lateral.cli import VERBS, group_of_verbs
 from xosc_lateral.cli.words import Osi, Written, command, say_json, warn, write_stdout
-from xosc_lateral.formats.openscenario.write.target import Player
-from xosc_lateral.limits import JOB_MEMORY, JOB_TIMEOUT
-from xosc_lateral.pipeline.settings import ConvertSettings, OutputMode
+from xosc_lateral.files.openscenario.write.target import Player
+from xosc_lateral.workflows.conversion.settings import ConvertSettings, OutputMode
 
 if TYPE_CHECKING:
-    from xosc_lateral.api.convert import Conversion
+    from xosc_lateral.workflows.conversion.call import Conversion
 
 app = group_of_verbs()
 
@@ -86,7 +86,7 @@ def convert(
     said: Written,
 ) -> None:
     """Give every car in a scenario the lateral movement of a real driver."""
-    from xosc_lateral.pipeline.request import is_single
+    from xosc_lateral.workflows.batch.request import is_single
 
     _refuse_together(settings)
     options = {**settings, "force": said.force}
@@ -130,11 +130,11 @@ def _convert_one(
     osi: str | None,
     said: Written,
 ) -> None:
-    from xosc_lateral.api.convert import convert, lifelike, osi_files, output_scenario
-    from xosc_lateral.api.result import PAGE_SUFFIXES
-    from xosc_lateral.formats.osi.extra import osi_wanted
-    from xosc_lateral.formats.output_paths import STDOUT, claim, output_file
-    from xosc_lateral.pipeline.convert import numbered
+    from xosc_lateral.files.osi.extra import osi_wanted
+    from xosc_lateral.files.output_paths import STDOUT, claim, output_file
+    from xosc_lateral.workflows.conversion.call import convert, lifelike, osi_files, output_scenario
+    from xosc_lateral.workflows.conversion.convert import numbered
+    from xosc_lateral.workflows.result import PAGE_SUFFIXES
 
     if output == STDOUT:
         if variants > 1 or said.as_json or osi is not None:
@@ -170,7 +170,7 @@ def _convert_one(
 
 def _convert_batch(inputs: Sequence[str], output: str | None, options: Mapping[str, Any], said: Written) -> None:
     """Convert all of them; exit code 1 if any failed, or with `--strict` if anything is to be said of any."""
-    from xosc_lateral.api.batch import convert_many
+    from xosc_lateral.workflows.batch.call import convert_many
 
     if output is None or output == "-":
         raise typer.BadParameter("several scenarios need a folder for their outputs: -o FOLDER", param_hint="-o")

@@ -26,8 +26,8 @@ def evaluate(
 ) -> None:
     """Score a profile on measured drives, beside other real drivers: metrics, spectrum, classifiers."""
     from xosc_lateral import evaluate
-    from xosc_lateral.api.result import PAGE_SUFFIXES
-    from xosc_lateral.formats.output_paths import claim, output_file
+    from xosc_lateral.files.output_paths import claim, output_file
+    from xosc_lateral.workflows.result import PAGE_SUFFIXES
 
     page = None if report is None else output_file(report, "evaluation.html", PAGE_SUFFIXES)
     claim([page], tables, force=said.force)

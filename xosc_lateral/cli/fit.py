@@ -13,8 +13,8 @@ app = group_of_verbs()
 
 
 def _known_model(text: str) -> str:
-    from xosc_lateral.driver.models.registry import model_named
-    from xosc_lateral.errors import DriverProfileError
+    from xosc_lateral.base.errors import DriverProfileError
+    from xosc_lateral.drivers.model.core.registry import model_named
 
     try:
         return model_named(text).model.kind
@@ -62,10 +62,10 @@ def fit(
 ) -> None:
     """Fit a driver profile to measured drives."""
     from xosc_lateral import fit, write_profile
-    from xosc_lateral.api.profiles import PROFILE_SUFFIXES
-    from xosc_lateral.driver.drivability import fit_warnings
-    from xosc_lateral.formats.output_paths import STDOUT, claim, output_file
-    from xosc_lateral.formats.profiles import describe_profile, profile_bytes, profile_record
+    from xosc_lateral.drivers.model.drivability import fit_warnings
+    from xosc_lateral.files.output_paths import STDOUT, claim, output_file
+    from xosc_lateral.files.profiles import describe_profile, profile_bytes, profile_record
+    from xosc_lateral.workflows.profiles.profiles import PROFILE_SUFFIXES
 
     usual = name or tables[0].name.split(".")[0]
     written = None if output == STDOUT else output_file(output, f"{usual}.json", PROFILE_SUFFIXES)

@@ -24,8 +24,8 @@ Source = Annotated[Path, typer.Argument(metavar="SOURCE", help="File or folder t
 def _import(name: str, sources: Sequence[Path], output: str, said: Written, /, **options: Any) -> None:
     """Read recordings of a format, write them as a table, and say what they are."""
     from xosc_lateral import import_drives
-    from xosc_lateral.formats.output_paths import STDOUT, claim, output_file
-    from xosc_lateral.formats.output_tables import harmless_frame, output_suffixes
+    from xosc_lateral.files.output_paths import STDOUT, claim, output_file
+    from xosc_lateral.files.output_tables import harmless_frame, output_suffixes
 
     if output != STDOUT:
         files = [source for source in sources if source.is_file()]
@@ -52,14 +52,14 @@ class _WithPlugins(TyperGroup):
 
 
 def _formats() -> list[str]:
-    from xosc_lateral.formats.importers import GROUP, IMPORTERS
-    from xosc_lateral.plugins import plugin_names
+    from xosc_lateral.base.plugins import plugin_names
+    from xosc_lateral.workflows.recordings.importers import GROUP, IMPORTERS
 
     return [*IMPORTERS, *plugin_names(GROUP)]
 
 
 def _plain_command(name: str) -> Any:
-    from xosc_lateral.formats.importers import find_importer
+    from xosc_lateral.workflows.recordings.importers import find_importer
 
     one = typer.Typer(context_settings=LOOKS["context_settings"], rich_markup_mode=None)
 
@@ -94,7 +94,7 @@ def dlr_ht(
     said: Written,
 ) -> None:
     """DLR Highway Traffic: the wheel of tasi 0.15.4, the data set's zip, or its trajectory CSV."""
-    from xosc_lateral.formats.importers.cuts import CutSettings
+    from xosc_lateral.workflows.recordings.cuts import CutSettings
 
     _import("dlr-ht", [source], output, said, settings=CutSettings(max_gap=max_gap), keep_cut=keep_cut)
 
@@ -138,7 +138,7 @@ def mf4(
     said: Written,
 ) -> None:
     """ASAM MDF bus logs (extra `mdf`). They need a channel map, since signal names differ from car to car."""
-    from xosc_lateral.formats.importers.mf4 import channels_wanted
+    from xosc_lateral.workflows.recordings.importers.mf4 import channels_wanted
 
     if not channels and mapping_file is None:
         raise typer.BadParameter(channels_wanted(sources[0]), param_hint="--map")
@@ -239,9 +239,9 @@ def table(
     if not propose:
         _import("table", sources, output, said, mapping=Mapped(columns, mapping_file).mapping())
         return
-    from xosc_lateral.formats.atomic import write_atomically
-    from xosc_lateral.formats.importers.foreign_table import propose_mapping
-    from xosc_lateral.formats.output_paths import STDOUT, claim, output_file
+    from xosc_lateral.files.atomic import write_atomically
+    from xosc_lateral.files.output_paths import STDOUT, claim, output_file
+    from xosc_lateral.workflows.recordings.importers.foreign_table import propose_mapping
 
     text = propose_mapping(sources)
     if output == STDOUT:

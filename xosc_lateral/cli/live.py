@@ -14,7 +14,7 @@ from xosc_lateral.cli import VERBS, group_of_verbs
 from xosc_lateral.cli.words import Force, Library, Osi, Profile, Quiet, Seed, Written, command, pairs, warn
 
 if TYPE_CHECKING:
-    from xosc_lateral.api.live import LiveRun
+    from xosc_lateral.workflows.live.call import LiveRun
 
 app = group_of_verbs()
 group = typer.Typer(help="Drivers in a simulation that runs.", no_args_is_help=True)
@@ -48,9 +48,9 @@ class Driven:
 
     def run(self, live: Callable[..., LiveRun], source: Path, said: Written, **settings: Any) -> None:
         """Run a simulation of that source, and write and say what came out."""
-        from xosc_lateral.formats.osi.extra import SUFFIXES, osi_wanted
-        from xosc_lateral.formats.output_paths import claim, output_file
-        from xosc_lateral.formats.tables import TABLE_SUFFIXES
+        from xosc_lateral.files.osi.extra import SUFFIXES, osi_wanted
+        from xosc_lateral.files.output_paths import claim, output_file
+        from xosc_lateral.files.tables import TABLE_SUFFIXES
 
         table = None if self.states is None else output_file(self.states, "states.csv", TABLE_SUFFIXES)
         trace = None if self.osi is None else output_file(self.osi, f"{source.stem}_gt.mcap", SUFFIXES)
@@ -84,7 +84,7 @@ def esmini(
     said: Written,
 ) -> None:
     """Play a scenario in esmini with drivers in its vehicles; its triggers and maneuvers stay as written."""
-    from xosc_lateral.api.live import live_esmini
+    from xosc_lateral.workflows.live.call import live_esmini
 
     settings = {"duration": duration, "step": step, "window": window}
     driven.run(live_esmini, scenario, said, library=player_library, **settings)
@@ -111,7 +111,7 @@ def sumo(
     said: Written,
 ) -> None:
     """Run a SUMO simulation with the sublane model and drivers in its vehicles; lane changes stay SUMO's."""
-    from xosc_lateral.api.live import live_sumo
+    from xosc_lateral.workflows.live.call import live_sumo
 
     options = () if fcd_output is None else ("--fcd-output", str(fcd_output), "--fcd-output.attributes", FCD)
     settings = {"duration": duration, "lateral_resolution": lateral_resolution, "options": options}
@@ -132,8 +132,8 @@ def stdio(
     import os
     import sys
 
-    from xosc_lateral.api.result import given_profile
-    from xosc_lateral.live.stdio import Pipe
+    from xosc_lateral.workflows.live.stdio import Pipe
+    from xosc_lateral.workflows.result import given_profile
 
     pipe = Pipe(given_profile(profile, library or ()), seed=seed, road=road)
     try:
@@ -163,9 +163,9 @@ def fmu(
     quiet: Quiet = False,
 ) -> None:
     """Write a driver as a functional mock-up unit for co-simulation; it needs this package where it is simulated."""
-    from xosc_lateral.api.result import given_profile
-    from xosc_lateral.formats.output_paths import claim
-    from xosc_lateral.live.fmu import export_fmu
+    from xosc_lateral.files.output_paths import claim
+    from xosc_lateral.workflows.live.fmu import export_fmu
+    from xosc_lateral.workflows.result import given_profile
 
     claim([output], force=force)
     chosen = given_profile(profile, library or ())

@@ -58,9 +58,9 @@ def play(
 ) -> None:
     """Play a scenario without offsets and write every entity's position at every step."""
     from xosc_lateral import play
-    from xosc_lateral.formats.osi.extra import SUFFIXES, osi_wanted
-    from xosc_lateral.formats.output_paths import STDOUT, claim, output_file
-    from xosc_lateral.formats.output_tables import output_suffixes
+    from xosc_lateral.files.osi.extra import SUFFIXES, osi_wanted
+    from xosc_lateral.files.output_paths import STDOUT, claim, output_file
+    from xosc_lateral.files.output_tables import output_suffixes
 
     if output is None and osi is None:
         raise typer.BadParameter("a table or, with --osi, a trace has to be named", param_hint="--output")

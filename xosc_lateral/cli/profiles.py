@@ -56,10 +56,10 @@ def show(
 ) -> None:
     """A profile's card: what it does, where it comes from, how realistic it is."""
     from xosc_lateral import read_profile
-    from xosc_lateral.api.profiles import write_card
-    from xosc_lateral.enrich.seen import NEIGHBOURS
-    from xosc_lateral.pipeline.proof import proofs_of
-    from xosc_lateral.report.cards import card, card_text
+    from xosc_lateral.workflows.conversion.proof import proofs_of
+    from xosc_lateral.workflows.conversion.seen import NEIGHBOURS
+    from xosc_lateral.workflows.profiles.cards import card, card_text
+    from xosc_lateral.workflows.profiles.profiles import write_card
 
     profile = read_profile(name, library or ())
     if report is not None:
@@ -127,9 +127,9 @@ def derive(
     The base gives what is not stated. Of a population the typical driver is taken.
     """
     from xosc_lateral import write_profile
-    from xosc_lateral.api.profiles import derive_profile
-    from xosc_lateral.formats.output_paths import STDOUT, output_file
-    from xosc_lateral.formats.profiles import profile_bytes
+    from xosc_lateral.files.output_paths import STDOUT, output_file
+    from xosc_lateral.files.profiles import profile_bytes
+    from xosc_lateral.workflows.profiles.profiles import derive_profile
 
     figures: dict[str, float | str | None] = {"sdlp": sdlp, "mean": mean, "restlessness": restlessness}
     figures |= {"memory": memory, "near_line": near_line, "speed": speed, "vehicle": vehicle}
@@ -155,7 +155,7 @@ def add(
     said: Written,
 ) -> None:
     """Put a profile into a library's folder, with tags and metadata."""
-    from xosc_lateral.api.profiles import add_profile
+    from xosc_lateral.workflows.profiles.profiles import add_profile
 
     path = add_profile(name, library, name=called, tags=tags or (), metadata=pairs(fields, "--set"), force=said.force)
     said.say_written(path, id=path.stem)
@@ -172,8 +172,8 @@ def tag(
     said: Said,
 ) -> None:
     """Change tags and metadata of a profile of your own, in its file."""
-    from xosc_lateral.api.profiles import tag_profile
-    from xosc_lateral.formats.profiles import facts_of
+    from xosc_lateral.files.profiles import facts_of
+    from xosc_lateral.workflows.profiles.profiles import tag_profile
 
     metadata = pairs(fields, "--set")
     changed = tag_profile(name, library or (), add=tags or (), remove=remove or (), metadata=metadata)
@@ -195,8 +195,8 @@ def export(
 ) -> None:
     """Write profiles to a file or a folder, to pass them on."""
     from xosc_lateral import read_profile, write_profile
-    from xosc_lateral.formats.output_paths import STDOUT, is_folder
-    from xosc_lateral.formats.profiles import profile_bytes
+    from xosc_lateral.files.output_paths import STDOUT, is_folder
+    from xosc_lateral.files.profiles import profile_bytes
 
     chosen = [read_profile(name, library or ()) for name in names]
     if len(chosen) > 1 and not is_folder(output):

@@ -46,8 +46,8 @@ def sample(
 ) -> None:
     """Sample offsets from a profile (one of --like, --context, --duration)."""
     from xosc_lateral import sample
-    from xosc_lateral.formats.output_paths import STDOUT, claim, output_file
-    from xosc_lateral.formats.output_tables import output_suffixes
+    from xosc_lateral.files.output_paths import STDOUT, claim, output_file
+    from xosc_lateral.files.output_tables import output_suffixes
 
     if sum(choice is not None for choice in (like, context, duration)) != 1:
         raise typer.BadParameter("give one of --like, --context, --duration")

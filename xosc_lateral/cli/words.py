@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args
 import typer
 
 if TYPE_CHECKING:
-    from xosc_lateral.api.result import Result
-    from xosc_lateral.formats.mapping import TableMapping
-    from xosc_lateral.pipeline.options import Option
+    from xosc_lateral.files.mapping import TableMapping
+    from xosc_lateral.workflows.conversion.options import Option
+    from xosc_lateral.workflows.result import Result
 
 Verb = TypeVar("Verb", bound=Callable[..., Any])
 
@@ -145,7 +145,7 @@ class Mapped:
 
     def mapping(self) -> TableMapping:
         """What `--mapping` and `--map` say; a column of the latter stands in for one of the former."""
-        from xosc_lateral.formats.mapping import as_mapping
+        from xosc_lateral.files.mapping import as_mapping
 
         return as_mapping(self.mapping_file).with_words(pairs(self.columns, "--map"))
 
@@ -195,7 +195,7 @@ def flags_of(name: str, option: Option) -> tuple[str, ...]:
 
 def _parameters(settings: type) -> list[Parameter]:
     """An option for each setting."""
-    from xosc_lateral.pipeline.options import settable
+    from xosc_lateral.workflows.conversion.options import settable
 
     found = []
     for item in settable(settings):
@@ -209,7 +209,7 @@ def _parameters(settings: type) -> list[Parameter]:
 
 def _read(settings: type, /, **said: Any) -> dict[str, Any]:
     """What was said of the settings; wrong usage, with the option's name, if it can't be."""
-    from xosc_lateral.pipeline.options import options_of
+    from xosc_lateral.workflows.conversion.options import options_of
 
     options = options_of(settings)
     given = {name: value for name, value in said.items() if value not in (None, [])}

@@ -8,8 +8,8 @@ from typing import ClassVar, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.drives.drive import Run
-from xosc_lateral.segment import Segment
+from xosc_lateral.base.segment import Segment
+from xosc_lateral.drivers.drives.drive import Run
 
 FloatArray = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.segment import Segment
+from xosc_lateral.base.segment import Segment
+from xosc_lateral.drivers.drives.resampling import STEP
 
 FloatArray = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from benchmarks.board.models.batch import SegmentBatch
 from benchmarks.board.models.calibration import Bounds, calibrate
 from benchmarks.board.models.ornstein_uhlenbeck import recursion
 from benchmarks.board.models.simulated import SimulatedModel, driver_means_of
-from xosc_lateral.drives.drive import Run
+from xosc_lateral.drivers.drives.drive import Run
 
 FloatArray = NDArray[np.float64]
 

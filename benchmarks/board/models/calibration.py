@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from benchmarks.board.models.base import LateralModel
 from benchmarks.board.models.calibration_targets import distance_to, targets_of
-from xosc_lateral.drives.drive import Run
+from xosc_lateral.drivers.drives.drive import Run
 
 FloatArray = NDArray[np.float64]
 M = TypeVar("M", bound=LateralModel)

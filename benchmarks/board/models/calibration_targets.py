@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from benchmarks.board.models.base import LateralModel
 from benchmarks.board.ranked import LONG, SHORT, ranked_numbers
-from xosc_lateral.drives.drive import Run
-from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.evaluation.measures import Features, differences, features_of
-from xosc_lateral.evaluation.parts import SnippetCondition
-from xosc_lateral.evaluation.snippets import Snippets, snippets_of
-from xosc_lateral.segment import Segment
+from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.base.segment import Segment
+from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.evaluation.measures import Features, differences, features_of
+from xosc_lateral.drivers.evaluation.parts import SnippetCondition
+from xosc_lateral.drivers.evaluation.snippets import Snippets, snippets_of
 
 FloatArray = NDArray[np.float64]
 

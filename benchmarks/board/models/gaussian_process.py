@@ -18,8 +18,8 @@ from benchmarks.board.models.batch import SegmentBatch
 from benchmarks.board.models.calibration import Bounds, calibrate
 from benchmarks.board.models.calibration_targets import distance_to, targets_of
 from benchmarks.board.models.simulated import SimulatedModel
-from xosc_lateral.drives.drive import Run
-from xosc_lateral.drives.resampling import STEP
+from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.drives.resampling import STEP
 
 FloatArray = NDArray[np.float64]
 

@@ -9,15 +9,15 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.fitting import fit_population, fit_runs
-from xosc_lateral.driver.models.base import ModelKind
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.sampling import sample_offsets
-from xosc_lateral.driver.seeds import child
-from xosc_lateral.driver.sensor.runs import driver_runs
-from xosc_lateral.drives.drive import Drive, Run
-from xosc_lateral.evaluation.snippets import sample_recorded, sensor_noise
-from xosc_lateral.segment import Segment
+from xosc_lateral.base.segment import Segment
+from xosc_lateral.drivers.drives.drive import Drive, Run
+from xosc_lateral.drivers.evaluation.snippets import sample_recorded, sensor_noise
+from xosc_lateral.drivers.fitting.fitting import fit_population, fit_runs
+from xosc_lateral.drivers.fitting.sensor.runs import driver_runs
+from xosc_lateral.drivers.model.core.base import ModelKind
+from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.drivers.model.sampling import sample_offsets
+from xosc_lateral.drivers.model.seeds import child
 
 FloatArray = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ class TwoLevel(ProfileModel):
 
     @classmethod
     def fit(cls, runs: Sequence[Run]) -> Self:
-        """See `xosc_lateral.driver.fitting.fit_runs`."""
+        """See `xosc_lateral.drivers.fitting.fitting.fit_runs`."""
         return cls(fit_runs(runs, name="two-level", model=ModelKind.TWO_LEVEL))
 
 
@@ -75,7 +75,7 @@ class TwoLevelRefined(ProfileModel):
     @classmethod
     def fit(cls, runs: Sequence[Run]) -> Self:
         """Fit the paper's model and close the loop on the same runs."""
-        from xosc_lateral.identification.close import close_loop
+        from xosc_lateral.drivers.loop.close import close_loop
 
         base = fit_runs(runs, name="two-level", model=ModelKind.TWO_LEVEL)
         return cls(close_loop(drives_of(runs), base, seed=0, name="two-level-refined").refined)

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.errors import XoscLateralError
+from xosc_lateral.base.errors import XoscLateralError
+from xosc_lateral.drivers.drives.resampling import STEP
 
 FloatArray = NDArray[np.float64]
 

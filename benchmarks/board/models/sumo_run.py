@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from benchmarks.board.models.lc_sigma import LcSigma
 from benchmarks.board.models.sumo_process import simulate_sumo
-from xosc_lateral.drives.drive import Run
-from xosc_lateral.segment import Segment
+from xosc_lateral.base.segment import Segment
+from xosc_lateral.drivers.drives.drive import Run
 
 FloatArray = NDArray[np.float64]
 

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 import xosc_lateral as xl
 from benchmarks.r157.cut_in import CRITERIA, Encounter, alarms, first_alarm
 from benchmarks.r157.study.encounters import Target
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.drives.cuts import all_runs
-from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.evaluation.snippets import sample_runs
+from xosc_lateral.drivers.drives.cuts import all_runs
+from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.evaluation.snippets import sample_runs
+from xosc_lateral.drivers.model.profile import DriverProfile
 
 FloatArray = NDArray[np.float64]
 

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.r157.cut_in import Encounter
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.enrich.enrich import enrich
-from xosc_lateral.motion.nominal import EntityMotion
-from xosc_lateral.motion.segments import cut_segments
-from xosc_lateral.pipeline.load import Played, play_scenario
+from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.workflows.conversion.enrich import enrich
+from xosc_lateral.workflows.conversion.load import Played, play_scenario
+from xosc_lateral.world.motion.nominal import EntityMotion
+from xosc_lateral.world.motion.segments import cut_segments
 
 FloatArray = NDArray[np.float64]
 

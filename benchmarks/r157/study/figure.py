@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.r157.study.verdicts import MODELS, Verdicts
-from xosc_lateral.report.chart import ENRICHED, NOMINAL
-from xosc_lateral.report.figure import Figure
+from xosc_lateral.files.pages.chart import ENRICHED, NOMINAL
+from xosc_lateral.files.pages.figure import Figure
 
 
 def verdict_figure(verdicts: Mapping[str, Verdicts], gaps: NDArray[np.float64]) -> Figure:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects import Acts, ColumnEffect
+from xosc_lateral.drivers.model.effects import Acts, ColumnEffect
 
 FloatArray = NDArray[np.float64]
 

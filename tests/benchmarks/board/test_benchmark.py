@@ -12,10 +12,10 @@ from benchmarks.board.result import Board
 from benchmarks.board.sampled_half import sample_half
 from benchmarks.board.units import halves, units_of
 from tests.benchmarks.models.made_runs import made_run, smooth_runs
-from xosc_lateral.drives.drive import Run
-from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.evaluation.measures import band_power, differences, features_of
-from xosc_lateral.segment import Segment
+from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.base.segment import Segment
+from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.evaluation.measures import band_power, differences, features_of
 
 QUICK = ["lane-centre", "constant", "gaussian-process"]
 

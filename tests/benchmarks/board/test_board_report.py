@@ -12,7 +12,7 @@ import pytest
 from benchmarks.board.record import board_record
 from benchmarks.board.result import Board, ModelScore, Row
 from benchmarks.board.text import board_markdown, board_text, headline, shown_columns
-from xosc_lateral.evaluation.realism import VarianceParts
+from xosc_lateral.drivers.evaluation.realism import VarianceParts
 
 PARTS = VarianceParts(0.04, 0.02, 0.01)
 

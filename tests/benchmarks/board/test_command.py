@@ -9,7 +9,7 @@ import pytest
 from benchmarks.board.__main__ import main
 from benchmarks.board.models import calibration
 from tests.benchmarks.models.made_runs import smooth_runs
-from xosc_lateral.errors import NotEnoughDataError
+from xosc_lateral.base.errors import NotEnoughDataError
 
 
 @pytest.fixture(scope="module")

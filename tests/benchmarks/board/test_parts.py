@@ -22,9 +22,9 @@ from benchmarks.board.sampled_half import SampledHalf, sample_half
 from benchmarks.board.units import halves, units_of
 from tests.benchmarks.models.made_runs import made_run, smooth_runs
 from tests.profiles import simulated_profile
-from xosc_lateral.drives.drive import Run
-from xosc_lateral.errors import NotEnoughDataError, XoscLateralError
-from xosc_lateral.evaluation.measures import LAGS, autocorrelation_of, resolved_bands
+from xosc_lateral.base.errors import NotEnoughDataError, XoscLateralError
+from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.evaluation.measures import LAGS, autocorrelation_of, resolved_bands
 
 RUNS = smooth_runs(24, 65.0)
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from xosc_lateral.driver.sampled_offsets import segment_of
-from xosc_lateral.drives.drive import Run
-from xosc_lateral.segment import Segment
+from xosc_lateral.base.segment import Segment
+from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.model.sampled_offsets import segment_of
 
 STEP = 0.2
 

@@ -24,7 +24,7 @@ from benchmarks.board.models.strip_based import StripBased
 from benchmarks.board.models.sumo_process import _read_tracks
 from benchmarks.board.models.sumo_run import NEAREST, SumoRun, _repeated
 from tests.benchmarks.models.made_runs import STEP, made_run, smooth_runs, straight
-from xosc_lateral.driver.sampled_offsets import segment_of
+from xosc_lateral.drivers.model.sampled_offsets import segment_of
 
 RNG_SEED = 31
 FIELD = PotentialField(strength=2.0, reach=0.4, friction=0.7, noise=0.3)

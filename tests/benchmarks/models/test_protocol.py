@@ -13,9 +13,9 @@ from benchmarks.board.models.calibration_targets import distance_to, targets_of
 from benchmarks.board.models.catalogue import MODELS
 from benchmarks.board.models.profiles import drives_of
 from tests.benchmarks.models.made_runs import smooth_runs
-from xosc_lateral.driver.sampled_offsets import cut_snippets, segment_of
-from xosc_lateral.drives.cuts import all_runs
-from xosc_lateral.errors import NotEnoughDataError
+from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.drivers.drives.cuts import all_runs
+from xosc_lateral.drivers.model.sampled_offsets import cut_snippets, segment_of
 
 ELSEWHERE = {"sumo", "two-level-refined"}  # a program of its own, a search that takes its time: tested apart
 WITHOUT_START = {"lane-centre"}

@@ -10,8 +10,8 @@ from benchmarks.simulated.assist import FLAG, OPENLKA_MAP, LaneKeepingAssist, op
 from benchmarks.simulated.camera_plants import ShakyCamera
 from examples.driver_simulator.motorway import STEP
 from examples.driver_simulator.plants import Context, Intent, SimulatedResponse, saturating, threshold
-from xosc_lateral.formats.drives import drives_of_table
-from xosc_lateral.formats.mapping import parse_map
+from xosc_lateral.files.drives import drives_of_table
+from xosc_lateral.files.mapping import parse_map
 
 N = round(2.0 * 3600.0 / STEP)
 

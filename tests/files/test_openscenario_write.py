@@ -1,0 +1,448 @@
+"""The writers: what is in the file, and that it plays as it was meant to."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from lxml import etree
+
+from tests.files.made_scenario import (
+    action,
+    declarations,
+    entity,
+    event,
+    made,
+    parameter,
+    private,
+    scenario_text,
+    speed_action,
+    story,
+    teleport,
+    time_condition,
+    write_scenario,
+)
+from xosc_lateral.base.errors import FormatError, PlaybackError
+from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.files.openscenario.provenance import provenance_of
+from xosc_lateral.files.openscenario.read import read_scenario
+from xosc_lateral.files.openscenario.write.draft import WrittenScenario
+from xosc_lateral.files.openscenario.write.lane_offset_scenario import write_lane_offset_scenario
+from xosc_lateral.files.openscenario.write.lateral_actions import lateral_actions
+from xosc_lateral.files.openscenario.write.trajectory_scenario import write_trajectory_scenario
+from xosc_lateral.world.motion.nominal import NominalMotion
+from xosc_lateral.world.motion.offset_chain import MOST_TURNING, TOLERANCE, OffsetChain, ramps
+from xosc_lateral.world.motion.trajectory import WorldTrajectory
+from xosc_lateral.world.player.player import play
+from xosc_lateral.world.scenario import Scenario
+from xosc_lateral.world.scenario.position import Polyline, WorldPosition
+from xosc_lateral.world.scenario.private_actions import FollowTrajectoryAction
+
+XSD = Path(__file__).parents[1] / "data" / "xsd"
+STEP = 0.02
+
+
+@pytest.fixture(scope="session")
+def schema() -> Callable[[int], etree.XMLSchema]:
+    """Schema of version 1.x by its minor number."""
+    files = {0: "1.0.0", 1: "1.1.1", 2: "1.2.0", 3: "1.3.0"}
+    loaded: dict[int, etree.XMLSchema] = {}
+
+    def get(minor: int) -> etree.XMLSchema:
+        if minor not in loaded:
+            loaded[minor] = etree.XMLSchema(etree.parse(str(XSD / f"OpenSCENARIO-{files[minor]}.xsd")))
+        return loaded[minor]
+
+    return get
+
+
+def played(scenario: Scenario, limit: float = 20.0) -> NominalMotion:
+    assert scenario.road_file is not None
+    return play(scenario, read_opendrive(scenario.road_file), step=STEP, time_limit=limit)
+
+
+def nominal(motion: NominalMotion) -> dict[str, WorldTrajectory]:
+    return {
+        e.name: WorldTrajectory(e.time, e.x, e.y, e.z, e.heading, e.pitch, e.roll, e.speed) for e in motion.entities
+    }
+
+
+def provenance(scenario: Scenario) -> dict[str, Any]:
+    files = [*scenario.input_files, *([scenario.road_file] if scenario.road_file else [])]
+    return {"seed": 3, "inputs": {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in files}}
+
+
+def converted(scenario: Scenario, output: Path, **overrides: Any) -> WrittenScenario:
+    motion = overrides.pop("motion", None) or played(scenario)
+    trajectories = overrides.pop("trajectories", None) or nominal(motion)
+    return write_trajectory_scenario(
+        scenario, motion, trajectories, output, provenance=provenance(scenario), summary="seed 3", **overrides
+    )
+
+
+def vertices(scenario: Scenario) -> list[np.ndarray]:
+    """Per trajectory: columns time, x, y, heading."""
+    found = []
+    for story_read in scenario.storyboard.stories:
+        for act in story_read.acts:
+            for group in act.maneuver_groups:
+                for item in (a for m in group.maneuvers for e in m.events for a in e.actions):
+                    if isinstance(item.content, FollowTrajectoryAction):
+                        assert isinstance(item.content.trajectory.shape, Polyline)
+                        rows = [(v.time, v.position) for v in item.content.trajectory.shape.vertices]
+                        found.append(
+                            np.array([(t, p.x, p.y, p.h) for t, p in rows if isinstance(p, WorldPosition)], dtype=float)
+                        )
+    return found
+
+
+LIGHT = (
+    "<PrivateAction><AppearanceAction><LightStateAction><LightType>"
+    '<VehicleLight vehicleLightType="brakeLights"/></LightType><LightState mode="on"/>'
+    "</LightStateAction></AppearanceAction></PrivateAction>"
+)
+VISIBLE = '<PrivateAction><VisibilityAction graphics="true" sensors="false" traffic="true"/></PrivateAction>'
+CUSTOM = '<UserDefinedAction><CustomCommandAction type="x">do it</CustomCommandAction></UserDefinedAction>'
+STOP_AND_GO = story(
+    event("stop", action("stop", speed_action("0")), time=2.01),
+    event("go", action("go", speed_action("12")), time=5.01),
+)
+
+
+@pytest.mark.parametrize("minor", [0, 1, 2, 3])
+def test_output_is_valid_against_the_schema_of_its_version(
+    tmp_path: Path, minor: int, schema: Callable[[int], etree.XMLSchema]
+) -> None:
+    scenario = read_scenario(write_scenario(tmp_path, scenario_text(minor=minor, stories=STOP_AND_GO)))
+    schema(minor).assertValid(etree.parse(str(scenario.path)))
+    converted(scenario, tmp_path / "out.xosc")
+    schema(minor).assertValid(etree.parse(str(tmp_path / "out.xosc")))
+    assert read_scenario(tmp_path / "out.xosc").header.version == (1, minor)
+
+
+@pytest.mark.parametrize("minor", [0, 3])
+def test_a_car_that_only_stands_gets_no_trajectory_and_a_valid_file(
+    tmp_path: Path, minor: int, schema: Callable[[int], etree.XMLSchema]
+) -> None:
+    standing = private("Ego", teleport(), speed_action("0"))
+    stories = story(event("light", action("custom", CUSTOM), time=99))
+    scenario = read_scenario(write_scenario(tmp_path, scenario_text(minor=minor, init=standing, stories=stories)))
+    converted(scenario, tmp_path / "out.xosc")
+    schema(minor).assertValid(etree.parse(str(tmp_path / "out.xosc")))
+    assert vertices(read_scenario(tmp_path / "out.xosc")) == []
+
+
+def test_played_output_is_where_the_input_was(tmp_path: Path) -> None:
+    scenario = made(tmp_path, stories=STOP_AND_GO)
+    before = played(scenario)
+    converted(scenario, tmp_path / "out.xosc", motion=before)
+    after = played(read_scenario(tmp_path / "out.xosc"))
+    assert after.end_time == pytest.approx(before.end_time, abs=STEP / 2)
+    error = np.hypot(after.entities[0].x - before.entities[0].x, after.entities[0].y - before.entities[0].y)
+    # 1 cm where it drives; one row more at the sudden stop, which this scenario makes from 30 m/s.
+    assert np.quantile(error, 0.99) < 0.01
+    assert error.max() < 0.05
+
+
+def test_vertices_are_apart_timed_and_end_at_the_stop(tmp_path: Path) -> None:
+    scenario = made(tmp_path, stories=STOP_AND_GO)
+    converted(scenario, tmp_path / "out.xosc")
+    paths = vertices(read_scenario(tmp_path / "out.xosc"))
+    assert len(paths) == 2
+    for path in paths:
+        assert np.hypot(np.diff(path[:, 1]), np.diff(path[:, 2])).min() >= 0.1
+        assert np.diff(path[:, 0]).min() > 0
+        assert np.isfinite(path).all()
+    assert paths[0][-1, 0] == pytest.approx(2.02, abs=STEP + 1e-9)
+    assert paths[1][0, 0] == pytest.approx(5.02, abs=STEP + 1e-9)
+    # Where it stopped, it moves off.
+    assert paths[1][0, 1:] == pytest.approx(paths[0][-1, 1:], abs=1e-4)
+
+
+def test_what_is_no_motion_happens_at_the_same_time_in_the_same_order(tmp_path: Path) -> None:
+    contents = [LIGHT, VISIBLE, CUSTOM, speed_action("31"), LIGHT]
+    stories = story(*(event(f"e{n}", action(f"a{n}", text), time=1.0 + n) for n, text in enumerate(contents)))
+    scenario = made(tmp_path, stories=stories, init=private("Ego", teleport(), speed_action(), LIGHT))
+    before = played(scenario)
+    converted(scenario, tmp_path / "out.xosc", motion=before)
+    after = played(read_scenario(tmp_path / "out.xosc"))
+
+    def happened(motion: NominalMotion) -> list[tuple[str, float]]:
+        kinds = ("LightStateAction", "VisibilityAction", "UserDefinedAction")
+        names = [(type(p.action.content).__name__, round(p.start, 6)) for p in motion.actions]
+        return [(name, start) for name, start in names if name in kinds]
+
+    assert len(happened(before)) == 5
+    assert happened(after) == happened(before)
+
+
+def test_kept_actions_get_local_parameters_filled_in_and_keep_global_ones(tmp_path: Path) -> None:
+    light = LIGHT.replace('mode="on"', 'mode="$Mode"').replace('"brakeLights"', '"$Which"')
+    scenario = made(
+        tmp_path,
+        parameters=declarations(parameter("Which", "brakeLights", "string")),
+        stories=story(
+            event("e", action("a", light)), maneuver_parameters=declarations(parameter("Mode", "flashing", "string"))
+        ),
+    )
+    converted(scenario, tmp_path / "out.xosc")
+    text = (tmp_path / "out.xosc").read_text()
+    assert 'mode="flashing"' in text
+    assert 'vehicleLightType="$Which"' in text
+
+
+def test_comments_catalog_locations_vendor_parts_and_date_survive(tmp_path: Path) -> None:
+    text = scenario_text(catalogs='<VehicleCatalog><Directory path="cars"/></VehicleCatalog>')
+    text = text.replace("<Properties/>", '<Properties><Property name="tint" value="7"/></Properties>')
+    text = text.replace("<Event ", "<!-- why it happens --><Event ")
+    scenario = read_scenario(write_scenario(tmp_path, text))
+    converted(scenario, tmp_path / "out.xosc")
+    out = (tmp_path / "out.xosc").read_text()
+    for kept in ("<!-- licence -->", "<!-- who drives -->", "<!-- why it happens -->", 'path="cars"', 'value="7"'):
+        assert kept in out
+    assert 'date="2024-01-01T00:00:00"' in out
+    assert 'author="tests"' in out
+
+
+def test_references_still_lead_there_from_another_folder(tmp_path: Path) -> None:
+    catalogs = '<VehicleCatalog><Directory path="cars"/></VehicleCatalog>'
+    scenario = made(tmp_path / "in", catalogs=catalogs)
+    output = tmp_path / "far" / "away" / "from" / "it" / "out.xosc"
+    output.parent.mkdir(parents=True)
+    converted(scenario, output)
+    again = read_scenario(output, allowed=[tmp_path / "in"])
+    assert again.road_file is not None
+    assert again.road_file.resolve() == (tmp_path / "in" / "road.xodr").resolve()
+    assert again.catalog_locations["VehicleCatalog"].resolve() == (tmp_path / "in" / "cars").resolve()
+    assert len(played(again).entities) == 1
+
+
+def test_same_input_same_bytes(tmp_path: Path) -> None:
+    scenario = made(tmp_path, stories=STOP_AND_GO)
+    first = converted(scenario, tmp_path / "a.xosc")
+    second = converted(read_scenario(scenario.path), tmp_path / "b.xosc")
+    assert (tmp_path / "a.xosc").read_bytes() == (tmp_path / "b.xosc").read_bytes()
+    assert first.sha256 == second.sha256 == hashlib.sha256((tmp_path / "a.xosc").read_bytes()).hexdigest()
+
+
+def test_provenance_is_inside_and_a_second_conversion_is_refused(tmp_path: Path) -> None:
+    scenario = made(tmp_path)
+    converted(scenario, tmp_path / "out.xosc")
+    root = etree.parse(str(tmp_path / "out.xosc")).getroot()
+    assert provenance_of(root) == json.loads(json.dumps(provenance(scenario)))
+    assert provenance_of(etree.fromstring(scenario.source)) is None
+    again = read_scenario(tmp_path / "out.xosc")
+    assert "seed 3" in again.header.description
+    with pytest.raises(FormatError, match="was converted by xosc-lateral already"):
+        converted(again, tmp_path / "again.xosc")
+    assert not (tmp_path / "again.xosc").exists()
+
+
+def test_provenance_with_dashes_stays_one_comment(tmp_path: Path) -> None:
+    scenario = made(tmp_path)
+    motion = played(scenario)
+    wild = {"note": "a--b---c-", "inputs": {}}
+    write_trajectory_scenario(scenario, motion, nominal(motion), tmp_path / "out.xosc", provenance=wild, summary="s")
+    assert provenance_of(etree.parse(str(tmp_path / "out.xosc")).getroot()) == wild
+
+
+def test_controllers_of_converted_entities_go_and_are_named(tmp_path: Path) -> None:
+    controller = '<ObjectController><Controller name="pilot"><Properties/></Controller></ObjectController>'
+    activate = '<PrivateAction><ActivateControllerAction lateral="true" longitudinal="true"/></PrivateAction>'
+    scenario = made(
+        tmp_path,
+        entities=entity("Ego", controller=controller) + entity("B", controller=controller),
+        init=private("Ego", teleport(), speed_action(), activate) + private("B", teleport("90"), speed_action()),
+    )
+    motion = played(scenario)
+    trajectories = {"Ego": nominal(motion)["Ego"]}
+    written = converted(scenario, tmp_path / "out.xosc", motion=motion, trajectories=trajectories)
+    again = read_scenario(tmp_path / "out.xosc")
+    assert again.entity("Ego").controllers == ()
+    assert [found.name for found in again.entity("B").controllers] == ["pilot"]
+    assert "ActivateControllerAction" not in (tmp_path / "out.xosc").read_text()
+    assert {removed.kind for removed in written.removed} == {"ObjectController", "ActivateControllerAction"}
+    assert written.converted == ("Ego",)
+
+
+def test_a_teleport_becomes_a_teleport_and_a_new_trajectory(tmp_path: Path) -> None:
+    scenario = made(tmp_path, stories=story(event("jump", action("jump", teleport("600", "-2")), time=3.01)))
+    before = played(scenario)
+    converted(scenario, tmp_path / "out.xosc", motion=before)
+    after = played(read_scenario(tmp_path / "out.xosc"))
+    assert np.abs(np.diff(before.entities[0].x)).max() > 400
+    error = np.hypot(after.entities[0].x - before.entities[0].x, after.entities[0].y - before.entities[0].y)
+    assert error.max() < 0.01
+
+
+def test_stop_trigger_becomes_the_time_at_which_it_fired(tmp_path: Path) -> None:
+    far = (
+        '<ConditionGroup><Condition name="far" delay="0" conditionEdge="none"><ByEntityCondition><TriggeringEntities '
+        'triggeringEntitiesRule="any"><EntityRef entityRef="Ego"/></TriggeringEntities><EntityCondition>'
+        '<TraveledDistanceCondition value="200"/></EntityCondition></ByEntityCondition></Condition></ConditionGroup>'
+    )
+    scenario = made(tmp_path, stop=far)
+    before = played(scenario)
+    converted(scenario, tmp_path / "out.xosc", motion=before)
+    out = (tmp_path / "out.xosc").read_text()
+    assert "TraveledDistanceCondition" not in out
+    assert played(read_scenario(tmp_path / "out.xosc")).end_time == pytest.approx(before.end_time, abs=STEP / 2)
+
+
+def test_a_stop_trigger_by_time_alone_stays_as_written(tmp_path: Path) -> None:
+    scenario = made(tmp_path, stop=time_condition(4.321))
+    converted(scenario, tmp_path / "out.xosc")
+    assert '<SimulationTimeCondition value="4.321" rule="greaterThan"/>' in (tmp_path / "out.xosc").read_text()
+
+
+def test_overridden_parameters_are_written_with_the_values_played(tmp_path: Path) -> None:
+    text = scenario_text(
+        parameters=declarations(parameter("Speed", "30"), parameter("Half", "${$Speed / 2}")),
+        init=private("Ego", teleport(), speed_action("$Speed")),
+    )
+    scenario = read_scenario(write_scenario(tmp_path, text), {"Speed": "20"})
+    converted(scenario, tmp_path / "out.xosc")
+    again = read_scenario(tmp_path / "out.xosc")
+    assert again.parameters["Speed"].value == "20"
+    assert float(again.parameters["Half"].value) == 10.0
+
+
+def test_a_trajectory_with_nan_is_a_wrong_call(tmp_path: Path) -> None:
+    scenario = made(tmp_path)
+    motion = played(scenario)
+    trajectory = nominal(motion)["Ego"]
+    trajectory.x.setflags(write=True)
+    broken = WorldTrajectory(
+        trajectory.time,
+        np.where(trajectory.time > 1, np.nan, trajectory.x),
+        *(getattr(trajectory, name) for name in ("y", "z", "heading", "pitch", "roll", "speed")),
+    )
+    with pytest.raises(ValueError, match="not finite"):
+        converted(scenario, tmp_path / "out.xosc", motion=motion, trajectories={"Ego": broken})
+    assert not (tmp_path / "out.xosc").exists()
+
+
+def sine_chain(entity_name: str, begin: float, end: float) -> OffsetChain:
+    time = np.arange(begin, end, STEP)
+    return OffsetChain(entity_name, time, 0.2 * np.sin(2 * np.pi * (time - begin) / 8.0))
+
+
+def test_transitions_follow_the_chain_within_the_tolerance_and_turn_gently() -> None:
+    """Half cosines on half cosines: a sine is met by one transition from each of its ends to the next."""
+    chain = sine_chain("Ego", 0.0, 30.0)
+    found = ramps(chain)
+    followed = np.full(len(chain.time), np.nan)
+    for ramp in found:
+        rows = (chain.time >= ramp.start - 1e-9) & (chain.time <= ramp.end + 1e-9)
+        share = (chain.time[rows] - ramp.start) / (ramp.end - ramp.start)
+        followed[rows] = ramp.origin + 0.5 * (1.0 - np.cos(np.pi * share)) * (ramp.target - ramp.origin)
+    settled = chain.time >= found[0].end
+    assert np.abs(followed - chain.offset_t)[settled & np.isfinite(followed)].max() <= TOLERANCE + 2e-3
+    assert len(found) < 30
+    turning = [0.5 * np.pi**2 * abs(r.target - r.origin) / (r.end - r.start) ** 2 / 30.0 for r in found]
+    assert max(turning) <= MOST_TURNING + 1e-9
+    assert 1.5 <= found[0].end - found[0].start <= 2.5
+
+
+def test_a_stretch_too_short_to_get_anywhere_is_left_alone() -> None:
+    time = np.arange(0.0, 0.5, STEP)
+    assert ramps(OffsetChain("Ego", time, np.full(len(time), 0.4))) == ()
+
+
+def test_no_transition_begins_where_the_t_axis_flips() -> None:
+    chain = sine_chain("Ego", 0.0, 20.0)
+    side = np.where(chain.time < 10.0, 1.0, -1.0)
+    flipped = OffsetChain("Ego", chain.time, chain.offset_t * side, flips=(10.0,))
+    found = ramps(flipped)
+    assert all(abs(ramp.start - 10.0) >= 0.29 for ramp in found)
+    assert any(ramp.start >= 10.29 for ramp in found)
+
+
+@pytest.mark.parametrize("minor", [0, 1, 2, 3])
+def test_lane_offset_output_is_valid_and_keeps_the_maneuvers(
+    tmp_path: Path, minor: int, schema: Callable[[int], etree.XMLSchema]
+) -> None:
+    scenario = read_scenario(write_scenario(tmp_path, scenario_text(minor=minor)))
+    motion = played(scenario)
+    write_lane_offset_scenario(
+        scenario,
+        motion,
+        [sine_chain("Ego", 0.0, 10.0)],
+        tmp_path / "out.xosc",
+        provenance=provenance(scenario),
+        summary="seed 3",
+    )
+    schema(minor).assertValid(etree.parse(str(tmp_path / "out.xosc")))
+    again = read_scenario(tmp_path / "out.xosc")
+    assert [found.name for found in again.storyboard.stories] == ["story", "xosc-lateral"]
+    names = [element.get("name") for element in etree.parse(str(tmp_path / "out.xosc")).iter("Act", "ManeuverGroup")]
+    assert len(set(names)) == len(names)
+
+
+def test_offsets_come_out_when_the_lane_offset_scenario_is_played(tmp_path: Path) -> None:
+    scenario = made(tmp_path, stop=time_condition(20))
+    motion = played(scenario, 30.0)
+    chain = sine_chain("Ego", 0.0, 20.0)
+    write_lane_offset_scenario(
+        scenario, motion, [chain], tmp_path / "out.xosc", provenance=provenance(scenario), summary="seed 3"
+    )
+    ego = played(read_scenario(tmp_path / "out.xosc"), 30.0).entities[0]
+    # Lane -1 of a right-hand road: the direction of travel is that of s, so +t is left.
+    wanted = np.interp(ego.time, chain.time, chain.offset_t)
+    settled = (ego.time > 2.5) & (ego.time < 19.5)
+    assert np.abs(ego.offset - wanted)[settled].max() < 0.02
+    turn = np.abs(np.diff(ego.heading_relative)) / STEP
+    assert turn.max() <= 0.3e-3 / 0.01
+
+
+LANE_CHANGE = (
+    "<PrivateAction><LateralAction><LaneChangeAction>"
+    '<LaneChangeActionDynamics dynamicsShape="sinusoidal" dynamicsDimension="time" value="4"/>'
+    '<LaneChangeTarget><AbsoluteTargetLane value="-2"/></LaneChangeTarget>'
+    "</LaneChangeAction></LateralAction></PrivateAction>"
+)
+
+
+def test_a_lateral_action_without_a_name_is_referred_to_by_its_event(tmp_path: Path) -> None:
+    text = scenario_text(stories=story(event("change", action("", LANE_CHANGE), time=8.0)), stop=time_condition(25))
+    found = lateral_actions(read_scenario(write_scenario(tmp_path, text)))
+    assert [(one.kind, one.reference) for one in found["Ego"]] == [("event", "change")]
+
+
+def test_a_lane_change_overrules_the_offsets_whenever_it_comes(tmp_path: Path) -> None:
+    def text(moment: float) -> str:
+        return scenario_text(
+            stories=story(event("change", action("change", LANE_CHANGE), time=moment)), stop=time_condition(25)
+        )
+
+    scenario = read_scenario(write_scenario(tmp_path, text(8.01)))
+    motion = played(scenario, 30.0)
+    end = next(p.end for p in motion.actions if p.action.name == "change")
+    assert end is not None
+    chains = [sine_chain("Ego", 0.0, 8.0), sine_chain("Ego", end, 25.0)]
+    write_lane_offset_scenario(
+        scenario, motion, chains, tmp_path / "out.xosc", provenance=provenance(scenario), summary="seed 3"
+    )
+    # The test drive makes the change come 3 s earlier than planned.
+    output = tmp_path / "out.xosc"
+    output.write_text(output.read_text().replace('value="8.01"', 'value="5.01"'))
+    ego = played(read_scenario(output), 30.0).entities[0]
+    assert ego.lane[np.searchsorted(ego.time, 4.9)] == -1
+    after = ego.time > 9.1
+    assert set(ego.lane[after].tolist()) == {-2}
+    # The second chain starts with the end of the change, not at the planned time.
+    shifted = np.interp(ego.time, chains[1].time - 3.0, chains[1].offset_t)
+    settled = (ego.time > 12.5) & (ego.time < 20)
+    assert np.abs(ego.offset - shifted)[settled].max() < 0.05
+
+
+def test_a_scenario_that_is_over_at_once_is_refused(tmp_path: Path) -> None:
+    scenario = made(tmp_path, stop=time_condition(-1))
+    with pytest.raises(PlaybackError, match=r"made.xosc:\d+: StopTrigger: the scenario is over at 0 s"):
+        converted(scenario, tmp_path / "out.xosc")
+    assert not (tmp_path / "out.xosc").exists()

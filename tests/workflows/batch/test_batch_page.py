@@ -1,0 +1,43 @@
+"""The index of a batch: what needs attention comes first, and nothing is said of outputs that there are none of."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import pytest
+
+from xosc_lateral.workflows.batch.page import BatchEntry, batch_page
+
+CALM = BatchEntry("calm.xosc", "calm.xosc", "calm.html", "calm.svg", 2, 3, 40.0, 0.2, 2.0, 1.9, (), "")
+
+
+@pytest.fixture
+def page() -> str:
+    entries = [
+        CALM,
+        replace(CALM, output="warned.xosc", page="warned.html", warnings=("one", "two <b>")),
+        replace(CALM, output="broken.xosc", page="", thumbnail="", error="broken.xosc:3: no road"),
+        replace(CALM, output="touching.xosc", page="touching.html", gap_after=0.0),
+        replace(CALM, output="touching_before.xosc", page="tb.html", gap_before=0.0, gap_after=0.0),
+    ]
+    return batch_page(entries, "out")
+
+
+def test_failures_come_first_then_contacts_then_warnings(page):
+    outputs = re.findall(r"[a-z_]+\.xosc(?=<)", page)
+    assert outputs[:5] == ["broken.xosc", "touching.xosc", "warned.xosc", "calm.xosc", "touching_before.xosc"]
+
+
+def test_only_what_needs_attention_is_marked(page):
+    assert page.count('<tr class="bad">') == 2
+
+
+def test_a_failed_output_has_its_reason_and_no_link_or_picture(page):
+    row = page.split("broken.xosc", 1)[1].split("</tr>")[0]
+    assert "failed: broken.xosc:3: no road" in row
+    assert "<img" not in page.split('<tr class="bad">')[1].split("</tr>")[0]
+
+
+def test_warnings_are_escaped(page):
+    assert "two &lt;b&gt;" in page

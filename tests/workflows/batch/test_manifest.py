@@ -1,0 +1,84 @@
+"""Manifest and timings on disk."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from xosc_lateral.base.errors import FormatError
+from xosc_lateral.workflows.batch.manifest import (
+    ManifestRow,
+    Timing,
+    read_manifest,
+    read_timings,
+    write_manifest,
+    write_timings,
+)
+
+ROW = ManifestRow(
+    output="a/x.xosc",
+    scenario="a/x.xosc",
+    scenario_sha256="12",
+    variant=2,
+    seed=7,
+    profile="auto",
+    parameters={"Speed": "30", "Straße": "ä"},
+    settings="34",
+    package_version="1.0",
+    output_sha256="56",
+    road="../r.xodr",
+    road_sha256="78",
+    inputs={"a/x.xosc": "12", "../r.xodr": "78"},
+    profiles={"Ego": "car"},
+    profile_sha256={"car": "90"},
+    entities=3,
+    enriched=("Ego", "Truck"),
+    segment_seconds=12.5,
+    offset_spread=0.21,
+    gap_before=1.5,
+    gap_after=None,
+    warnings=("one", "two"),
+)
+FAILED = replace(ROW, output="b.xosc", output_sha256="", error="b.xosc:3: Event 'x': what")
+
+
+def test_rows_come_back_as_they_were(tmp_path: Path) -> None:
+    path = tmp_path / "manifest.parquet"
+    rows = [replace(ROW, output=f"{index:05d}.xosc") for index in range(2500)] + [FAILED]
+    write_manifest(rows, path)
+    assert list(read_manifest(path)) == rows
+
+
+def test_the_same_rows_give_the_same_bytes(tmp_path: Path) -> None:
+    write_manifest([ROW, FAILED], tmp_path / "a")
+    write_manifest([ROW, FAILED], tmp_path / "b")
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
+def test_others_can_read_it(tmp_path: Path) -> None:
+    write_manifest([ROW, FAILED], tmp_path / "manifest.parquet")
+    table = pd.read_parquet(tmp_path / "manifest.parquet").set_index("output")
+    assert table.loc["a/x.xosc", "segment_seconds"] == 12.5
+    assert list(table.loc["a/x.xosc", "enriched"]) == ["Ego", "Truck"]
+    assert table.loc["b.xosc", "error"] == FAILED.error
+    assert pd.isna(table.loc["a/x.xosc", "gap_after"])
+
+
+def test_a_foreign_file_of_that_name_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "manifest.parquet"
+    path.write_text("mine")
+    with pytest.raises(FormatError, match=r"manifest\.parquet: can't be read as Parquet"):
+        list(read_manifest(path))
+    pd.DataFrame({"x": [1]}).to_parquet(path)
+    with pytest.raises(FormatError, match="not a manifest of this package"):
+        list(read_manifest(path))
+
+
+def test_timings_come_back(tmp_path: Path) -> None:
+    written = {"a": Timing(0.5), "b": Timing(1.0, "1 2 3 4")}
+    write_timings(written.items(), tmp_path / "t")
+    assert read_timings(tmp_path / "t") == written
+    assert read_timings(tmp_path / "none") == {}

@@ -1,0 +1,150 @@
+"""What `verify` names, and that `reproduce` makes the same again: by editing outputs, inputs and provenance by hand."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+import xosc_lateral as xl
+from xosc_lateral.base.shipped import shipped_folder
+from xosc_lateral.base.version import BEHAVIOUR
+from xosc_lateral.cli import main
+from xosc_lateral.workflows.batch.manifest import MANIFEST
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of inputs, each with a road of its own, and of outputs."""
+    folder = tmp_path_factory.mktemp("verify")
+    for number in range(4):
+        xl.write_template("cut-in", folder / "in" / str(number))
+    profile = folder / "mine.json"
+    shutil.copy(shipped_folder("driver_profiles") / "motorway-vehicle-2.json", profile)
+    options = {"seed": 3, "time_limit": 4.0, "ego": ["none"], "profile": profile}
+    assert xl.convert_many(folder / "in", folder / "out", variants=2, **options).failed == 0
+    return folder
+
+
+@pytest.fixture
+def copy(made: Path, tmp_path: Path) -> Path:
+    shutil.copytree(made, tmp_path / "copy")
+    return tmp_path / "copy"
+
+
+def named(result: xl.Verification) -> dict[str, list[str]]:
+    return {one.output.name: [kind.value for kind, _ in one.problems] for one in result.failing}
+
+
+def change(path: Path, before: str, after: str) -> None:
+    text = path.read_text(encoding="utf-8")
+    assert before in text
+    path.write_text(text.replace(before, after), encoding="utf-8")
+
+
+def test_exactly_what_was_changed_is_named_with_its_reason(copy: Path) -> None:
+    out = copy / "out"
+    assert not xl.verify(out).failing and len(xl.verify(out).checked) == 8
+    outputs = sorted(out.rglob("*.xosc"))
+    first = sorted((out / "0").glob("*.xosc"))
+    change(first[0], "<FileHeader", "<FileHeader ")
+    road = next((copy / "in" / "1").rglob("*.xodr"))
+    change(road, "</OpenDRIVE>", "</OpenDRIVE> ")
+    version = sorted((out / "2").glob("*.xosc"))[1]
+    change(version, f'"behaviour": {BEHAVIOUR},', '"behaviour": 1,')
+    outputs[-1].unlink()
+    result = xl.verify(out)
+    problems = {one.output: [kind.value for kind, _ in one.problems] for one in result.failing}
+    expected = {first[0]: ["edited"], version: ["version"], outputs[-1]: ["missing"]}
+    expected |= {path: ["input"] for path in (out / "1").glob("*.xosc")}
+    assert problems == expected
+    assert "made by behaviour 1 of version" in str(result) and "3 of 8 outputs are" in str(result)
+
+
+def test_other_profiles_other_seeds_in_the_provenance_and_strangers_are_seen(copy: Path) -> None:
+    output = sorted((copy / "out").rglob("*.xosc"))[0]
+    change(output, '"seed": 3', '"seed": 4')
+    assert not xl.verify(output).failing, "alone it can't be known"
+    assert named(xl.verify(copy / "out")) == {output.name: ["edited"]}, "the manifest knows"
+    profile = copy / "mine.json"
+    values = json.loads(profile.read_text())
+    profile.write_text(json.dumps(values | {"name": "another"}))
+    assert {kind for kinds in named(xl.verify(copy / "out")).values() for kind in kinds} >= {"profile"}
+    stranger = copy / "in" / "0" / "cut-in.xosc"
+    assert named(xl.verify(stranger)) == {"cut-in.xosc": ["not ours"]}
+    with pytest.raises(xl.FormatError, match="no manifest"):
+        xl.verify(copy / "in")
+    with pytest.raises(xl.FormatError, match=r"gone\.xosc"):
+        xl.verify(copy / "gone.xosc")
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ('"options": {', '"options": 5, "old": {'),
+        ('"scenario": "', '"scenario": "\\u0000'),
+        ('"inputs": {', '"inputs": [], "old": {'),
+        ('"profiles": {', '"profiles": {"Nobody": 3}, "old": {'),
+        ('"variant": 1', '"variant": 1e400'),
+        ('"seed": 3', '"seed": -3'),
+        ('"mode": "auto"', '"mode": []'),
+        ('"inputs"', '"outputs"'),
+    ],
+)
+def test_a_provenance_that_was_written_by_hand_costs_a_line(copy: Path, before: str, after: str) -> None:
+    output = sorted((copy / "out").rglob("*.xosc"))[0]
+    change(output, before, after)
+    assert len(xl.verify(output).failing) == 1
+    assert main(["reproduce", str(output), "-o", str(copy / "again.xosc")]) in (0, 1)
+
+
+def test_an_output_and_a_folder_are_made_again_elsewhere(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = sorted((copy / "out").rglob("*.xosc"))[1]
+    (copy / "deep" / "er").mkdir(parents=True)
+    assert main(["reproduce", str(output), "-o", str(copy / "deep" / "er" / "again.xosc")]) == 0
+    assert not xl.reproduce(copy / "out", copy / "again").failing
+    assert not xl.verify(copy / "again").failing
+    again = pd.read_parquet(copy / "again" / MANIFEST)
+    assert list(again.output) == list(pd.read_parquet(copy / "out" / MANIFEST).output)
+    road = next((copy / "in" / output.parent.name).rglob("*.xodr"))
+    change(road, "</OpenDRIVE>", "</OpenDRIVE> ")
+    assert not xl.reproduce(output, copy / "same.xosc").failing, "another file, the same content"
+    change(output, "<FileHeader", "<FileHeader ")
+    capsys.readouterr()
+    assert main(["reproduce", str(output), "-o", str(copy / "other.xosc"), "--json"]) == 1
+    (problem,) = json.loads(capsys.readouterr().out)["outputs"]
+    assert [one["kind"] for one in problem["problems"]] == ["edited", "input"]
+    assert main(["reproduce", str(output), "-o", str(output), "--force"]) == 1
+
+
+def test_a_manifest_that_names_files_elsewhere_is_refused(copy: Path) -> None:
+    rows = pd.read_parquet(copy / "out" / MANIFEST)
+    rows.loc[0, "output"] = "../../evil.xosc"
+    rows.to_parquet(copy / "out" / MANIFEST)
+    with pytest.raises(xl.FormatError, match="expected the name of a file"):
+        xl.verify(copy / "out")
+
+
+def test_what_is_stale_is_made_anew_with_its_reason_and_kept_if_asked(copy: Path) -> None:
+    options = {"variants": 2, "seed": 3, "time_limit": 4.0, "ego": ["none"], "profile": copy / "mine.json"}
+
+    def totals(**more: object) -> tuple[int, dict[str, int], dict[str, int], int]:
+        found = xl.convert_many(copy / "in", copy / "out", **options, **more).totals()  # type: ignore[arg-type]
+        return found["written"], found["anew"], found["kept"], found["up_to_date"]
+
+    assert totals() == (0, {}, {}, 8)
+    road = next((copy / "in" / "1").rglob("*.xodr"))
+    change(road, "</OpenDRIVE>", "</OpenDRIVE> ")
+    rows = pd.read_parquet(copy / "out" / MANIFEST)
+    rows.loc[rows.output.str.startswith("2/"), "behaviour"] = BEHAVIOUR - 1
+    rows.to_parquet(copy / "out" / MANIFEST)
+    changed = {"inputs changed": 2, "another version made it": 2}
+    assert totals(keep_old=True) == (0, {}, changed, 4)
+    assert pd.read_parquet(copy / "out" / MANIFEST).stale.sum() == 4
+    assert totals() == (4, changed, {}, 4)
+    assert totals(mode="trajectory") == (8, {"settings differ": 8}, {}, 0)
+    next((copy / "out" / "3").glob("*.xosc")).unlink()
+    assert totals(mode="trajectory", keep_old=True) == (1, {"changed or gone": 1}, {}, 7), "that is not old but lost"

@@ -1,0 +1,66 @@
+"""`neighbours` of a conversion: by argument, configuration and table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+import xosc_lateral as xl
+from xosc_lateral.base.errors import FormatError
+from xosc_lateral.cli import main
+from xosc_lateral.workflows.batch.request import frame_requests
+from xosc_lateral.workflows.conversion.result import Neighbours
+from xosc_lateral.workflows.conversion.settings import ConvertSettings
+
+
+@pytest.fixture
+def configuration(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The user's file, not written yet."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "home"))
+    path = tmp_path / "home" / "xosc-lateral" / "config.toml"
+    path.parent.mkdir(parents=True)
+    return path
+
+
+def test_an_argument_comes_before_the_configuration_and_both_are_said(tmp_path: Path, configuration: Path) -> None:
+    scenario, _ = xl.write_template("cut-in", tmp_path)
+
+    def neighbours(**given: str) -> tuple[str, str]:
+        made = xl.convert(scenario, seed=1, time_limit=6.0, profile="motorway-vehicle-1", ego="none", **given)
+        return made.to_dict()["provenance"]["options"]["neighbours"], str(made)
+
+    used, said = neighbours()
+    assert used == "borrow" and "left unknown: borrowed from the population" in said
+    configuration.write_text('neighbours = "profile"\n')
+    used, said = neighbours()
+    assert used == "profile" and "left unknown" in said and "borrowed" not in said
+    used, said = neighbours(neighbours="none")
+    assert used == "none" and "no answer" in said
+    configuration.write_text('neighbours = "some"\n')
+    with pytest.raises(FormatError, match="expected one of profile, borrow, none"):
+        neighbours()
+
+
+def test_rows_of_a_table_choose_and_a_wrong_word_is_named_with_its_line(tmp_path: Path) -> None:
+    frame = pd.DataFrame({"scenario": ["a.xosc", "b.xosc"], "neighbours": ["none", ""]})
+    chosen = [request.settings.neighbours for request in frame_requests(frame, ConvertSettings())]
+    assert chosen == [Neighbours.NONE, Neighbours.BORROW]
+    frame.loc[1, "neighbours"] = "all"
+    with pytest.raises(FormatError, match=r"3.*neighbours 'all', expected one of profile, borrow, none"):
+        list(frame_requests(frame, ConvertSettings()))
+
+
+def test_the_command_line_takes_it_and_profiles_show_says_what_is_known(
+    tmp_path: Path, configuration: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scenario, _ = xl.write_template("cut-in", tmp_path)
+    output = tmp_path / "made.xosc"
+    assert main(["convert", str(scenario), "-o", str(output), "--neighbours", "profile"]) == 0
+    assert b'"neighbours": "profile"' in output.read_bytes().replace(b'"neighbours":"', b'"neighbours": "')
+    capsys.readouterr()
+    assert main(["profiles", "show", "motorway-vehicle-1"]) == 0
+    assert "neighbours left unknown; right unknown" in capsys.readouterr().out
+    assert main(["profiles", "show", "motorway"]) == 0
+    assert "neighbours left population, as its effects have it" in capsys.readouterr().out

@@ -1,0 +1,58 @@
+"""The index of near vehicles against looking at every pair."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from xosc_lateral.world.motion import gaps
+from xosc_lateral.world.motion.gaps import BoxPath, smallest_gaps
+from xosc_lateral.world.surroundings.nearby import pairs_within
+
+
+def paths(count: int, seed: int, turn: float) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Points that wander along a line, some of them absent for a while."""
+    rng = np.random.default_rng(seed)
+    n = 300
+    along = rng.uniform(0, 2000, count)[:, None] + np.cumsum(rng.normal(0.5, 1.0, (count, n)), axis=1)
+    across = rng.uniform(-10, 10, count)[:, None] + np.cumsum(rng.normal(0, 0.05, (count, n)), axis=1)
+    for k in range(0, count, 4):
+        along[k, : int(rng.integers(n))] = np.nan
+    along[1] = np.nan
+    x, y = np.cos(turn) * along - np.sin(turn) * across, np.sin(turn) * along + np.cos(turn) * across
+    return list(x), list(y)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.8, 1.6])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_no_pair_that_comes_near_is_missing_and_few_others_are_there(seed: int, turn: float) -> None:
+    x, y = paths(40, seed, turn)
+    reach = 25.0
+    near = {
+        (a, b)
+        for a, b in combinations(range(len(x)), 2)
+        if np.nanmin([np.inf, *np.hypot(x[a] - x[b], y[a] - y[b])]) <= reach
+    }
+    found = pairs_within(x, y, reach)
+    assert near and near <= set(found)
+    assert found == sorted(found)
+    assert len(found) < 0.5 * len(x) * (len(x) - 1) / 2
+
+
+def test_gaps_are_those_of_all_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
+    x, y = paths(25, 3, 0.3)
+    boxes = [BoxPath(f"v{k}", x[k], y[k], np.full(300, 0.3), 4.0 + k % 9, 2.0, 1.0) for k in range(len(x))]
+    time = np.arange(300) / 50
+    indexed = smallest_gaps(time, boxes)
+    monkeypatch.setattr(
+        gaps, "stretches_within", lambda x, y, reach: [(slice(0, len(x[0])), list(combinations(range(len(x)), 2)))]
+    )
+    assert indexed == smallest_gaps(time, boxes)
+    assert len(indexed) > 5
+
+
+def test_nobody_is_near_nobody() -> None:
+    assert pairs_within([], [], 1.0) == []
+    assert pairs_within([np.zeros(3)], [np.zeros(3)], 1.0) == []

@@ -1,0 +1,156 @@
+"""Every limit on what comes in, with its reason: the one place for these numbers.
+
+``python -m xosc_lateral.base.limits`` prints them as a table. A message that refuses something names
+limit and value (`Limit.refusal`). Nothing here is a tuning constant of a model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """A number that nothing may exceed.
+
+    Parameters
+    ----------
+    value : float
+        The largest that is taken.
+    unit : str
+        "MB" counts a million bytes; empty for a count.
+    what : str
+        What is counted, as in "bytes of a file".
+    reason : str
+        Why it is where it is.
+    """
+
+    value: float
+    unit: str
+    what: str
+    reason: str
+
+    def __str__(self) -> str:
+        return self._with_unit(self.value)
+
+    def refusal(self, found: float) -> str:
+        """``WHAT: FOUND, at most LIMIT``."""
+        return f"{self.what}: {self._with_unit(found)}, at most {self}"
+
+    def _with_unit(self, value: float) -> str:
+        number = f"{value:.0f}" if abs(value) < 1e15 and value == round(value) else f"{value:.6g}"
+        return f"{number} {self.unit}" if self.unit else number
+
+    @property
+    def bytes(self) -> int:
+        """The limit as a count of bytes, where the unit is MB."""
+        return int(self.value * 1_000_000)
+
+
+FILE_SIZE = Limit(4000, "MB", "size of an input file", "a day of 60 channels at 50 Hz as text; larger logs are split")
+PACKING_RATIO = Limit(
+    200, "", "unpacked bytes per byte of a file", "measured tables shrink 3 to 30 times, decompression bombs 1000 times"
+)
+UNPACKED_UNASKED = Limit(100, "MB", "unpacked size that needs no such ratio", "takes a second, and little memory")
+UNPACKED_SIZE = Limit(4000, "MB", "unpacked size of a gz, zip or Parquet file", "as for a file that is not packed")
+TABLE_CELLS = Limit(250e6, "", "cells of a table", "2 GB as doubles: 24 h at 50 Hz with 57 columns")
+TABLE_COLUMNS = Limit(2000, "", "columns of a table", "bus logs have hundreds; beyond, it is transposed")
+PROFILE_SIZE = Limit(50, "MB", "size of a driver profile", "fitted ones have less than 1 MB")
+JSON_DEPTH = Limit(64, "", "levels of nested JSON", "profiles nest 10 deep; Python's parser ends at about 1000")
+XML_TREE = Limit(750, "MB", "memory of an XML file, estimated", "a road of 25 MB fits, and reading stays below 1 GB")
+
+TIME = Limit(1e10, "s", "time stamp", "seconds since 1970 until the year 2286; beyond, doubles lose microseconds")
+DRIVE_SPAN = Limit(2.7e6, "s", "time that one drive covers", "a month; 13.5 million model steps")
+CLOCK_ROWS = Limit(30e6, "", "rows of an evenly sampled log", "two weeks at 25 Hz; 240 MB a channel")
+
+EXPRESSION = Limit(10_000, "", "characters of an expression", "field files stay below 200")
+VALUE = Limit(10_000, "", "characters of a parameter's value", "each reference may double it: 40 fill any memory")
+PARAMETER_SETS = Limit(100_000, "", "parameter sets of one distribution", "a day of conversions on two cores")
+COMBINATIONS = Limit(1_000_000, "", "combinations of parameters tried", "constraints may leave some out")
+DISTRIBUTION_TIME = Limit(120, "s", "time to draw the parameter sets of a distribution", "100 000 take seconds")
+VARIANTS = Limit(10_000, "", "variants of one scenario", "more add no information")
+BATCH_JOBS = Limit(1_000_000, "", "outputs of one batch", "1 GB of plans; a database that large is converted in parts")
+DECIMAL_EXPONENT = Limit(30, "", "decimal exponent of a range's numbers", "exact arithmetic writes out every digit")
+
+JOB_TIMEOUT = Limit(
+    600, "s", "time for one scenario", "field scenarios take a second; 500 entities for a minute take half of one"
+)
+JOB_MEMORY = Limit(4000, "MB", "memory for one scenario", "500 entities for a minute take 1.5 GB")
+
+OFFSET_LANES = Limit(
+    1.5,
+    "",
+    "lane widths between an offset and the lane centre",
+    "at 1 it follows the next lane",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """What a quantity of the real world can be.
+
+    Parameters
+    ----------
+    low, high : float
+        Both included.
+    reason : str
+    """
+
+    low: float
+    high: float
+    reason: str
+
+
+CONTEXT_RANGES: Mapping[str, Range] = MappingProxyType(
+    {
+        "speed": Range(-50, 150, "540 km/h; cars reverse more slowly than that"),
+        "acceleration": Range(-100, 100, "10 g: a crash"),
+        "curvature": Range(-1, 1, "a radius of 1 m; cars turn in 5 m"),
+        "lane_width": Range(0, 20, "the widest toll plaza lane; 0 where a lane begins"),
+        "lane_index": Range(-1, 50, "lanes of one direction; -1: none"),
+        "lane_count": Range(0, 50, "lanes of one direction"),
+        "crossfall": Range(-100, 100, "45 degrees"),
+        "grade": Range(-100, 100, "45 degrees"),
+        "lead_distance": Range(-100, 1e5, "overlapping by a road train's length, to 100 km"),
+        "is_truck": Range(0, 1, "a truth value"),
+        "lead_is_truck": Range(0, 1, "a truth value"),
+        "left_distance": Range(-1e5, 1e5, "100 km"),
+        "right_distance": Range(-1e5, 1e5, "100 km"),
+        "left_is_truck": Range(0, 1, "a truth value"),
+        "right_is_truck": Range(0, 1, "a truth value"),
+        "oncoming_distance": Range(-1e5, 1e5, "100 km"),
+        "time_of_day": Range(0, 24, "hours of a day"),
+        "rain": Range(0, 2000, "the most ever measured in a minute: 1870 mm/h (Guadeloupe 1970)"),
+        "wind_speed": Range(0, 150, "the strongest gust ever measured: 113 m/s (Barrow Island 1996)"),
+        "wind_direction": Range(-360, 720, "a circle, either way"),
+        "friction": Range(0, 3, "racing tyres: 2"),
+        "illuminance": Range(0, 200_000, "the sun in the zenith: 130 000 lx"),
+    }
+)
+"""Context by the names of DESIGN, section 4, in the units of `segment.CONTEXT_UNITS`."""
+
+DISTANCES = frozenset({"lead_distance", "left_distance", "right_distance"})
+"""To vehicles in lanes; infinite where a lane has nobody in it."""
+
+ANY_CONTEXT = Range(-1e30, 1e30, "other names, whatever their unit: squares and cubes stay far from overflow")
+
+
+def context_range(name: str) -> Range:
+    """Range of a context column."""
+    return CONTEXT_RANGES.get(name, ANY_CONTEXT)
+
+
+def limits_table() -> str:
+    """All limits as Markdown."""
+    lines = ["| limit | at most | why |", "|---|---|---|"]
+    lines += [f"| {item.what} | {item} | {item.reason} |" for item in globals().values() if isinstance(item, Limit)]
+    lines += ["", "| context | from | to | why |", "|---|---|---|---|"]
+    for name, item in (*CONTEXT_RANGES.items(), ("any other", ANY_CONTEXT)):
+        lines.append(f"| {name} | {item.low:g} | {item.high:g} | {item.reason} |")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    print(limits_table())

@@ -1,0 +1,79 @@
+"""What is found instead of listed: other packages' entry points, and what modules of a package define."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from functools import lru_cache
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+from typing import Any, TypeVar
+
+GROUPS = ("xosc_lateral.effects", "xosc_lateral.importers", "xosc_lateral.files.templates", "xosc_lateral.profiles")
+"""Entry point groups that are looked at."""
+
+
+def entry_points(group: str) -> Iterable[Any]:
+    """Entry points of a group; `importlib.metadata`, which takes 40 ms to load and search, only where there are any."""
+    if not _any_offered(tuple(sys.path)):
+        return ()
+    from importlib import metadata
+
+    return metadata.entry_points(group=group)
+
+
+@lru_cache(maxsize=1)
+def _any_offered(folders: tuple[str, ...]) -> bool:
+    """Whether an installed package may offer something in any group of ours; one in an archive may."""
+    for folder in map(Path, folders):
+        if folder.is_file() or any(
+            b"[xosc_lateral." in path.read_bytes() for path in folder.glob("*-info/entry_points.txt")
+        ):
+            return True
+    return False
+
+
+@lru_cache(maxsize=len(GROUPS))
+def plugins(group: str) -> dict[str, Any]:
+    """Everything that installed packages offer in a group, by its name; loaded once.
+
+    Raises
+    ------
+    Exception
+        Whatever the import of a broken plug-in raises: it is that package's bug, and its traceback names it.
+    """
+    return {point.name: point.load() for point in sorted(entry_points(group=group), key=lambda one: one.name)}
+
+
+@lru_cache(maxsize=len(GROUPS))
+def plugin_names(group: str) -> tuple[str, ...]:
+    """Names of what `plugins` would load, nothing loaded."""
+    return tuple(sorted(point.name for point in entry_points(group=group)))
+
+
+T = TypeVar("T")
+
+
+def defined_in(package: str, kind: type[T]) -> tuple[type[T], ...]:
+    """Classes of a kind that a package's modules define and that can be made.
+
+    Ordered by the names of the modules, then as written there: the same on every machine, however folders are listed.
+
+    Parameters
+    ----------
+    package : str
+        Its full name; imported already, or being so.
+    kind : type
+        What they are subclasses of. Private ones are left out, and those that still have an abstract method.
+    """
+    names = sorted(module.name for module in iter_modules(sys.modules[package].__path__))
+    modules = [import_module(f"{package}.{name}") for name in names]
+    own = [(one, module.__name__) for module in modules for one in vars(module).values() if isinstance(one, type)]
+    return tuple(one for one, home in own if one.__module__ == home and issubclass(one, kind) and _can_be_made(one))
+
+
+def _can_be_made(one: type) -> bool:
+    """Public, and nothing of it is abstract; structs don't keep count of that, as `abc.ABC` would."""
+    members = (getattr(one, name, None) for name in dir(one))
+    return not one.__name__.startswith("_") and not any(getattr(one, "__isabstractmethod__", False) for one in members)

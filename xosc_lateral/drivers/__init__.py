@@ -1,0 +1,1 @@
+"""How people drive: models and profiles, drives, fitting, evaluation, the loop."""

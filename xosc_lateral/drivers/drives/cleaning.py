@@ -1,0 +1,176 @@
+"""Raw rows of one drive into clean ones: the same for every source, be it a file, a DataFrame or an import."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.limits import DRIVE_SPAN, TIME
+from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.drives.markings import both_markings
+
+MAX_STEP = 0.25
+"""Median step of a table that can give 5 Hz. [s]"""
+
+LANE_WIDTHS = (2.0, 6.0)
+"""What a lane's median width is believed to be. [m]"""
+
+MAX_MEDIAN_SPEED = 60.0
+"""A drive faster than this in the median has its speed in km/h. [m/s]"""
+
+MAX_OUTSIDE = 0.01
+"""Share of rows farther than one lane width from the lane centre that is still taken for glitches. [-]"""
+
+CONTRADICTION = 0.05
+"""Two rows of one time further apart than this contradict each other [m] ..."""
+
+MAX_CONTRADICTIONS = 0.01
+"""... and more than this share of them means several drives in one. [-]"""
+
+RUN = "following_run"
+"""Column of tables that an import has cut: number of the road-following stretch. What it has cut is not cut again."""
+
+OWN = frozenset({"time", "drive", "offset", "lane_width", "distance_left", "distance_right", RUN})
+"""Columns that are no context."""
+
+
+def clean_drive(
+    name: str,
+    columns: dict[str, FloatArray],
+    levels: frozenset[str],
+    path: Path,
+) -> Drive | None:
+    """Rows of one drive, from whatever source, sorted by time, without repeated times and rows without a place in the
+    lane; None when nothing is left.
+
+    Raises `FormatError` if a column can't be in the unit meant, or the rows are too far apart.
+
+    Parameters
+    ----------
+    columns : mapping of str to array, shape (n,)
+        `time` [s], and `offset` and `lane_width` or `distance_left` and `distance_right` [m]; `speed` [m/s] if known;
+        `RUN` where an import has cut the drive; all others are context. NaN: missing, or "there is none".
+    levels : frozenset of str
+        Columns that hold levels.
+    path : Path
+        What messages call the source.
+    """
+    columns = _in_order(columns, name, path)
+    offset, lane_width = _position(columns)
+    _check_units(name, columns, offset, lane_width, path)
+    narrow = (lane_width < LANE_WIDTHS[0] / 2) | (lane_width > 2 * LANE_WIDTHS[1])
+    good = np.isfinite(offset) & np.isfinite(lane_width) & ~narrow
+    good[good] = np.abs(offset[good]) <= lane_width[good]
+    if RUN in columns:
+        good &= columns[RUN] >= 0  # also NaN is none
+    speed = columns.get("speed")
+    if speed is not None and np.isfinite(speed).any():
+        good &= np.isfinite(speed)
+    if good.sum() < 2:
+        return None
+    every = {key: values[good] for key, values in columns.items() if key not in OWN}
+    empty = frozenset(key for key, values in every.items() if np.isnan(values).all())
+    context = {key: values for key, values in every.items() if key not in empty} | {"lane_width": lane_width[good]}
+    run = columns[RUN][good].astype(np.int64) if RUN in columns else None
+    drive = Drive(
+        name, columns["time"][good], offset[good], lane_width[good],
+        context, frozenset(levels & context.keys()), str(path), run, empty=empty,
+    )  # fmt: skip
+    return drive if run is not None else _seen_through(drive)
+
+
+def _seen_through(drive: Drive) -> Drive:
+    """With the other marking followed where a camera had misjudged one, and with what it saw of both."""
+    seen = both_markings(drive.time, drive.offset, drive.lane_width)
+    if seen is None:
+        return drive
+    mended, half_width = seen.mended(), 0.5 * drive.lane_width
+    if mended is None:
+        return replace(drive, half_width=half_width)
+    kept = mended.kept
+    context = {key: values[kept] for key, values in drive.context.items()} | {"lane_width": mended.lane_width[kept]}
+    return replace(
+        drive,
+        time=drive.time[kept],
+        offset=mended.offset[kept],
+        lane_width=mended.lane_width[kept],
+        context=context,
+        mended=mended.shares,
+        half_width=half_width[kept],
+    )
+
+
+def _in_order(columns: dict[str, FloatArray], name: str, path: Path) -> dict[str, FloatArray]:
+    """Rows sorted by time, the first of each time kept."""
+    known = np.flatnonzero(np.isfinite(columns["time"]))
+    order = known[np.argsort(columns["time"][known], kind="stable")]
+    columns = {key: values[order] for key, values in columns.items()}
+    time = columns["time"]
+    if len(time) < 2:
+        return columns
+
+    def refuse(what: str) -> None:
+        raise FormatError(f"drive {name}: {what}", path=path, element="column 'time'")
+
+    clock = "if the clock is in milliseconds: --map time=COLUMN:ms"
+    latest, span = float(np.abs(time[[0, -1]]).max()), float(time[-1] - time[0])
+    for limit, found in ((TIME, latest), (DRIVE_SPAN, span)):
+        if found > limit.value:
+            refuse(f"{limit.refusal(found)}; {clock}")
+    repeated = np.concatenate([[False], np.diff(time) <= 0])
+    offset, later = _position(columns)[0], np.flatnonzero(repeated)
+    apart = int((np.abs(offset[later] - offset[later - 1]) > CONTRADICTION).sum())
+    if apart > max(5, MAX_CONTRADICTIONS * len(time)):
+        refuse(
+            f"{apart} of {len(time)} rows repeat a time with another offset; if the table holds several drives it "
+            "needs a column 'drive'"
+        )
+    steps = np.diff(time[~repeated])
+    if len(steps) and np.median(steps) > MAX_STEP:
+        refuse(f"rows are {np.median(steps):.4g} s apart (median), 5 Hz needs at most {MAX_STEP} s; {clock}")
+    return {key: values[~repeated] for key, values in columns.items()}
+
+
+def _position(columns: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Offset, positive to the left (far from the right marking), and lane width. [m]"""
+    if {"offset", "lane_width"} <= columns.keys():
+        return columns["offset"], columns["lane_width"]
+    left, right = columns["distance_left"], columns["distance_right"]
+    return (right - left) / 2, right + left
+
+
+def _check_units(
+    name: str, columns: Mapping[str, FloatArray], offset: FloatArray, width: FloatArray, path: Path
+) -> None:
+    known = np.isfinite(offset) & np.isfinite(width)
+    if not known.any():
+        return
+    offset, width = offset[known], width[known]
+    median_width = float(np.median(width))
+    if not LANE_WIDTHS[0] <= median_width <= LANE_WIDTHS[1]:
+        raise FormatError(
+            f"drive {name}: the lane is {median_width:.4g} m wide (median), expected {LANE_WIDTHS[0]:g} to "
+            f"{LANE_WIDTHS[1]:g} m; name the unit with --map, as in lane_width=COLUMN:cm",
+            path=path,
+        )
+    outside = np.abs(offset) > np.maximum(width, LANE_WIDTHS[0])
+    if outside.mean() > MAX_OUTSIDE:
+        raise FormatError(
+            f"drive {name}: offsets of up to {float(np.max(np.abs(offset))):.4g} m in a lane of {median_width:.3g} m, "
+            f"{100 * outside.mean():.0f} % of the rows beyond a whole lane width; name the unit with --map, "
+            "as in offset=COLUMN:cm",
+            path=path,
+        )
+    speed = columns.get("speed")
+    if speed is not None and np.isfinite(speed).any() and float(np.nanmedian(speed)) > MAX_MEDIAN_SPEED:
+        raise FormatError(
+            f"drive {name}: speed is {float(np.nanmedian(speed)):.4g} m/s (median), more than {MAX_MEDIAN_SPEED:g}; "
+            "if it is in km/h: --map speed=COLUMN:km/h",
+            path=path,
+            element="column 'speed'",
+        )

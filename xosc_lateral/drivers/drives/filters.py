@@ -1,0 +1,89 @@
+"""Filters: low-passes of one design, a windowed sinc with a Kaiser window; first-order lags; gains over frequency.
+
+(What `scipy.signal.firwin` gives too, to rounding; importing that takes 0.4 s, which a conversion hasn't got. Lags are
+needed where drives are simulated, which has the time.)
+
+References
+----------
+J. F. Kaiser, "Nonrecursive digital filter design using the I0-sinh window function", Proc. IEEE Int. Symp. Circuits and
+Systems, 1974, pp. 20-23: how long a window must be, and of what shape, for an attenuation and a transition width.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray
+
+LEAST_ATTENUATION = 21.0
+"""Of a rectangular window, shape 0: Kaiser's formulas begin there, and change at `GREAT_ATTENUATION`. [dB]"""
+
+GREAT_ATTENUATION = 50.0
+"""[dB]"""
+
+LENGTH_OFFSET = 7.95
+LENGTH_SLOPE = 2.285
+"""Attenuation = offset + slope * transition width [rad per sample] * (taps - 1). [dB]"""
+
+SHAPE_POWER_FACTOR, SHAPE_POWER, SHAPE_SLOPE = 0.5842, 0.4, 0.07886
+"""Shape between both attenuations: factor * excess ** power + slope * excess, with the excess over the least. [-]"""
+
+
+def kaiser_design(attenuation: float, width: float) -> tuple[int, float]:
+    """Taps to each side of the middle one, and shape of a Kaiser window. [-]
+
+    For an attenuation in the stop band [dB] and a width from the end of the pass band to the beginning of the stop
+    band, as a share of half the sampling rate, > 0 [-]. Raises `ValueError` outside 21 to 50 dB, the formula's range.
+    """
+    if not LEAST_ATTENUATION <= attenuation <= GREAT_ATTENUATION:
+        raise ValueError(f"attenuation {attenuation} dB, expected {LEAST_ATTENUATION:g} to {GREAT_ATTENUATION:g}")
+    steps = (attenuation - LENGTH_OFFSET) / (LENGTH_SLOPE * math.pi * width)
+    excess = attenuation - LEAST_ATTENUATION
+    return math.ceil(steps / 2), SHAPE_POWER_FACTOR * excess**SHAPE_POWER + SHAPE_SLOPE * excess
+
+
+def low_pass(half: int, cutoff: float, beta: float) -> FloatArray:
+    """Symmetric kernel of gain 1, shape (2 * half + 1,). [-]
+
+    `cutoff`: where the gain is one half, as a share of half the sampling rate, 0 to 1; `beta` >= 0: shape of the Kaiser
+    window. [-]
+    """
+    kernel = np.sinc(cutoff * np.arange(-half, half + 1)) * np.kaiser(2 * half + 1, beta)
+    return np.asarray(kernel / kernel.sum())
+
+
+def low_pass_between(passed: float, stopped: float, step: float, attenuation: float) -> FloatArray:
+    """Symmetric kernel of gain 1 that passes what is slower than one frequency, and stops what is faster than another.
+
+    Both below half the sampling rate [Hz]; `step` of the rows [s]; attenuation in the stop band, 21 to 50 dB.
+    """
+    nyquist = 0.5 / step
+    half, beta = kaiser_design(attenuation, (stopped - passed) / nyquist)
+    return low_pass(half, 0.5 * (passed + stopped) / nyquist, beta)
+
+
+def filtered(values: FloatArray, kernel: FloatArray) -> FloatArray:
+    """A series through a symmetric kernel, continued beyond its ends as by `mirrored`. Shape and unit of the values."""
+    return np.convolve(mirrored(values, len(kernel) // 2), kernel, mode="valid")
+
+
+def mirrored(values: FloatArray, rows: int) -> FloatArray:
+    """A series continued by so many rows at both ends, shape (n + 2 * rows,), for a symmetric kernel. [any unit]
+
+    Beyond each end it goes on as its mirror image through the end's point, as far as there is one, and stays there: a
+    filter without delay leaves the ends, and straight lines, where they are.
+    """
+    near = min(rows, len(values) - 1)
+    before, after = 2 * values[0] - values[near:0:-1], 2 * values[-1] - values[-2 : -near - 2 : -1]
+    extended = np.concatenate([before, values, after])
+    return np.pad(extended, rows - near, mode="edge") if near < rows else extended
+
+
+def scale_frequencies(values: FloatArray, gain: FloatArray) -> FloatArray:
+    """A series, shape (n,), with every frequency scaled; it goes round: its end runs into its beginning. [any unit]
+
+    `gain` [-] at ``numpy.fft.rfftfreq(n)`` cycles per sample, shape (n // 2 + 1,).
+    """
+    return np.asarray(np.fft.irfft(np.fft.rfft(values) * gain, len(values)), dtype=np.float64)

@@ -1,0 +1,209 @@
+"""Does a classifier separate sampled snippets from real ones? The strictest score, since it looks at everything.
+
+References
+----------
+D. Lopez-Paz, M. Oquab, "Revisiting classifier two-sample tests", ICLR 2017.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.drivers.drives.periodogram import tapered_powers, without_line
+from xosc_lateral.drivers.evaluation.metrics import DIFFERENCE_SCALE, snippet_metrics
+from xosc_lateral.drivers.evaluation.shape import shape_features, turns
+from xosc_lateral.drivers.evaluation.snippets import Snippets
+
+AUTOCORRELATION_LAGS = (1, 2, 3, 5, 8, 12)  # steps; of the first difference's autocorrelation
+FOLDS = 5
+BANDS = 16  # Of the log spectrum, from one period a snippet to the highest frequency, evenly on a logarithmic scale.
+# Of the log spectrum once more, evenly: what is smoothed piece by piece has its lines and holes at fast movement.
+EVEN_BANDS = 25
+# Values of a snippet, and differences over as much, that are shown: more slow a tree down and add nothing. [-]
+VALUES = 20
+MOST = 1500  # Snippets of either kind that a classifier sees, spread evenly: an error of 0.01 in the area. [-]
+RESAMPLES = 200  # Of the drives, for the interval.
+
+
+@dataclass(frozen=True)
+class TwoSampleResult:
+    """How well two sets of snippets are separated."""
+
+    auc: float  # Area under the ROC curve, cross-validated: 0.5 by chance, 1 always. [-]
+    low: float  # Ends of its 95 % interval, drives resampled. [-]
+    high: float
+
+
+def snippet_features(snippets: FloatArray, *, fast: bool = False) -> FloatArray:
+    """Everything that gives a model away: values, differences, log spectrum, ten metrics, roughness, memory, shape.
+
+    `snippets`, shape (n, m) [m]; `fast`: also what second and third differences and an even spectrum show: fast
+    movement, with its sensor, as recorded. Returns shape (n, k).
+    """
+    difference = np.diff(snippets, axis=1)
+    every = max(1, snippets.shape[1] // VALUES)
+    thin = snippets[:, ::every]
+    energy = (difference**2).mean(axis=1) + 1e-15
+    autocorrelation = [
+        (difference[:, lag:] * difference[:, :-lag]).mean(axis=1) / energy
+        for lag in AUTOCORRELATION_LAGS
+        if lag < difference.shape[1]
+    ]
+    acceleration = np.abs(np.diff(difference, axis=1))
+    roughness = np.log(np.column_stack([acceleration.std(axis=1), acceleration.max(axis=1)]) + 1e-9)
+    differences = DIFFERENCE_SCALE * np.diff(thin, axis=1)
+    metrics = snippet_metrics(snippets)
+    power = tapered_powers(without_line(snippets), np.hanning(snippets.shape[1]))
+    bins = power.shape[1]
+    bands = _log_power(power, np.geomspace(1, bins, BANDS + 1))
+    more = [_fast_features(difference), _log_power(power, np.linspace(1, bins, EVEN_BANDS + 1))] if fast else []
+    return np.column_stack(
+        [thin, differences, bands, metrics, roughness, *autocorrelation, shape_features(snippets), *more]
+    )
+
+
+def _fast_features(difference: FloatArray) -> FloatArray:
+    """Size, largest, tails and turns of second and third differences. [log m], [log m], [-], [-] Shape (n, 8)."""
+    found = []
+    for order in (1, 2):
+        values = np.diff(difference, order, axis=1)
+        square = (values**2).mean(axis=1)
+        tails = (values**4).mean(axis=1) / np.maximum(square**2, 1e-36)
+        largest = np.abs(values).max(axis=1)
+        found += [np.log(np.sqrt(square) + 1e-9), np.log(largest + 1e-9), tails, turns(values)]
+    return np.column_stack(found)
+
+
+def _log_power(power: FloatArray, edges: FloatArray) -> FloatArray:
+    """Logarithm of the mean power [m2] between edges, which are counted in frequencies, shape (n, bands)."""
+    whole = np.unique(edges.astype(np.int64)).tolist()
+    return np.column_stack([np.log(power[:, a:b].mean(axis=1) + 1e-12) for a, b in pairwise(whole)])
+
+
+def context_features(snippets: Snippets, paths: FloatArray) -> FloatArray:
+    """What was around each snippet, and how a path moves with it.
+
+    Parameters
+    ----------
+    snippets : Snippets
+        Of measured driving.
+    paths : array, shape (n, m)
+        Measured or sampled under that context. [m]
+
+    Returns
+    -------
+    array, shape (n, 3 * columns)
+        Mean and standard deviation of every context column, and its correlation with the path. Where there is none: -2
+        for a correlation, one less than the least for the others, so that a tree can part it from the rest.
+    """
+    names = sorted({name for one in snippets.items for name in one.run.context})
+    empty = np.full(paths.shape[1], np.nan)
+    found = []
+    for name in names:
+        values = np.array(
+            [one.run.context[name][one.rows] if name in one.run.context else empty for one in snippets.items]
+        )
+        found += _beside(values, paths)
+    return np.column_stack(found) if found else np.empty((len(paths), 0))
+
+
+def _beside(values: FloatArray, paths: FloatArray) -> list[FloatArray]:
+    known = np.isfinite(values)
+    count = np.where(known.any(axis=1), known.sum(axis=1), np.nan)
+    mean = np.where(known, values, 0.0).sum(axis=1) / count
+    centred = np.where(known, values - mean[:, None], 0.0)
+    spread = np.sqrt((centred**2).sum(axis=1) / count)
+    moved = np.where(known, paths - paths.mean(axis=1, keepdims=True), 0.0)
+    both = np.sqrt((centred**2).sum(axis=1) * (moved**2).sum(axis=1))
+    together = np.divide((centred * moved).sum(axis=1), both, out=np.full(len(paths), -2.0), where=both > 1e-12)
+    return [_filled(mean), _filled(spread), together]
+
+
+def _filled(column: FloatArray) -> FloatArray:
+    known = np.isfinite(column)
+    return np.where(known, column, column[known].min() - 1.0 if known.any() else 0.0)
+
+
+def classifier_two_sample_test(
+    real: FloatArray,
+    other: FloatArray,
+    groups_real: NDArray[np.generic],
+    groups_other: NDArray[np.generic],
+    *,
+    context: Sequence[FloatArray] | None = None,
+    fast: bool = False,
+    seed: int = 0,
+) -> TwoSampleResult | None:
+    """Train a gradient-boosted classifier to separate two sets of snippets, and judge it on drives it has not seen.
+
+    Parameters
+    ----------
+    real, other : array, shape (n, m) and (k, m)
+    groups_real, groups_other : array, shape (n,) and (k,)
+        Drives: no drive is both learnt from and judged.
+    context : two arrays, shape (n, c) and (k, c), optional
+        Features of the context of either: then context and movement are judged jointly.
+    fast : bool
+        Look at fast movement closely, see `snippet_features`.
+
+    Returns
+    -------
+    Separation or None
+        None without scikit-learn (extra `classifier`) or with fewer than five drives.
+    """
+    try:
+        from sklearn.ensemble import HistGradientBoostingClassifier
+        from sklearn.model_selection import GroupKFold, cross_val_predict
+        from threadpoolctl import threadpool_limits
+    except ImportError:
+        return None
+    rows, others = spread_out(len(real)), spread_out(len(other))
+    groups = np.concatenate([groups_real[rows], groups_other[others]])
+    if len(np.unique(groups)) < FOLDS:
+        return None
+    features = np.vstack([snippet_features(snippets, fast=fast) for snippets in (real[rows], other[others])])
+    if context is not None:
+        features = np.hstack([features, np.vstack([context[0][rows], context[1][others]])])
+    label = np.r_[np.zeros(len(rows)), np.ones(len(others))]
+    model = HistGradientBoostingClassifier(max_iter=100, max_bins=63, random_state=seed)
+    # One thread: on a machine that is busy otherwise, its threads waiting for one another take twenty times as long.
+    with threadpool_limits(1):
+        chance = cross_val_predict(
+            model, features, label, groups=groups, cv=GroupKFold(FOLDS), method="predict_proba", n_jobs=1
+        )
+    return _judged(chance[:, 1], label.astype(bool), groups, seed)
+
+
+def spread_out(count: int) -> NDArray[np.int64]:
+    """At most `MOST` of so many rows, evenly. Shape (k,), k <= `MOST`. [-]"""
+    return np.unique(np.linspace(0, count - 1, min(count, MOST)).astype(np.int64))
+
+
+def _judged(score: FloatArray, label: NDArray[np.bool_], groups: NDArray[np.generic], seed: int) -> TwoSampleResult:
+    names, member = np.unique(groups, return_inverse=True)
+    rng = np.random.default_rng(seed)
+    drawn = []
+    for _ in range(RESAMPLES):
+        weight = np.bincount(rng.integers(len(names), size=len(names)), minlength=len(names))[member]
+        if weight[label].any() and weight[~label].any():
+            drawn.append(area_under_roc(score, label, weight.astype(np.float64)))
+    low, high = np.quantile(drawn, [0.025, 0.975]) if drawn else (np.nan, np.nan)
+    return TwoSampleResult(area_under_roc(score, label, np.ones(len(label))), float(low), float(high))
+
+
+def area_under_roc(score: FloatArray, label: NDArray[np.bool_], weight: FloatArray) -> float:
+    """Probability that a weighted draw of the labelled scores above one of the others; equal scores count half. [-]
+
+    All of shape (n,).
+    """
+    values, place = np.unique(score, return_inverse=True)
+    yes = np.bincount(place, weight * label, minlength=len(values))
+    no = np.bincount(place, weight * ~label, minlength=len(values))
+    below = np.cumsum(no) - no
+    return float((yes * (below + 0.5 * no)).sum() / (yes.sum() * no.sum()))

@@ -1,0 +1,237 @@
+"""What traffic psychology, lane keeping assistance and UN R157 read in a stretch of driving, window by window."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.segment import Segment
+from xosc_lateral.drivers.drives.cuts import HALF_WIDTH
+from xosc_lateral.drivers.model.jit_kernel import prepare
+from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.drivers.model.sampling import sample_offsets
+from xosc_lateral.drivers.model.seeds import child
+
+NEAR_MARKING = 1.2  # A reference point this close to a marking counts as near: half a car (0.9 m) and 0.3 m of air. [m]
+
+
+@dataclass(frozen=True)
+class Margins:
+    """How a driver uses the lane's margins."""
+
+    share_near: float  # Share of time with the reference point within `NEAR_MARKING` of a marking. [-]
+    excursions_per_hour: float  # How often that zone is entered. [1/h]
+    largest: float  # Largest |offset|. [m]
+
+
+def margins(offsets: Sequence[FloatArray], lane_widths: Sequence[FloatArray], step: float) -> Margins:
+    """Time near a marking and rate of excursions over several runs (offset and lane width [m] at an even step [s]).
+
+    Shape (n_i,) each.
+    """
+    near = [np.abs(x) > 0.5 * w - NEAR_MARKING for x, w in zip(offsets, lane_widths, strict=True)]
+    rows = sum(len(one) for one in near)
+    entries = sum(int((one[1:] & ~one[:-1]).sum()) for one in near)
+    return Margins(
+        share_near=sum(int(one.sum()) for one in near) / rows,
+        excursions_per_hour=entries / (rows * step / 3600.0),
+        largest=max(float(np.abs(x).max()) for x in offsets),
+    )
+
+
+LONGEST_TLC = 20.0  # Times to line crossing beyond it count as it: far above the 2 s that warning systems look at. [s]
+
+
+def time_to_line_crossing(
+    offset: FloatArray, lane_width: FloatArray, step: float, *, half_width: float = HALF_WIDTH
+) -> FloatArray:
+    """Time until the side that the vehicle moves towards reaches its marking, at constant lateral speed.
+
+    `offset` and `lane_width`, shape (..., m). [m] Returns shape (..., m - 1): 0 where the side is beyond the marking
+    already, at most `LONGEST_TLC`. [s]
+    """
+    speed = np.diff(offset, axis=-1) / step
+    towards = np.sign(speed) * offset[..., 1:]
+    room = np.maximum(0.5 * lane_width[..., 1:] - half_width - towards, 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        time = np.where(speed == 0.0, np.inf, room / np.abs(speed))
+    return np.minimum(time, LONGEST_TLC)
+
+
+# Columns of `lane_keeping_indicators`.
+INDICATORS = (
+    "sdlp",
+    "tlc_min",
+    "tlc_median",
+    "beyond_wandering_zone",
+    "near_marking",
+    "lateral_acceleration",
+    "lateral_jerk",
+)
+
+UNITS = ("m", "s", "s", "-", "-", "m/s2", "m/s3")
+# UN R157, guidance on performance models: a neighbour this far from its lane's centre is no longer wandering. [m]
+WANDERING_ZONE = 0.375
+
+
+def lane_keeping_indicators(
+    offset: FloatArray, lane_width: FloatArray, step: float, *, half_width: float = HALF_WIDTH
+) -> FloatArray:
+    """Indicators of each window.
+
+    Parameters
+    ----------
+    offset, lane_width : array, shape (n, m)
+        One window a row, m >= 4. [m]
+    step : float
+        [s]
+    half_width : float
+        Of the vehicles. [m]
+
+    Returns
+    -------
+    array, shape (n, 7)
+        Columns as in `INDICATORS`, units as in `UNITS`: standard deviation of lateral position [1]_; smallest and
+        median time to line crossing [2]_; shares of time beyond the wandering zone of UN R157 [3]_ and near a marking;
+        root mean square of lateral acceleration and jerk, from differences of the offset (no steering in them).
+
+    References
+    ----------
+    .. [1] J. F. O'Hanlon et al., "Diazepam impairs lateral position control in highway driving", Science 217, 1982.
+    .. [2] W. van Winsum, K. A. Brookhuis, D. de Waard, "A comparison of different ways to approximate time-to-line
+       crossing (TLC) during car driving", Accident Analysis & Prevention 32, 2000: here distance over lateral speed.
+    .. [3] UN Regulation No. 157, guidance on performance models, cut-in scenario.
+    """
+    crossing = time_to_line_crossing(offset, lane_width, step, half_width=half_width)
+    acceleration = np.diff(offset, 2, axis=1) / step**2
+    jerk = np.diff(offset, 3, axis=1) / step**3
+    near = np.abs(offset) > 0.5 * lane_width - NEAR_MARKING
+    return np.column_stack(
+        [
+            offset.std(axis=1),
+            crossing.min(axis=1),
+            np.median(crossing, axis=1),
+            (np.abs(offset) > WANDERING_ZONE).mean(axis=1),
+            near.mean(axis=1),
+            np.sqrt((acceleration**2).mean(axis=1)),
+            np.sqrt((jerk**2).mean(axis=1)),
+        ]
+    )
+
+
+# ---- the highway driving test ----------------------------------------------------------------------------------------
+# The test's speed [m/s] and the length of its drive [s]: 100 km at 95 km/h [4]_.
+HIGHWAY_SPEED, HIGHWAY_DRIVE = 95.0 / 3.6, 3600.0
+HIGHWAY_DRIVES = 60  # Sampled drives: the standard error of an SDLP is below 0.5 % then.
+SHOWN_DRIVES = 20  # For a card: enough for two digits.
+NEAR_LINE = 0.2  # A side of the vehicle so near to a marking is near the line. [m]
+DRIFT, DRIFT_LASTS = 1.0, 8.0  # A lane drift is so far from the drive's mean [m] for so long [s] [5]_.
+
+
+@dataclass(frozen=True, slots=True)
+class LaneKeeping:
+    """How a driver keeps the lane in drives of an hour.
+
+    References
+    ----------
+    .. [4] J. C. Verster, T. Roth, "Standard operation procedures for conducting the on-the-road driving test, and
+       measurement of the standard deviation of lateral position (SDLP)", International J. of General Medicine 4, 2011,
+       pp. 359-371, doi:10.2147/IJGM.S19639.
+    .. [5] "Validating lane drifts as a predictive measure of drug or sleepiness induced driving impairment",
+       Psychopharmacology, 2020: deviations of more than 100 cm from the mean for 8 s.
+    """
+
+    sdlp: float  # Standard deviation of lateral position within a drive, its mean over drives quadratic [4]_. [m]
+    mean: float  # Mean offset, positive left. [m]
+    restlessness: float  # Root mean square of lateral speed. [m/s]
+    memory: float  # After which the autocorrelation within a drive is 1/e. [s]
+    near_line: float  # Share of time with a side within `NEAR_LINE` of a marking or beyond. [-]
+    drifts: float  # Lane drifts. [1/h]
+    line_crossing: float  # Time to line crossing that is undercut in 5 % of the time. [s]
+    errors: Mapping[str, float] = field(default_factory=dict)  # Standard errors, from drive to drive, by field.
+    limit_near_line: float = 0.0  # |offset| from which on a side is near the line. [m]
+
+    def line(self, name: str, unit: str, digits: int = 3) -> str:
+        """A figure with its 95 % interval."""
+        value, error = getattr(self, name), 1.96 * self.errors.get(name, 0.0)
+        return f"{value:.{digits}f} +- {error:.{digits}f}{unit and ' '}{unit}"
+
+    @property
+    def words(self) -> str:
+        """Figures that traffic psychology asks for, in a line."""
+        return (
+            f"SDLP {self.line('sdlp', 'm')}, lane drifts {self.line('drifts', 'an hour', 1)}, "
+            f"5 % of times to line crossing below {self.line('line_crossing', 's', 1)}, "
+            f"near a line {self.line('near_line', '')} of the time"
+        )
+
+
+def highway_drives(
+    profile: DriverProfile, seed: int, *, speed: float = HIGHWAY_SPEED, drives: int = HIGHWAY_DRIVES
+) -> FloatArray:
+    """Offsets of drives of an hour in even traffic, each a driver of his own, shape (drives, n); `speed` in [m/s]."""
+    segment = Segment.even(HIGHWAY_DRIVE, profile.model.step, profile.lane_width, speed)
+    root = np.random.SeedSequence(seed)
+    prepare(drives * len(segment))
+    return np.array([sample_offsets(profile, segment, child(root, k)) for k in range(drives)])
+
+
+def keeping_of(profile: DriverProfile, seed: int = 0) -> LaneKeeping:
+    """Lane keeping of a profile in even traffic, from `SHOWN_DRIVES` drives: the errors include that they are few."""
+    drives = highway_drives(profile, seed, drives=SHOWN_DRIVES)
+    return lane_keeping(drives, profile.lane_width, profile.model.step)
+
+
+def lane_keeping(drives: FloatArray, lane_width: float, step: float, *, half_width: float | None = None) -> LaneKeeping:
+    """Measure drives, shape (drives, n) [m], in a lane of a width [m], with rows `step` seconds apart."""
+    half_width = HALF_WIDTH if half_width is None else half_width
+    mean = drives.mean(axis=1)
+    within = drives - mean[:, None]
+    variance = (within**2).mean(axis=1)
+    squared_speed = (np.diff(drives, axis=1) ** 2).mean(axis=1) / step**2
+    limit = 0.5 * lane_width - half_width - NEAR_LINE
+    crossing = time_to_line_crossing(drives, np.full_like(drives, lane_width), step, half_width=half_width)
+    single = {
+        "mean": mean,
+        "near_line": (np.abs(drives) > limit).mean(axis=1),
+        "drifts": np.array([_drifts(one, step) for one in within]) / (drives.shape[1] * step / 3600.0),
+        "line_crossing": np.quantile(crossing, 0.05, axis=1),
+    }
+    sdlp, restlessness = float(np.sqrt(variance.mean())), float(np.sqrt(squared_speed.mean()))
+    of_mean = {name: _error(values) for name, values in single.items()}
+    of_roots = {"sdlp": _error(variance) / (2.0 * sdlp or 1.0), "restlessness": _error(squared_speed)}
+    of_roots["restlessness"] /= 2.0 * restlessness or 1.0
+    means = {name: float(values.mean()) for name, values in single.items()}
+    memory = _memory(within, step)
+    return LaneKeeping(
+        sdlp, restlessness=restlessness, memory=memory, errors=of_mean | of_roots, limit_near_line=limit, **means
+    )
+
+
+def _error(values: FloatArray) -> float:
+    return float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else 0.0
+
+
+def _drifts(deviation: FloatArray, step: float) -> int:
+    """How often one is `DRIFT` or more from the mean, on one side, for `DRIFT_LASTS` or longer."""
+    count = 0
+    for far in (deviation > DRIFT, deviation < -DRIFT):
+        edges = np.flatnonzero(np.diff(np.concatenate(([0], far.astype(np.int8), [0]))))
+        count += int(((edges[1::2] - edges[::2]) * step >= DRIFT_LASTS).sum())
+    return count
+
+
+def _memory(within: FloatArray, step: float) -> float:
+    """Lag at which the mean autocovariance falls to 1/e of the variance, linear between rows. [s]"""
+    n = within.shape[1]
+    spectrum = np.abs(np.fft.rfft(within, 2 * n, axis=1)) ** 2
+    covariance = np.fft.irfft(spectrum.mean(axis=0))[:n] / np.arange(n, 0, -1)
+    if not covariance[0] > 0.0:
+        return 0.0
+    share = covariance / covariance[0]
+    below = int(np.argmax(share < np.exp(-1.0)))
+    high, low = share[below - 1], share[below]
+    return float(step * (below - 1 + (high - np.exp(-1.0)) / (high - low))) if below else n * step

@@ -1,0 +1,141 @@
+"""Several profiles beside one another: how each moves, how far each is from each, which are alike."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.drivers.evaluation.distances import wasserstein
+from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, keeping_of
+from xosc_lateral.drivers.evaluation.metrics import (
+    DRIVERS,
+    DURATION,
+    METRICS,
+    MovementSummary,
+    cut_snippets,
+    free_runs,
+    snippet_metrics,
+    summarise,
+)
+from xosc_lateral.drivers.evaluation.scores import SNIPPET
+from xosc_lateral.drivers.evaluation.spectra import Spectrum, spectrum
+from xosc_lateral.drivers.model.profile import DriverProfile
+
+HALVINGS, SURE = 40, 0.95
+"""Random halves of a profile's drivers, and how many of them are no further apart than what counts as alike. [-]"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ComparedProfile:
+    """A profile and its free runs in even traffic."""
+
+    profile: DriverProfile
+    runs: FloatArray
+    """Shape (drivers, n). [m]"""
+    summary: MovementSummary
+    keeping: LaneKeeping
+    spectrum: Spectrum
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Compared:
+    """Profiles and how they differ.
+
+    Parameters
+    ----------
+    profiles : tuple of ComparedProfile
+    metrics : array, shape (k, k, 10)
+        Wasserstein distance per metric, in standard deviations over all profiles' snippets. On the diagonal: of a
+        profile from itself, as much driving as it was fitted on from as much other driving, half of its drivers at
+        most, where the mean over the metrics is the 95 % quantile of random choices.
+    seed : int
+    """
+
+    profiles: tuple[ComparedProfile, ...]
+    metrics: FloatArray
+    seed: int
+
+    @property
+    def names(self) -> list[str]:
+        """Of the profiles."""
+        return [one.profile.name for one in self.profiles]
+
+    @property
+    def distance(self) -> FloatArray:
+        """Mean over the ten metrics, shape (k, k). [-]"""
+        return np.asarray(self.metrics.mean(axis=2))
+
+    @property
+    def floors(self) -> FloatArray:
+        """Up to which distance two profiles are alike, shape (k, k): root mean square of both from themselves. [-]
+
+        From itself is one piece of its free runs from another, each as long as the drives that it was fitted on, at
+        most half of them: so far apart are two profiles of one driver by the chance of what was recorded.
+        """
+        own = np.diag(self.distance)
+        return np.sqrt(0.5 * (own[:, None] ** 2 + own[None, :] ** 2))
+
+    @property
+    def groups(self) -> tuple[tuple[str, ...], ...]:
+        """Profiles that are alike: no further apart (average linkage) than halves of their own drivers."""
+        from scipy.cluster.hierarchy import fcluster, linkage
+        from scipy.spatial.distance import squareform
+
+        between = self.distance / np.maximum(self.floors, 1e-12)
+        np.fill_diagonal(between, 0.0)
+        labels = fcluster(linkage(squareform(between, checks=False), "average"), 1.0, "distance")
+        names = self.names
+        return tuple(tuple(names[k] for k in np.flatnonzero(labels == one)) for one in dict.fromkeys(labels))
+
+
+def compare(profiles: Sequence[DriverProfile], seed: int) -> Compared:
+    """Sample every profile in even traffic and measure each against each; the first's luck is no other's."""
+    found = []
+    for number, profile in enumerate(profiles):
+        runs, step = free_runs(profile, seed + number), profile.model.step
+        own = summarise(runs, step), keeping_of(profile, seed), spectrum(list(runs), step)
+        found.append(ComparedProfile(profile, runs, *own))
+    return Compared(tuple(found), _distances(found, seed), seed)
+
+
+def _distances(profiles: Sequence[ComparedProfile], seed: int) -> FloatArray:
+    """Distance per metric in standard deviations, shape (k, k, metrics); the diagonal is between halves. [-]"""
+    drivers = [
+        [snippet_metrics(cut_snippets(run, round(SNIPPET / one.profile.model.step) + 1)) for run in one.runs]
+        for one in profiles
+    ]
+    pooled = [np.concatenate(own) for own in drivers]
+    scale = np.concatenate(pooled).std(axis=0)
+    scale = np.where(scale > 0.0, scale, 1.0)
+    found = np.empty((len(profiles), len(profiles), len(METRICS)))
+    for one in range(len(profiles)):
+        fitted = _fitted_drivers(profiles[one].profile)
+        found[one, one] = _from_itself(drivers[one], fitted, scale, np.random.default_rng([seed, one]))
+        for other in range(one):
+            found[one, other] = found[other, one] = _per_metric(pooled[one], pooled[other]) / scale
+    return found
+
+
+def _fitted_drivers(profile: DriverProfile) -> int:
+    """Of how many free runs a profile's drives are worth, half of them where that is not known."""
+    known = profile.provenance
+    return round(3600.0 * known.hours / DURATION) if known.hours and "derived_from" not in known.fit else DRIVERS // 2
+
+
+def _from_itself(drivers: Sequence[FloatArray], fitted: int, scale: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Distance per metric, shape (10,), between those random pieces that are further apart than 95 % of them."""
+    count = min(max(fitted, 1), len(drivers) // 2)
+    found = []
+    for _ in range(HALVINGS):
+        order = rng.permutation(len(drivers)).tolist()
+        half, rest = order[:count], order[-count:]
+        found.append(_per_metric(*(np.concatenate([drivers[k] for k in part]) for part in (half, rest))) / scale)
+    means = [float(gaps.mean()) for gaps in found]
+    return found[int(np.argsort(means)[round(SURE * (HALVINGS - 1))])]
+
+
+def _per_metric(one: FloatArray, other: FloatArray) -> FloatArray:
+    return np.array([wasserstein(one[:, k], other[:, k]) for k in range(one.shape[1])])

@@ -1,0 +1,234 @@
+"""How near sampled driving is to real driving, beside how near other real drivers are: the fair measure.
+
+Snippets of 10, 30 and 60 s are compared under three conditions: sampled from where the real ones start; cut from free
+runs that know no start; and free runs again, movement below 0.5 Hz alone. Every number stands beside that of real
+snippets of other drivers that know as much about the start. What was recorded is the driver and the sensor, so a
+profile that knows its sensor is compared with it; below 0.5 Hz the driver is compared alone, as `convert` writes him.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.evaluation.classifier import TwoSampleResult, classifier_two_sample_test, context_features
+from xosc_lateral.drivers.evaluation.distances import PROPER, proper_scores, split_groups
+from xosc_lateral.drivers.evaluation.filters import PASSED, below_half_hertz, thinned
+from xosc_lateral.drivers.evaluation.measures import (
+    FLOOR_DRAWS,
+    UNITS,
+    Features,
+    differences,
+    features_of,
+    named_distances,
+    named_means,
+    real_against_real,
+    windows_with_the_same_start,
+)
+from xosc_lateral.drivers.evaluation.parts import LENGTHS, SnippetCondition
+from xosc_lateral.drivers.evaluation.snippets import Snippets, sample_runs, sample_snippets, sensor_noise, snippets_of
+from xosc_lateral.drivers.model.profile import DriverProfile
+
+
+@dataclass(frozen=True)
+class VarianceParts:
+    """Where the variance of the offset lies."""
+
+    between: float  # Of the drivers' own means. [m²]
+    within: float  # Of a driver's windows about that mean. [m²]
+    inside: float  # About a window's own mean. [m²]
+
+
+def variance_parts(windows: FloatArray, drivers: NDArray[np.generic]) -> VarianceParts:
+    """Variance between drivers, within drivers, and inside windows.
+
+    One-way random effects on the windows' means, by the method of moments for unequal counts [1]_. Neighbouring
+    windows of a driver are alike, so `between` holds what changes more slowly than a drive is long.
+
+    `windows`, shape (n, m) [m]; `drivers`, shape (n,).
+
+    References
+    ----------
+    .. [1] S. R. Searle, G. Casella, C. E. McCulloch, "Variance Components", Wiley 1992, section 3.6.
+    """
+    means = windows.mean(axis=1)
+    names, member, counts = np.unique(drivers, return_inverse=True, return_counts=True)
+    own = np.bincount(member, means) / counts
+    inside = float(windows.var(axis=1).mean())
+    n, k = len(means), len(names)
+    if k < 2 or n == k:
+        return VarianceParts(float(means.var()), 0.0, inside)
+    within = float(((means - own[member]) ** 2).sum() / (n - k))
+    among = float((counts * (own - means.mean()) ** 2).sum() / (k - 1))
+    effective = (n - (counts**2).sum() / n) / (k - 1)
+    return VarianceParts(max((among - within) / float(effective), 0.0), within, inside)
+
+
+SPLITS = 8  # Random halves of the drives that both are averaged over.
+LEAST = 20  # Fewer snippets of a length: it is left out.
+# Sampled snippets for each of so many real ones of 10 s, spread evenly: proper scores need several of each.
+ENSEMBLE, SCORED = 8, 200
+
+
+@dataclass(frozen=True)
+class Beside:
+    """A number, and what real driving of other drivers gets (the floor). Unit in its name's table."""
+
+    value: float
+    floor: float
+    unit: str = "sd"
+
+    @property
+    def ratio(self) -> float:
+        """Value over that of real drivers; 1: as near as other real drivers. [-]"""
+        return self.value / self.floor if self.floor > 0.0 else float("nan")
+
+
+@dataclass(frozen=True, eq=False)
+class ConditionScores:
+    """What was found under one condition."""
+
+    condition: SnippetCondition
+    with_sensor: bool  # Whether what was sampled holds the profile's sensor.
+    count: int  # Snippets.
+    # `metrics`, `lane_keeping` [sd], `spectrum` [dB], `memory` [-]; see `measures.differences`. With the same start and
+    # 10 s, also the proper scores [m].
+    families: Mapping[str, Beside]
+    named: Mapping[str, Beside]  # Distance of each of the ten metrics and of each lane-keeping indicator. [sd]
+    # Mean of each lane-keeping indicator, real and sampled; units in `lane_keeping.UNITS`.
+    means: Mapping[str, tuple[float, float]]
+    # Classifier on movement, and on context and movement jointly (below 0.5 Hz). None: not trained.
+    alone: TwoSampleResult | None
+    jointly: TwoSampleResult | None
+    # A classifier between two halves of the real drivers, by movement. Jointly it is 0.5: both kinds have the same
+    # context. With the same start it is as with any: both halves start alike.
+    floor: TwoSampleResult | None
+
+
+@dataclass(frozen=True, eq=False)
+class Realism:
+    """The fair measure of a profile."""
+
+    conditions: tuple[ConditionScores, ...]  # Those with enough snippets.
+    variance_real: VarianceParts  # Between drivers, within drivers and inside snippets of 10 s, of free runs. [m2]
+    variance_sampled: VarianceParts
+
+    def of(self, condition: SnippetCondition) -> ConditionScores | None:
+        """Scores under a condition, None where there were too few snippets."""
+        return next((one for one in self.conditions if one.condition == condition), None)
+
+
+def score_realism(profile: DriverProfile, runs: Sequence[Run], *, seed: int, classify: bool = True) -> Realism:
+    """Compare a profile's snippets with real ones under every condition that has enough of them.
+
+    `runs`: measured, at the profile's step; `classify`: whether to train classifiers too, most of the work.
+    """
+    step = profile.model.step
+    driver = sample_runs(profile, runs, seed, same_start=False)
+    noise = sensor_noise(profile, driver, seed)
+    recorded = [path + error for path, error in zip(driver, noise, strict=True)]
+    slow_real = [below_half_hertz(run.offset, step) for run in runs]
+    slow_driver = [below_half_hertz(path, step) for path in driver]
+    found = []
+    for seconds in LENGTHS:
+        cut = snippets_of(runs, seconds, step)
+        if len(cut) < LEAST or len(np.unique(cut.group)) < 2:
+            continue
+        same = sample_snippets(profile, cut, seed + 1, with_sensor=True)
+        slow = cut.cut_from(slow_real), cut.cut_from(slow_driver)
+        for condition, real, sampled in (
+            (SnippetCondition(seconds, True), cut.offset, same),
+            (SnippetCondition(seconds, False), cut.offset, cut.cut_from(recorded)),
+            (SnippetCondition(seconds, False, slow=True), *slow),
+        ):
+            found.append(_under(condition, cut, real, sampled, profile, seed, classify))
+    short = snippets_of(runs, LENGTHS[0], step)
+    whose = np.array([str(number) for number, _ in short.place])
+    if found and found[0].condition == SnippetCondition(LENGTHS[0], True):
+        found[0] = _with_proper_scores(found[0], profile, short, seed)
+    return Realism(tuple(found), variance_parts(short.offset, whose), variance_parts(short.cut_from(recorded), whose))
+
+
+def _under(
+    condition: SnippetCondition,
+    cut: Snippets,
+    real: FloatArray,
+    sampled: FloatArray,
+    profile: DriverProfile,
+    seed: int,
+    classify: bool,
+) -> ConditionScores:
+    """Scores of one condition; `real` and `sampled` of shape (n, m). [m]"""
+    step = profile.model.step
+    highest = PASSED if condition.slow else np.inf
+    own = features_of(real, cut.lane_width, step, highest=highest)
+    made = features_of(sampled, cut.lane_width, step, highest=highest)
+    families, named = _distances(condition, own, made, real, cut.group, seed)
+    alone = jointly = floor = None
+    shown = (thinned(real, step), thinned(sampled, step)) if condition.slow else (real, sampled)
+    if classify:
+        fast, group = not condition.slow, cut.group
+        alone = classifier_two_sample_test(*shown, group, group, fast=fast, seed=seed)
+        if not condition.same_start:
+            half = split_groups(group, np.random.default_rng(seed))
+            sides, drivers = (shown[0][half], shown[0][~half]), (group[half], group[~half])
+            floor = classifier_two_sample_test(*sides, *drivers, fast=fast, seed=seed)
+        if condition.slow:
+            context = context_features(cut, real), context_features(cut, sampled)
+            jointly = classifier_two_sample_test(*shown, group, group, context=context, seed=seed)
+    with_sensor, means = profile.sensor is not None and not condition.slow, named_means(own, made)
+    return ConditionScores(condition, with_sensor, len(cut), families, named, means, alone, jointly, floor)
+
+
+def _distances(
+    condition: SnippetCondition, own: Features, made: Features, real: FloatArray, group: NDArray[np.str_], seed: int
+) -> tuple[dict[str, Beside], dict[str, Beside]]:
+    """Over random halves: a half beside its own sampled snippets, and beside the other half; equally many in both."""
+    rng = np.random.default_rng(seed)
+    values, floors, named, named_floors = [], [], [], []
+    for _ in range(SPLITS):
+        half = split_groups(group, rng)
+        rows, others = np.flatnonzero(half), np.flatnonzero(~half)
+        stand_ins = _stand_ins(real, group, rows, others, rng) if condition.same_start else None
+        values.append(differences(own, made, rows, rows))
+        floors.append(real_against_real(own, own, rows, others, stand_ins))
+        named.append(named_distances(own.take(rows), made.take(rows)))
+        beside = others if stand_ins is None else stand_ins[:, 0]
+        named_floors.append(named_distances(own.take(rows), own.take(beside)))
+    return _beside(values, floors, UNITS), _beside(named, named_floors, {})
+
+
+def _beside(
+    values: Sequence[Mapping[str, float]], floors: Sequence[Mapping[str, float]], units: Mapping[str, str]
+) -> dict[str, Beside]:
+    def mean(several: Sequence[Mapping[str, float]], name: str) -> float:
+        return float(np.mean([one[name] for one in several]))
+
+    return {name: Beside(mean(values, name), mean(floors, name), units.get(name, "sd")) for name in values[0]}
+
+
+def _stand_ins(
+    real: FloatArray, group: NDArray[np.str_], rows: IntArray, others: IntArray, rng: np.random.Generator
+) -> IntArray:
+    """Other drivers' snippets with the same start, shape (rows, draws)."""
+    count, first = min(FLOOR_DRAWS, len(others)), real[:, 0]
+    own = windows_with_the_same_start(first[rows], group[rows], first[others], group[others], rng, count=count)
+    return others[own]
+
+
+def _with_proper_scores(scores: ConditionScores, profile: DriverProfile, cut: Snippets, seed: int) -> ConditionScores:
+    """Energy and variogram score of several sampled snippets, beside other drivers' snippets with the same start."""
+    chosen = np.unique(np.linspace(0, len(cut) - 1, min(len(cut), SCORED)).astype(np.int64))
+    some = cut.take(chosen)
+    members = [sample_snippets(profile, some, seed + 10 + k, with_sensor=True) for k in range(ENSEMBLE)]
+    rng, starts = np.random.default_rng(seed), (some.offset[:, 0], some.group, cut.offset[:, 0], cut.group)
+    drivers = windows_with_the_same_start(*starts, rng, count=ENSEMBLE)
+    sampled = proper_scores(some.offset, np.stack(members, axis=1))
+    real = proper_scores(some.offset, cut.offset[drivers])
+    added = {name: Beside(sampled[name], real[name], PROPER[name]) for name in sampled}
+    return replace(scores, families={**scores.families, **added})

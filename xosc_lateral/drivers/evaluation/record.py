@@ -1,0 +1,120 @@
+"""Scores as plain values: what `evaluate --json` prints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import isfinite
+from typing import Any
+
+from xosc_lateral.base.digits import all_significant
+from xosc_lateral.drivers.evaluation.filters import HIGHEST
+from xosc_lateral.drivers.evaluation.lane_keeping import UNITS, Margins
+from xosc_lateral.drivers.evaluation.realism import Beside, ConditionScores, VarianceParts
+from xosc_lateral.drivers.evaluation.scores import LAGS, ProfileScores, SnippetScores
+
+
+def scores_to_dict(scores: ProfileScores) -> dict[str, Any]:
+    """Plain JSON values, for `--json` and for a profile's provenance (without the single snippets)."""
+    return {
+        "profile": scores.profile,
+        "seed": scores.seed,
+        "drives": scores.drives,
+        "runs": scores.runs,
+        "hours": round(scores.hours, 4),
+        "realism": [_condition_to_dict(one) for one in scores.realism.conditions],
+        "variance_m2": {
+            "real": _variance_to_dict(scores.realism.variance_real),
+            "sampled": _variance_to_dict(scores.realism.variance_sampled),
+        },
+        "snippets": _snippets_to_dict(scores.snippets),
+        "long_snippets": None if scores.long_snippets is None else _snippets_to_dict(scores.long_snippets),
+        "evaluations": [
+            {
+                "number": one.number,
+                "coarse": one.coarse,
+                "fine": one.fine,
+                "distances": _rounded(one.distances.by_metric),
+            }
+            for one in scores.evaluations
+        ],
+        "spectrum": {
+            "frequency_hz": [round(float(f), 5) for f in scores.spectrum_real.frequency],
+            "real_m2_per_hz": list(all_significant(scores.spectrum_real.density, 4)),
+            "sampled_m2_per_hz": list(all_significant(scores.spectrum_sampled.density, 4)),
+            "error_db": round(scores.spectrum_error, 3),
+        },
+        "autocorrelation": {
+            "lag_s": list(LAGS),
+            "real": [round(float(v), 4) for v in scores.autocorrelation_real],
+            "sampled": [round(float(v), 4) for v in scores.autocorrelation_sampled],
+        },
+        "margins": {"real": _margins_to_dict(scores.margins_real), "sampled": _margins_to_dict(scores.margins_sampled)},
+        "classifier_auc": None if scores.classifier_auc is None else round(scores.classifier_auc, 4),
+    }
+
+
+def _snippets_to_dict(scores: SnippetScores) -> dict[str, Any]:
+    worst, ratio = scores.worst_ratio
+    return {
+        "seconds": scores.seconds,
+        "count": scores.count,
+        "distance": _rounded(scores.distances.by_metric),
+        "floor": _rounded(scores.floor.by_metric),
+        "mean_distance": round(scores.distances.mean, 4),
+        "mean_floor": round(scores.floor.mean, 4),
+        "mean_ratio": round(scores.ratio, 3),
+        "worst_metric": worst,
+        "worst_ratio": round(ratio, 3),
+    }
+
+
+def _condition_to_dict(one: ConditionScores) -> dict[str, Any]:
+    return {
+        "seconds": one.condition.seconds,
+        "start": "same" if one.condition.same_start else "free",
+        "band": f"below {HIGHEST:g} Hz" if one.condition.slow else "all",
+        "sampled": "driver and sensor" if one.with_sensor else "driver",
+        "count": one.count,
+        "families": {name: {**_beside_to_dict(value), "unit": value.unit} for name, value in one.families.items()},
+        "distances": {name: _beside_to_dict(value) for name, value in one.named.items()},
+        "indicators": {
+            name: {"real": round(real, 5), "sampled": round(sampled, 5), "unit": unit}
+            for (name, (real, sampled)), unit in zip(one.means.items(), UNITS, strict=True)
+        },
+        "auc": None if one.alone is None else _areas_to_dict(one),
+    }
+
+
+def _beside_to_dict(one: Beside) -> dict[str, float | None]:
+    ratio = round(one.ratio, 3) if isfinite(one.ratio) else None
+    return {"value": round(one.value, 4), "floor": round(one.floor, 4), "ratio": ratio}
+
+
+def _areas_to_dict(one: ConditionScores) -> dict[str, Any]:
+    areas = {"movement": one.alone, "with_context": one.jointly, "real_drivers": one.floor}
+    return {
+        name: None
+        if area is None
+        else {"auc": round(area.auc, 4), "low": round(area.low, 4), "high": round(area.high, 4)}
+        for name, area in areas.items()
+    }
+
+
+def _variance_to_dict(parts: VarianceParts) -> dict[str, float]:
+    return {
+        "between_drivers": round(parts.between, 6),
+        "within_drivers": round(parts.within, 6),
+        "inside_snippets": round(parts.inside, 6),
+    }
+
+
+def _margins_to_dict(one: Margins) -> dict[str, float]:
+    return {
+        "share_near_marking": round(one.share_near, 5),
+        "excursions_per_hour": round(one.excursions_per_hour, 2),
+        "largest_offset_m": round(one.largest, 3),
+    }
+
+
+def _rounded(values: Mapping[str, float]) -> dict[str, float]:
+    return {name: round(value, 4) for name, value in values.items()}

@@ -1,0 +1,188 @@
+"""How true a profile is to measured drives: distances, the paper's four evaluations, and beyond.
+
+The paper (arXiv:2405.17080, section IV) compares ten metrics of 10 s snippets in four evaluations. Before them comes
+the fair measure (`realism`), and beside them what the paper does not look at: spectrum, autocorrelation, the lane's
+margins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.evaluation.distances import Distances, mean_distances, metric_distances, split_groups
+from xosc_lateral.drivers.evaluation.lane_keeping import Margins, margins
+from xosc_lateral.drivers.evaluation.metrics import METRICS, snippet_metrics
+from xosc_lateral.drivers.evaluation.parts import PartEvaluation, SnippetCondition, evaluate_parts
+from xosc_lateral.drivers.evaluation.realism import Realism, score_realism
+from xosc_lateral.drivers.evaluation.snippets import Snippets, sample_runs, sample_snippets, snippets_of
+from xosc_lateral.drivers.evaluation.spectra import Spectrum, autocorrelation, spectrum
+from xosc_lateral.drivers.model.profile import DriverProfile
+
+SNIPPET = 10.0  # The paper's. [s]
+SPLITS = 8  # Random halves of the drives that both are averaged over.
+
+
+@dataclass(frozen=True, eq=False)
+class SnippetScores:
+    """Distances for snippets of one length."""
+
+    seconds: float  # Length. [s]
+    count: int
+    distances: Distances  # Real to sampled and real to real, averaged over the same random halves of the drives.
+    floor: Distances
+
+    @property
+    def ratio(self) -> float:
+        """Mean distance over that between measured drives. 1: as close as real data is to itself. [-]"""
+        return self.distances.mean / self.floor.mean
+
+    @property
+    def worst_ratio(self) -> tuple[str, float]:
+        """Metric with the largest ratio, and that. [-]"""
+        ratios = {name: self.distances.by_metric[name] / self.floor.by_metric[name] for name in METRICS}
+        worst = max(ratios, key=ratios.__getitem__)
+        return worst, ratios[worst]
+
+
+def score_snippets(
+    real: FloatArray, sampled: FloatArray, group: NDArray[np.str_], *, seed: int, seconds: float = SNIPPET
+) -> SnippetScores:
+    """Distances of sampled snippets, and between measured ones, over random halves of the groups.
+
+    A half of real snippets is compared with its own sampled ones, and with the other real half: both distances rest on
+    as many snippets, so that their ratio is fair.
+
+    `real` and `sampled`, shape (n, m): row k of both starts at the same offset under the same context. [m]; `group`,
+    shape (n,): never split between halves.
+    """
+    rng = np.random.default_rng(seed)
+    metrics, artificial = snippet_metrics(real), snippet_metrics(sampled)
+    model, floor = [], []
+    for _ in range(SPLITS):
+        half = split_groups(group, rng)
+        model.append(metric_distances(metrics[half], artificial[half]))
+        floor.append(metric_distances(metrics[half], metrics[~half]))
+    return SnippetScores(seconds, len(real), mean_distances(model), mean_distances(floor))
+
+
+LONG_SNIPPET = 60.0  # [s]
+LAGS = (0.2, 0.4, 0.6, 1.0, 1.4, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)  # Of the autocorrelation. [s]
+TRACES, TRACE = 6, 120.0  # Drives of which a trace is kept for the eye, and its length. [s]
+MIN_SNIPPETS = 20  # Fewer say nothing about a distribution.
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """A measured stretch of one drive, and what the profile does from the same start under the same context."""
+
+    drive: str
+    step: float  # [s]
+    real: FloatArray  # shape (n,): Offsets. [m]
+    sampled: FloatArray  # shape (n,). [m]
+
+
+@dataclass(frozen=True, eq=False)
+class ProfileScores:
+    """Everything that `evaluate` finds."""
+
+    profile: str  # Its name.
+    drives: int  # What was measured, and how many hours of it.
+    runs: int
+    hours: float
+    realism: Realism  # The headline: free runs and shared starts beside other real drivers.
+    snippets: SnippetScores  # 10 s.
+    long_snippets: SnippetScores | None  # 60 s; None with fewer than `MIN_SNIPPETS`.
+    evaluations: tuple[PartEvaluation, ...]
+    spectrum_real: Spectrum
+    spectrum_sampled: Spectrum
+    lags: FloatArray  # shape (k,). [s]
+    autocorrelation_real: FloatArray  # shape (k,). [-]
+    autocorrelation_sampled: FloatArray  # shape (k,). [-]
+    margins_real: Margins
+    margins_sampled: Margins
+    traces: tuple[Trace, ...]  # The longest run of each of the first `TRACES` drives, for the eye.
+    seed: int
+
+    @property
+    def classifier_auc(self) -> float | None:
+        """Area under the ROC curve between real and sampled snippets of 10 s with the same start; None: not trained.
+
+        [-]
+        """
+        shared = self.realism.of(SnippetCondition(SNIPPET, True))
+        return None if shared is None or shared.alone is None else shared.alone.auc
+
+    @property
+    def spectrum_error(self) -> float:
+        """Root mean square of the spectra's difference over the bands. [dB]"""
+        common = len(self.spectrum_real.density)
+        ratio = self.spectrum_sampled.density[:common] / self.spectrum_real.density
+        return float(np.sqrt(np.mean((10.0 * np.log10(ratio)) ** 2)))
+
+
+def score_profile(profile: DriverProfile, runs: Sequence[Run], *, seed: int, classify: bool = True) -> ProfileScores:
+    """Evaluate a profile on measured runs.
+
+    Raises `NotEnoughDataError` with fewer than `MIN_SNIPPETS` snippets of 10 s.
+
+    `runs`: at the profile's step; `classify`: whether to train the classifiers (a minute or two for some hours of
+    driving).
+    """
+    step = profile.model.step
+    short = _enough(snippets_of(runs, SNIPPET, step))
+    long = snippets_of(runs, LONG_SNIPPET, step)
+    sampled = sample_snippets(profile, short, seed)
+    free = sample_runs(profile, runs, seed + 1)
+    widths = [run.lane_width for run in runs]
+    offsets = [run.offset for run in runs]
+    lags = [round(lag / step) for lag in LAGS]
+    long_scores = None
+    if len(long) >= MIN_SNIPPETS and len(np.unique(long.group)) >= 2:
+        long_sampled = sample_snippets(profile, long, seed + 2)
+        long_scores = score_snippets(long.offset, long_sampled, long.group, seed=seed, seconds=LONG_SNIPPET)
+    return ProfileScores(
+        profile=profile.name,
+        drives=len({run.drive for run in runs}),
+        runs=len(runs),
+        hours=sum(map(len, runs)) * step / 3600.0,
+        realism=score_realism(profile, runs, seed=seed + 4, classify=classify),
+        snippets=score_snippets(short.offset, sampled, short.group, seed=seed, seconds=SNIPPET),
+        long_snippets=long_scores,
+        evaluations=evaluate_parts(profile, short, sampled, seed=seed + 3),
+        spectrum_real=spectrum(offsets, step),
+        spectrum_sampled=spectrum(free, step),
+        lags=np.array(LAGS),
+        autocorrelation_real=autocorrelation(offsets, lags),
+        autocorrelation_sampled=autocorrelation(free, lags),
+        margins_real=margins(offsets, widths, step),
+        margins_sampled=margins(free, widths, step),
+        traces=_traces(runs, free, step),
+        seed=seed,
+    )
+
+
+def _traces(runs: Sequence[Run], sampled: Sequence[FloatArray], step: float) -> tuple[Trace, ...]:
+    longest: dict[str, int] = {}
+    for k, run in enumerate(runs):
+        if run.drive not in longest or len(run) > len(runs[longest[run.drive]]):
+            longest[run.drive] = k
+    rows = slice(0, round(TRACE / step) + 1)
+    return tuple(
+        Trace(drive, step, np.array(runs[k].offset[rows]), np.array(sampled[k][rows]))
+        for drive, k in list(longest.items())[:TRACES]
+    )
+
+
+def _enough(snippets: Snippets) -> Snippets:
+    if len(snippets) < MIN_SNIPPETS:
+        raise NotEnoughDataError(
+            f"{len(snippets)} snippets of {SNIPPET:g} s are left after cutting; {MIN_SNIPPETS} are needed to compare"
+        )
+    return snippets

@@ -1,0 +1,1 @@
+"""Driver profiles from measured drives, and from stated figures."""

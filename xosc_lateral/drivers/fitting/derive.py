@@ -1,0 +1,283 @@
+"""A driver from stated figures: what a profile does, made larger, slower or elsewhere, until it has them.
+
+The driver is a single one: where the base is a population, its typical driver, without what differs between drivers. A
+base's movement has four handles, those of the effect `Adapted`: a shift, factors on coarse and fine movement, a rate.
+Variances and squared lateral speeds of both parts add up, and a memory is in inverse proportion to the rate, so that
+figures give the handles in closed form. Long free runs of the result are measured, the handles corrected by what
+they miss, and the result measured again with other seeds: those are the figures that it is said to have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from msgspec import structs
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.errors import DriverProfileError
+from xosc_lateral.base.version import __version__
+from xosc_lateral.drivers.evaluation.lane_keeping import HIGHWAY_SPEED, LaneKeeping, highway_drives, lane_keeping
+from xosc_lateral.drivers.fitting.stated_figures import Asked, Preset
+from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
+from xosc_lateral.drivers.model.drivability import SELDOM, strain
+from xosc_lateral.drivers.model.effects import Acts, Adapted, ColumnEffect, Population
+from xosc_lateral.drivers.model.effects.base import FACTOR_LIMIT
+from xosc_lateral.drivers.model.profile import DriverProfile
+
+TOLERANCE = 0.02
+"""Figures are reached within this share of what was asked; a mean within it of the standard deviation. [-]"""
+
+DESIGN, PROOF = 20261, 20262
+"""Seeds of the runs that handles are corrected by, and of those that the result is measured with. [-]"""
+
+DRIVES = 240
+"""Of an hour each, twice as many for a memory or a share near a line: standard errors are 0.3 % of an SDLP, 0.6 % of a
+memory, 2 % of a share of 0.02."""
+
+CORRECTIONS = 4
+"""At most; one is enough where figures answer to the handles as the closed form has it. [-]"""
+
+TRUCK_HALF_WIDTH = 1.275
+"""Half the largest width of a lorry in the European Union (Directive 96/53/EC, annex I: 2.55 m). [m]"""
+
+
+class Derived(NamedTuple):
+    """A profile, what was asked, and what it has."""
+
+    profile: DriverProfile
+    asked: Asked
+    reached: LaneKeeping
+
+    def __str__(self) -> str:
+        asked = self.asked.figures
+        had = [f"{name} {value:g}, reached {getattr(self.reached, name):.4g}" for name, value in asked.items()]
+        if "near_line" in asked and "mean" not in asked and self.asked.size_is_given:
+            side = "left" if self.reached.mean > 0 else "right"
+            had.append(f"for which he drives {abs(self.reached.mean):.2f} m {side} of the lane's middle")
+        return f"{self.profile.name}: " + ("; ".join(had) or "as its base")
+
+
+def derive(base: DriverProfile, asked: Asked, name: str, *, preset: Preset | None = None) -> Derived:
+    """A driver with stated figures.
+
+    `base`: gives what is not stated; `name`: the new profile's id; `preset`: that the figures are of. Raises
+    `DriverProfileError`: if figures contradict each other, are too far from the base's, or no car could drive them.
+    """
+    asked.check()
+    speed = HIGHWAY_SPEED if asked.speed is None else asked.speed
+    plain, adapted = _of_class(_single(base), asked.vehicle)
+    plain = structs.replace(plain, name=name)
+    half_width = TRUCK_HALF_WIDTH if asked.vehicle == "truck" else None
+    count = DRIVES if asked.memory is None and asked.near_line is None else 2 * DRIVES
+
+    def measured(handles: Adapted, seed: int) -> tuple[LaneKeeping, FloatArray]:
+        drives = highway_drives(plain.with_effects(handles), seed, speed=speed, drives=count)
+        return lane_keeping(drives, plain.lane_width, plain.model.step, half_width=half_width), drives
+
+    known, drives = measured(adapted, DESIGN)
+    if asked.sdlp_change is not None:
+        if known.sdlp + asked.sdlp_change <= 0.0:
+            raise DriverProfileError(f"the SDLP of {base.name} is {known.sdlp:.3f} m: it can't be so much smaller")
+        asked = replace(asked, sdlp=known.sdlp + asked.sdlp_change, sdlp_change=None)
+    within = drives - drives.mean(axis=1, keepdims=True)
+    parts = _parts(known, measured(structs.replace(adapted, fine=0.5 * adapted.fine), DESIGN)[0])
+    handles, reached, want = adapted, known, asked
+    for _ in range(CORRECTIONS):
+        handles = _handles(adapted, known, parts, within, want, plain.lane_width)
+        reached, _ = measured(handles, DESIGN)
+        if not _missed(asked, reached, share=0.25):
+            break
+        want = _corrected(want, asked, reached)
+    reached, drives = measured(handles, PROOF)
+    missed = _missed(asked, reached)
+    if missed:
+        raise DriverProfileError(f"{base.name} can't have these together: {'; '.join(missed)}")
+    _check_drivable(drives, plain, speed)
+    return Derived(_described(plain.with_effects(handles), base, asked, reached, speed, preset), asked, reached)
+
+
+def _single(base: DriverProfile) -> DriverProfile:
+    """The typical driver of a population: without what differs between its drivers."""
+    model = base.model
+    if isinstance(model, AutoregressiveModel):
+        alike = {
+            name: structs.replace(getattr(model, name), between=0.0)
+            for name in ("coarse_volatility", "fine_volatility")
+        }
+        model = structs.replace(model, between_drivers=0.0, **alike)
+    effects = [
+        structs.replace(effect, between_drivers=()) if isinstance(effect, ColumnEffect) else effect
+        for effect in base.effects
+        if not isinstance(effect, Population)
+    ]
+    return structs.replace(base, model=model, effects=tuple(effects))
+
+
+def _of_class(base: DriverProfile, vehicle: str | None) -> tuple[DriverProfile, Adapted]:
+    """The base with what it knows of trucks made its own, where that is asked."""
+    if vehicle is None:
+        return base, Adapted()
+    of_trucks = [effect for effect in base.effects if effect.columns == ("is_truck",)]
+    if not of_trucks:
+        raise DriverProfileError(f"{base.name} doesn't know how trucks differ: no effect of is_truck")
+    found = dict.fromkeys(Acts, 0.0)
+    for effect in of_trucks:
+        assert isinstance(effect, ColumnEffect)
+        strength = effect.strength(base.model.step, {"is_truck": np.ones(2)})
+        found[effect.acts] += 0.0 if strength is None else float(strength[-1])
+    rest = tuple(effect for effect in base.effects if effect not in of_trucks)
+    spread, rate, fine = (float(np.exp(found[acts])) for acts in (Acts.SPREAD, Acts.RATE, Acts.FINE))
+    return structs.replace(base, effects=rest), Adapted(shift=found[Acts.LOCATION], spread=spread, rate=rate, fine=fine)
+
+
+class _Parts(NamedTuple):
+    """Variances [m2] and mean squared lateral speeds [m2/s2] of the coarse and the fine movement."""
+
+    coarse: float
+    fine: float
+    coarse_speed: float
+    fine_speed: float
+
+
+def _parts(known: LaneKeeping, quiet: LaneKeeping) -> _Parts:
+    """From a driver and the same with half of the fine movement."""
+    share = 1.0 - 0.5**2
+    fine = max((known.sdlp**2 - quiet.sdlp**2) / share, 0.0)
+    fine_speed = max((known.restlessness**2 - quiet.restlessness**2) / share, 0.0)
+    return _Parts(known.sdlp**2 - fine, fine, known.restlessness**2 - fine_speed, fine_speed)
+
+
+def _handles(
+    start: Adapted, known: LaneKeeping, parts: _Parts, within: FloatArray, want: Asked, lane_width: float
+) -> Adapted:
+    """Closed form: from the base's figures, and its deviations `within` drives [m], to those wanted."""
+    limit = known.limit_near_line
+    mean = known.mean if want.mean is None else want.mean
+    rate = 1.0 if want.memory is None else known.memory / want.memory
+    size, fine = 1.0, None
+    if want.sdlp is None and want.restlessness is not None and want.memory is not None:
+        size = want.restlessness / (rate * known.restlessness)  # from speed and memory follows how far
+    elif want.sdlp is None and want.near_line is not None:
+        size = _solved(lambda k: _near(mean + k * within, limit), want.near_line, 1 / FACTOR_LIMIT, FACTOR_LIMIT)
+    elif want.sdlp is not None:
+        size = want.sdlp / known.sdlp
+    if want.restlessness is not None and want.memory is None:
+        rate = want.restlessness / (size * known.restlessness)
+        if want.sdlp is not None:  # slower movement has less of the fine one in its variance
+            size = want.sdlp / float(np.sqrt(parts.coarse + rate**2 * parts.fine))
+            rate = want.restlessness / (size * known.restlessness)
+    elif want.restlessness is not None and want.sdlp is not None:
+        left = want.restlessness**2 - size**2 * rate**2 * parts.coarse_speed
+        fine = float(np.sqrt(max(left, 0.0) / max(parts.fine_speed, 1e-12)))
+        if fine < size * rate / FACTOR_LIMIT:
+            least = size * rate * float(np.sqrt(parts.coarse_speed + parts.fine_speed / FACTOR_LIMIT**2))
+            raise DriverProfileError(
+                f"an SDLP of {want.sdlp:.3g} m with a memory of {want.memory:.3g} s moves at {least:.3g} m/s at least: "
+                f"a restlessness of {want.restlessness:.3g} m/s can't be had with them"
+            )
+    if want.near_line is not None and want.mean is None and want.size_is_given:
+        away = 1.0 if known.mean >= 0 else -1.0
+        moved = _solved(lambda m: _near(away * m + size * within, limit), want.near_line, 0.0, 0.5 * lane_width)
+        mean = away * moved
+    fine = start.fine * (size * rate if fine is None else fine)
+    spread, rate = start.spread * size, start.rate * rate
+    for word, factor in (("large", spread), ("quick", rate), ("restless", fine)):
+        if not 1.0 / FACTOR_LIMIT <= factor <= FACTOR_LIMIT:
+            raise DriverProfileError(
+                f"movement {factor:.2g} times as {word} as the base's (SDLP {known.sdlp:.3f} m, restlessness "
+                f"{known.restlessness:.3f} m/s, memory {known.memory:.2g} s): {1 / FACTOR_LIMIT:g} to "
+                f"{FACTOR_LIMIT:g} times can be had"
+            )
+    return Adapted(shift=start.shift + mean - known.mean, spread=spread, rate=rate, fine=fine)
+
+
+def _near(offset: FloatArray, limit: float) -> float:
+    return float((np.abs(offset) > limit).mean())
+
+
+def _solved(share: Callable[[float], float], wanted: float, low: float, high: float) -> float:
+    """Where a share that grows becomes what is wanted, by halving."""
+    if not share(low) < wanted < share(high):
+        raise DriverProfileError(
+            f"near line {wanted:g}: with what else is stated or the base gives it lies between {share(low):.2g} and "
+            f"{share(high):.2g}"
+        )
+    for _ in range(30):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if share(middle) < wanted else (low, middle)
+    return 0.5 * (low + high)
+
+
+def _missed(asked: Asked, reached: LaneKeeping, *, share: float = 1.0) -> list[str]:
+    """Figures that are not reached within so much of the tolerance, in words."""
+    found = []
+    for name, value in asked.figures.items():
+        had = getattr(reached, name)
+        scale = reached.sdlp if name == "mean" else value
+        known_to = 0.0 if share < 1.0 else 2.0 * reached.errors.get(name, 0.0)  # what runs as many can't tell
+        if abs(had - value) > share * TOLERANCE * scale + known_to:
+            found.append(f"{name.replace('_', ' ')} {value:.4g} asked, {had:.4g} reached")
+    return found
+
+
+def _corrected(want: Asked, asked: Asked, reached: LaneKeeping) -> Asked:
+    """What to want instead, by what was missed."""
+    now = {}
+    for name, value in asked.figures.items():
+        had, wanted = getattr(reached, name), getattr(want, name)
+        now[name] = wanted + value - had if name == "mean" else wanted * value / max(had, 1e-6)
+    return replace(want, **now)
+
+
+def _check_drivable(drives: FloatArray, profile: DriverProfile, speed: float) -> None:
+    """Refuse what could not be driven, or is no lane keeping."""
+    out = float((np.abs(drives) > 0.5 * profile.lane_width).mean())
+    if out > SELDOM:
+        raise DriverProfileError(
+            f"the vehicle's middle would be out of its lane of {profile.lane_width:.2f} m for {out:.1%} of the time"
+        )
+    strains = [strain(drive, profile.model.step, np.full(len(drive), speed)) for drive in drives]
+    worst = sorted(strains, key=lambda one: one.excess)[len(strains) // 2]
+    if worst.excess > 1.0:  # in every second hour
+        raise DriverProfileError(
+            f"no car could drive it: lateral acceleration above {worst.seldom:.2f} m/s2 for 0.1 % of the time, at most "
+            f"{worst.largest:.2f} m/s2, jerk at most {worst.jerk:.1f} m/s3 (see `driver.drivability`)"
+        )
+
+
+def _described(
+    profile: DriverProfile,
+    base: DriverProfile,
+    asked: Asked,
+    reached: LaneKeeping,
+    speed: float,
+    preset: Preset | None,
+) -> DriverProfile:
+    """With a provenance that says from what it was derived, what was asked and reached."""
+    stated = asked.figures
+    reach = {name: round(getattr(reached, name), 5) for name in stated}
+    words = [f"{name.replace('_', ' ')} {value:.4g} (reached {reach[name]:.4g})" for name, value in stated.items()]
+    notes = f"Derived from {base.name}: {', '.join(words) or 'as its base'}, at {speed:.3g} m/s."
+    fit: dict[str, object] = {
+        "derived_from": base.name,
+        "asked": stated if asked.vehicle is None else {**stated, "vehicle": asked.vehicle},
+        "reached": reach,
+        "speed": round(speed, 3),
+    }
+    if preset is not None:
+        notes = f"{preset.what[0].upper()}{preset.what[1:]}. {notes}"
+        fit["preset"] = {"name": preset.name, "source": preset.source, "doi": preset.doi}
+    provenance = structs.replace(
+        base.provenance,
+        source=f"derived from {base.name}, which is of: {base.provenance.source}",
+        fit=fit,
+        evaluation={},
+        package_version=__version__,
+        notes=notes,
+    )
+    known = base.metadata
+    metadata = structs.replace(known, tags=(*known.tags, "derived"), vehicle=asked.vehicle or known.vehicle)
+    return structs.replace(profile, provenance=provenance, metadata=metadata, sensor=None)

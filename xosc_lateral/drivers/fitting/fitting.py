@@ -1,0 +1,128 @@
+"""Fit a profile to measured drives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from msgspec.structs import replace
+
+from xosc_lateral.base.errors import DriverProfileError
+from xosc_lateral.base.version import __version__
+from xosc_lateral.drivers.drives.cuts import PAPER_RULES, CutRules, all_runs
+from xosc_lateral.drivers.drives.drive import Drive, Run
+from xosc_lateral.drivers.fitting.answers import answer_effects, measure_beside
+from xosc_lateral.drivers.fitting.place import LEAST_DRIVES, fit_place, without_place
+from xosc_lateral.drivers.fitting.sensor.runs import driver_runs
+from xosc_lateral.drivers.model.core.base import CoreModel, ModelKind
+from xosc_lateral.drivers.model.core.registry import model_named
+from xosc_lateral.drivers.model.effects import ColumnEffect
+from xosc_lateral.drivers.model.profile import DriverProfile, Provenance
+from xosc_lateral.drivers.model.sensor.model import SensorModel
+
+
+def fit_profile(
+    drives: Sequence[Drive],
+    *,
+    name: str,
+    model: ModelKind | str = ModelKind.AUTOREGRESSIVE,
+    rules: CutRules = PAPER_RULES,
+    provenance: Provenance | None = None,
+    sensor_noise: float | None = None,
+    neighbours: bool | None = None,
+) -> DriverProfile:
+    """Cut drives into runs, separate driver and sensor, and fit a profile.
+
+    Of a population it holds what class, lane and speed do to level, spread and fine movement, and neighbours to the
+    level, as far as they are known (`place`); of few drives, and of the two-level model, nothing of that.
+
+    Raises `NotEnoughDataError` when too little is left after cutting, or neighbours are asked for (True) and not known;
+    `DriverProfileError` when neighbours are asked for (True) of the two-level model, which is the paper's to the
+    letter.
+
+    Parameters
+    ----------
+    provenance : Provenance, optional
+        What is known about the drives; hours, counts and fit settings are filled in.
+    sensor_noise : float, optional
+        Standard deviation of the sensor's error on the rows, rounding included, where it is known. [m]
+    neighbours : bool, optional
+        Whether a population's profile holds how its drivers keep away from vehicles beside them. None: where they are
+        known.
+    """
+    runs = all_runs(drives, rules)
+    if (
+        model_named(model).model.kind == ModelKind.TWO_LEVEL
+    ):  # to the letter: the paper takes offsets as they were measured
+        if neighbours:
+            raise DriverProfileError(f"a {ModelKind.TWO_LEVEL} profile is fitted without what neighbours do")
+        return fit_runs(runs, name=name, model=model, provenance=provenance)
+    cleaned, sensor = driver_runs(runs, drives, sensor_noise=sensor_noise)
+    known = provenance or Provenance()
+    known = replace(known, fit={**known.fit, **_marking_notes(drives)})
+    return fit_population(cleaned, name=name, model=model, provenance=known, sensor=sensor, neighbours=neighbours)
+
+
+def _marking_notes(drives: Sequence[Drive]) -> Mapping[str, float]:
+    """Shares of all rows that follow one marking, and that were left out, where a camera had misjudged any."""
+    mended = [(len(drive), drive.mended) for drive in drives if drive.mended]
+    rows = sum(map(len, drives))
+    if not mended:
+        return {}
+    one = sum(count * shares.one_marking for count, shares in mended) / rows
+    none = sum(count * shares.no_marking for count, shares in mended) / rows
+    return {"one_marking": round(one, 4), "no_marking": round(none, 4)}
+
+
+def fit_population(
+    runs: Sequence[Run],
+    *,
+    name: str,
+    model: ModelKind | str = ModelKind.AUTOREGRESSIVE,
+    provenance: Provenance | None = None,
+    sensor: SensorModel | None = None,
+    neighbours: bool | None = None,
+) -> DriverProfile:
+    """Fit a profile to the driver's part of runs: what class, lane, speed and neighbours do first, then the drivers.
+
+    Runs come without the sensor's part (`driver_runs`), which the profile keeps. For `neighbours` see `fit_profile`.
+    """
+    few = len({run.drive for run in runs}) < LEAST_DRIVES
+    beside = measure_beside(runs)
+    place: tuple[ColumnEffect, ...]
+    if few and neighbours is not False and beside:
+        place = tuple(answer_effects(runs, beside))
+    else:
+        place = fit_place(runs, neighbours=neighbours)
+    profile = fit_runs(without_place(runs, place), name=name, model=model, provenance=provenance)
+    return replace(profile, sensor=sensor, effects=place, beside=beside)
+
+
+def fit_runs(
+    runs: Sequence[Run],
+    *,
+    name: str,
+    model: ModelKind | str = ModelKind.AUTOREGRESSIVE,
+    provenance: Provenance | None = None,
+) -> DriverProfile:
+    """Fit a profile to runs that are cut already."""
+    core = model_named(model).fit([run.rel_offset for run in runs], [run.drive for run in runs])
+    return DriverProfile(
+        name=name,
+        model=core,
+        lane_width=float(np.median(np.concatenate([run.lane_width for run in runs]))),
+        provenance=_fitted_on(runs, core, provenance or Provenance()),
+    )
+
+
+def _fitted_on(runs: Sequence[Run], core: CoreModel, known: Provenance) -> Provenance:
+    """What is known, with what it was fitted on and how."""
+    seconds = sum(len(run) for run in runs) * core.step
+    return replace(
+        known,
+        hours=round(seconds / 3600.0, 4),
+        drives=len({run.drive for run in runs}),
+        runs=len(runs),
+        fit={**known.fit, "model": core.kind, "step_s": core.step},
+        package_version=__version__,
+    )

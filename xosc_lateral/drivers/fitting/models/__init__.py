@@ -1,0 +1,1 @@
+"""Fits the core models: a package each."""

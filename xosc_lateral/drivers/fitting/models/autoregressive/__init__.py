@@ -1,0 +1,1 @@
+"""Fits the autoregressive core model: coarse part, match of spectra, settings."""

@@ -1,0 +1,251 @@
+"""Coarse movement of a population, and fine noise that has what its spectrum lacks.
+
+One autoregression, and drivers' own means about which it moves: it is fitted to the low-passed offset, all moments of a
+driver counting the same, and then gets back what the low-pass took near the border. Drivers' means are a random effect:
+their variance is the covariance of moments far apart in a run, less what of it the autoregression itself still
+remembers. Each needs the other, so both are fitted in turn.
+
+References
+----------
+.. [1] G. Wahba, "Automatic smoothing of the log periodogram", J. American Statistical Association 75, 1980.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from msgspec.structs import replace
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.drivers.drives.periodogram import Detrend, periodograms
+from xosc_lateral.drivers.fitting.models.autoregressive.settings import FitSettings
+from xosc_lateral.drivers.model.core.autoregressive.coarse import (
+    COARSE_EVERY,
+    FREQUENCIES,
+    GRID,
+    Autoregression,
+    building_low_pass,
+    measuring_low_pass,
+    stabilise,
+)
+from xosc_lateral.drivers.model.core.noise import NOISE_VARIANCE, ShapedNoise
+
+RIDGE = 1e-7
+"""Share of the mean square that is added to the normal equations' diagonal. [-]"""
+
+LEAST_RESIDUAL = 0.1
+"""Share of a driver's mean square residual that his mean never takes. [-]"""
+
+WILD = 9.0
+"""Mean square residual over the median driver's beyond which a driver is wild: three times as far. Drivers on a
+motorway differ by less (standard deviation of the logarithm 0.3, so that 1 in 10 000 is). [-]"""
+
+PASSES = 2
+"""The first finds the drivers' sizes, the second is weighted by them. [-]"""
+
+
+def fit_autoregression(
+    runs: Sequence[FloatArray], order: int, *, every: int, drivers: Sequence[str], between: float = 0.0
+) -> Autoregression:
+    """Fit by least squares, all moments alike but those of wild drivers, who are measured by their own size.
+
+    The scale is the geometric mean of the drivers' residuals. Weights by how calm a moment is would drop the return of
+    whoever drifts calmly and corrects briskly, and the rest is an endless drift.
+
+    Drivers' own means are a random effect of variance `between`: it is taken out of the normal equations, where it adds
+    the same to every product. Taking each driver's estimated mean out of his runs instead would take slow movement with
+    it, and a run of a minute would then forget twice too fast.
+
+    Parameters
+    ----------
+    runs, drivers : sequence of array, shape (n_i,), and of str
+        Series with the mean of all taken out [any unit], and whose each is.
+    order, every : int
+        Of the model, >= 1; one step of it in samples of the runs.
+    between : float
+        Variance of the drivers' own means.
+    """
+    long = [(run, driver) for run, driver in zip(runs, drivers, strict=True) if len(run) > every * order + every]
+    pasts = [np.stack([run[every * (order - 1 - k) : len(run) - every * (k + 1)] for k in range(order)], axis=1)
+             for run, _ in long]  # fmt: skip
+    nexts = [run[every * order :] for run, _ in long]
+    whose = np.unique([driver for _, driver in long], return_inverse=True)[1]
+    counts = np.bincount(whose, [len(y) for y in nexts])
+    smallest = 1e-12 * float(np.mean([np.mean(y**2) for y in nexts])) + 1e-300
+    variances = np.ones(len(counts))
+    coefficients: FloatArray = np.zeros(order)
+    for _ in range(PASSES):
+        # Only outliers are weighed: what a calm driver's short run shows of his memory is biased by what made it calm.
+        usual = np.median(variances)
+        sizes = np.where(variances > WILD * usual, variances, usual)
+        normal, right = np.zeros((order, order)), np.zeros(order)
+        for past, value, size in zip(pasts, nexts, sizes[whose], strict=True):
+            normal += (past.T @ past - len(value) * between) / size
+            right += (past.T @ value - len(value) * between) / size
+        normal += RIDGE * np.trace(normal) / order * np.eye(order)
+        coefficients = np.asarray(np.linalg.solve(normal, right), dtype=np.float64)
+        squares = [float(np.sum((y - past @ coefficients) ** 2)) for past, y in zip(pasts, nexts, strict=True)]
+        raw = np.bincount(whose, squares) / counts
+        own = between * (1.0 - coefficients.sum()) ** 2  # what the drivers' means leave in the residual
+        variances = np.maximum(raw - own, LEAST_RESIDUAL * raw) + smallest
+    scale = float(np.exp(0.5 * np.average(np.log(variances), weights=counts)))
+    return Autoregression(stabilise(coefficients), scale)
+
+
+TURNS = 20
+"""Of fitting both in turn at most: each leaves less than a third of the last one's error on runs of a minute. [-]"""
+
+SETTLED = 1e-3
+"""Change of the drivers' share of the variance at which they end. [-]"""
+
+HALF_GAIN = 0.5
+"""Of the measuring low-pass at its border. Beyond, most is not coarse, and the building low-pass takes it away. [-]"""
+
+
+def fit_coarse(
+    slow: Sequence[FloatArray], drives: Sequence[str], settings: FitSettings
+) -> tuple[Autoregression, float]:
+    """Autoregression at one step a second [lane widths], and the variance between drivers [lane widths squared].
+
+    From low-passed runs at 5 Hz, shape (n_i,), the mean of all taken out [lane widths], and whose drive each is of.
+    """
+    longest = max(map(len, slow)) * settings.step
+    order = max(2, min(settings.order, int(0.4 * longest)))
+    several = len(set(drives)) > 1
+    variance = float(np.mean(np.concatenate(slow) ** 2))
+    covariance, lags, pairs = _far_covariance(slow, len(set(drives)), settings) if several else (0.0, [1], [1])
+    between = float(np.clip(covariance, 0.0, 0.9 * variance))
+    for _ in range(TURNS):
+        coarse = fit_autoregression(slow, order, every=COARSE_EVERY, drivers=drives, between=between)
+        if not several:
+            break
+        remembered = coarse.covariance(max(lags) + 1)
+        share = float(np.average(remembered[lags] / remembered[0], weights=pairs))
+        before, between = between, (covariance - share * variance) / (1.0 - share)
+        between = float(np.clip(between, 0.0, 0.9 * variance))
+        if abs(between - before) < SETTLED * variance:
+            break
+    return _restored(coarse, settings.step), between
+
+
+def _far_covariance(
+    slow: Sequence[FloatArray], drivers: int, settings: FitSettings
+) -> tuple[float, list[int], list[int]]:
+    """Covariance of moments far apart in one run; at which lags in coarse steps, and from how many pairs each."""
+    lengths = np.array([len(run) for run in slow])
+    order = np.argsort(lengths)
+    typical = lengths[order][np.searchsorted(np.cumsum(lengths[order]), 0.5 * lengths.sum())]
+    reach = min(float(typical), settings.farthest / settings.step) / COARSE_EVERY
+    lags = list(range(max(1, int(settings.far[0] * reach)), max(2, int(settings.far[1] * reach))))
+    total, pairs = np.zeros(len(lags)), np.zeros(len(lags), dtype=np.int64)
+    for run in slow:
+        for k, lag in enumerate(lags):
+            if len(run) > lag * COARSE_EVERY:
+                total[k] += run[lag * COARSE_EVERY :] @ run[: len(run) - lag * COARSE_EVERY]
+                pairs[k] += len(run) - lag * COARSE_EVERY
+    # The common mean was taken out, and with it a part of the differences between a few drivers.
+    return float(total.sum() / max(pairs.sum(), 1) * drivers / (drivers - 1)), lags, pairs.tolist()
+
+
+def _restored(coarse: Autoregression, step: float) -> Autoregression:
+    """With what the measuring low-pass took below the border; `step` of the runs. [s]"""
+    kernel = measuring_low_pass(step)
+    gain = np.abs(np.exp(-2j * np.pi * np.outer(FREQUENCIES / COARSE_EVERY, np.arange(len(kernel)))) @ kernel)
+    return scaled_spectrum(coarse, 1.0 / np.maximum(gain, HALF_GAIN))
+
+
+def scaled_spectrum(coarse: Autoregression, gain: FloatArray) -> Autoregression:
+    """One of the same order with the spectrum's amplitude times a gain, by the covariance of that spectrum.
+
+    `gain` at `FREQUENCIES`. [-]
+    """
+    from scipy.linalg import solve_toeplitz
+
+    power = coarse.power(FREQUENCIES) * gain**2
+    covariance = np.fft.irfft(power, GRID)[: coarse.order + 1]
+    row = covariance[:-1].copy()
+    row[0] *= 1.0 + RIDGE
+    coefficients = solve_toeplitz(row, covariance[1:])
+    scale = float(np.sqrt(covariance[0] - coefficients @ covariance[1:]))
+    return Autoregression(stabilise(coefficients), scale)
+
+
+ENOUGH_WINDOWS = 20
+"""Spectral windows that a length needs: the log power of one has a standard deviation of 5.6 dB, of so many 1.3 dB."""
+
+MOST_TIME = 0.5
+"""Share of all time that they need to hold: a few long runs don't speak for many short ones. The motorway recording's
+windows of 30 s hold 0.57, those of 20 s 0.71. [-]"""
+
+GAIN_ROUNDS = 20
+"""Rounds in which the damping is corrected for what the kernel's window does to it. [-]"""
+
+
+def fit_spectrum(
+    runs: Sequence[FloatArray], coarse: Autoregression, settings: FitSettings
+) -> tuple[Autoregression, ShapedNoise]:
+    """Scale of the coarse movement, and fine noise that has what the coarse lacks of the measured power.
+
+    From runs of shape (n_i,), evenly sampled. [lane widths]
+    """
+    frequency, power = _typical_power(runs, settings)
+    knots = np.linspace(0.0, 0.5, settings.n_knots)  # in cycles per sample
+    coarse_power = _coarse_power(coarse, knots)
+    measured = np.exp(np.interp(knots, frequency, np.log(power)))
+    hertz = knots / settings.step
+    shared = (hertz >= settings.scale_band[0]) & (hertz <= settings.scale_band[1])
+    scale = float(np.exp(np.log(measured[shared] / coarse_power[shared]).mean()))
+    lacking = np.maximum(measured - scale * coarse_power, 0.0)
+    noise = _shaped(np.sqrt(lacking / NOISE_VARIANCE) * rise(hertz, settings), settings)
+    return replace(coarse, scale=coarse.scale * np.sqrt(scale)), noise
+
+
+def _coarse_power(coarse: Autoregression, knots: FloatArray) -> FloatArray:
+    """Of the coarse movement at 5 Hz, shape of `knots` [cycles per sample]. [lane widths squared]"""
+    kernel = building_low_pass()
+    gain = np.abs(np.exp(-2j * np.pi * np.outer(knots, np.arange(len(kernel)))) @ kernel)
+    return np.asarray(coarse.power(knots * COARSE_EVERY) * gain**2 / COARSE_EVERY)
+
+
+def rise(hertz: FloatArray, settings: FitSettings) -> FloatArray:
+    """From 0 to 1 where the fine noise begins, shape of `hertz` [Hz]. [-]"""
+    low, high = settings.fine_from
+    return np.asarray(np.sin(0.5 * np.pi * np.clip((hertz - low) / (high - low), 0.0, 1.0)) ** 2)
+
+
+def window_of(runs: Sequence[FloatArray], lengths: Sequence[float], settings: FitSettings) -> int:
+    """Samples of the first of some lengths [s] that enough windows are as long as; of the last where none is."""
+    sizes = [round(seconds / settings.step) for seconds in lengths]
+    least = MOST_TIME * sum(map(len, runs))
+    for size in sizes:
+        count = sum(len(run) // size for run in runs)
+        if count >= ENOUGH_WINDOWS and count * size >= least:
+            return size
+    return sizes[-1]
+
+
+def _shaped(wanted: FloatArray, settings: FitSettings) -> ShapedNoise:
+    """Noise whose kernel has the wanted gain at the knots, although it is short and faded out."""
+    half = settings.n_taps // 2
+    knots = np.linspace(0.0, 0.5, len(wanted))
+    waves = np.cos(2.0 * np.pi * np.outer(knots, np.arange(-half, half + 1)))
+    noise = ShapedNoise(wanted, settings.n_taps, settings.taper)
+    for _ in range(GAIN_ROUNDS):
+        gain = np.abs(waves @ noise.kernel)
+        ratio = np.where(wanted > 0.0, wanted / np.maximum(gain, 1e-30), 1.0)
+        noise = replace(noise, damping=noise.damping * np.clip(ratio, 0.5, 2.0))
+    return noise
+
+
+def _typical_power(runs: Sequence[FloatArray], settings: FitSettings) -> tuple[FloatArray, FloatArray]:
+    """Frequencies [cycles per sample] and power of steady movement; white noise of variance 1 has 1 everywhere.
+
+    Geometric means over windows, so that volatile ones don't outweigh the others. (A periodogram's logarithm lies on
+    average Euler's constant below that of the power.)
+    """
+    size = min(window_of(runs, settings.spectrum_windows, settings), max(map(len, runs)))
+    power = np.concatenate([periodograms(run, size, detrend=Detrend.ENDS) for run in runs])
+    frequency = np.fft.rfftfreq(size)
+    typical = np.exp(np.log(power + 1e-30).mean(axis=0) + np.euler_gamma)
+    return np.asarray(frequency, dtype=np.float64), np.asarray(typical)

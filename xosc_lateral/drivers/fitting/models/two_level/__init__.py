@@ -1,0 +1,1 @@
+"""Fits the two-level model of Neis and Beyerer to the letter."""

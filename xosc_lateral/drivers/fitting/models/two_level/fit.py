@@ -1,0 +1,59 @@
+"""Fitting of the two-level model: count transitions, shape the noise like what is left.
+
+References
+----------
+.. [1] N. Neis, J. Beyerer, "A two-level stochastic model for the lateral movement of vehicles within their lane", IEEE
+       ITSC 2023, pp. 1896-1903, arXiv:2405.17080, section III.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.drivers.model.core.noise import fit_shaped_noise
+from xosc_lateral.drivers.model.core.two_level.markov import N_BINS, MarkovChain, bin_of
+from xosc_lateral.drivers.model.core.two_level.model import PAPER_SETTINGS, TwoLevelModel, TwoLevelSettings
+from xosc_lateral.drivers.model.linear_filters import convolve
+
+
+def split_levels(rel_offset: FloatArray, settings: TwoLevelSettings = PAPER_SETTINGS) -> tuple[FloatArray, FloatArray]:
+    """Coarse part and capped fine part of a measured run at the model's step, shape (n,) each. [-]
+
+    Bin centres smoothed (at the run's ends with the kernel's part that lies inside), and what is left, capped.
+    """
+    rel_offset = np.asarray(rel_offset, dtype=np.float64)
+    levels = (bin_of(rel_offset, settings.n_bins) + 0.5) / settings.n_bins - 0.5
+    kernel = settings.smoothing_kernel
+    half = len(kernel) // 2
+    weight = convolve(np.pad(np.ones(len(levels)), half), kernel)
+    coarse = convolve(np.pad(levels, half), kernel) / weight
+    return coarse, np.clip(rel_offset - coarse, -settings.fine_cap, settings.fine_cap)
+
+
+def fit_markov_chain(rel_offsets: Sequence[FloatArray], *, n_bins: int = N_BINS) -> MarkovChain:
+    """Count transitions inside each run of relative offsets [-], shape (n_i,) each; none across two runs.
+
+    Raises `NotEnoughDataError` when there is no transition.
+    """
+    counts = np.zeros((n_bins, n_bins), dtype=np.int64)
+    for run in rel_offsets:
+        bins = bin_of(np.asarray(run), n_bins)
+        np.add.at(counts, (bins[:-1], bins[1:]), 1)
+    if not counts.any():
+        raise NotEnoughDataError(f"{len(rel_offsets)} runs hold no two successive offsets: nothing to fit")
+    return MarkovChain(counts)
+
+
+def fit_two_level(rel_offsets: Sequence[FloatArray], settings: TwoLevelSettings = PAPER_SETTINGS) -> TwoLevelModel:
+    """Fit to relative offsets [-], one array of shape (n_i,) per run, evenly sampled at the model's step.
+
+    Raises `NotEnoughDataError` when there is no transition, or no run of 5 s.
+    """
+    chain = fit_markov_chain(rel_offsets, n_bins=settings.n_bins)
+    fine = [split_levels(run, settings)[1] for run in rel_offsets]
+    noise = fit_shaped_noise(fine, n_knots=settings.n_knots, n_taps=settings.n_taps)
+    return TwoLevelModel(settings, chain.counts, noise.damping)

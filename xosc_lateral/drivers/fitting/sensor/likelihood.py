@@ -1,0 +1,196 @@
+"""Whittle's likelihood of driver plus sensor.
+
+References
+----------
+.. [1] P. Whittle, "Estimation and information in stationary time series", Arkiv för Matematik 2, 1953.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.drivers.fitting.sensor.periodogram import Periodogram, climb
+from xosc_lateral.drivers.fitting.sensor.second_view import LEVEL_SD, SecondView
+from xosc_lateral.drivers.fitting.sensor.vehicle_bound import KNOTS, N_KNOTS, N_STATE, interpolation, prior
+
+ABOVE = 1.0
+"""No driver is seen above this in a sensor worth splitting: where white noise is estimated at first. [Hz]"""
+
+WHITE_SD = 3.0
+COLOUR_SD = 4.0
+"""Of weak priors that keep parts that are not there from running off: of log density. [-]"""
+
+NO_WHITE = np.log(1e-14)
+"""Log density of white noise that is not there: a hundredth of what is added to every periodogram. [-]"""
+
+KNOWN_SD = 0.05
+"""How closely a noise level that is known is kept to: of its logarithm. [-]"""
+
+
+@dataclass(frozen=True, slots=True)
+class Colour:
+    """Coloured part of the sensor: a Butterworth shape of some order and corner [Hz], or what a second view shows.
+
+    Of order 0 and without a view there is none. `alone`: there is no white noise beside it.
+    """
+
+    order: int = 0
+    corner: float = 1.0
+    alone: bool = False
+    view: SecondView | None = None
+
+    @property
+    def is_there(self) -> bool:
+        """Whether there is a coloured part."""
+        return self.order > 0 or self.view is not None
+
+    def shape(self, frequency: FloatArray) -> FloatArray:
+        """Density over that at frequency 0 [-], or of the second view [m2/Hz]. Shape as `frequency` [Hz]."""
+        if self.view is not None:
+            return self.view.density(frequency)
+        return np.asarray(1.0 / (1.0 + (frequency / self.corner) ** (2 * self.order)))
+
+    def integral(self, highest: float) -> float:
+        """Of the shape over all frequencies; of a second view, up to `highest`, that of the rows [Hz]."""
+        if self.view is not None:
+            return self.view.variance(highest)
+        part = np.pi / (2 * self.order)
+        return float(self.corner * part / np.sin(part))
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """A sensor whose error is known."""
+
+    deviation: float
+    """Standard deviation on the table's rows. [m]"""
+    rate: float
+    """Rows per second. [Hz]"""
+    rounding: float = 0.0
+    """What rounding has of its square, which is known from the rows. [m2]"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Solution:
+    """The maximum."""
+
+    state: FloatArray
+    """The driver, shape (N_STATE,): log density at the knots, and the corner of corrections, see `vehicle_bound`."""
+    white: float
+    """Log densities of the sensor's two parts, of `colour` over its shape; -inf where there is none."""
+    colour: float
+    loss: float
+    """Minus log posterior."""
+
+    @property
+    def knots(self) -> FloatArray:
+        """Log density of the driver, shape (N_KNOTS,)."""
+        return self.state[:N_KNOTS]
+
+    def coloured(self, colour: Colour, frequency: FloatArray) -> FloatArray:
+        """Density of the coloured part, which there is. [m2/Hz] Shape as `frequency` [Hz]."""
+        return np.asarray(np.exp(self.colour) * colour.shape(frequency))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Measured:
+    """What driver and sensor are to explain."""
+
+    data: Periodogram
+    base: FloatArray
+    """Density of the sensor's that is known already, at the data's frequencies, shape (n,). [m2/Hz]"""
+    known: Known | None = None
+
+
+class _Problem:
+    """Loss, gradient and Fisher information at a point (state, white, colour)."""
+
+    def __init__(self, measured: Measured, colour: Colour) -> None:
+        data, known = measured.data, measured.known
+        self.data, self.base, self.known = data, measured.base, known
+        self.matrix = interpolation(data.frequency)
+        self.shape = colour.shape(data.frequency) if colour.is_there else None
+        self.integral = colour.integral(0.5 * known.rate) if colour.is_there and known else 0.0
+        self.size = N_STATE + 1 + colour.is_there
+        self.is_seen, self.is_low_passed = colour.view is not None, colour.order > 0
+        high = data.frequency > ABOVE
+        self.top = float(np.log(np.average(data.density[high], weights=data.weight[high])))
+        self.corner, self.alone = colour.corner, colour.alone
+
+    def start(self) -> FloatArray:
+        """The measured density up to 0.3 Hz, going on as f^-6 from there; the sensor's as flat as above 1 Hz."""
+        log = np.log(KNOTS)
+        measured = np.interp(log, np.log(self.data.frequency), np.log(self.data.density))
+        last = int(np.searchsorted(KNOTS, 0.3)) - 1
+        measured[last + 1 :] = measured[last] - 6.0 * (log[last + 1 :] - log[last])
+        at = int(np.argmin(np.abs(self.data.frequency - 0.7 * self.corner)))
+        white = NO_WHITE if self.alone else self.top - 0.3
+        rest = [white, 0.0 if self.is_seen else float(np.log(self.data.density[at])) - 0.7]
+        return np.concatenate([measured, [0.0], rest[: self.size - N_STATE]])
+
+    def at(self, point: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        """Loss, gradient, information."""
+        driver, white = np.exp(self.matrix @ point[:N_KNOTS]), np.exp(point[N_STATE])
+        total = driver + white + self.base
+        slope = np.zeros((len(total), self.size))
+        if self.shape is not None:
+            coloured = np.exp(point[N_STATE + 1]) * self.shape
+            total = total + coloured
+            slope[:, N_STATE + 1] = coloured
+        slope[:, :N_KNOTS] = self.matrix * driver[:, None]
+        slope[:, N_STATE] = white
+        slope /= total[:, None]
+        ratio, weight = self.data.density / total, self.data.weight
+        loss = float((weight * (np.log(total) + ratio)).sum())
+        gradient = slope.T @ (weight * (1.0 - ratio))
+        information = (slope.T * weight) @ slope
+        loss = self._add_priors(point, loss, gradient, information)
+        return loss, gradient, information
+
+    def _add_priors(self, point: FloatArray, loss: float, gradient: FloatArray, information: FloatArray) -> float:
+        """Loss with the priors' share; gradient and information are added to in place."""
+        for row, value in self._priors(point):
+            residual = float(row @ point) - value
+            loss += 0.5 * residual**2
+            gradient += residual * row
+            information += np.outer(row, row)
+        residuals, jacobian = prior(point[:N_STATE], is_corner_free=not self.is_low_passed)
+        gradient[:N_STATE] += jacobian.T @ residuals
+        information[:N_STATE, :N_STATE] += jacobian.T @ jacobian
+        return loss + 0.5 * float(residuals @ residuals)
+
+    def _priors(self, point: FloatArray) -> list[tuple[FloatArray, float]]:
+        """Weak priors of the sensor's levels, and the level that is known, linearised where it is looked at."""
+        white = np.zeros(self.size)
+        white[N_STATE] = 1.0 / WHITE_SD
+        rows = [(white, (NO_WHITE if self.alone else self.top - 1.0) / WHITE_SD)]
+        if self.is_seen:
+            level = np.zeros(self.size)
+            level[N_STATE + 1] = 1.0 / LEVEL_SD
+            rows.append((level, 0.0))
+        elif self.shape is not None and not self.alone:
+            both = np.zeros(self.size)
+            both[N_STATE], both[N_STATE + 1] = -1.0 / COLOUR_SD, 1.0 / COLOUR_SD
+            rows.append((both, 0.0))
+        if self.known is not None:
+            parts = np.zeros(self.size)
+            parts[N_STATE] = np.exp(point[N_STATE]) * 0.5 * self.known.rate
+            if self.shape is not None:
+                parts[N_STATE + 1] = np.exp(point[N_STATE + 1]) * self.integral
+            variance = float(parts.sum()) + self.known.rounding
+            row = parts / variance / KNOWN_SD
+            lacking = (2.0 * np.log(self.known.deviation) - np.log(variance)) / KNOWN_SD
+            rows.append((row, float(row @ point) + lacking))
+        return rows
+
+
+def solve(measured: Measured, colour: Colour, start: Solution | None = None) -> Solution:
+    """Most likely driver and sensor for a given colour of the sensor, climbed to from one of the same colour."""
+    problem = _Problem(measured, colour)
+    point = problem.start() if start is None else np.array([*start.state, start.white, start.colour])[: problem.size]
+    point, loss = climb(problem.at, point)
+    coloured = float(point[N_STATE + 1]) if colour.is_there else -np.inf
+    return Solution(point[:N_STATE], float(point[N_STATE]), coloured, loss)

@@ -1,0 +1,119 @@
+"""Power density of runs as a Whittle likelihood wants it: mean periodograms in bins, what they weigh, and the climb to
+the likelihood's maximum by Fisher scoring.
+
+References
+----------
+.. [1] P. Whittle, "Estimation and information in stationary time series", Arkiv för Matematik 2, 1953.
+.. [2] P. D. Welch, "The use of fast Fourier transform for the estimation of power spectra", IEEE Trans. Audio and
+       Electroacoustics 15, 1967: means over windows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.drivers.drives.periodogram import Detrend, periodograms
+
+WINDOWS = (102.4, 51.2, 25.6, 12.8)
+"""Lengths of window, the first of which there are at least `ENOUGH`; a longer one sees slower movement. [s]"""
+
+ENOUGH = 16
+
+INDEPENDENT = 0.53
+"""Independent windows per Hann window at half overlap (Welch 1967, eq. for the variance at 50 % overlap). [-]"""
+
+FAINTEST = 1e-12
+"""Added everywhere, so that values that stand still have a density. [m2/Hz]"""
+
+PASSED = 1.5
+"""Resampling to 5 Hz keeps what is slower than this. [Hz]"""
+
+BINS_FROM, BIN = 0.12, 0.05
+"""Above the first frequency [Hz], neighbouring ones within this share are averaged. [-]"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Periodogram:
+    """Mean power density and its weight, shape (n,) each."""
+
+    frequency: FloatArray
+    """Mean of each bin. [Hz]"""
+    density: FloatArray
+    """One-sided: integrates to the variance. [m2/Hz]"""
+    weight: FloatArray
+    """Independent ordinates in each bin. [-]"""
+
+    @property
+    def count(self) -> float:
+        """Independent ordinates in all. [-]"""
+        return float(self.weight.sum())
+
+
+def windows_of(runs: Sequence[FloatArray], step: float) -> tuple[FloatArray, FloatArray]:
+    """Frequencies, shape (m,), and densities of all windows, shape (k, m), of evenly sampled runs.
+
+    Raises `NotEnoughDataError` if no run holds the shortest window.
+    """
+    size = 0
+    for seconds in WINDOWS:
+        size = round(seconds / step)
+        if sum((len(run) - size) // (size // 2) + 1 for run in runs if len(run) >= size) >= ENOUGH:
+            break
+    longest = max(map(len, runs), default=0)
+    if longest < size:
+        raise NotEnoughDataError(f"no run of {size * step:g} s; the longest lasts {longest * step:g} s")
+    powers = np.concatenate([periodograms(run, size, detrend=Detrend.MEAN) for run in runs])
+    density = 2.0 * step * powers + FAINTEST
+    return np.asarray(np.fft.rfftfreq(size, step), dtype=np.float64), density
+
+
+def periodogram(frequency: FloatArray, windows: FloatArray) -> Periodogram:
+    """Mean over windows, binned, from the second frequency (Hann smears the mean into the first) to `PASSED`.
+
+    `frequency` [Hz] of shape (n,), `windows` [m2/Hz] of shape (k, n).
+    """
+    use = (frequency > 1.5 * frequency[1]) & (frequency <= PASSED)
+    known, density = frequency[use], windows[:, use].mean(axis=0)
+    edges = [int(k) for k in np.flatnonzero(known < BINS_FROM)]
+    at = len(edges)
+    while at < len(known):
+        edges.append(at)
+        at = max(at + 1, int(np.searchsorted(known, known[at] * (1.0 + BIN))))
+    count = np.diff([*edges, len(known)])
+    return Periodogram(
+        np.add.reduceat(known, edges) / count,
+        np.add.reduceat(density, edges) / count,
+        (INDEPENDENT * len(windows) + 0.5) * count,
+    )
+
+
+ROUNDS, LEAST_GAIN, LONGEST_STEP = 60, 1e-3, 1.5
+"""Of a climb: at most so many; it ends where one gains less loss than this; each log density moves by no more. [-]"""
+
+
+def climb(
+    at: Callable[[FloatArray], tuple[float, FloatArray, FloatArray]], point: FloatArray
+) -> tuple[FloatArray, float]:
+    """The least loss and where it is, by Fisher scoring from a point; `at` gives loss, gradient and information."""
+    loss, gradient, information = at(point)
+    for _ in range(ROUNDS):
+        step = np.linalg.solve(information + 1e-6 * np.eye(len(point)), -gradient)
+        step = np.clip(step, -LONGEST_STEP, LONGEST_STEP)
+        length = 1.0
+        tried = at(point + step)
+        while tried[0] >= loss and length > 1e-3:
+            length *= 0.4
+            tried = at(point + length * step)
+        if tried[0] >= loss:
+            break
+        gained = loss - tried[0]
+        point = point + length * step
+        loss, gradient, information = tried
+        if gained < LEAST_GAIN:
+            break
+    return point, loss

@@ -1,0 +1,258 @@
+"""Driver and sensor, separated in measured runs.
+
+References
+----------
+.. [1] P. Whittle, "Estimation and information in stationary time series", Arkiv för Matematik 2, 1953: the likelihood.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from dataclasses import replace as replaced
+from functools import partial
+
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.digits import all_significant
+from xosc_lateral.base.errors import DriverProfileError
+from xosc_lateral.base.normal import NORMAL_95
+from xosc_lateral.drivers.drives.filters import scale_frequencies
+from xosc_lateral.drivers.fitting.sensor.explanations import Explanation, explanations
+from xosc_lateral.drivers.fitting.sensor.likelihood import Colour, Known, Measured, Solution, solve
+from xosc_lateral.drivers.fitting.sensor.periodogram import Periodogram, periodogram, windows_of
+from xosc_lateral.drivers.fitting.sensor.quantisation import (
+    COARSEST,
+    quantisation_step,
+    rounding_density,
+    uniform_variance,
+)
+from xosc_lateral.drivers.fitting.sensor.second_view import LEVEL_SD, SecondView, second_view
+from xosc_lateral.drivers.fitting.sensor.vehicle_bound import density
+from xosc_lateral.drivers.model.sensor.model import SensorModel
+
+PLAUSIBLE = 6.0
+"""Explanations whose information criterion is within this of the best count for the interval: e^-3 as likely. [-]"""
+
+BLOCKS = 8
+"""Of windows, of which each is left out in turn for the interval. [-]"""
+
+LEAST_LEVELS = 3
+"""How often two levels are left is one number, and what lies behind them has two, mean and spread. [-]"""
+
+ROUNDING_ROUNDS = 3
+
+MOST_NOISE = 0.9
+"""Share of what is rounded that noise may have: the rest is the driver's. [-]"""
+
+
+@dataclass(frozen=True, eq=False)
+class Separation:
+    """Densities of driver and sensor."""
+
+    knots: FloatArray
+    """Of the driver's density, see `vehicle_bound`."""
+    sensor: SensorModel
+    beside: Callable[[FloatArray], FloatArray]
+    """Density of what the sensor's numbers don't hold: of rounding, and of errors seen in a second view. [m2/Hz]"""
+
+    def driver_part(self, offset: FloatArray, step: float) -> FloatArray:
+        """The offset with every frequency scaled down to the driver's share of the power, about its own mean.
+
+        Keeps the driver's spectrum (Wiener's filter would not: it leaves less than the driver's power), and the path
+        itself wherever the sensor is good.
+        """
+        n = len(offset)
+        if n < 2:
+            return offset
+        mean = float(offset.mean())
+        about = offset - mean
+        extended = np.concatenate([2.0 * about[0] - about[:0:-1], about, 2.0 * about[-1] - about[-2::-1]])
+        frequency: FloatArray = np.asarray(np.fft.rfftfreq(len(extended), step), dtype=np.float64)
+        driver = density(self.knots, frequency)
+        share = driver / (driver + self.sensor.density(frequency) + self.beside(frequency))
+        share[0] = 1.0
+        filtered = scale_frequencies(extended, np.sqrt(share))
+        return np.asarray(mean + filtered[n - 1 : 2 * n - 1])
+
+
+def separate(
+    runs: Sequence[FloatArray],
+    step: float,
+    *,
+    rows: Sequence[FloatArray] | None = None,
+    durations: Sequence[FloatArray] | None = None,
+    rate: float | None = None,
+    sensor_noise: float | None = None,
+    half_widths: Sequence[FloatArray] | None = None,
+    one_camera: bool = False,
+) -> Separation:
+    """Separate driver and sensor.
+
+    Raises `NotEnoughDataError` if no run lasts 12.8 s; `DriverProfileError` if the error that is known is more than all
+    that was measured.
+
+    Parameters
+    ----------
+    runs, step : sequence of array, float
+        Offsets [m] at an even step [s].
+    rows, durations : sequence of array, optional
+        The offsets of the same runs as recorded: variances are counted, and rounding is detected, in these [m]; and how
+        long each row stands for, where rows are not even in time [s].
+    rate : float, optional
+        Rows per second; without, as many as there are in the time of the runs. [Hz]
+    sensor_noise : float, optional
+        Standard deviation of the sensor's error on the rows, rounding included, where it is known. [m]
+    half_widths, one_camera : sequence of array, bool, optional
+        Half the lane width in the same runs, where a camera measured it: a second view of its errors [m]; and whether
+        that is known to be the camera that measured the offset: else what the width shows is taken where plausible.
+    """
+    measured = list(rows) if rows is not None else list(runs)
+    variance = _variance(measured, durations)
+    frequency, windows = windows_of(runs, step)
+    data = periodogram(frequency, windows)
+    per_second = rate or sum(map(len, measured)) / (step * sum(map(len, runs)))
+    grain = quantisation_step(np.concatenate(measured))
+    if sensor_noise is not None and 0.0 < variance <= sensor_noise**2 - uniform_variance(grain):
+        raise DriverProfileError(
+            f"a sensor error of {sensor_noise:g} m is more than all that was measured: offsets vary by "
+            f"{np.sqrt(variance):.2g} m (standard deviation)"
+        )
+    too_coarse = grain > COARSEST * np.sqrt(variance) or len(np.unique(np.concatenate(measured))) < LEAST_LEVELS
+    is_rounded = grain > 0.0 and not too_coarse
+    rounding = _rounding(data, grain, variance, per_second) if is_rounded else _no_density
+    rounded_off = uniform_variance(grain) if is_rounded else 0.0
+    known = None if sensor_noise is None else Known(sensor_noise, per_second, rounded_off)
+    asked = Measured(data, rounding(data.frequency), known)
+    view = second_view(half_widths, step) if half_widths else None
+    found = explanations(asked, view, only_view=one_camera)
+    least = _taken(found)
+    best, colour = least.solution, least.colour
+    beside = _with_view(rounding, best, colour)
+    result = Separation(best.knots, _sensor(best, colour, grain), beside)
+    driver = float(np.concatenate([result.driver_part(run, step) for run in runs]).var())
+    error = _in_band(best, colour, data)
+    share = min(driver, max(variance - error, 0.0)) / variance if variance > 0.0 else 1.0
+    plausible = [(one.solution, one.colour) for one in found if one.criterion < least.criterion + PLAUSIBLE]
+    if colour.view is not None:
+        plausible += [(solve(asked, one, best), one) for one in _other_views(colour, colour.view)]
+    interval = (0.0, 1.0) if too_coarse else _interval(frequency, windows, least, asked, plausible, share)
+    sensor = _sensor(best, colour, grain, share * variance, (1.0 - share) * variance, interval)
+    return Separation(best.knots, sensor, beside)
+
+
+def _taken(found: Sequence[Explanation]) -> Explanation:
+    """The best by its criterion, or that of the plausible ones which another measurement supports."""
+    least = min(found, key=lambda one: one.criterion)
+    seen = [one for one in found if one.colour.view is not None and one.criterion < least.criterion + PLAUSIBLE]
+    return min(seen, key=lambda one: one.criterion, default=least)
+
+
+def _variance(rows: Sequence[FloatArray], durations: Sequence[FloatArray] | None) -> float:
+    """Over time, as runs at an even step have it. [m2]"""
+    values = np.concatenate(rows)
+    if durations is None:
+        return float(values.var())
+    weights = np.concatenate(durations)
+    return float(np.average((values - np.average(values, weights=weights)) ** 2, weights=weights))
+
+
+def _with_view(
+    rounding: Callable[[FloatArray], FloatArray], found: Solution, colour: Colour
+) -> Callable[[FloatArray], FloatArray]:
+    """Density of rounding, and of errors that a second view shows, where one does."""
+    if colour.view is None:
+        return rounding
+    return lambda frequency: rounding(frequency) + found.coloured(colour, frequency)
+
+
+def _other_views(colour: Colour, view: SecondView) -> list[Colour]:
+    """The same, if no lane ever widened, and as far as 95 % of what pitch or errors of both markings alike make go."""
+    shift = NORMAL_95 * LEVEL_SD
+    others = [replaced(view, slowest=0.0), view.scaled(np.exp(-shift)), view.scaled(np.exp(shift))]
+    return [replaced(colour, view=other) for other in others]
+
+
+def _sensor(
+    found: Solution,
+    colour: Colour,
+    grain: float,
+    driver: float = 0.0,
+    rest: float = 0.0,
+    interval: tuple[float, float] = (0.0, 1.0),
+) -> SensorModel:
+    level = float(np.exp(found.colour))
+    coloured, seen = (level, 0.0) if colour.view is None else (0.0, level)
+    numbers = (np.exp(found.white), coloured, colour.corner, driver, rest, *interval, seen)
+    white, coloured, corner, driver, rest, low, high, seen = all_significant(numbers, DIGITS)
+    return SensorModel(white, coloured, corner, colour.order, grain, driver, rest, (low, high), second_view=seen)
+
+
+DIGITS = 7
+"""Significant digits kept of a sensor's numbers: what differs beyond is the processor's rounding. [-]"""
+
+
+def _no_density(frequency: FloatArray) -> FloatArray:
+    return np.zeros(np.shape(frequency))
+
+
+def _rounding(data: Periodogram, grain: float, variance: float, rate: float) -> Callable[[FloatArray], FloatArray]:
+    """Density of rounding, which depends on the driver's and the noise's, which depend on it: a few rounds."""
+    error = uniform_variance(grain)
+    level = 2.0 * error / rate  # white, to begin with
+    shape: Callable[[FloatArray], FloatArray] = lambda frequency: np.full(np.shape(frequency), level)  # noqa: E731
+    for _ in range(ROUNDING_ROUNDS):
+        found = solve(Measured(data, shape(data.frequency)), Colour())
+        noise = min(0.5 * float(np.exp(found.white)) * rate, MOST_NOISE * (variance - error))
+        spectrum = partial(density, found.knots)
+        shape = rounding_density(grain, spectrum, variance - error - noise, rate=rate, noise=noise)
+    return shape
+
+
+def _chance(found: Solution, colour: Colour, data: Periodogram) -> float:
+    """Standard error of what a second view says of a sensor's power: its errors are not the offset's own. [m2]
+
+    Both are one draw each of the same density, of which a bin of weight w shows its mean to a share of 1 / sqrt(w).
+    """
+    power = found.coloured(colour, data.frequency) * np.gradient(data.frequency)
+    return float(np.sqrt((2.0 * power**2 / data.weight).sum()))
+
+
+def _in_band(found: Solution, colour: Colour, data: Periodogram) -> float:
+    """Sensor's power among what was seen. [m2]"""
+    from scipy.integrate import trapezoid
+
+    frequency = np.linspace(0.0, float(data.frequency[-1]), 400)
+    total = np.full(len(frequency), np.exp(found.white))
+    if colour.is_there:
+        total += found.coloured(colour, frequency)
+    return float(trapezoid(total, frequency))
+
+
+def _interval(
+    frequency: FloatArray,
+    windows: FloatArray,
+    taken: Explanation,
+    measured: Measured,
+    plausible: Sequence[tuple[Solution, Colour]],
+    share: float,
+) -> tuple[float, float]:
+    """95 % interval of the driver's share: over what else would explain the data, and over blocks left out."""
+    best, colour, data = taken.solution, taken.colour, measured.data
+    seen = float((data.density[:-1] * np.diff(data.frequency)).sum())
+    levels = np.array([_in_band(one, shape, data) for one, shape in plausible]) - _in_band(best, colour, data)
+    blocks = np.array_split(np.arange(len(windows)), min(BLOCKS, len(windows)))
+    left_out = []
+    for block in blocks:
+        others = np.setdiff1d(np.arange(len(windows)), block)
+        if len(others):
+            part = periodogram(frequency, windows[others])
+            left_out.append(_in_band(solve(replaced(measured, data=part), colour, best), colour, part))
+    error = np.sqrt((len(blocks) - 1) * np.var(left_out)) if len(left_out) > 1 else seen
+    if colour.view is not None:
+        error = np.hypot(error, _chance(best, colour, data))
+    span = share / max(seen, 1e-30)
+    low = share - span * (float(levels.max()) + NORMAL_95 * float(error))
+    high = share - span * (float(levels.min()) - NORMAL_95 * float(error))
+    return float(np.clip(low, 0.0, share)), float(np.clip(high, share, 1.0))

@@ -1,0 +1,325 @@
+"""The movement that no effect explains as an autoregression, and whitening by it, for generalised least squares.
+
+A heterogeneous autoregression [1]_: the last seconds one by one, and the means of longer and longer stretches before
+them. It knows drifts of a minute with few parameters. Whitening is exact within each run: the first rows use the
+lower-order predictors of the same process (the Levinson recursion stepped down [2]_), and runs are independent.
+
+References
+----------
+.. [1] F. Corsi, "A simple approximate long-memory model of realized volatility", J. Financial Econometrics 7, 2009.
+.. [2] P. Brockwell, R. Davis, "Time Series: Theory and Methods", 1991, section 5.2.
+.. [3] C. Gourieroux, P. Phillips, J. Yu, "Indirect inference for dynamic panel models", J. Econometrics 157, 2010.
+.. [4] A. C. Aitken, "On least squares and linear combination of observations", Proc. R. Soc. Edinburgh 55, 1936.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
+from xosc_lateral.base.rows import true_slices
+
+MAX_REFLECTION = 0.999  # Reflection coefficients are kept inside the unit circle: the process is stationary. [-]
+ENOUGH_ROWS = 0.5  # The memory is the longest for which this share of the rows has so much past in its own run. [-]
+ROWS_PER_COEFFICIENT = 20  # Fewer rows than this per coefficient shorten the memory. [-]
+START_ROWS = 10.0  # First rows of runs have errors of their own as far as there are more of them than this.
+# Simulated tables that tell the bias of short drives: their scatter adds an eighth to the fit's own variance.
+BIAS_DRAWS = 4
+BIAS_SEED = 0  # The same numbers each time: fits with and without a term differ by the term alone.
+
+
+@dataclass(frozen=True, eq=False)
+class MovementProcess:
+    """x_t = sum_k a_k x_{t-k} + sd * white."""
+
+    # Coefficients of the best predictors from 0, 1, ... p past values; the last one is the process itself.
+    lags: tuple[FloatArray, ...]
+    deviations: FloatArray  # shape (p + 1,): Standard deviation of each predictor's error.
+
+    @property
+    def order(self) -> int:
+        """Number of past values, p."""
+        return len(self.lags) - 1
+
+    @property
+    def polynomial(self) -> FloatArray:
+        """(1, -a_1, ..., -a_p) / sd, shape (p + 1,): turns the process into white noise of variance 1. [1/m]"""
+        return np.asarray(np.concatenate([[1.0], -self.lags[-1]]) / self.deviations[-1], dtype=np.float64)
+
+    @cached_property
+    def start(self) -> FloatArray:
+        """Whitening of the first p rows of a run, lower triangular, shape (p, p). [1/m]"""
+        matrix = np.zeros((self.order, self.order))
+        for row in range(self.order):
+            matrix[row, row] = 1.0
+            matrix[row, :row] = -self.lags[row][::-1]
+            matrix[row] /= self.deviations[row]
+        return matrix
+
+    def simulate(self, n: int, rng: np.random.Generator, *, runs: int = 1) -> FloatArray:
+        """Stationary sample paths, shape (runs, n). [m]"""
+        from scipy.signal import lfilter
+
+        warm = 20 * self.order + 200
+        noise = rng.normal(size=(runs, n + warm))
+        return np.asarray(lfilter([1.0], self.polynomial, noise, axis=1)[:, warm:])
+
+
+def positions_in_run(valid: BoolArray) -> IndexArray:
+    """How many valid rows in a row came before each row, shape (n,); -1 where invalid. [-]"""
+    rows = np.arange(len(valid))
+    start = np.where(valid & ~np.concatenate([[False], valid[:-1]]), rows, 0)
+    return np.where(valid, rows - np.maximum.accumulate(start), -1)
+
+
+def moving_sum(weights: FloatArray, values: FloatArray) -> FloatArray:
+    """sum_k weights[k] values[t - k], zeros before the start; shape and precision of `values`, (n,) or (n, k)."""
+    from scipy.signal import oaconvolve
+
+    weights = weights.astype(values.dtype)
+    if values.ndim == 2 and values.shape[1] == 0:
+        return np.zeros(values.shape)
+    if len(weights) > 16 and len(values) > len(weights):
+        series = np.ascontiguousarray(np.atleast_2d(values.T))
+        return np.asarray(oaconvolve(series, weights[None], axes=1)[:, : len(values)].T.reshape(values.shape))
+    result = weights[0] * values
+    for lag, weight in enumerate(weights[1:], start=1):
+        result[lag:] += weight * values[:-lag]
+    return np.asarray(result)
+
+
+def fit_autoregression(
+    values: FloatArray, valid: BoolArray, order: int, *, longest: int | None = None, noise: float = 0.0
+) -> MovementProcess:
+    """Least squares over all rows that have the whole memory in their own run.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+        Mean about zero.
+    valid : bool array, shape (n,)
+    order : int
+        Past values that have a coefficient each; lowered when the runs are too short for it.
+    longest : int, optional
+        Past values that are seen as means of stretches that double in length; `order` without.
+    noise : float
+        Standard deviation of white noise that the process has beside what `values` show. In regressions it is a ridge.
+    """
+    position = positions_in_run(valid)
+    rows_in_all = max(1, int((position >= 0).sum()))
+    order = max(1, order)
+    while order > 1 and (position >= order).sum() < max(ROWS_PER_COEFFICIENT * order, 0.25 * rows_in_all):
+        order -= 1
+    edges = [order]
+    while longest is not None and 2 * edges[-1] <= longest:
+        if (position >= 2 * edges[-1]).sum() < ENOUGH_ROWS * rows_in_all:
+            break
+        edges.append(2 * edges[-1])
+    rows = np.flatnonzero(position >= edges[-1])
+    if len(rows) < 2 * order:
+        return MovementProcess((np.zeros(0),), np.array([max(float(np.std(values[valid])), 1e-150)]))
+    sums = np.concatenate([[0.0], np.cumsum(np.where(valid, values, 0.0))])
+    past = [values[rows - lag] for lag in range(1, order + 1)]
+    past += [(sums[rows - low] - sums[rows - high]) / (high - low) for low, high in pairwise(edges)]
+    design, now = np.stack(past, axis=1), values[rows]
+    # the variance of that noise in each past value or mean
+    shares = noise**2 / np.array([1.0] * order + [high - low for low, high in pairwise(edges)])
+    gram = design.T @ design
+    gram[np.diag_indices(len(gram))] *= 1.0 + 1e-9
+    gram[np.diag_indices(len(gram))] += len(rows) * shares
+    sizes = np.linalg.lstsq(gram, design.T @ now, rcond=None)[0]
+    variance = float(np.mean((now - design @ sizes) ** 2)) * len(rows) / max(1, len(rows) - len(sizes))
+    variance += noise**2 + float(shares @ sizes**2)
+    lags = [sizes[:order]]
+    lags += [
+        np.full(high - low, size / (high - low))
+        for size, (low, high) in zip(sizes[order:], pairwise(edges), strict=True)
+    ]
+    return _stepped_down(np.concatenate(lags), max(variance, 1e-300))
+
+
+def _reflections(lags: FloatArray) -> FloatArray:
+    """Reflection coefficients, first to last, kept inside the unit circle: the Levinson recursion backwards."""
+    reflections = []
+    current = lags.copy()
+    for order in range(len(lags), 0, -1):
+        last = float(np.clip(current[order - 1], -MAX_REFLECTION, MAX_REFLECTION))
+        reflections.append(last)
+        current = (current[: order - 1] + last * current[order - 2 :: -1][: order - 1]) / (1.0 - last**2)
+    return np.array(reflections[::-1])
+
+
+def _stepped_down(lags: FloatArray, variance: float) -> MovementProcess:
+    """All lower-order predictors, forwards from safe reflections."""
+    predictors: list[FloatArray] = [np.zeros(0)]
+    shares = [1.0]
+    for last in _reflections(lags):
+        before = predictors[-1]
+        predictors.append(np.concatenate([before - last * before[::-1], [last]]))
+        shares.append(shares[-1] * (1.0 - last**2))
+    deviations = np.sqrt(variance * np.asarray(shares) / shares[-1])
+    return MovementProcess(tuple(predictors), deviations)
+
+
+def start_factors(rows: FloatArray, valid: BoolArray, order: int) -> FloatArray:
+    """Factor on the errors of the first rows of runs, shape (order + 1,), beside those of rows with the whole memory.
+
+    The process says how well a row is predicted from the few before it, if the run is a piece of a stationary movement.
+    Runs begin where something ended, a lane change for one: their first rows may be off by more.
+
+    `rows`, shape (n,): whitened; `valid`, shape (n,).
+    """
+    position = positions_in_run(valid)
+    early, late = (position >= 0) & (position < order), position >= order
+    usual = float(np.mean(rows[late] ** 2)) if late.any() else 1.0
+    if usual <= 0.0:  # nothing moves
+        return np.ones(order + 1)
+    squares = np.bincount(position[early], rows[early] ** 2, minlength=order)
+    count = np.bincount(position[early], minlength=order)
+    factors = np.ones(order + 1)
+    edges = [0, *(2**power for power in range(order.bit_length()) if 2**power < order), order]
+    for low, high in pairwise(edges):
+        mean = (squares[low:high].sum() + START_ROWS * usual) / (count[low:high].sum() + START_ROWS)
+        factors[low:high] = np.sqrt(mean / usual)
+    return factors
+
+
+def unbiased(
+    process: MovementProcess, valid: BoolArray, drive: IndexArray, order: int, *, longest: int | None = None
+) -> MovementProcess:
+    """A process fitted to `valid` rows less each drive's level, freed of what those levels do to it in short drives.
+
+    A level takes part of the slow movement with it, so that the process looks less persistent than it is (Nickell's
+    bias: the errors of effects in runs of a minute come out an eighth too small). The same is done to drives simulated
+    from the fitted process, and the difference taken off: indirect inference for panels [3]_.
+    """
+    if process.order == 0:
+        return process
+    rng = np.random.default_rng(BIAS_SEED)
+    lags, log_variance = np.zeros(process.order), 0.0
+    whitener = Whitener(process, valid, drive, np.ones(len(valid)))
+    for simulated in process.simulate(len(valid), rng, runs=BIAS_DRAWS):
+        left = np.where(valid, simulated - whitener.levels(simulated)[drive], 0.0)
+        again = fit_autoregression(left, valid, order, longest=longest)
+        if again.order != process.order:
+            return process
+        lags += again.lags[-1] / BIAS_DRAWS
+        log_variance += 2.0 * float(np.log(again.deviations[-1])) / BIAS_DRAWS
+    own = 2.0 * float(np.log(process.deviations[-1]))
+    for share in (1.0, 0.5, 0.25):
+        better = process.lags[-1] + share * (process.lags[-1] - lags)
+        if np.abs(_reflections(better)).max() < MAX_REFLECTION:
+            return _stepped_down(better, float(np.exp(own + share * (own - log_variance))))
+    return process
+
+
+@dataclass(frozen=True, eq=False)
+class Whitener:
+    """Turns series on the grid into independent rows of variance 1, the drives' own levels taken out."""
+
+    process: MovementProcess  # Of the movement divided by `scale`.
+    valid: BoolArray  # shape (n,)
+    drive: IndexArray  # shape (n,): Which level a row has; increasing.
+    scale: FloatArray  # shape (n,): Factor on the movement at each row.
+    runs: tuple[slice, ...] = ()  # Rows of each run, where they stand side by side without anything invalid in between.
+
+    @cached_property
+    def compact(self) -> Whitener:
+        """The same for the valid rows alone, put side by side: half the work where drives are short."""
+        ends = np.cumsum([run.stop - run.start for run in self._runs])
+        runs = tuple(
+            slice(int(end) - (run.stop - run.start), int(end)) for run, end in zip(self._runs, ends, strict=True)
+        )
+        _, drive = np.unique(self.drive[self.valid], return_inverse=True)
+        valid = np.ones(int(self.valid.sum()), dtype=np.bool_)
+        return Whitener(self.process, valid, drive.astype(np.intp), self.scale[self.valid], runs)
+
+    @cached_property
+    def _runs(self) -> list[slice]:
+        if self.runs:
+            return list(self.runs)
+        return true_slices(self.valid)
+
+    @cached_property
+    def _edges(self) -> IndexArray:
+        return np.searchsorted(self.drive, np.arange(int(self.drive.max()) + 1)).astype(np.intp)
+
+    def by_position(self, values: FloatArray) -> FloatArray:
+        """What belongs to a row by its place in its run, shape (n,); `values`: shape (order + 1,), the last for all
+        later rows."""
+        return values[np.clip(positions_in_run(self.valid), 0, self.process.order)]
+
+    @property
+    def deviations(self) -> FloatArray:
+        """What each row is divided by, predictor and scale, shape (n,). [m]"""
+        return self.by_position(self.process.deviations) * self.scale
+
+    @cached_property
+    def ones(self) -> FloatArray:
+        """A level of 1 m, whitened, shape (n,). [-]"""
+        return self.white(np.ones(len(self.valid)))
+
+    @cached_property
+    def power(self) -> FloatArray:
+        """What every drive tells of its level: 1 / variance, > 0, shape (drives,). [1/m2]"""
+        return np.add.reduceat(self.ones**2, self._edges)
+
+    def white(self, values: FloatArray) -> FloatArray:
+        """Whitened, levels still in; 0 at invalid rows; shape and precision of `values`, (n,) or (n, k)."""
+        columns = values[:, None] if values.ndim == 1 else values
+        scaled = columns / self.scale[:, None].astype(columns.dtype)
+        start = self.process.start.astype(columns.dtype)
+        if not self.runs:
+            scaled = np.where(self.valid[:, None], scaled, 0.0)
+        result = moving_sum(self.process.polynomial, scaled)
+        for run in self._runs:
+            stop = min(run.stop, run.start + self.process.order)
+            known = stop - run.start
+            result[run.start : stop] = start[:known, :known] @ scaled[run.start : stop]
+        if not self.runs:
+            result[~self.valid] = 0.0
+        return np.asarray(result[:, 0] if values.ndim == 1 else result)
+
+    def without_levels(self, white: FloatArray) -> FloatArray:
+        """Take the drives' levels out of whitened rows [-], shape (n,) or (n, k)."""
+        columns = white[:, None] if white.ndim == 1 else white
+        ones, power = (of.astype(columns.dtype)[:, None] for of in (self.ones, np.maximum(self.power, 1e-30)))
+        mean = np.add.reduceat(ones * columns, self._edges, axis=0) / power
+        result = columns - ones * mean[self.drive]
+        return np.asarray(result[:, 0] if white.ndim == 1 else result)
+
+    def levels(self, values: FloatArray) -> FloatArray:
+        """Level of every drive by generalised least squares, shape (drives,). [m]"""
+        sums = np.add.reduceat(self.ones * self.white(values), self._edges)
+        return np.asarray(sums / np.maximum(self.power, 1e-300))
+
+    def rows(self, values: FloatArray) -> FloatArray:
+        """Whitened, levels out; shape of `values` [m], the rows of variance 1. [-]"""
+        return self.without_levels(self.white(values))
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """One linear regression, whitened: an ordinary one [4]_."""
+
+    whitener: Whitener  # For series and columns.
+    series: FloatArray  # shape (n,): With what the model has of this component still in.
+    columns: FloatArray  # shape (n, k): What the model has already.
+
+    @cached_property
+    def observed(self) -> FloatArray:
+        """White series, levels out, shape (seconds,), valid ones only. [-]"""
+        return self.rows(self.series)
+
+    @cached_property
+    def known(self) -> FloatArray:
+        """White columns, shape (seconds, k). [-]"""
+        return self.rows(self.columns)
+
+    def rows(self, values: FloatArray) -> FloatArray:
+        """White rows [-] of series or columns, shape (n,) or (n, k); valid ones only."""
+        return self.whitener.compact.rows(values[self.whitener.valid])

@@ -1,0 +1,236 @@
+"""Close the loop: find, prove, add, refit, and score on blocks that nothing was chosen or fitted on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.loop.core_model import (
+    DriverVariance,
+    SpectrumShape,
+    compare_spectrum_shapes,
+    test_population,
+)
+from xosc_lateral.drivers.loop.cross_validation import Progress, held_out_words
+from xosc_lateral.drivers.loop.held_out import HeldOut, Scorecard, Setting, fit_without, score_held_out, score_runs
+from xosc_lateral.drivers.loop.identify import Identified, identify, initial_terms
+from xosc_lateral.drivers.loop.model import Description, Fitted, Term
+from xosc_lateral.drivers.loop.refinement import Alternatives
+from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop.residual import LackOfFit, lack_of_fit_of, size_of
+from xosc_lateral.drivers.loop.selection import Accepted, Gain, Selection
+from xosc_lateral.drivers.loop.significance import LoopSeed
+from xosc_lateral.drivers.loop.terms.between import between_shift
+from xosc_lateral.drivers.loop.timeline import Coarse, join_drives
+from xosc_lateral.drivers.model.core.base import ModelKind
+from xosc_lateral.drivers.model.effects import Effect
+from xosc_lateral.drivers.model.profile import DriverProfile, Provenance
+from xosc_lateral.drivers.model.seeds import generator
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Finding(Description):
+    """One effect that the base lacked."""
+
+    kind: str  # As in the report's schema.
+    p_value: float  # Family-wise over everything that its component tried.
+    error_before: float  # On held-out blocks, by the effect's own quantity. [m]
+    error_after: float  # On held-out blocks, by the effect's own quantity. [m]
+    columns: tuple[str, ...] = ()  # That cause it; two when it is a product.
+    alike: Alternatives = ()  # Columns of each other effect that the data can't tell from it.
+    effects: tuple[Effect, ...] = ()  # What the profile got.
+    gain: Gain | None = None  # Held-out gain, nested; None where its path can't be predicted.
+
+
+def _finding(size: Description, scored: HeldOut, **about: Any) -> Finding:
+    """Put errors on held-out blocks to what was described."""
+    before, after = scored.error_of(size.statistic)
+    described = asdict(size) | {"measure": size.measure or size.statistic}
+    return Finding(error_before=before, error_after=after, **described, **about)
+
+
+def describe_finding(one: Accepted, key: str, effects: tuple[Effect, ...], fitted: Fitted, scored: HeldOut) -> Finding:
+    """Put sizes and errors to what was accepted."""
+    term = one.term
+    about = {"kind": term.kind, "columns": term.columns, "alike": term.alike, "p_value": one.p_value, "gain": one.gain}
+    return _finding(term.describe(fitted, effects, key), scored, effects=effects, **about)
+
+
+# The held-out error of a profile with more effects may be so many times the base's: 24 runs leave 2 % of noise. [-]
+NO_WORSE = 1.05
+# Why an effect that does not help is taken back.
+HARMFUL = "significant, but with it held-out blocks are predicted worse by its own quantity, beyond what chance does"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LoopResult:
+    """What the loop found, as data; `xosc_lateral.workflows.profiles.loop_page` turns it into words."""
+
+    base: DriverProfile
+    refined: DriverProfile
+    given: bool  # Whether the base was given; else it was fitted first.
+    findings: tuple[Finding, ...]
+    coarse: Coarse
+    identified: Identified  # Terms that are kept and those that are not, and the columns.
+    scored: HeldOut  # Both profiles on held-out blocks.
+    lack_of_fit: LackOfFit  # What is left.
+    scores: Scorecard  # The ten metrics.
+    seed: int
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Drives."""
+        return self.coarse.timeline.names
+
+    @property
+    def final(self) -> Fitted:
+        """All terms that are kept, fitted to everything."""
+        return self.identified.selection.final
+
+    @property
+    def error_before(self) -> float:
+        """Of the base on held-out blocks. [m]"""
+        return self.scored.errors[0]
+
+    @property
+    def error_after(self) -> float:
+        """Of the refined profile. [m]"""
+        return self.scored.errors[1]
+
+    @property
+    def floor(self) -> float:
+        """Sampling error of the measured drives: how far random halves of their blocks are from all of them. [m]"""
+        return self.lack_of_fit.floor
+
+    @property
+    def held_out(self) -> str:
+        """What was held out, in words."""
+        return held_out_words(self.coarse.timeline)
+
+
+def close_loop(
+    drives: Sequence[Drive],
+    base: DriverProfile | None = None,
+    *,
+    seed: int,
+    name: str = "refined",
+    provenance: Provenance | None = None,
+    excluded: Sequence[str] = (),
+    roles: Mapping[str, str] = MappingProxyType({}),
+    progress: Progress = lambda share, what: None,
+) -> LoopResult:
+    """Find what a profile fails to reproduce, trace it, add it, and score it on held-out blocks.
+
+    Parameters
+    ----------
+    drives : sequence of Drive
+    base : DriverProfile, optional
+        Start from it and from its effects; without, one is fitted first.
+    seed : int
+        Same drives, base and seed: same result.
+    name : str
+        Of the refined profile.
+    provenance : Provenance, optional
+        What is known about the drives.
+    excluded : sequence of str
+        Columns that are not to be tested.
+    roles : mapping of str to str
+        What columns are: column -> road, weather, traffic, time, own, driver or unknown. Those that it lacks are
+        proposed from name and values.
+    progress : callable
+
+    Raises
+    ------
+    NotEnoughDataError
+        When less than two minutes of road-following are left after cutting.
+    FormatError
+        A role that there is not, or of a column that the drives lack.
+    """
+    root = np.random.SeedSequence(seed)
+    progress(0.0, "reading the drives")
+    timeline = join_drives(drives)
+    coarse, everything = Coarse.of(timeline), np.ones(len(timeline), dtype=np.bool_)
+    given = base is not None
+    paper = base is not None and base.model.kind == ModelKind.TWO_LEVEL.value
+    kind = ModelKind.TWO_LEVEL if paper else ModelKind.AUTOREGRESSIVE
+    if base is None:
+        progress(0.02, "fitting the base profile")
+        base = fit_without(fit_model(coarse, ()), everything, kind, f"{name}-base", provenance)
+    # the loop's own base knows what class, lane and speed do as `fit` has it; what acts is found, not begun with
+    initial = initial_terms(base, timeline) if given else ()
+    found = identify(coarse, root, initial=initial, excluded=excluded, roles=roles, progress=progress)
+    lacks: list[SpectrumShape | DriverVariance] = []
+    if paper:  # what the two-level model lacks is found once, by replacing it: the autoregressive one has both
+        final = found.selection.final
+        tested = compare_spectrum_shapes(base, timeline, root), test_population(final, between_shift(final))
+        lacks = [lack for lack in tested if lack is not None and lack.found]
+    setting = Setting(coarse, base if given else None, kind, ModelKind.AUTOREGRESSIVE if lacks else kind, root)
+    found, scored = _that_helps(setting, found, progress)
+    selection = found.selection
+    progress(0.95, "refitting on everything")
+    refined = base
+    if selection.accepted or not given or lacks:
+        refined = fit_without(selection.final, everything, setting.refined_kind, name, provenance)
+    findings = [describe_finding(*one, selection.final, scored) for one in _accepted(selection)]
+    findings += [_finding(lack.described(), scored, kind=lack.KIND, p_value=lack.p_value) for lack in lacks]
+    rng = generator(root, LoopSeed.SNIPPETS)
+    progress(1.0, "done")
+    return LoopResult(
+        base=base,
+        refined=refined,
+        given=given,
+        findings=tuple(findings),
+        coarse=coarse,
+        identified=found,
+        scored=scored,
+        lack_of_fit=lack_of_fit_of(scored.real, scored.before, scored.after, scored.halves),
+        scores=score_runs(timeline, scored.runs_before, scored.runs_after, setting.blocks, rng),
+        seed=seed,
+    )
+
+
+def _that_helps(setting: Setting, found: Identified, progress: Progress) -> tuple[Identified, HeldOut]:
+    """Less what makes held-out blocks look less like the profile, the worst first; and how the rest is scored."""
+    while True:
+        scored = score_held_out(setting, found.selection, found.nested, found.usable.columns, progress)
+        before, after = scored.errors
+        if not found.selection.accepted:
+            return found, scored
+        harmful = _most_harmful(found.selection, scored)
+        if harmful is not None:
+            found = found.without([harmful], HARMFUL)
+        elif setting.kind is setting.refined_kind and after > NO_WORSE * before:
+            why = f"with the effects that were found the held-out error rises from {before:.4f} to {after:.4f} m"
+            found = found.without([one.term for one in found.selection.accepted], why)
+        else:
+            return found, scored
+
+
+def _most_harmful(selection: Selection, scored: HeldOut) -> Term | None:
+    """The accepted term with which held-out mean or spread by its own quantity differ most from what is measured.
+
+    Of those that are not sure to gain likelihood there, and by more than half samples differ: an error grows by chance
+    as well.
+    """
+    worst: tuple[float, Term | None] = (1.0, None)
+    for one, key, effects in _accepted(selection):
+        if one.gain is not None and one.gain.interval[0] > 0.0:
+            continue
+        own = {f"{what} by effect: {key}" for what in ("mean", "spread")} & set(scored.real)
+        for group in own or {one.term.describe(selection.final, effects, key).statistic} & set(scored.real):
+            before, after = scored.error_of(group)
+            chance = np.mean([size_of({"": half[group]}) ** 2 for half in scored.halves])
+            loss = (after**2 - before**2) / max(float(chance), 1e-300)
+            worst = max(worst, (loss, one.term), key=lambda pair: pair[0])
+    return worst[1]
+
+
+def _accepted(selection: Selection) -> list[tuple[Accepted, str, tuple[Effect, ...]]]:
+    """What was accepted, with its key and what the profile gets."""
+    estimates = selection.final.estimates.items()
+    return [(one, key, own) for one in selection.accepted for key, (term, own) in estimates if term is one.term]

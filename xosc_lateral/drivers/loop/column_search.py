@@ -1,0 +1,268 @@
+"""The search for one more column: best of the dictionary, refined, fitted, and proved against rotations."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.drivers.loop.autocorrelation import Problem
+from xosc_lateral.drivers.loop.dictionary import (
+    CROSS_BASIS,
+    NULL_DRAWS,
+    Dictionary,
+    build_dictionary,
+    orthonormal,
+    score_entries,
+)
+from xosc_lateral.drivers.loop.model import Fitted, Outcome
+from xosc_lateral.drivers.loop.refinement import Refined, Refinement
+from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop.search import Search
+from xosc_lateral.drivers.loop.significance import LoopSeed, upper_tail
+from xosc_lateral.drivers.loop.terms.column import ColumnTerm, of_kind
+from xosc_lateral.drivers.model.effects import Acts, ColumnEffect
+from xosc_lateral.drivers.model.seeds import generator
+
+CONTENDERS = 4  # Sets of columns that are refined, at most.
+WITHIN = 12.0  # Sets of columns that score lower than the best by more than this are not. [squared score]
+# A term may lower the likelihood of the rows that it is fitted to by so much. More, and the model contradicts it: a
+# factor on the movement that changes faster than the movement does, say, which its innovations alone allow. [nat]
+ROUNDING = 1e-6
+# Windows that count as independent where movement with and without a term is compared: longer than the memory of a
+# minute and a half. [s]
+CLUSTER_S = 120
+# Standard errors by which the movement must have grown. A term of the right size lowers it by as much as one of twice
+# the right size leaves it the same: a true one is lost in at most 2 % of the tables, however weak it is. [-]
+GROWN = 2.0
+ROUNDS = 2  # Times that the candidates are scored beside what was found before; the first changes most.
+
+
+class SearchedTerm(ColumnTerm):
+    """An effect that the dictionary is searched for, in a regression of its own."""
+
+    @classmethod
+    @abstractmethod
+    def problem(cls, fitted: Fitted) -> Problem:
+        """Regression in which a column of this kind is tested, with the terms fitted already."""
+
+    @classmethod
+    def reweighted(cls, fitted: Fitted, after: Fitted) -> Problem | None:
+        """The same regression beside `fitted`, weighted by the noise that is left in `after`; None: no other."""
+        return None
+
+    @classmethod
+    def barred(cls, fitted: Fitted) -> frozenset[str]:
+        """Columns that this kind may not take up beside the terms fitted."""
+        return frozenset()
+
+    @classmethod
+    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
+        """The best candidate of the whole dictionary against rotations."""
+        return ColumnSearch(search, cls, fitted).outcome()
+
+    def probability_beside(self, search: Search, fitted: Fitted) -> float:
+        """p-value of its columns in whatever shape suits them beside the terms fitted."""
+        return ColumnSearch(search, type(self), fitted).probability_of(self.columns)
+
+
+@dataclass(frozen=True, eq=False)
+class _Scored:
+    """All candidates, scored beside what is known."""
+
+    problem: Problem
+    dictionary: Dictionary
+    known: FloatArray  # shape (seconds, k), orthonormal
+    scores: FloatArray  # shape (entries,): Squared score less cost; -inf: barred.
+    maxima: FloatArray  # shape (draws,): The largest that the null gives.
+
+    @property
+    def best(self) -> int:
+        """Entry with the largest score."""
+        return int(np.argmax(self.scores))
+
+    def likeliest(self) -> tuple[ColumnEffect, float]:
+        """Best candidate and its p-value."""
+        return self.dictionary.timed(self.best), upper_tail(float(self.scores[self.best]), self.maxima)
+
+    def contenders(self) -> list[int]:
+        """Best entry of each of the best sets of columns, and of each single column in the best of them.
+
+        A product of a column and what is nearly constant wherever it acts is that column: refined, the cheaper one
+        wins.
+        """
+        scores, columns = self.scores, [candidate.columns for candidate in self.dictionary.candidates]
+        order = np.argsort(-scores, kind="stable")
+        best: dict[tuple[str, ...], int] = {}
+        for index in order:
+            if scores[index] < scores[self.best] - WITHIN or len(best) == CONTENDERS:
+                break
+            best.setdefault(columns[index], int(index))
+        for index in order[np.isfinite(scores[order])]:
+            if columns[index] in {(column,) for column in columns[self.best]}:
+                best.setdefault(columns[index], int(index))
+        return list(best.values())
+
+
+@dataclass(frozen=True, eq=False)
+class ColumnSearch:
+    """One more column is searched for beside the terms of a fit."""
+
+    search: Search
+    kind: type[SearchedTerm]  # Of the term that it would become.
+    fitted: Fitted
+
+    def outcome(self) -> Outcome | None:
+        """Best candidate; None: there is no candidate.
+
+        The p-value is that of a score test [1]_: data and null are whitened alike, by what is left *without* the
+        candidate. To whiten again with it in would give a slow column credit for the memory that it has just explained
+        away, which no rotation gets: on drives without an effect such p-values fall below 0.005 seven times as often as
+        they should.
+
+        References
+        ----------
+        .. [1] C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948.
+        """
+        scored, refused = self._scored_once(), set[tuple[str, ...]]()
+        while scored is not None:
+            found, p_value = scored.likeliest()
+            if not self.kind.passes(self.search, p_value, self.fitted):  # refined, it would not be accepted either
+                return Outcome(None, found.columns, p_value)
+            term, after = self._term(scored, refused)
+            if not _grows(self.fitted, after) and after.log_likelihood >= self.fitted.log_likelihood - ROUNDING:
+                return Outcome(term, term.columns, p_value, after)
+            refused.add(term.columns)
+            scored = self._scored(scored.problem, scored.dictionary, refused)
+        return Outcome(None, min(refused), 1.0) if refused else None
+
+    def probability_of(self, columns: tuple[str, ...]) -> float:
+        """p-value of the best candidate of given columns, against the same null as in `outcome`.
+
+        The fit is one without a term of these columns. Where it has a product with one of them, that product is known
+        as it is, not with every shape of its factors: nothing would be left to test.
+        """
+        scored = self._scored(self.kind.problem(self.fitted), spared=columns)
+        if scored is None:
+            return 1.0
+        own = [i for i, candidate in enumerate(scored.dictionary.candidates) if candidate.columns == columns]
+        return upper_tail(float(scored.scores[own].max()), scored.maxima) if own else 1.0
+
+    def likely_response(self, level: float) -> tuple[FloatArray, float]:
+        """Response of the best candidate and its p-value, shape (n, 1) where that is at most `level`; else (n, 0)."""
+        scored = self._scored_once()
+        effect, p_value = (None, 1.0) if scored is None else scored.likeliest()
+        if effect is None or p_value > level:
+            return np.zeros((len(self.fitted.coarse), 0)), 1.0
+        return self.fitted.coarse.response(effect), p_value
+
+    def _scored_once(self) -> _Scored | None:
+        def make() -> _Scored | None:
+            return self._scored(self.kind.problem(self.fitted))
+
+        found: _Scored | None = self.search.once(self.kind, self.fitted, make)
+        return found
+
+    def _scored(
+        self,
+        problem: Problem,
+        dictionary: Dictionary | None = None,
+        refused: Collection[tuple[str, ...]] = (),
+        *,
+        draws: int = NULL_DRAWS,
+        spared: tuple[str, ...] = (),
+    ) -> _Scored | None:
+        """Score what is neither barred nor refused; None: nothing is left.
+
+        Known is what the model has already, and the whole cross-basis of its columns, but for one set that is `spared`:
+        nothing may be blamed on their likes.
+        """
+        kind, search = self.kind, self.search
+        if dictionary is None:
+            dictionary = build_dictionary(search.quantities, problem.whitener)
+        columns, candidates = kind.barred(self.fitted), dictionary.candidates
+        barred = np.array([not columns.isdisjoint(one.columns) or one.columns in refused for one in candidates])
+        if len(dictionary) == 0 or barred.all():
+            return None
+        sizes = np.maximum(np.linalg.norm(problem.known, axis=0), 1e-300)
+        blocks = [orthonormal(problem.known / sizes, 1e-8)]
+        for term in of_kind(self.fitted, kind):
+            parts = ({(column,) for column in term.columns} | {term.columns}) - {spared}
+            rows = np.array([candidate.columns in parts for candidate in candidates])
+            if rows.any():
+                blocks.append(orthonormal(dictionary.rows[rows].astype(np.float64).T, CROSS_BASIS))
+        known = orthonormal(np.concatenate(blocks, axis=1), 1e-6)
+        drive, rng = search.coarse.drive[problem.whitener.valid], generator(search.seed, LoopSeed.COLUMNS)
+        of_mean = kind.acts is Acts.LOCATION
+        scores = score_entries(dictionary, problem.observed, known, barred, drive, rng, draws=draws, of_mean=of_mean)
+        return _Scored(problem, dictionary, known, *scores)
+
+    def _term(self, scored: _Scored, refused: Collection[tuple[str, ...]]) -> tuple[SearchedTerm, Fitted]:
+        """The term that the best candidate becomes, and the fit with it.
+
+        *That* something acts is tested with the noise that is left without it, for data and null alike. *What* acts is
+        chosen once more with the noise that is left beside what was found: a strong slow effect makes the noise look
+        slow, and against slow noise a quicker look-alike stands out better than the effect itself.
+        """
+        term: SearchedTerm = self.kind.of(scored.dictionary.timed(scored.best))
+        after = self._fit_with(term)
+        best: Refined | None = None
+        for _ in range(ROUNDS):
+            problem = self.kind.reweighted(self.fitted, after)
+            here = scored if problem is None else self._scored(problem, refused=refused, draws=0)
+            if here is None:
+                break
+            refined, other = self._refined(here)
+            other_after = self._fit_with(other)
+            if best and 2.0 * other_after.log_likelihood - refined.price <= 2.0 * after.log_likelihood - best.price:
+                break
+            same = other.columns == term.columns
+            best, term, after = refined, other, other_after
+            if same or problem is None:
+                break
+        return term, after
+
+    def _fit_with(self, term: SearchedTerm) -> Fitted:
+        return fit_model(self.fitted.coarse, (*self.fitted.terms, term))
+
+    def _refined(self, scored: _Scored) -> tuple[Refined, SearchedTerm]:
+        """Refine the best sets of columns; the best of them, which knows what others explain as much."""
+        from scipy.stats import chi2
+
+        search, candidates = self.search, scored.dictionary.candidates
+        costs = {candidate.family: candidate.cost for candidate in candidates}
+        refinement = Refinement(search.coarse, scored.problem, scored.known, costs)
+        outcomes = [
+            refinement.refine(scored.dictionary.timed(index), candidates[index].cost, search.columns)
+            for index in scored.contenders()
+        ]
+        outcomes.sort(key=lambda outcome: -outcome.score)
+        parts = {(column,) for column in outcomes[0].effect.columns}
+        # a second factor is a finding of its own, and has to be as sure as any; a part of a table need not be sure
+        chance = float(chi2.isf(search.levels[self.kind.component], 1)) if search.wanted is None else 0.0
+        simpler = [one for one in outcomes if one.effect.columns in parts and one.score > outcomes[0].score - chance]
+        best = simpler[0] if simpler else outcomes[0]
+        rest = [one for one in outcomes if one.effect.columns != best.effect.columns and np.isfinite(one.score)]
+        alike = dict.fromkeys(one.effect.columns for one in rest if refinement.as_good(best.effect, one.effect))
+        return best, self.kind.of(best.effect, tuple(alike))
+
+
+def _grows(before: Fitted, after: Fitted) -> bool:
+    """Whether the movement that is left is larger with a term than without it, beyond chance.
+
+    Generalised and ordinary least squares agree on a quantity that moves the driver [1]_. What was sized on a few odd
+    seconds alone, as those after a lane change or around a jump of the camera, does not lie in between the rest of the
+    time: taken out, it puts in more than was there, and an autoregression close to a unit root lets it.
+
+    References
+    ----------
+    .. [1] J. Hausman, "Specification tests in econometrics", Econometrica 46, 1978.
+    """
+    rows = np.flatnonzero(before.coarse.valid)
+    saved = np.square(before.movement * before.scale)[rows] - np.square(after.movement * after.scale)[rows]
+    cluster = rows // CLUSTER_S
+    sums = np.bincount(cluster, saved)[np.unique(cluster)]
+    return len(sums) > 1 and float(sums.sum()) < -GROWN * float(np.std(sums, ddof=1)) * np.sqrt(len(sums))

@@ -1,0 +1,275 @@
+"""All candidates as whitened rows of length one, their scores, and what chance gives.
+
+References
+----------
+.. [1] C. R. Rao, "Large sample tests of statistical hypotheses concerning several parameters with applications to
+       problems of estimation", Proc. Cambridge Philosophical Society 44, 1948: scores, fitted under the null alone.
+.. [2] H. White, "A heteroskedasticity-consistent covariance matrix estimator", Econometrica 48, 1980.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from msgspec import structs
+from numpy.typing import NDArray
+
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
+from xosc_lateral.drivers.loop.autocorrelation import Whitener
+from xosc_lateral.drivers.loop.candidates import Candidate
+from xosc_lateral.drivers.loop.significance import MANY_DRIVES
+from xosc_lateral.drivers.loop.timeline import Timeline, coarse_mean, coarse_middle, start_anew
+from xosc_lateral.drivers.model.effects import ColumnEffect
+
+SingleArray = NDArray[np.float32]
+Reals = NDArray[np.floating[Any]]
+# Lags tried first, by time constant; refined later. What is smoothed by 4 s differs little from one second to the next.
+# [s]
+TIMINGS: Mapping[float, tuple[int, ...]] = {1.0: (-3, -2, -1, 0, 1, 2), 4.0: (-4, -2, 0, 2)}
+# The same for products, of which there are many more. [s]
+PRODUCT_TIMINGS: Mapping[float, tuple[int, ...]] = {2.0: (-2, -1, 0, 1)}
+NULL_DRAWS = 400  # Rotated or re-signed residuals that the null is taken from.
+LEAST_SHIFT_S = 60  # No rotation is shorter: a driver's response must be out of reach. [s]
+BLOCK_S = 300  # Length of the blocks that are dealt in random order: three times the memory that whitening sees. [s]
+# A quantity that rests on fewer seconds than this is not tested: anything may have happened just then. [s]
+MIN_SUPPORT_S = 45.0
+LEFT_OVER = 0.05  # A candidate of which less than this share is left beside what is known is not tested. [-]
+# Directions of a column's cross-basis with less than this share of the largest variance are left in. [-]
+CROSS_BASIS = 0.01
+ROBUST = 200  # Entries whose scores are set beside the squares of their own rows: those that may be the best.
+RESPONSES = 12  # Of one column's entries, the best so many stand for all that it may do; more of them span hardly more.
+CHUNK = 48  # Candidates that are whitened at once: few enough to stay in a processor's cache.
+TINY = 1e-30  # Keeps single precision from dividing by zero.
+
+
+@dataclass(frozen=True, eq=False)
+class Quantities:
+    """Candidates on the 1 Hz grid before lag and response, standardised, shape (candidates, n); `drive`, shape (n,)."""
+
+    candidates: list[Candidate]
+    values: SingleArray
+    drive: IndexArray
+
+    @classmethod
+    def of(
+        cls, candidates: Sequence[Candidate], timeline: Timeline, context: Mapping[str, FloatArray], valid: BoolArray
+    ) -> Quantities:
+        """Evaluate all; those that never vary on valid seconds are left out."""
+        kept, rows = [], []
+        for candidate in candidates:
+            second = coarse_mean(_without_gaps(candidate.values(context), timeline.valid))
+            deviation = float(second[valid].std())
+            # beside all that it ever is: a product may be zero but for rounding wherever the car follows the road
+            if deviation > 1e-9 * max(float(np.abs(second).max()), 1e-300):
+                kept.append(candidate)
+                rows.append(((second - second[valid].mean()) / deviation).astype(np.float32))
+        stacked = np.stack(rows) if rows else np.zeros((0, len(valid)), dtype=np.float32)
+        return cls(kept, stacked, coarse_middle(timeline.drive)[: len(valid)])
+
+    def responses(self, members: IndexArray, response_s: float) -> FloatArray:
+        """Some of them through a first-order lag, each drive on its own, shape (n, members)."""
+        return respond_by_second(self.values[members].T, response_s, self.drive)
+
+
+@dataclass(frozen=True, eq=False)
+class Dictionary:
+    """Whitened candidates at every lag and response."""
+
+    candidates: list[Candidate]  # One per entry.
+    lag: FloatArray  # shape (entries,): [s]
+    response: FloatArray  # shape (entries,): [s]
+    rows: SingleArray  # shape (entries, seconds): Length one each; valid seconds only.
+
+    @cached_property
+    def costs(self) -> FloatArray:
+        """Of the entries."""
+        return np.array([candidate.cost for candidate in self.candidates])
+
+    def __len__(self) -> int:
+        return len(self.candidates)
+
+    def timed(self, index: int) -> ColumnEffect:
+        """An entry's effect with its lag and response."""
+        effect = self.candidates[index].effect
+        return structs.replace(effect, lag_s=float(self.lag[index]), response_s=float(self.response[index]))
+
+
+def _without_gaps(values: FloatArray, valid: BoolArray) -> FloatArray:
+    """What is unknown takes the mean of what is known and valid, shape (n,). [own unit]"""
+    there = values[valid & np.isfinite(values)]
+    return np.where(np.isnan(values), there.mean() if len(there) else 0.0, values)
+
+
+def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:
+    """Pass every candidate through every response and lag, and whiten it; those left that rest on enough seconds."""
+    seconds, compact = np.flatnonzero(whitener.valid), whitener.compact
+    entries: list[tuple[Candidate, float, float]] = []
+    blocks: list[SingleArray] = [np.zeros((0, len(seconds)), dtype=np.float32)]
+    single = np.array([len(candidate.columns) == 1 for candidate in quantities.candidates], dtype=np.bool_)
+    for members, grid in ((np.flatnonzero(single), TIMINGS), (np.flatnonzero(~single), PRODUCT_TIMINGS)):
+        for first in range(0, len(members), CHUNK):
+            chunk = members[first : first + CHUNK]
+            for response_s, lags in grid.items():
+                response = quantities.responses(chunk, response_s)
+                for lag in lags:
+                    # drives are padded by more than any lag
+                    moved = response[np.clip(seconds - lag, 0, len(response) - 1)]
+                    rows = compact.rows(moved)
+                    squares = np.square(rows)
+                    power = squares.sum(axis=0)
+                    support = power**2 / np.maximum(np.square(squares).sum(axis=0), TINY)
+                    varies = power > 1e-9 * np.maximum(np.square(moved).sum(axis=0), TINY)  # within drives
+                    kept = np.flatnonzero(varies & (support >= MIN_SUPPORT_S))
+                    unit = rows[:, kept] / np.sqrt(np.maximum(power[kept], TINY))
+                    blocks.append(unit.T.astype(np.float32, copy=False))
+                    entries += [(quantities.candidates[chunk[i]], float(lag), response_s) for i in kept]
+    timings = np.array([entry[1:] for entry in entries]).reshape(-1, 2)
+    return Dictionary([entry[0] for entry in entries], timings[:, 0], timings[:, 1], np.concatenate(blocks))
+
+
+def respond_by_second(values: Reals, response_s: float, drive: IndexArray) -> FloatArray:
+    """Means over each second of a first-order lag of gain 1, settled where a drive starts; like `values`, (n, k).
+
+    Exact for values that stay the same for the second. `drive`: of each row, shape (n,), increasing.
+    """
+    from scipy.signal import lfilter
+
+    keep = float(np.exp(-1.0 / response_s))
+    late = response_s * (1.0 - keep)
+    later, earlier = np.array([[1.0 - late, late - keep], [1.0, -keep]], dtype=values.dtype)
+    response = lfilter(later, earlier, values, axis=0, zi=late * values[:1])[0]
+    return start_anew(response, values, keep, drive)
+
+
+def score_entries(
+    dictionary: Dictionary,
+    residual: FloatArray,
+    known: FloatArray,
+    barred: BoolArray,
+    drive: IndexArray,
+    rng: np.random.Generator,
+    *,
+    draws: int = NULL_DRAWS,
+    of_mean: bool = True,
+) -> tuple[FloatArray, FloatArray]:
+    """Squared score of every entry less its cost, -inf if barred, and the largest of each of the null's residuals.
+
+    Parameters
+    ----------
+    residual : array, shape (seconds,)
+        Whitened, valid seconds only.
+    known : array, shape (seconds, k)
+        Orthonormal; partialled out of residual and entries.
+    barred : bool array, shape (entries,)
+    drive : int array, shape (seconds,)
+        Drive that each row is of.
+    draws : int
+        Of the null; without any, no maxima.
+    of_mean : bool
+        Entries shift the mean, so that loudness where they act is no evidence; of a spread it is all there is.
+    """
+    left = beside(known, residual)
+    left = left / max(float(np.sqrt(np.mean(left**2))), 1e-300)
+    if len(dictionary) == 0 or barred.all():
+        return np.full(len(dictionary), -np.inf), np.zeros(0)
+    rotated = np.concatenate([left[:, None], draw_null(left, drive, rng, draws)], axis=1)
+    rotated = beside(known, rotated).astype(np.float32)
+    basis = known.astype(np.float32)
+    squared = np.empty((len(dictionary), rotated.shape[1]), dtype=np.float32)
+    rest = np.empty(len(dictionary))
+    for first in range(0, len(dictionary), 2048):
+        part = slice(first, first + 2048)
+        rows = dictionary.rows[part]
+        squared[part] = np.square(rows @ rotated)
+        rest[part] = 1.0 - np.square(rows @ basis).sum(axis=1) if basis.shape[1] else 1.0
+    usable = ~barred & (rest > LEFT_OVER)
+    squared = squared / np.maximum(rest, LEFT_OVER).astype(np.float32)[:, None]
+    squared -= dictionary.costs.astype(np.float32)[:, None]
+    squared[~usable] = -np.inf
+    largest = squared.max(axis=0).astype(np.float64)
+    scores = squared[:, 0].astype(np.float64)
+    if of_mean:
+        scores = _beside_loud_stretches(scores, dictionary, left, basis)
+    return scores, largest[1:] if np.isfinite(largest).all() else np.zeros(0)
+
+
+def _beside_loud_stretches(
+    scores: FloatArray, dictionary: Dictionary, left: FloatArray, basis: SingleArray
+) -> FloatArray:
+    """Scores of the best entries beside the squares of the very rows that they rest on, where these are larger [2]_.
+
+    The null deals residuals anew, and loses that they are larger where the column is: in bends, say.
+    """
+    order = np.argsort(-scores)[:ROBUST]
+    order = order[np.isfinite(scores[order])]
+    rows = dictionary.rows[order].astype(np.float64)
+    rows -= (rows @ basis) @ basis.T
+    columns = [frozenset(dictionary.candidates[index].effect.columns) for index in order]
+    rest = np.empty_like(rows)
+    for own in set(columns):  # what some response to the same columns explains is not loudness
+        alike = [k for k, others in enumerate(columns) if others <= own or own <= others][:RESPONSES]
+        span = orthonormal(rows[alike].T)
+        rest[[others == own for others in columns]] = beside(span, left)
+    power = np.maximum(np.square(rows).sum(axis=1), TINY)
+    weights = np.square(rows) / power[:, None]
+    scatter = (weights * np.square(rest)).sum(axis=1)
+    # of few rows it is a rough estimate: what counts is what is sure of it, two standard errors less
+    kurtosis = float(np.mean(left**4) / np.mean(left**2) ** 2)
+    scatter /= 1.0 + 2.0 * np.sqrt((kurtosis - 1.0) * np.square(weights).sum(axis=1))
+    scatter = np.maximum(scatter, 1.0)
+    robust = scores.copy()
+    costs = dictionary.costs[order]
+    robust[order] = (scores[order] + costs) / scatter - costs
+    return robust
+
+
+def draw_null(residual: FloatArray, drive: IndexArray, rng: np.random.Generator, draws: int = NULL_DRAWS) -> FloatArray:
+    """Residuals whose tie to the columns is broken, shape (seconds, draws).
+
+    Few long drives: rotated by at least `LEAST_SHIFT_S`, cut into blocks, and these dealt in random order. Rotations
+    alone are few: a column that changes within a minute sees no more than fifty of them in a drive of fifty minutes.
+    Many short drives: the sign of each whole drive drawn anew (a wild cluster bootstrap [1]_). Drives are independent,
+    and what an autoregression fitted to runs of a minute leaves in a drive's slow movement and first rows stays beside
+    the columns of that very drive; rotation would spread it evenly.
+
+    References
+    ----------
+    .. [1] A. C. Cameron, J. B. Gelbach, D. L. Miller, "Bootstrap-based improvements for inference with clustered
+       errors", Review of Economics and Statistics 90, 2008.
+    """
+    seconds = len(residual)
+    names, own = np.unique(drive, return_inverse=True)
+    if len(names) >= MANY_DRIVES:
+        return np.asarray(residual[:, None] * rng.choice([-1.0, 1.0], size=(len(names), draws))[own])
+    low = min(LEAST_SHIFT_S, seconds // 4)
+    # in order: where there is but one block, neighbours are alike, and how much so tells how many there are in truth
+    shifts = np.sort(rng.integers(low, max(low + 1, seconds - low), size=draws))
+    drawn = np.empty((seconds, draws))
+    for draw, shift in enumerate(shifts):
+        drawn[:, draw] = in_another_order(np.roll(residual, -shift), BLOCK_S, rng)
+    return drawn
+
+
+def in_another_order(values: FloatArray, length: int, rng: np.random.Generator) -> FloatArray:
+    """Blocks of about a length, dealt in random order, shape (n,) like `values`."""
+    blocks = np.array_split(values, max(1, round(len(values) / length)))
+    return np.concatenate([blocks[index] for index in rng.permutation(len(blocks))])
+
+
+def orthonormal(columns: FloatArray, share: float = 1e-6) -> FloatArray:
+    """Orthonormal basis of what holds all but a share of the columns' largest variance, shape (n, rank)."""
+    if columns.shape[1] == 0:
+        return columns
+    # by the Gram matrix: few columns of many rows, for which a singular value decomposition takes ten times as long
+    powers, directions = np.linalg.eigh(columns.T @ columns)
+    kept = powers > share * max(float(powers[-1]), 1e-300)
+    return np.asarray(columns @ (directions[:, kept] / np.sqrt(powers[kept])))
+
+
+def beside(basis: FloatArray, rows: FloatArray) -> FloatArray:
+    """Rows, shape (n,) or (n, k), without what an orthonormal basis, shape (n, rank), explains of them."""
+    return np.asarray(rows - basis @ (basis.T @ rows))

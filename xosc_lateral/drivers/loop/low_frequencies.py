@@ -1,0 +1,149 @@
+"""Tests at low frequencies of what changes over a whole drive: a smooth or a step of the mean, a smooth of the spread.
+
+Cosine coefficients of white rows are independent and of one variance. Those of the slowest periods are compared with
+the next quicker ones, which know how much people wander and how long loud stretches last [1]_.
+
+References
+----------
+.. [1] E. Lazarus, D. Lewis, J. Stock, M. Watson, "HAR inference: recommendations for practice", J. Business & Economic
+   Statistics 36, 2018: a long-run variance from cosines; U. K. Müller, M. W. Watson, "Testing models of low-frequency
+   variability", Econometrica 76, 2008.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.base.arrays import BoolArray, FloatArray
+from xosc_lateral.drivers.loop.autocorrelation import Whitener, fit_autoregression
+from xosc_lateral.drivers.loop.dictionary import beside, orthonormal
+from xosc_lateral.drivers.loop.innovations import LONGEST, ORDER
+from xosc_lateral.drivers.loop.model import Fitted
+from xosc_lateral.drivers.loop.significance import LEAST, upper_tail
+from xosc_lateral.drivers.loop.timeline import MIN_DRIFT_S, Coarse
+from xosc_lateral.drivers.model.effects.hidden import half_cosines
+
+# Half cosines tried for the mean. The fit has the most of them, penalised: a test wants few, a curve its shape.
+ORDERS = (1, 2, 4, 8)
+SPREAD_ORDERS = (1, 2, 4)  # Half cosines tried for the spread: its square scatters more than an offset does.
+EDGE_S, STEP_GRID_S = 60, 15  # Least time on either side of a step, and between the moments that are tried. [s]
+# Half cosines whose period is down to this say how much the slower ones are by chance; four times as long as what a
+# regime lasts, so that regimes count as chance. [s]
+SHORTEST_S = 240.0
+MEAN_SHORTEST_S = 120.0  # The same for the mean: people wander within a minute or two, which whitening knows. [s]
+# Half cosines of longer periods are hidden from the autoregression: eight times as long as it sees. [s]
+UNSEEN_S = 750.0
+STEP_DRAWS = 2000  # Draws of white rows that the best smooth or step is compared with.
+LEAST_OTHERS = 8  # So many of them at least, also on a short drive.
+SAME_S = 90  # Steps of two fits that are so close are the same one. [s]
+
+
+def slow_rows(fitted: Fitted) -> tuple[FloatArray, Whitener]:
+    """White rows, shape (n,), by an autoregression that has not seen what changes over the whole drive."""
+    coarse = fitted.coarse
+    left = np.where(coarse.valid, fitted.movement * fitted.scale, 0.0)
+    # of a short drive all of them would take ordinary wander along, and the rest would look whiter than it is
+    number = int(np.clip(2.0 * coarse.valid.sum() / coarse.drives / UNSEEN_S, 1, max(ORDERS)))
+    slow = np.column_stack([np.ones(len(left)), half_cosines_of(coarse, number)]) * coarse.valid[:, None]
+    basis = np.linalg.qr(slow)[0]
+    movement = np.where(coarse.valid, beside(basis, left) / fitted.scale, 0.0)
+    process = fit_autoregression(movement, coarse.valid, ORDER, longest=LONGEST)
+    whitener = Whitener(process, coarse.valid, coarse.drive, fitted.scale)
+    return whitener.rows(left), whitener
+
+
+def low_frequencies(values: FloatArray, coarse: Coarse, valid: BoolArray, shortest_s: float) -> FloatArray:
+    """Cosine transform of each drive that lasts, without the mean and what is quicker, shape (frequencies, k).
+
+    `values` of shape (n, k); the drives one after the other. Of white rows all are independent and of one variance.
+    """
+    from scipy.fft import dct
+
+    found = []
+    for index in range(coarse.drives):
+        own = values[valid & (coarse.drive == index)]
+        if len(own) >= MIN_DRIFT_S:
+            number = max(round(2.0 * len(own) / shortest_s), max(ORDERS) + LEAST_OTHERS)
+            found.append(dct(own, type=2, norm="ortho", axis=0)[1 : number + 1])
+    return np.concatenate(found) if found else np.zeros((0, values.shape[1]))
+
+
+def smooth_probabilities(rows: FloatArray, columns: FloatArray, orders: Sequence[int]) -> dict[int, float]:
+    """p-value of the first so many columns, shape (frequencies, k), by an F test at low frequencies alone.
+
+    What is left there says how much chance does, a long-run variance by cosines [1]_: rows need not be white beyond.
+    """
+    from scipy.stats import f
+
+    found = {}
+    for order in orders:
+        basis = orthonormal(columns[:, :order])
+        others = len(rows) - basis.shape[1]
+        if basis.shape[1] and others > 0:
+            explained = float(np.sum(np.square(basis.T @ rows)))
+            left = max(float(rows @ rows) - explained, 1e-300)
+            ratio = explained / basis.shape[1] / (left / others)
+            found[order] = max(float(f.sf(ratio, basis.shape[1], others)), LEAST)
+    return found
+
+
+def step_moments(coarse: Coarse) -> NDArray[np.intp]:
+    """Rows of the 1 Hz grid at which a single drive may step, shape (moments,); several drives have no common step."""
+    count = np.cumsum(coarse.valid)
+    inside = coarse.valid & (count >= EDGE_S) & (count <= count[-1] - EDGE_S)
+    return np.flatnonzero(inside)[::STEP_GRID_S] if coarse.drives == 1 else np.zeros(0, dtype=np.intp)
+
+
+def mean_probability(rows: FloatArray, waves: FloatArray, jumps: FloatArray, rng: np.random.Generator) -> float:
+    """p-value of the best of all smooths and steps at low frequencies: the least p of F tests, against white rows.
+
+    `rows`, shape (frequencies,); `waves` and `jumps`, shape (frequencies, k), may have no columns.
+    """
+    from scipy.stats import f
+
+    bases = [orthonormal(waves[:, :order]) for order in ORDERS if order <= waves.shape[1]]
+    unit = jumps / np.maximum(np.linalg.norm(jumps, axis=0), 1e-12)
+
+    def surest(drawn: FloatArray) -> FloatArray:
+        """Largest negative logarithm of a p-value, shape (draws,)."""
+        total = np.square(drawn).sum(axis=1)
+        tests = [(np.square(drawn @ basis).sum(axis=1), basis.shape[1]) for basis in bases if basis.shape[1]]
+        tests += [(np.square(drawn @ unit).max(axis=1), 1)] if unit.shape[1] else []
+        found = []
+        for explained, degrees in tests:
+            ratio = explained / degrees / ((total - explained) / (len(rows) - degrees))
+            found.append(-f.logsf(ratio, degrees, len(rows) - degrees))
+        return np.asarray(np.max(found, axis=0))
+
+    # of the logarithm of a least p the tail is exponential, whatever the tests have in common
+    return upper_tail(float(surest(rows[None])[0]), surest(rng.normal(size=(STEP_DRAWS, len(rows)))), least_excess=1.0)
+
+
+def moment_of(rows: FloatArray, whitener: Whitener, at: int) -> int:
+    """The second at which a step near `at` is likeliest: a jump leaves its mark in the movement of that very second."""
+    near = np.arange(max(at - SAME_S, 1), min(at + SAME_S + 1, len(rows)))
+    jumps = whitener.rows((np.arange(len(rows))[:, None] >= near).astype(np.float64))
+    return int(near[np.argmax(np.square(jumps.T @ rows) / np.maximum(np.square(jumps).sum(axis=0), 1e-12))])
+
+
+def clock_range(coarse: Coarse) -> tuple[float, float]:
+    """First and last valid time of all drives, in their clocks. [s]"""
+    seen = coarse.time[coarse.valid]
+    return float(seen.min()), float(seen.max())
+
+
+def half_cosines_of(coarse: Coarse, number: int) -> FloatArray:
+    """Half cosines of the drives' clock, within -1..1, shape (n, number). [-]"""
+    return half_cosines(coarse.time, *clock_range(coarse), number)
+
+
+def without_known(
+    known: FloatArray, squares: FloatArray, columns: FloatArray, valid: BoolArray
+) -> tuple[FloatArray, FloatArray]:
+    """Squares, shape (n, 1), and columns, shape (n, k), without what is known to go with the size."""
+    both = np.column_stack([squares, columns])
+    both[valid] = beside(orthonormal(np.column_stack([np.ones(valid.sum()), known[valid]])), both[valid])
+    return both[:, :1], both[:, 1:]

@@ -1,0 +1,246 @@
+"""The model of a drive: its terms, and what a fit of them gives.
+
+offset = level of the drive + mean terms + scale * movement, the movement an autoregression at 1 Hz, log scale = level
+of the drive + scale terms.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+from functools import cached_property
+from typing import ClassVar, Self
+
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.drivers.loop.autocorrelation import Whitener
+from xosc_lateral.drivers.loop.innovations import innovations
+from xosc_lateral.drivers.loop.refinement import Alternatives
+from xosc_lateral.drivers.loop.search import Search
+from xosc_lateral.drivers.loop.timeline import Coarse, on_fine_grid
+from xosc_lateral.drivers.model.effects import Effect
+
+
+class Stage(IntEnum):
+    """When a term is tested. The mean comes first: a mean that is not known looks like a spread.
+
+    Regimes come after the spread, because they explain whatever comes in clusters, and before what a regime's loud
+    stretches might be taken for.
+    """
+
+    MEAN = 1
+    LOW_FREQUENCY = 2
+    MEAN_AGAIN = 3
+    SPREAD = 4
+    REGIMES = 5
+    FINE_NOISE = 6
+    BETWEEN_DRIVES = 7
+
+
+@dataclass(frozen=True)
+class Description:
+    """A term in numbers that a report can put into words."""
+
+    effect: str  # Short name.
+    shape: str
+    size_m: float  # Change of the mean between the 5 % and 95 % quantile, or amplitude [m]; factor for scale.
+    size_error: float  # Standard error of it.
+    statistic: str  # Group of summary statistics that shows it best.
+    measure: str = ""  # What the errors before and after compare; empty: that group.
+    lag_s: float | None = None
+    response_s: float | None = None
+
+
+@dataclass(eq=False)
+class Removal:
+    """What all terms together did to the measured offsets, on the 0.2 s grid, shape (n,) each."""
+
+    location: FloatArray  # [m]
+    spread: FloatArray = field(init=False)  # Natural logarithm of a factor.
+    fine: FloatArray = field(init=False)  # Natural logarithm of a factor.
+
+    def __post_init__(self) -> None:
+        """Nothing but the location so far."""
+        self.spread, self.fine = np.zeros(len(self.location)), np.zeros(len(self.location))
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What a test says."""
+
+    term: Term | None  # To be added, or None: nothing that could be.
+    columns: tuple[str, ...]
+    p_value: float  # Family-wise over everything that the test tried.
+    after: Fitted | None = None  # Fit with the term, where the test has made it.
+    together: tuple[Term, ...] = ()  # Found with it, as one finding.
+
+
+class Term(ABC):
+    """One term. Frozen and small; sizes are in the fit, not in the term."""
+
+    component: ClassVar[str]  # Key of its share of the error budget.
+    kind: ClassVar[str]  # As in the report's schema.
+    stages: ClassVar[tuple[Stage, ...]] = ()  # At which it is tested; none: with another term, which it competes with.
+    # Among those of a stage: smaller ones are asked first, and first where two are equally sure; then by name. [-]
+    place: ClassVar[int] = 0
+    weight: ClassVar[float]  # Of its component in the error budget; one for each kind of hidden effect. [-]
+    # Whether the mean or the innovations' scale follow terms of this class on held-out rows: not the latent path of a
+    # cycle, nor what changes the slow movement alone.
+    seen_held_out: ClassVar[bool] = True
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Context columns that it reads; empty: hidden."""
+        return ()
+
+    @property
+    def alike(self) -> Alternatives:
+        """Columns of each other effect that explains as much."""
+        return ()
+
+    @property
+    def predictable(self) -> bool:
+        """Whether the model's likelihood of rows that it was not fitted on can tell this term from nothing."""
+        return self.seen_held_out
+
+    @property
+    def kind_key(self) -> str:
+        """Names its groups of summary statistics."""
+        return self.component
+
+    def mean_columns(self, coarse: Coarse) -> FloatArray:
+        """Columns of the mean, shape (n, k). [any unit]"""
+        return np.zeros((len(coarse), 0))
+
+    def fine_mean_columns(self, coarse: Coarse) -> FloatArray:
+        """The same columns of the mean on the 0.2 s grid, shape (fine n, k). [any unit]"""
+        return on_fine_grid(self.mean_columns(coarse), coarse.timeline)
+
+    def scale_columns(self, coarse: Coarse) -> FloatArray:
+        """Columns of the log scale, shape (n, j). [any unit]"""
+        return np.zeros((len(coarse), 0))
+
+    def size_columns(self, coarse: Coarse) -> FloatArray:
+        """Columns with which the movement's size changes, in whatever measure, shape (n, i): no other term's doing."""
+        return self.scale_columns(coarse)
+
+    def known_scale(self, coarse: Coarse) -> FloatArray | None:
+        """Log scale that is known as a whole, shape (n,). [-]"""
+        return None
+
+    def may_be_explained_by(self, later: Term, coarse: Coarse) -> bool:
+        """Whether a term that was found later may be why this one was found: a column is why a hidden effect was."""
+        return bool(later.columns) and not self.columns
+
+    @classmethod
+    def passes(cls, search: Search, p_value: float, fitted: Fitted) -> bool:
+        """Whether the best that was found of its component is good enough to be added to the terms fitted."""
+        if p_value <= search.levels[cls.component]:
+            return True
+        there = sum(term.component == cls.component for term in fitted.terms)
+        return search.wanted is not None and there < search.wanted.get(cls.component, 0)
+
+    @classmethod
+    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
+        """Test for one more term of this kind beside those fitted; None: there is no candidate."""
+        return None
+
+    def probability_beside(self, search: Search, fitted: Fitted) -> float:
+        """p-value of this very finding beside the terms fitted, which it is not one of."""
+        test = type(self).test(search, fitted)
+        return test.p_value if test is not None and test.term is not None and self.matches(test.term) else 1.0
+
+    @abstractmethod
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """What the profile gets: the effect proper first, then what goes with it."""
+
+    def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
+        """Add what the term did to the measured offsets; hidden ones as they most likely were."""
+        coarse, path = fitted.coarse, latent_path(self, fitted)
+        removal.location += on_fine_grid(path - path[coarse.valid].mean(), coarse.timeline)
+
+    def quantity(self, coarse: Coarse, effects: tuple[Effect, ...]) -> FloatArray | None:
+        """What the residual is compared by, on the 0.2 s grid, shape (fine n,); None: nothing of its own."""
+        return None
+
+    @abstractmethod
+    def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
+        """Size and words; `key` names its group of summary statistics."""
+
+    def matches(self, other: Self) -> bool:
+        """Whether another fit's term is the same finding."""
+        return type(self) is type(other) and self.columns == other.columns
+
+
+def latent_path(term: Term, fitted: Fitted) -> FloatArray:
+    """A term's part of the mean as fitted, shape (n,). [m]"""
+    return np.asarray(term.mean_columns(fitted.coarse) @ fitted.sizes[fitted.mean_part(term)])
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """Terms with sizes, and what is left."""
+
+    coarse: Coarse
+    terms: tuple[Term, ...]
+    whitener: Whitener
+    columns: FloatArray  # shape (n, k): Of the mean, term by term.
+    sizes: FloatArray  # shape (k,): [m] per unit.
+    covariance: FloatArray  # shape (k, k): [m] per unit.
+    levels: FloatArray  # shape (drives,): Mean offset of every drive where all mean terms are at their mean. [m]
+    log_sizes: FloatArray  # shape (j,): Natural logarithm per unit.
+    log_covariance: FloatArray  # shape (j, j): Natural logarithm per unit.
+    movement: FloatArray  # shape (n,): Offset less level and mean terms, over the scale; 0 where invalid. [m]
+    starts: FloatArray  # shape (order + 1,): Factor on the errors of the first rows of runs, for the likelihood.
+    log_likelihood: float  # Gaussian, of the valid rows.
+
+    @property
+    def scale(self) -> FloatArray:
+        """Factor on the movement, > 0, shape (n,). [-]"""
+        return self.whitener.scale
+
+    @cached_property
+    def innovations(self) -> FloatArray:
+        """Whitened by the movement without measurement noise: how large it is just now. Shape (n,), variance 1."""
+        coarse = self.coarse
+        moved = coarse.offset - self.levels[coarse.drive]
+        rows = innovations(moved, self.columns @ self.sizes, coarse.valid, coarse.drive, self.scale)
+        variance = float(rows @ rows) / max(1, int(coarse.valid.sum()) - len(self.sizes))
+        return np.asarray(rows / np.sqrt(max(variance, 1e-300)))
+
+    @property
+    def explained(self) -> FloatArray:
+        """Levels and mean terms on the 0.2 s grid, shape (fine n,). [m]"""
+        timeline = self.coarse.timeline
+        columns = joined([term.fine_mean_columns(self.coarse) for term in self.terms], len(timeline))
+        return columns @ self.sizes + self.levels[timeline.drive]
+
+    @cached_property
+    def estimates(self) -> Mapping[str, tuple[Term, tuple[Effect, ...]]]:
+        """Every term and what the profile gets for it, by component and number ("mean 0", "step 0")."""
+        found: dict[str, tuple[Term, tuple[Effect, ...]]] = {}
+        for term in self.terms:
+            number = sum(1 for key in found if key.rpartition(" ")[0] == term.kind_key)
+            found[f"{term.kind_key} {number}"] = (term, term.estimate(self))
+        return found
+
+    def mean_part(self, term: Term) -> slice:
+        """Where a term's coefficients of the mean are."""
+        return self._part(term, [other.mean_columns(self.coarse).shape[1] for other in self.terms])
+
+    def scale_part(self, term: Term) -> slice:
+        """Where a term's coefficients of the log scale are."""
+        return self._part(term, [other.scale_columns(self.coarse).shape[1] for other in self.terms])
+
+    def _part(self, term: Term, widths: Sequence[int]) -> slice:
+        index = next(i for i, other in enumerate(self.terms) if other is term)
+        first = sum(widths[:index])
+        return slice(first, first + widths[index])
+
+
+def joined(blocks: Sequence[FloatArray], n: int) -> FloatArray:
+    """Columns side by side, shape (n, k); none of none."""
+    return np.concatenate(blocks, axis=1) if blocks else np.zeros((n, 0))

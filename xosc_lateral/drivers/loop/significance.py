@@ -1,0 +1,103 @@
+"""From scores under the null to a family-wise p-value."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray
+
+
+class LoopSeed(IntEnum):
+    """Key of a source of chance."""
+
+    COLUMNS = 0  # Rotations that candidates of a column are compared with.
+    REGIMES = 3  # Simulated loudness that regimes are compared with.
+    LOW_FREQUENCY = 4  # Simulated rows and drawn signs that drifts and steps are compared with.
+    BETWEEN = 5  # Places dealt anew to drives.
+    # Runs before and after on held-out folds. The key of `BETWEEN`, too: that draws nothing but an order of drives.
+    FOLDS = 5
+    SPECTRUM = 7  # Runs whose spectrum is compared with the drives'.
+    BLOCKS = 9  # Half samples of the blocks.
+    SNIPPETS = 11  # Halves of the blocks whose snippets are compared.
+
+
+LEAST = 1e-300  # p-values stay above: their logarithm is taken. [-]
+# Probability that chance is named: on 39 tables of 40 nothing wrong is to be, and now and then what goes along with an
+# effect is taken for it. [-]
+BUDGET = 0.02
+# Share of a null of maxima that their tail is fitted on: they have an exponential one (Gumbel's law). [-]
+TAIL_SHARE = 0.25
+HEAVY_TAIL_SHARE = 0.1  # Share that the tail of a quadratic form is fitted on: further in it is no exponential yet. [-]
+# So many independent draws that reach a score tell its probability to a third, without any law of the tail.
+ENOUGH = 10
+# Mean excess in the far tail of a chi-square with one degree of freedom, and of maxima of many. [-]
+CHI_SQUARE_EXCESS = 2.0
+# From so many drives on a table tells what differs between them, and its null is drawn by whole drives.
+MANY_DRIVES = 20
+
+
+def upper_tail(
+    score: float, null: FloatArray, *, tail_share: float = TAIL_SHARE, least_excess: float = CHI_SQUARE_EXCESS
+) -> float:
+    """Probability, `LEAST` to 1, that chance gives `score` or more. [-]
+
+    What many independent draws reach has their share. Beyond, the null's tail falls as an exponential, whose scale is
+    known from no more than the draws in it: integrated over what it may be, the tail is a power [1]_, which an
+    exponential of the mean excess would put too low by a factor of 2 at 1e-3, of 4 at 1e-4, for 25 draws.
+
+    Parameters
+    ----------
+    score : float
+    null : array, shape (n,)
+        Scores under the null. Draws that resemble each other, as those of neighbouring rotations do, are neighbours.
+    tail_share : float
+        Share of the null that its tail is fitted on.
+    least_excess : float
+        The tail's scale is no smaller, in the scores' unit.
+
+    References
+    ----------
+    .. [1] J. Aitchison, I. R. Dunsmore, "Statistical Prediction Analysis", Cambridge 1975, chapter 2.
+    """
+    if len(null) == 0:
+        return 1.0
+    independent, share = effective_number(null), float(np.mean(null >= score))
+    knee = float(np.quantile(null, 1.0 - tail_share))
+    if score <= knee or share * independent >= ENOUGH:
+        return share
+    draws = max(tail_share * independent, 1.0)
+    excess = max(float(np.mean(null[null > knee] - knee)) if np.any(null > knee) else 0.0, least_excess, 1e-300)
+    p_value = tail_share * float(np.exp(-draws * np.log1p((score - knee) / (excess * draws))))
+    return max(min(p_value, ENOUGH / independent), LEAST)
+
+
+def effective_number(draws: FloatArray) -> float:
+    """Independent draws that tell as much about a mean as these do, by their autocorrelation [1]_; 1 to n.
+
+    `draws`, shape (n,): in an order in which those that resemble each other are neighbours.
+
+    References
+    ----------
+    .. [1] C. J. Geyer, "Practical Markov chain Monte Carlo", Statistical Science 7, 1992: sums of two neighbouring lags
+       up to the first that is not positive.
+    """
+    n = len(draws)
+    left = draws - draws.mean()
+    power = float(left @ left)
+    if power <= 0.0 or not np.isfinite(power):
+        return float(n)
+    size = 2 * n
+    correlation = np.fft.irfft(np.square(np.abs(np.fft.rfft(left, size))), size)[: n - n % 2] / power
+    pairs = correlation[0::2] + correlation[1::2]
+    ends = np.flatnonzero(pairs <= 0.0)
+    time = 2.0 * float(pairs[: ends[0] if len(ends) else len(pairs)].sum()) - 1.0
+    return float(np.clip(n / max(time, 1.0), 1.0, n))
+
+
+def as_one_degree(chi_square: FloatArray | float, degrees: int) -> FloatArray:
+    """Chi-square with one degree of freedom that is as rare as one with `degrees`, of the same shape."""
+    from scipy.stats import chi2
+
+    return np.asarray(chi2.isf(np.maximum(chi2.sf(chi_square, degrees), LEAST), 1))

@@ -1,0 +1,210 @@
+"""A column whose usual value in a drive goes with the place that the drive keeps: slow vehicles keep right, say.
+
+Every drive has a level of its own, so what hardly changes within drives can't act on the mean there. Here the levels
+themselves are regressed on what each drive usually meets, weighted by how well each is known beside how much drives
+differ anyway. The null deals the drives anew, which is exact: drives know nothing of one another. Columns of whole
+drives go along with each other (the left lane is the fast one), and two may act against each other and show together
+only: so pairs are tested, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
+
+import numpy as np
+from msgspec import structs
+
+from xosc_lateral.base.arrays import BoolArray, FloatArray
+from xosc_lateral.drivers.loop.dictionary import NULL_DRAWS, beside
+from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage
+from xosc_lateral.drivers.loop.search import Search
+from xosc_lateral.drivers.loop.significance import MANY_DRIVES, LoopSeed, as_one_degree, upper_tail
+from xosc_lateral.drivers.loop.terms.column import ColumnTerm, of_kind
+from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect, Linear
+from xosc_lateral.drivers.model.seeds import generator
+
+# Response time of an effect between drives: what a drive usually meets, as far as a run can know it. [s]
+USUAL_S = 60.0
+MIN_SECONDS = 10  # Of road-following in a drive that is counted. [s]
+# Rounds of Newton's method at most, and the share of the variance that the last one may change it by: the sum of
+# squares falls and is convex in the variance, so that rounds from zero approach the root from below.
+ROUNDS, SETTLED = 50, 1e-9
+MIN_SUPPORT = 8.0  # A quantity that rests on fewer drives than this is not tested.
+# Share of either member's variance that the other of a pair must leave: below, the two are one quantity twice. [-]
+LEAST_APART = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class BetweenTerm(ColumnTerm):
+    """Between-driver regression of the drives' levels."""
+
+    component: ClassVar[str] = "between"
+    kind: ClassVar[str] = "location"
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.BETWEEN_DRIVES,)
+    weight: ClassVar[float] = 5.0
+    seen_held_out: ClassVar[bool] = False
+    within_drives: ClassVar[bool] = False
+    acts: ClassVar[Acts] = Acts.LOCATION
+    what: ClassVar[str] = "place that a drive keeps"
+    group: ClassVar[str] = "mean"
+
+    @classmethod
+    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
+        """Best candidate, or pair of candidates, over all columns and shapes, against drives dealt anew."""
+        coarse, places = fitted.coarse, _Places.of(fitted)
+        if np.count_nonzero(places.weight) < MANY_DRIVES:
+            return None
+        present = {name for term in of_kind(fitted, cls) for name in term.columns}
+        candidates, usual = [], []
+        for candidate, values in zip(search.quantities.candidates, search.quantities.values, strict=True):
+            if len(candidate.columns) > 1 or len(candidate.contrast) > 1 or present & set(candidate.columns):
+                continue
+            if isinstance(candidate.effect, Linear) and search.columns[candidate.columns[0]].gaps:
+                # a line in a distance would set a neighbour who is far away apart from one who is gone
+                continue
+            mean = places.left(coarse.by_drive(values.astype(np.float64)))
+            power = float(mean @ mean)
+            if power > 1e-12 and power**2 / max(float(np.sum(mean**4)), 1e-300) >= MIN_SUPPORT:
+                candidates.append(candidate)
+                usual.append(mean / np.sqrt(power))
+        if not candidates:
+            return None
+        members, p_value = best_of_drives(
+            places.left(places.place),
+            places.weight > 0.0,
+            np.stack(usual, axis=1),
+            np.array([candidate.cost for candidate in candidates]),
+            [candidate.columns[0] for candidate in candidates],
+            generator(search.seed, LoopSeed.BETWEEN),
+        )
+        terms = [cls.of(structs.replace(candidates[index].effect, lag_s=0.0, response_s=USUAL_S)) for index in members]
+        return Outcome(terms[0], tuple(term.columns[0] for term in terms), p_value, together=tuple(terms[1:]))
+
+    def matches(self, other: Self) -> bool:
+        """Any other: columns that go along with each other from drive to drive stand in for one another."""
+        return isinstance(other, BetweenTerm)
+
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """Weighted least squares over drives, all such terms jointly."""
+        sizes, errors = _Places.of(fitted).sizes()
+        own = [term is self for term in of_kind(fitted, BetweenTerm)]
+        return (self.sized(fitted.coarse, Acts.LOCATION, sizes[own], errors[own]),)
+
+    def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
+        """Change between drives; it has no lag."""
+        size = super().describe(fitted, effects, key)
+        return replace(size, shape=f"{size.shape}, between drives", lag_s=None, response_s=None)
+
+
+def is_between(effect: ColumnEffect) -> bool:
+    """Whether an effect acts by what a drive usually meets."""
+    return effect.response_s >= USUAL_S
+
+
+def between_shift(fitted: Fitted) -> FloatArray:
+    """What the effects between drives do to every drive's place, shape (drives,). [m]"""
+    places = _Places.of(fitted)
+    return np.asarray(places.known[:, 1:] @ places.sizes()[0])
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Places:
+    """Places that drives keep."""
+
+    place: FloatArray  # shape (drives,): Levels. [m]
+    # shape (drives,): One over the variance of a place about what is known; 0: the drive is too short. [1/m^2]
+    weight: FloatArray
+    known: FloatArray  # shape (drives, k): A one and the effects between drives that are in the model.
+
+    @classmethod
+    def of(cls, fitted: Fitted) -> _Places:
+        """Weights at which the weighed squares add up to their degrees of freedom [1]_, by Newton's method.
+
+        References
+        ----------
+        .. [1] R. Paule, J. Mandel, "Consensus values and weighting factors", J. Research of the National Bureau of
+               Standards 87, 1982.
+        """
+        coarse, groups = fitted.coarse, fitted.coarse.drives
+        seconds = np.bincount(coarse.drive, coarse.valid.astype(float), minlength=groups)
+        power = fitted.whitener.power
+        counted = (seconds >= MIN_SECONDS) & (power > 0.0)
+        noise = np.where(counted, 1.0 / np.maximum(power, 1e-300), np.inf)
+        usual = [coarse.by_drive(coarse.response(term.effect)[:, 0]) for term in of_kind(fitted, BetweenTerm)]
+        known = np.column_stack([np.ones(groups), *usual])
+        scatter = 0.0
+        for _ in range(ROUNDS):
+            places = cls(fitted.levels, np.where(counted, 1.0 / (scatter + noise), 0.0), known)
+            squares = np.square(places.left(fitted.levels))
+            excess = float(squares.sum()) - max(int(counted.sum()) - known.shape[1], 1)
+            change = excess / max(float(squares @ places.weight), 1e-300)
+            settled = abs(change) <= SETTLED * scatter or (change < 0.0 and scatter == 0.0)
+            scatter = max(scatter + change, 0.0)
+            if settled:
+                break
+        return places
+
+    def left(self, values: FloatArray) -> FloatArray:
+        """Times the weight's root, free of what is known; shape (drives,)."""
+        root = np.sqrt(self.weight)
+        return beside(np.linalg.qr(self.known * root[:, None])[0], values * root)
+
+    def sizes(self) -> tuple[FloatArray, FloatArray]:
+        """Sizes of the known effects and their standard errors, shape (k,) each. [m] per unit"""
+        weighed = self.known * self.weight[:, None]
+        inverse = np.linalg.pinv(weighed.T @ self.known)
+        return (inverse @ (weighed.T @ self.place))[1:], np.sqrt(np.diag(inverse))[1:]
+
+
+def best_of_drives(
+    left: FloatArray,
+    counted: BoolArray,
+    quantities: FloatArray,
+    costs: FloatArray,
+    columns: Sequence[str],
+    rng: np.random.Generator,
+) -> tuple[tuple[int, ...], float]:
+    """One candidate or two, whichever gain most in chi-square less what their choice costs, and the p-value.
+
+    A pair's gain is the chi-square that is as rare with one degree of freedom. The null: drives dealt anew.
+
+    Parameters
+    ----------
+    left : array, shape (drives,)
+        What is not explained, of variance 1. [-]
+    counted : bool array, shape (drives,)
+        Drives that are long enough.
+    quantities : array, shape (drives, k)
+        Candidates, free of what is known, of length 1.
+    costs : array, shape (k,)
+        Of choosing each among its family.
+    columns : sequence of str
+        Each candidate's; the two of a pair are of different columns.
+    """
+    rows = np.flatnonzero(counted)
+    draws = np.zeros((NULL_DRAWS + 1, len(left)))
+    draws[0] = left
+    for drawn in draws[1:]:
+        drawn[rows] = left[rng.permutation(rows)]
+    names, products = np.array(columns), quantities.T @ quantities
+    apart = (names[:, None] != names) & (1.0 - np.square(products) >= LEAST_APART)
+    first, second = np.nonzero(np.triu(apart, 1))
+    product = products[first, second]
+
+    def pairs(z: FloatArray) -> FloatArray:
+        power = np.square(z[first]) + np.square(z[second]) - 2.0 * product * z[first] * z[second]
+        return np.asarray(power / (1.0 - np.square(product)))
+
+    z = draws @ quantities
+    singles = np.square(z) - costs
+    scores = singles.max(axis=1)
+    if len(first):
+        best = np.array([pairs(drawn).max() for drawn in z])  # one by one: a table of all would fill gigabytes
+        scores = np.maximum(scores, as_one_degree(best, 2) - 2.0 * np.log(len(first)))
+    p_value, alone = upper_tail(float(scores[0]), scores[1:]), int(np.argmax(singles[0]))
+    if singles[0, alone] >= scores[0]:
+        return (alone,), p_value
+    pair = int(np.argmax(pairs(z[0])))
+    return (int(first[pair]), int(second[pair])), p_value

@@ -1,0 +1,167 @@
+"""The mean by a column, and how unsure its size is because shape, lag and time constant were estimated with it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from msgspec import structs
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.drivers.loop.autocorrelation import Problem
+from xosc_lateral.drivers.loop.candidates import shapes_of
+from xosc_lateral.drivers.loop.column_search import SearchedTerm
+from xosc_lateral.drivers.loop.columns import Column, read_column
+from xosc_lateral.drivers.loop.dictionary import beside
+from xosc_lateral.drivers.loop.model import Fitted, Stage, Term
+from xosc_lateral.drivers.loop.refinement import (
+    FINE_RESPONSES,
+    LAG_STEPS,
+    lags_about,
+    means_by_second,
+    other_centres,
+    other_scales,
+    running_sums,
+)
+from xosc_lateral.drivers.loop.terms.column import driving_range
+from xosc_lateral.drivers.loop.timeline import Coarse, coarse_mean
+from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect, Product, Proximity
+
+NEAR_S = 2.0  # Lags that differ from the estimate by up to this are compared. [s]
+# Scales that are compared, as shares of the estimate, 7 % apart: between two that refinement tries, 40 % apart, the
+# change from the usual to the near end differs by a third.
+NEAR_SCALES = tuple(np.geomspace(0.5, 2.0, 21).tolist())
+# 95 % quantile of chi-square with one degree of freedom: the interval gives up half as much log-likelihood. [-]
+CHI_SQUARE = 3.84
+
+
+@dataclass(frozen=True, eq=False)
+class MeanTerm(SearchedTerm):
+    """Mean offset by a column: generalised least squares on whitened offsets."""
+
+    component: ClassVar[str] = "mean"
+    kind: ClassVar[str] = "location"
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.MEAN, Stage.MEAN_AGAIN)
+    weight: ClassVar[float] = 5.0
+    acts: ClassVar[Acts] = Acts.LOCATION
+    what: ClassVar[str] = "mean offset"
+    group: ClassVar[str] = "mean"
+
+    def mean_columns(self, coarse: Coarse) -> FloatArray:
+        """The response, shape (n, k). [unit of the quantity]"""
+        return coarse.response(self.effect, keep=True)
+
+    def fine_mean_columns(self, coarse: Coarse) -> FloatArray:
+        """The response as the profile gives it: steps of a second would be noise."""
+        response = coarse.fine_response(self.effect)
+        return np.asarray(response - coarse_mean(response)[coarse.valid].mean(axis=0))
+
+    def may_be_explained_by(self, later: Term, coarse: Coarse) -> bool:
+        """What changes the spread: the null keeps how loud the movement is, not where."""
+        return bool(later.scale_columns(coarse).shape[1]) or later.known_scale(coarse) is not None
+
+    @classmethod
+    def problem(cls, fitted: Fitted) -> Problem:
+        """Whitened offsets."""
+        return Problem(fitted.whitener, fitted.coarse.offset, fitted.columns)
+
+    @classmethod
+    def reweighted(cls, fitted: Fitted, after: Fitted) -> Problem:
+        """Whitened by what is left in `after`: an effect that is still in the offsets looks like memory."""
+        return Problem(after.whitener, fitted.coarse.offset, fitted.columns)
+
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """From the joint fit; shrunk as if timing and shape were known, with errors for what is not."""
+        part = fitted.mean_part(self)
+        errors = np.sqrt(np.maximum(np.diag(fitted.covariance)[part], 0.0))
+        effect = self.sized(fitted.coarse, Acts.LOCATION, fitted.sizes[part], errors)
+        return (structs.replace(effect, errors=tuple(widening(fitted, effect, part) * errors)),)
+
+
+def widening(fitted: Fitted, effect: ColumnEffect, part: slice) -> float:
+    """Factor on the standard errors of an effect on the mean, at least 1.
+
+    How far the profile-likelihood interval [1]_ of the change over the driving range reaches from the estimate with
+    lag and time constant free, or the shape of its column, or the distances over which its product fades, over how far
+    it reaches with all of them known. The likelihood is that of independent rows, scaled to the variance that stretches
+    of a minute show [2]_.
+
+    `effect`: with coefficients; `part`: its columns of the mean.
+
+    References
+    ----------
+    .. [1] D. Venzon, S. Moolgavkar, "A method for computing profile-likelihood-based confidence intervals", Applied
+       Statistics 37, 1988.
+    .. [2] R. E. Chandler, S. Bate, "Inference for clustered data using the independence loglikelihood", Biometrika 94,
+       2007.
+    """
+    low, high = driving_range(fitted.coarse, effect)
+    contrast = high - low
+    white = fitted.whitener.rows
+    others, _ = np.linalg.qr(white(np.delete(fitted.columns, np.r_[part], axis=1)))
+    left = beside(others, white(fitted.coarse.offset))
+    own = beside(others, white(fitted.columns[:, part]))
+    estimated = _profile(own, left, contrast)
+    found = [estimated]
+    for response in _timed(fitted, effect):
+        rows = beside(others, white(response.reshape(len(response), -1)))
+        width = len(contrast)
+        found += [_profile(rows[:, at : at + width], left, contrast) for at in range(0, rows.shape[1], width)]
+    for shape in _shapes(fitted.coarse, effect):
+        low, high = driving_range(fitted.coarse, shape)
+        rows = beside(others, white(fitted.coarse.response(shape)))
+        alike = np.sign(float(np.sum(own * rows)))  # nearness falls where distance rises
+        found.append(_profile(rows, left, alike * (high - low)))
+    gain, size, variance = np.asarray(found).T
+    noise = float(left @ left - gain.max()) / max(1, int(fitted.coarse.valid.sum()))
+    clustered = float(contrast @ fitted.covariance[part, part] @ contrast)
+    room = CHI_SQUARE * clustered / max(noise * estimated[2], 1e-300) - (gain.max() - gain) / noise
+    inside = room > 0.0
+    half = np.sqrt(noise * variance[inside] * room[inside])
+    reach = float(np.max(np.abs(size[inside] - estimated[1]) + half))
+    return float(max(1.0, reach / max(np.sqrt(CHI_SQUARE * clustered), 1e-300)))
+
+
+def _shapes(coarse: Coarse, effect: ColumnEffect) -> list[ColumnEffect]:
+    """Other shapes of the only column, or scales and centres of a product, with one coefficient and the same timing."""
+    timing = {"lag_s": effect.lag_s, "response_s": effect.response_s}
+    if isinstance(effect, Product):
+        others = (*other_scales(effect, NEAR_SCALES), *other_centres(effect, coarse))
+        return [structs.replace(other, response_range=()) for other in others]
+    if len(effect.columns) > 1 or len(effect.coefficients) > 1:
+        return []
+    (name,) = effect.columns
+    seen = coarse.context[name][coarse.timeline.valid]
+    column = read_column(name, seen, coarse.timeline.periods.get(name, 0.0))
+    if not isinstance(column, Column):
+        return []
+    plain, bent, _ = shapes_of(column, seen, curves=False)
+    near = [
+        structs.replace(effect, scale=share * effect.scale) for share in NEAR_SCALES if isinstance(effect, Proximity)
+    ]
+    return [
+        structs.replace(shape, response_range=(), **timing)
+        for shape in (*plain, *bent, *near)
+        if shape.seen({name: seen[:1]}).shape[1] == 1
+    ]
+
+
+def _timed(fitted: Fitted, effect: ColumnEffect) -> list[FloatArray]:
+    """Responses at 1 Hz per time constant, shape (n, lags, k)."""
+    coarse = fitted.coarse
+    late = [round(float(lag) / coarse.timeline.step) for lag in lags_about(effect.lag_s, NEAR_S, LAG_STEPS[-1])]
+    quantity = coarse.fine_response(structs.replace(effect, lag_s=0.0, response_s=0.0, response_range=()))
+    sums = (running_sums(coarse, quantity, response_s) for response_s in FINE_RESPONSES)
+    return [np.stack([means_by_second(one, shift) for shift in late], axis=1) for one in sums]
+
+
+def _profile(rows: FloatArray, left: FloatArray, contrast: FloatArray) -> tuple[float, float, float]:
+    """Squares explained, the contrast's size, and its variance for noise of variance 1."""
+    inverse = np.linalg.pinv(rows.T @ rows)
+    products = rows.T @ left
+    return (
+        float(products @ inverse @ products),
+        float(contrast @ inverse @ products),
+        float(contrast @ inverse @ contrast),
+    )

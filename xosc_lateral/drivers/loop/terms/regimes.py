@@ -1,0 +1,195 @@
+"""Loud and quiet stretches that no column tells apart: distraction, say.
+
+A two-state Markov chain [1]_. The null is a movement that is loud or quiet for no longer than `CLUSTER_S`: its own
+squares, in blocks of that length, in random order [2]_.
+
+References
+----------
+.. [1] J. D. Hamilton, "A new approach to the economic analysis of nonstationary time series and the business cycle",
+       Econometrica 57, 1989.
+.. [2] E. Carlstein, "The use of subseries values for estimating the variance of a general statistic from a stationary
+       sequence", Annals of Statistics 14, 1986: blocks that do not overlap. Dealt without replacement: a permutation
+       test, of blocks that are taken for exchangeable.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+
+from xosc_lateral.base.arrays import BoolArray, FloatArray
+from xosc_lateral.base.jit import njit
+from xosc_lateral.drivers.loop.dictionary import beside, in_another_order
+from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Removal, Stage, Term
+from xosc_lateral.drivers.loop.search import Search
+from xosc_lateral.drivers.loop.significance import HEAVY_TAIL_SHARE, LoopSeed, upper_tail
+from xosc_lateral.drivers.loop.squares import SLOW_S, fine_squares, log_sizes, quick_squares, slow_squares
+from xosc_lateral.drivers.loop.terms.spread import known_log_scale, what_a_column_may_do, what_columns_do
+from xosc_lateral.drivers.loop.timeline import Coarse, on_fine_grid
+from xosc_lateral.drivers.model.effects import Effect, Regimes
+from xosc_lateral.drivers.model.seeds import generator
+
+
+@njit
+def forward_backward(squares, valid, quiet, loud, go, leave):  # type: ignore[no-untyped-def]
+    """Probability of the loud state per row, expected numbers of switches on and off, log-likelihood."""
+    n = len(squares)
+    forward, emit = np.empty((n, 2)), np.ones((n, 2))
+    likelihood = 0.0
+    a0, a1 = leave / (go + leave), go / (go + leave)
+    for t in range(n):
+        if valid[t]:
+            emit[t, 0] = np.exp(-0.5 * squares[t] / quiet**2) / quiet + 1e-300
+            emit[t, 1] = np.exp(-0.5 * squares[t] / loud**2) / loud + 1e-300
+        p0 = (a0 * (1.0 - go) + a1 * leave) * emit[t, 0]
+        p1 = (a0 * go + a1 * (1.0 - leave)) * emit[t, 1]
+        total = p0 + p1
+        likelihood += np.log(total)
+        a0, a1 = p0 / total, p1 / total
+        forward[t, 0], forward[t, 1] = a0, a1
+    on = np.empty(n)
+    on[n - 1] = forward[n - 1, 1]
+    b0, b1, went, left = 1.0, 1.0, 0.0, 0.0
+    for t in range(n - 2, -1, -1):
+        e0, e1 = emit[t + 1, 0] * b0, emit[t + 1, 1] * b1
+        j00, j01 = forward[t, 0] * (1.0 - go) * e0, forward[t, 0] * go * e1
+        j10, j11 = forward[t, 1] * leave * e0, forward[t, 1] * (1.0 - leave) * e1
+        total = j00 + j01 + j10 + j11
+        went += j01 / total
+        left += j10 / total
+        on[t] = (j10 + j11) / total
+        b0, b1 = (1.0 - go) * e0 + go * e1, leave * e0 + (1.0 - leave) * e1
+        norm = b0 + b1
+        b0, b1 = b0 / norm, b1 / norm
+    return on, went, left, likelihood
+
+
+ITERATIONS = 60  # Of expectation maximisation; converges well before.
+# Factor between the regimes and mean length [s] that the fit starts from; the likelier end is kept.
+STARTS = ((1.6, 15.0), (2.2, 40.0))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class RegimeFit:
+    """Two regimes of a movement."""
+
+    factor: float  # Spread in the loud regime over the quiet one. [-]
+    on_s: float  # Mean length of either. [s]
+    off_s: float  # Mean length of either. [s]
+    on: FloatArray  # shape (n,): Probability that the loud regime is on, given the whole drive.
+    quiet: float  # Standard deviation of the innovations in the quiet regime. [-]
+    log_likelihood: float
+
+
+def fit_regimes(rows: FloatArray, valid: BoolArray) -> RegimeFit:
+    """Fit to white rows [-], shape (n,), by expectation maximisation; cut-out seconds say nothing about the regime."""
+    squares, fits = rows**2, []
+    for factor, length in STARTS:
+        quiet = float(np.sqrt(np.mean(squares[valid]) / (0.7 + 0.3 * factor**2)))
+        loud, go, leave = quiet * factor, 1.0 / (2.0 * length), 1.0 / length
+        for _ in range(ITERATIONS):
+            on, went, left, likelihood = forward_backward(squares, valid, quiet, loud, go, leave)  # type: ignore[no-untyped-call]  # compiled: numba has no types
+            weight_on, weight_off = on[valid], 1.0 - on[valid]
+            loud = float(np.sqrt((weight_on @ squares[valid]) / max(weight_on.sum(), 1e-9)))
+            quiet = float(np.sqrt((weight_off @ squares[valid]) / max(weight_off.sum(), 1e-9)))
+            go = float(np.clip(went / max(float((1.0 - on).sum()), 1e-9), 1e-4, 0.5))
+            leave = float(np.clip(left / max(float(on.sum()), 1e-9), 1e-4, 0.5))
+            if quiet > loud:
+                quiet, loud, go, leave = loud, quiet, leave, go
+            quiet = max(quiet, 1e-3)
+        fits.append(RegimeFit(loud / quiet, 1.0 / leave, 1.0 / go, on, quiet, likelihood))
+    return max(fits, key=lambda fit: fit.log_likelihood)
+
+
+MEMORIES_S = (6.0, 15.0, 40.0)  # Lengths of regimes that are tested. [s]
+# Loudness that persists for up to this is how people steer, by a correction now and then and what it takes to settle,
+# and no regime. [s]
+CLUSTER_S = 15
+SHORTEST_S = 12  # Lags are compared from here on. [s]
+DRAWS = 2000  # Orders of the blocks that are the null.
+
+
+@dataclass(frozen=True, eq=False)
+class RegimesTerm(Term):
+    """Two-state Markov chain in the log scale."""
+
+    component: ClassVar[str] = "regimes"
+    kind: ClassVar[str] = "regime"
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.REGIMES,)
+    weight: ClassVar[float] = 2.5
+    seen_held_out: ClassVar[bool] = False
+    fit: RegimeFit = field(repr=False)
+
+    def known_scale(self, coarse: Coarse) -> FloatArray | None:
+        """As far as the regimes are known, about its mean, shape (n,). [-]"""
+        scale = self.fit.on * np.log(self.fit.factor)
+        return np.asarray(scale - scale[coarse.valid].mean())
+
+    @classmethod
+    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
+        """Weighted autocovariance of the squared innovations; null: blocks of the same squares in another order."""
+        coarse = fitted.coarse
+        if not coarse.lasts or any(isinstance(term, cls) for term in fitted.terms):
+            return None
+        # what a column does to the size in another shape than the one that was found is no regime
+        columns = what_columns_do(search, fitted), what_a_column_may_do(search, fitted)[0]
+        known = np.concatenate([known_log_scale(fitted), *columns], axis=1)
+        squares, rng = quick_squares(fitted).standardised, generator(search.seed, LoopSeed.REGIMES)
+        p_value = probability_of_persistence(squares, coarse.valid, known, rng)
+        return Outcome(cls(fit_regimes(fitted.innovations, coarse.valid)), (), p_value)
+
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """Regimes are found in the innovations; what they do to the movement itself may be more."""
+        on = self.fit.on[:, None]
+        # the fit holds the regimes' scale already; squares of its innovations say what is left of them
+        fine = float(log_sizes(fine_squares(fitted), on)[0][0])
+        moved = float(log_sizes(slow_squares(fitted), on)[0][0])
+        factor = self.fit.factor * max(1.0, float(np.exp(moved)))
+        loud = float(np.sum(self.fit.on[fitted.coarse.valid]))
+        error = factor / np.sqrt(2.0 * max(loud / SLOW_S, 1.0))
+        lengths = {"on_s": self.fit.on_s, "off_s": self.fit.off_s}
+        return (Regimes(factor=factor, factor_error=error, fine_factor=float(np.exp(fine)), **lengths),)
+
+    def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
+        """By the probability that the loud regime is on."""
+        effect = effects[0]
+        assert isinstance(effect, Regimes)
+        on = on_fine_grid(self.fit.on, fitted.coarse.timeline)
+        removal.spread += on * np.log(effect.factor)
+        removal.fine += on * np.log(effect.fine_factor)
+
+    def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
+        """Factor and mean lengths."""
+        effect = effects[0]
+        assert isinstance(effect, Regimes)
+        shape = f"on for {effect.on_s:.0f} s, off for {effect.off_s:.0f} s on average"
+        statistic = "quantiles of local spread"
+        return Description("on/off regimes", shape, effect.factor, effect.factor_error, statistic)
+
+
+def probability_of_persistence(
+    squares: FloatArray, valid: BoolArray, known: FloatArray, rng: np.random.Generator
+) -> float:
+    """Probability that loudness which lasts for no longer than `CLUSTER_S` shows as much persistence.
+
+    `squares`, shape (n,): of white rows, one per second, mean 0; 0 where invalid; `known`, shape (n, k): what is known
+    to go with the size; taken out of the squares.
+    """
+    if known.shape[1]:
+        basis = np.linalg.qr((known - known[valid].mean(axis=0)) * valid[:, None])[0]
+        squares = beside(basis, squares)
+    lags = np.arange(SHORTEST_S, int(3 * max(MEMORIES_S)) + 1)
+    weights = np.exp(-lags / np.asarray(MEMORIES_S)[:, None])
+    scales, size = np.sqrt(valid.sum() * (weights**2).sum(axis=1)), len(squares) + int(lags[-1])
+
+    def score(series: FloatArray) -> float:
+        products = np.fft.irfft(np.abs(np.fft.rfft(series, size)) ** 2, size)[lags]
+        return float((weights @ products / scales).max())
+
+    inside, drawn, null = np.flatnonzero(valid), np.zeros(len(squares)), np.zeros(DRAWS)
+    for draw in range(DRAWS):
+        drawn[inside] = in_another_order(np.roll(squares[inside], rng.integers(CLUSTER_S)), CLUSTER_S, rng)
+        null[draw] = score(drawn)
+    return upper_tail(score(squares), null, tail_share=HEAVY_TAIL_SHARE, least_excess=0.0)

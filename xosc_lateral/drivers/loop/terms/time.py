@@ -1,0 +1,291 @@
+"""What changes with time and no column explains: the mean or the spread as a smooth function, or one step of the mean.
+
+A driver learns or tires, a camera warms up or is calibrated anew. The smooths are half cosines over the drive, as many
+as the test asks for; what the profile gets is penalised: the k-th one's size has a prior variance that falls with the
+fourth power of k, as of an integrated random walk, at the scale that the sizes themselves make likeliest [1]_.
+
+References
+----------
+.. [1] S. N. Wood, "Generalized Additive Models", 2nd ed., 2017, section 5.8 and chapter 6: smooths as random effects.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.drivers.loop.low_frequencies import (
+    MEAN_SHORTEST_S,
+    ORDERS,
+    SAME_S,
+    SHORTEST_S,
+    SPREAD_ORDERS,
+    clock_range,
+    half_cosines_of,
+    low_frequencies,
+    mean_probability,
+    moment_of,
+    slow_rows,
+    smooth_probabilities,
+    step_moments,
+    without_known,
+)
+from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Removal, Stage, Term
+from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop.search import Search
+from xosc_lateral.drivers.loop.significance import LoopSeed
+from xosc_lateral.drivers.loop.squares import SLOW_S, fine_squares, log_sizes, quick_squares, slow_squares
+from xosc_lateral.drivers.loop.terms.spread import what_a_column_may_do, what_columns_do
+from xosc_lateral.drivers.loop.timeline import COARSE, Coarse
+from xosc_lateral.drivers.model.effects import Effect, Step, TimeSmooth
+from xosc_lateral.drivers.model.seeds import generator
+
+STEP_PARAMETERS = 2  # Of a step: its height and its moment.
+SURER = 0.01  # Where it is surer than the best column by this factor, what that column may do is left to time. [-]
+
+
+class _MeanByTime(Term):
+    """Step or smooth of the mean: they are tested at the same time, and compete."""
+
+    component: ClassVar[str] = "time_mean"
+    weight: ClassVar[float] = 3.0
+
+    @property
+    def kind_key(self) -> str:
+        """Two kinds share the component."""
+        return self.kind
+
+    def probability_beside(self, search: Search, fitted: Fitted) -> float:
+        """p-value of the mean by time, whichever of the two it looks like beside the terms fitted."""
+        test = StepTerm.test(search, fitted)
+        return 1.0 if test is None else test.p_value
+
+
+@dataclass(frozen=True, eq=False)
+class StepTerm(_MeanByTime):
+    """The mean jumps once."""
+
+    kind: ClassVar[str] = "step"
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.LOW_FREQUENCY,)
+    seen_held_out: ClassVar[bool] = False
+    at: int  # Row of the 1 Hz grid.
+
+    def mean_columns(self, coarse: Coarse) -> FloatArray:
+        """0 before, 1 after, shape (n, 1). [-]"""
+        return (np.arange(len(coarse)) >= self.at).astype(np.float64)[:, None]
+
+    @classmethod
+    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
+        """Step or smooth, whichever is likelier, each parameter at Schwarz's price [1]_.
+
+        References
+        ----------
+        .. [1] G. Schwarz, "Estimating the dimension of a model", Annals of Statistics 6, 1978.
+        """
+        coarse = fitted.coarse
+        if not coarse.lasts or any(isinstance(term, _MeanByTime) for term in fitted.terms):
+            return None
+        rows, whitener = slow_rows(fitted)
+        moments = step_moments(coarse)
+        jumps = whitener.rows((np.arange(len(coarse))[:, None] >= moments).astype(np.float64))
+        waves = whitener.rows(half_cosines_of(coarse, max(ORDERS)))
+        slow, waves, jumps = (
+            low_frequencies(one, coarse, coarse.valid, MEAN_SHORTEST_S) for one in (rows[:, None], waves, jumps)
+        )
+        p_value = mean_probability(slow[:, 0], waves, jumps, generator(search.seed, LoopSeed.LOW_FREQUENCY))
+        if not len(moments):
+            return Outcome(TimeMeanTerm(), (), p_value)
+        unit = jumps / np.maximum(np.linalg.norm(jumps, axis=0), 1e-12)
+        step = cls(moment_of(rows, whitener, int(moments[np.argmax(np.abs(unit.T @ slow[:, 0]))])))
+        smooth = smooth_probabilities(slow[:, 0], waves, ORDERS)
+        order = min(smooth, key=lambda one: smooth[one])
+        likelihoods = [fit_model(coarse, (*fitted.terms, one)).log_likelihood for one in (step, TimeMeanTerm(order))]
+        price = 0.5 * (STEP_PARAMETERS - order) * float(np.log(coarse.valid.sum()))
+        is_step = likelihoods[0] - likelihoods[1] > price
+        return Outcome(step if is_step else TimeMeanTerm(), (), p_value)
+
+    def matches(self, other: Self) -> bool:
+        """About the same moment."""
+        return isinstance(other, StepTerm) and abs(self.at - other.at) <= SAME_S
+
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """Height, moment, and the share of the drive before it: the mean stays."""
+        coarse, part = fitted.coarse, fitted.mean_part(self)
+        before = coarse.valid & (np.arange(len(coarse)) < self.at)
+        step = Step(
+            size=float(fitted.sizes[part][0]),
+            size_error=float(np.sqrt(fitted.covariance[part, part][0, 0])),
+            at_s=float(coarse.time[self.at]),
+            share_before=float(before.sum() / coarse.valid.sum()),
+        )
+        return (step,)
+
+    def quantity(self, coarse: Coarse, effects: tuple[Effect, ...]) -> FloatArray:
+        """0 before, 1 after."""
+        return (np.arange(len(coarse.timeline)) >= self.at * COARSE).astype(float)
+
+    def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
+        """Height and moment."""
+        effect = effects[0]
+        assert isinstance(effect, Step)
+        return Description("step", f"at {effect.at_s:.0f} s", effect.size, effect.size_error, f"mean by effect: {key}")
+
+
+@dataclass(frozen=True, eq=False)
+class TimeMeanTerm(_MeanByTime):
+    """The mean is a smooth function of time; `StepTerm` tests both."""
+
+    kind: ClassVar[str] = "drift"
+    order: int = max(ORDERS)  # Half cosines that it is made of.
+
+    def mean_columns(self, coarse: Coarse) -> FloatArray:
+        """Half cosines, within -1..1, shape (n, order). [-]"""
+        return half_cosines_of(coarse, self.order)
+
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """Penalised sizes."""
+        part = fitted.mean_part(self)
+        sizes, errors = penalised(fitted.sizes[part], fitted.covariance[part, part])
+        return (_smooth(fitted.coarse, location=tuple(sizes), location_errors=tuple(errors)),)
+
+    def quantity(self, coarse: Coarse, effects: tuple[Effect, ...]) -> FloatArray:
+        """The curve."""
+        assert isinstance(effects[0], TimeSmooth)
+        return effects[0].path(effects[0].location, coarse.timeline.time)
+
+    def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
+        """As the profile has it."""
+        path = self.quantity(fitted.coarse, effects)
+        removal.location += path - path[fitted.coarse.timeline.valid].mean()
+
+    def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
+        """Change between its extremes, in the order of time."""
+        effect = effects[0]
+        assert isinstance(effect, TimeSmooth)
+        size, error, shape = _swing(fitted.coarse, effect, effect.location, effect.location_errors)
+        return Description("mean offset by time", shape, size, error, f"mean by effect: {key}")
+
+
+@dataclass(frozen=True, eq=False)
+class TimeSpreadTerm(Term):
+    """The logarithm of the spread is a smooth function of time."""
+
+    component: ClassVar[str] = "time_spread"
+    kind: ClassVar[str] = "scale"
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.SPREAD,)
+    weight: ClassVar[float] = 2.0
+    order: int = max(ORDERS)  # Half cosines that it is made of.
+    slow: bool = False  # Of the slower movement only.
+
+    @property
+    def predictable(self) -> bool:
+        """As far as the innovations change."""
+        return not self.slow
+
+    def scale_columns(self, coarse: Coarse) -> FloatArray:
+        """Half cosines, shape (n, order); none where only slow movement changes. [-]"""
+        return np.zeros((len(coarse), 0)) if self.slow else half_cosines_of(coarse, self.order)
+
+    def size_columns(self, coarse: Coarse) -> FloatArray:
+        """Half cosines, shape (n, order), whichever movement changes. [-]"""
+        return half_cosines_of(coarse, self.order)
+
+    @classmethod
+    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
+        """The slowest half cosines of the squares beside those that are a little quicker, by an F test."""
+        if not fitted.coarse.lasts or any(isinstance(term, cls) for term in fitted.terms):
+            return None
+        # what a column does to the size of any part of the movement is not time's doing, slow as the column may be
+        known = what_columns_do(search, fitted)
+        may_act, p_column = what_a_column_may_do(search, fitted)
+        columns = half_cosines_of(fitted.coarse, max(SPREAD_ORDERS))
+
+        def best_beside(known: FloatArray) -> tuple[float, bool] | None:
+            found = []
+            for slow, squares in enumerate((quick_squares(fitted), slow_squares(fitted))):
+                own, basis = without_known(known, squares.standardised, columns, squares.valid)
+                own, basis = (low_frequencies(one, fitted.coarse, squares.valid, SHORTEST_S) for one in (own, basis))
+                tests = smooth_probabilities(own[:, 0], basis, SPREAD_ORDERS)
+                found += [(p_value, bool(slow)) for p_value in tests.values()]
+            return (min(1.0, min(found)[0] * len(found)), min(found)[1]) if found else None
+
+        best = best_beside(known)
+        if best is not None and best[0] > SURER * p_column:
+            best = best_beside(np.concatenate([known, may_act], axis=1))
+        return None if best is None else Outcome(cls(slow=best[1]), (), best[0])
+
+    def matches(self, other: Self) -> bool:
+        """Whichever movement changes."""
+        return isinstance(other, TimeSpreadTerm)
+
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """Penalised sizes; the fine noise goes along as far as it does."""
+        coarse = fitted.coarse
+        columns = half_cosines_of(coarse, self.order)
+        if self.slow:
+            sizes, errors = log_sizes(slow_squares(fitted), columns)
+            sizes, errors = penalised(sizes, np.diag(np.square(errors) * SLOW_S))  # neighbouring sums overlap
+            fine = np.zeros(len(sizes))
+        else:
+            part = fitted.scale_part(self)
+            sizes, errors = penalised(fitted.log_sizes[part], fitted.log_covariance[part, part])
+            fine, fine_errors = log_sizes(fine_squares(fitted), columns)
+            fine = penalised(fine, np.diag(np.square(fine_errors)))[0]
+        return (_smooth(coarse, spread=tuple(sizes), spread_errors=tuple(errors), fine=tuple(fine)),)
+
+    def quantity(self, coarse: Coarse, effects: tuple[Effect, ...]) -> FloatArray:
+        """The curve of the spread."""
+        assert isinstance(effects[0], TimeSmooth)
+        return effects[0].path(effects[0].spread, coarse.timeline.time)
+
+    def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
+        """A plain function of time."""
+        assert isinstance(effects[0], TimeSmooth)
+        removal.spread += self.quantity(fitted.coarse, effects)
+        removal.fine += effects[0].path(effects[0].fine, fitted.coarse.timeline.time)
+
+    def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
+        """Factor between its extremes, in the order of time."""
+        effect = effects[0]
+        assert isinstance(effect, TimeSmooth)
+        size, error, shape = _swing(fitted.coarse, effect, effect.spread, effect.spread_errors)
+        factor = float(np.exp(size))
+        return Description("spread by time", shape, factor, factor * error, f"spread by effect: {key}")
+
+
+def penalised(sizes: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Sizes of half cosines and their errors, shape (k,), given that rougher ones are smaller beforehand.
+
+    The prior's scale is the one under which the sizes are likeliest (restricted maximum likelihood).
+    """
+    shape = np.arange(1, len(sizes) + 1, dtype=np.float64) ** -4.0
+    largest = float(np.max(np.square(sizes) / shape, initial=1e-300))
+    best, found = -np.inf, np.zeros(len(sizes))
+    for scale in largest * np.geomspace(1e-6, 10.0, 60):
+        total = covariance + np.diag(scale * shape)
+        sign, volume = np.linalg.slogdet(total)
+        likelihood = -0.5 * float(sizes @ np.linalg.solve(total, sizes)) - 0.5 * volume if sign > 0 else -np.inf
+        if likelihood > best:
+            best, found = likelihood, scale * shape
+    gain = np.linalg.solve(covariance + np.diag(found), np.diag(found)).T
+    return gain @ sizes, np.sqrt(np.diag(gain @ covariance))
+
+
+def _smooth(coarse: Coarse, **sizes: tuple[float, ...]) -> TimeSmooth:
+    from_s, to_s = clock_range(coarse)
+    return TimeSmooth(from_s=from_s, to_s=to_s, **sizes)
+
+
+def _swing(
+    coarse: Coarse, effect: TimeSmooth, sizes: tuple[float, ...], errors: tuple[float, ...]
+) -> tuple[float, float, str]:
+    """Later extreme less earlier, its standard error, and when they are. [m] or natural logarithm"""
+    time = np.unique(coarse.time[coarse.valid])
+    path = effect.path(sizes, time)
+    first, last = sorted((int(np.argmin(path)), int(np.argmax(path))))
+    contrast = [np.diff(effect.path(tuple(row), time[[first, last]]))[0] for row in np.eye(len(sizes))]
+    error = float(np.linalg.norm(np.multiply(contrast, errors)))
+    return float(path[last] - path[first]), error, f"smooth, from {time[first]:.0f} s to {time[last]:.0f} s"

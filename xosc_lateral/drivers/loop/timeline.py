@@ -1,0 +1,270 @@
+"""Measured drives on one uniform grid, context throughout, offsets where road-following: what the loop computes on.
+
+Drives stand one after the other with a pad between them that is longer than any lag, so that shifting a column by a few
+seconds never brings in another drive's values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from msgspec import structs
+from numpy.typing import NDArray
+
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.drivers.drives.cuts import CutRules
+from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.drives.gridding import GriddedDrive, grid_drives
+from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.model.effects import Acts, ColumnEffect
+from xosc_lateral.drivers.model.effects.response import respond
+
+# Samples of the 0.2 s grid per sample of the coarse one: effects take seconds, so they are tested at 1 Hz. [-]
+COARSE = 5
+PAD = 75  # Samples before and after each drive in which the context holds its outermost value: 15 s. [-]
+# What is cut for tracing: a little more around lane changes than for fitting, or their last second looks like an effect
+# of the lane.
+TRACE_RULES = CutRules(lane_change_margin=6.0)
+LOCAL_S = 20.0  # Movement slower than this counts as mean, faster as spread. [s]
+# Stretches of a drive that count as independent in the errors of sizes: far beyond what whitening leaves of the memory,
+# and the whole of a passing vehicle. [s]
+CLUSTER_S = 60
+MIN_DRIFT_S = 600.0  # A shorter drive tells nothing about drift or a trend of the variance. [s]
+MIN_VALID_S = 120.0  # Road-following time below which nothing can be said. [s]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Timeline:
+    """All drives on the 0.2 s grid."""
+
+    names: tuple[str, ...]  # Drives.
+    drive: IntArray  # shape (n,): Index into `names`.
+    time: FloatArray  # shape (n,): The drive's own clock. [s]
+    offset: FloatArray  # shape (n,): 0 outside `valid`. [m]
+    valid: BoolArray  # shape (n,): Road-following, not cut out.
+    lane_width: FloatArray  # shape (n,): [m]
+    context: Mapping[str, FloatArray]  # shape (n,): NaN: there is none.
+    levels: frozenset[str]  # Columns of whole numbers.
+    periods: Mapping[str, float] = field(default_factory=dict)  # Full circle of the columns that wrap around.
+    # Columns measured by the camera that measured the offset, and misjudged markings: their errors are the offset's.
+    of_one_camera: frozenset[str] = frozenset()
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @property
+    def step(self) -> float:
+        """Of the grid. [s]"""
+        return STEP
+
+    @property
+    def spans(self) -> list[slice]:
+        """Rows of each drive, pads included."""
+        edges = np.searchsorted(self.drive, np.arange(len(self.names) + 1))
+        return [slice(int(first), int(last)) for first, last in pairwise(edges)]
+
+    def respond(self, values: FloatArray, lag_s: float, response_s: float) -> FloatArray:
+        """`driver.effects.response.respond` drive by drive: shape of `values`, (n,) or (n, k), in their unit.
+
+        A lag of a minute would outlast the pad between two drives, so that one would respond to what the other met.
+        """
+        response = respond(values, self.step, lag_s, response_s)
+        if response_s <= 0.0:
+            return response
+        # amid the pad, what is shifted is the drive's own; before, it is as it is there
+        rows = np.arange(len(values))
+        amid = self.drive[np.maximum(rows - PAD // 2, 0)]
+        anew = start_anew(response, values, float(np.exp(-self.step / response_s)), amid)
+        starts = np.searchsorted(self.drive, np.arange(len(self.names)))
+        return anew[np.maximum(rows, np.minimum(starts + PAD // 2, len(rows) - 1)[self.drive])]
+
+
+def smoothed(offset: FloatArray, timeline: Timeline, times_s: Sequence[float]) -> list[FloatArray]:
+    """Moving averages of a series over each of several times, shape (n,) each, in its unit."""
+    return [local_mean(offset, timeline.valid, seconds, timeline.step) for seconds in times_s]
+
+
+def unsized(effect: ColumnEffect) -> ColumnEffect:
+    """The same effect before it was fitted."""
+    return structs.replace(effect, coefficients=(), errors=(), reference=(), between_drivers=(), response_range=())
+
+
+def join_drives(drives: Sequence[Drive], rules: CutRules = TRACE_RULES) -> Timeline:
+    """Put drives on one grid.
+
+    Raises `NotEnoughDataError` when less than two minutes of road-following are left.
+    """
+    kept, periods = grid_drives(drives, rules, pad=PAD, multiple=COARSE)
+    valid_s = STEP * sum(float(part.valid.sum()) for part in kept)
+    if valid_s < MIN_VALID_S:
+        raise NotEnoughDataError(
+            f"{valid_s:.0f} s of road-following in {len(drives)} drives; closing the loop needs {MIN_VALID_S:.0f} s"
+        )
+    names = sorted({name for part in kept for name in part.context})
+    return Timeline(
+        names=tuple(part.name for part in kept),
+        drive=np.repeat(np.arange(len(kept)), [len(part) for part in kept]),
+        time=np.concatenate([part.time for part in kept]),
+        offset=np.concatenate([part.offset for part in kept]),
+        valid=np.concatenate([part.valid for part in kept]),
+        lane_width=np.concatenate([part.lane_width for part in kept]),
+        context=MappingProxyType({name: np.concatenate([_column(part, name) for part in kept]) for name in names}),
+        levels=frozenset.intersection(*(part.levels for part in kept)),
+        periods=periods,
+        of_one_camera=frozenset({"lane_width"} if any(drive.mended for drive in drives) else ()),
+    )
+
+
+def _column(part: GriddedDrive, name: str) -> FloatArray:
+    """A drive that never met one has no such column: there is none, all along."""
+    return part.context[name] if name in part.context else np.full(len(part), np.nan)
+
+
+def coarse_mean(values: FloatArray) -> FloatArray:
+    """Mean over each second, shape (n // 5, ...), in the unit of the values."""
+    n = len(values) // COARSE
+    return np.asarray(values[: n * COARSE].reshape(n, COARSE, *values.shape[1:]).mean(axis=1))
+
+
+def coarse_middle(values: NDArray[Any]) -> NDArray[Any]:
+    """Value in the middle of each second, shape (n // 5,), in its own unit: for what can't be averaged."""
+    return values[COARSE // 2 :: COARSE][: len(values) // COARSE]
+
+
+def coarse_all(mask: BoolArray) -> BoolArray:
+    """Whether the whole second is valid, shape (n // 5,)."""
+    n = len(mask) // COARSE
+    return np.asarray(mask[: n * COARSE].reshape(n, COARSE).all(axis=1))
+
+
+def means_by_drive(values: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
+    """Mean over the valid rows of each drive, shape (drives,), in the values' unit; 0 where there are none."""
+    drives = int(drive.max()) + 1
+    count = np.bincount(drive, valid.astype(float), minlength=drives)
+    sums = np.bincount(drive, np.where(valid, values, 0.0), minlength=drives)
+    return np.asarray(sums / np.maximum(count, 1.0))
+
+
+def start_anew(
+    response: FloatArray, values: NDArray[np.floating[Any]], keep: float, drive: NDArray[np.intp]
+) -> FloatArray:
+    """A first-order lag over drives in a row, less what it carries over: settled where each drive starts.
+
+    What is constant within drives must stay so: a threshold or a cell's edge would tell what is left of the drive
+    before.
+
+    `response`, shape (n,) or (n, k): of the lag, to `values` of the same shape; `keep`: what the lag keeps of itself
+    from row to row; `drive`, shape (n,): increasing.
+    """
+    _, starts, own = np.unique(drive, return_index=True, return_inverse=True)
+    first = starts[own]
+    left = keep ** (np.arange(len(values)) - first).astype(values.dtype)
+    return np.asarray(response - (response - values)[first] * (left[:, None] if values.ndim == 2 else left))
+
+
+def on_fine_grid(values: FloatArray, timeline: Timeline) -> FloatArray:
+    """From the middles of the seconds, shape (n // 5, ...), to the 0.2 s grid: steps of a second would be noise."""
+    n = len(timeline)
+    at = np.clip((np.arange(n) - 0.5 * (COARSE - 1)) / COARSE, 0.0, len(values) - 1.0)
+    low = np.minimum(at.astype(np.intp), max(0, len(values) - 2))
+    share = (at - low).reshape(-1, *[1] * (values.ndim - 1))
+    return np.asarray(values[low] * (1.0 - share) + values[np.minimum(low + 1, len(values) - 1)] * share)
+
+
+def local_mean(values: FloatArray, valid: BoolArray, seconds: float, step: float) -> FloatArray:
+    """Moving average over the valid rows within `seconds`, shape (n,); 0 where there are none."""
+    half = max(1, round(0.5 * seconds / step))
+    sums = np.concatenate([[0.0], np.cumsum(np.where(valid, values, 0.0))])
+    counts = np.concatenate([[0.0], np.cumsum(valid.astype(np.float64))])
+    index = np.arange(len(values))
+    low, high = np.maximum(index - half, 0), np.minimum(index + half + 1, len(values))
+    count = counts[high] - counts[low]
+    return np.asarray((sums[high] - sums[low]) / np.maximum(count, 1.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Coarse:
+    """The timeline at 1 Hz, and every column effect's response on it."""
+
+    timeline: Timeline
+    offset: FloatArray  # shape (n,): Mean of each second. [m]
+    valid: BoolArray  # shape (n,)
+    drive: IntArray  # shape (n,)
+    time: FloatArray  # shape (n,): [s]
+    # Columns on the fine grid, lane width included, clipped to what occurs while road-following: a traffic jam that is
+    # cut out must not stretch a column's range.
+    context: Mapping[str, FloatArray]
+    _responses: dict[ColumnEffect, FloatArray] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def of(cls, timeline: Timeline) -> Coarse:
+        """Average to 1 Hz."""
+        columns = {"lane_width": timeline.lane_width, **timeline.context}
+        return cls(
+            timeline,
+            coarse_mean(timeline.offset),
+            coarse_all(timeline.valid),
+            coarse_middle(timeline.drive),
+            coarse_mean(timeline.time),
+            {name: _within(values, timeline.valid) for name, values in columns.items()},
+        )
+
+    def __len__(self) -> int:
+        return len(self.offset)
+
+    def only(self, rows: BoolArray) -> Coarse:
+        """The same with fewer valid rows; `rows`: shape (n,)."""
+        return replace(self, valid=self.valid & rows, _responses={})
+
+    @property
+    def drives(self) -> int:
+        """Number of drives."""
+        return int(self.drive.max()) + 1
+
+    @cached_property
+    def cluster(self) -> IntArray:
+        """Clusters: minutes within drives, numbered, shape (n,); they count as independent of each other."""
+        _, first = np.unique(self.drive, return_index=True)
+        minute = (np.arange(len(self)) - first[self.drive]) // CLUSTER_S
+        _, cluster = np.unique(self.drive * len(self) + minute, return_inverse=True)
+        return cluster.astype(np.intp)
+
+    @property
+    def lasts(self) -> bool:
+        """Whether a drive is long enough to change with time: minutes, not the minute of a passing vehicle."""
+        return bool(np.bincount(self.drive, self.valid.astype(float)).max() >= MIN_DRIFT_S)
+
+    def response(self, effect: ColumnEffect, *, keep: bool = False) -> FloatArray:
+        """The effect's quantity [own unit] as the driver responds to it, less its mean where valid; shape (n, k)."""
+        key = structs.replace(unsized(effect), acts=Acts.LOCATION)
+        if key in self._responses:
+            return self._responses[key]
+        response = coarse_mean(self.fine_response(key))
+        response = response - response[self.valid].mean(axis=0)
+        if keep:
+            self._responses[key] = response
+        return np.asarray(response, dtype=np.float64)
+
+    def fine_response(self, effect: ColumnEffect) -> FloatArray:
+        """The same on the 0.2 s grid, as it is, shape (fine n, k). [own unit]"""
+        return self.timeline.respond(effect.known(self.context), effect.lag_s, effect.response_s)
+
+    def strength(self, effect: ColumnEffect) -> FloatArray:
+        """What an effect of columns that the table has does on the 0.2 s grid, shape (fine n,). [m], or log factor"""
+        return effect.weighed(self.fine_response(effect))
+
+    def by_drive(self, values: FloatArray) -> FloatArray:
+        """Mean over the valid rows of each drive, shape (drives,), in the values' unit; 0 where there are none."""
+        return means_by_drive(values, self.valid, self.drive)
+
+
+def _within(values: FloatArray, valid: BoolArray) -> FloatArray:
+    seen = values[valid & np.isfinite(values)]
+    return np.where(np.isinf(values), values, np.clip(values, seen.min(), seen.max())) if len(seen) else values

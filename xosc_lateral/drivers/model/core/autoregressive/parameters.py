@@ -1,0 +1,131 @@
+"""Parameters of the autoregressive model, what follows from them, and drivers drawn from the population they describe.
+
+References
+----------
+.. [1] D. B. Rubin, "Using the SIR algorithm to simulate posterior distributions", Bayesian Statistics 3, 1988.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import msgspec
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.errors import DriverProfileError
+from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.model.core.autoregressive.coarse import COARSE_EVERY, Autoregression, building_low_pass
+from xosc_lateral.drivers.model.core.autoregressive.volatility import Volatility
+from xosc_lateral.drivers.model.core.base import CoreModel, Start
+from xosc_lateral.drivers.model.core.noise import NOISE_VARIANCE, ShapedNoise
+
+START_LAGS = 300
+"""Steps after which a drive has forgotten the offset that it was made to start at: 60 s. [-]"""
+
+
+class AutoregressiveParameters(CoreModel, frozen=True, eq=False, dict=True):
+    """What `AutoregressiveModel` says of its fields, and what follows from them."""
+
+    mean: float
+    between_drivers: float
+    limits: tuple[float, float]
+    coarse: Autoregression
+    fine: ShapedNoise
+    coarse_volatility: Volatility
+    fine_volatility: Volatility
+    correlation: float
+    step: float = STEP
+
+    def __post_init__(self) -> None:
+        low, high = self.limits
+        if not -1.0 <= low < self.mean < high <= 1.0:
+            raise DriverProfileError(f"mean {self.mean} outside the limits {low} and {high}, or these beyond -1 and 1")
+        if not (0.0 <= self.between_drivers < 1.0 and -1.0 <= self.correlation <= 1.0):
+            raise DriverProfileError(f"between drivers {self.between_drivers}, correlation {self.correlation}")
+
+    @cached_property
+    def kernel(self) -> FloatArray:
+        """Kernel of the fine noise, shape (n_taps,). [lane widths]"""
+        return self.fine.kernel
+
+    @cached_property
+    def coarse_covariance(self) -> FloatArray:
+        """Of the coarse movement about the driver's mean at lags of 0.2 s, mean over the phases of a coarse step.
+
+        Shape (START_LAGS,). [lane widths squared]
+        """
+        n_ticks = START_LAGS // COARSE_EVERY + 20
+        ticks = self.coarse.covariance(n_ticks)
+        spread = np.zeros(2 * n_ticks * COARSE_EVERY - 1)
+        middle = n_ticks * COARSE_EVERY - 1
+        spread[middle::COARSE_EVERY][:n_ticks] = ticks
+        spread[middle::-COARSE_EVERY][:n_ticks] = ticks
+        kernel = building_low_pass()
+        both = np.convolve(kernel, kernel) / COARSE_EVERY
+        return np.asarray(np.convolve(spread, both, "same")[middle : middle + START_LAGS])
+
+    @cached_property
+    def fine_covariance(self) -> FloatArray:
+        """Of the fine movement at lags of 0.2 s, shape (START_LAGS,). [lane widths squared]"""
+        kernel = self.kernel
+        full = np.convolve(kernel, kernel)[len(kernel) - 1 :] * NOISE_VARIANCE
+        result = np.zeros(START_LAGS)
+        result[: len(full)] = full[:START_LAGS]
+        return result
+
+    @cached_property
+    def start_factor(self) -> FloatArray:
+        """Lower triangle that turns white noise into a stationary past, shape (order, order). [lane widths]"""
+        order = self.coarse.order
+        covariance = self.coarse.covariance(order)
+        if not covariance[0] > 0.0:  # coarse movement that is none has a past of none
+            return np.zeros((order, order))
+        matrix = covariance[np.abs(np.subtract.outer(np.arange(order), np.arange(order)))]
+        return np.asarray(np.linalg.cholesky(matrix + 1e-9 * covariance[0] * np.eye(order)))
+
+
+CANDIDATES = 64
+"""Drivers that one is chosen from, by how likely each is at the offset to start at. [-]"""
+
+
+class DriverState(msgspec.Struct):
+    """What drivers keep for a whole drive, shape (drivers,): the mean [lane widths], factors on both parts [-]."""
+
+    mean: FloatArray
+    coarse: FloatArray
+    fine: FloatArray
+
+
+def draw_drivers(model: AutoregressiveParameters, start: Start | None, rng: np.random.Generator, n: int) -> DriverState:
+    """Draw n drivers from the population; given a start, each from those found there."""
+    coarse_normal, fine_normal = rng.standard_normal((2, n, CANDIDATES))
+    coarse = _factor(model.coarse_volatility.between, coarse_normal)
+    mixed = model.correlation * coarse_normal + np.sqrt(1.0 - model.correlation**2) * fine_normal
+    fine = _factor(model.fine_volatility.between, mixed)
+    mean_normal, choice = rng.standard_normal(n), rng.random(n)
+    if start is None:
+        return DriverState(model.mean + model.between_drivers * mean_normal, coarse[:, 0].copy(), fine[:, 0].copy())
+    between = model.between_drivers**2
+    coarse_variance = (start.spread * coarse) ** 2 * model.coarse_covariance[0]
+    moving = coarse_variance + (start.fine * fine) ** 2 * model.fine_covariance[0]
+    away = np.broadcast_to(np.asarray(start.rel_offset) - model.mean, n)
+    weight = np.cumsum(_likelihood(away[:, None], between + moving), axis=1)
+    k = np.sum(weight < weight[:, -1:] * choice[:, None], axis=1)
+    rows = np.arange(n)
+    share = between / (between + moving[rows, k]) if between > 0.0 else np.zeros(n)
+    mean = model.mean + share * away + np.sqrt(between * (1.0 - share)) * mean_normal
+    return DriverState(mean, coarse[rows, k], fine[rows, k])
+
+
+def _likelihood(away: FloatArray, variance: FloatArray) -> FloatArray:
+    """Of a normal variable, relative to the likeliest candidate's; shape of `variance`."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        log_weight = -0.5 * np.log(variance) - 0.5 * away**2 / variance
+        relative = np.nan_to_num(log_weight - log_weight.max(axis=1, keepdims=True), nan=0.0)
+    return np.asarray(np.exp(relative))
+
+
+def _factor(variance: float, normal: FloatArray) -> FloatArray:
+    """Log-normal factors of mean square 1."""
+    return np.asarray(np.exp(np.sqrt(variance) * normal - variance))

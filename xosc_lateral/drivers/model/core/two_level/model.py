@@ -1,0 +1,264 @@
+"""The paper's model to the letter: smoothed Markov chain + shaped uniform noise, x = kappa + phi.
+
+Sampled in pieces of any length, of one driver or of several at once.
+
+References
+----------
+.. [1] N. Neis, J. Beyerer, "A two-level stochastic model for the lateral movement of vehicles within their lane", IEEE
+       ITSC 2023, pp. 1896-1903, arXiv:2405.17080, section III.
+"""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from functools import cached_property
+from typing import ClassVar
+
+import msgspec
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.base.errors import DriverProfileError
+from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.model.core.base import CoreModel, Start
+from xosc_lateral.drivers.model.core.mean_reversion import ClockState, take_at_rate
+from xosc_lateral.drivers.model.core.noise import KERNEL_TAPS, N_KNOTS, ShapedNoise
+from xosc_lateral.drivers.model.core.two_level.markov import N_BINS, AliasTable, MarkovChain, bin_of
+from xosc_lateral.drivers.model.jit_kernel import JitKernel
+from xosc_lateral.drivers.model.linear_filters import convolve
+from xosc_lateral.drivers.model.records import Record, frozen_array, set_once
+from xosc_lateral.drivers.model.seeds import TwoLevelSeed, generator
+
+
+class TwoLevelSettings(Record, frozen=True):
+    """Constants of the model, each above 0; the defaults are the paper's.
+
+    Parameters
+    ----------
+    n_bins : int
+        Bins of the relative offset over [-0.5, 0.5].
+    smoothing_sigma, smoothing_support : float
+        Standard deviation of the Gaussian that smooths the chain's step function, and the distance to both sides at
+        which it is cut off. [s]
+    fine_cap : float
+        The measured fine part is capped at plus and minus this. [lane widths]
+    n_knots : int
+        Knots of the piecewise linear damping function. (The paper shows a figure, no count.)
+    n_taps : int
+        Length of the kernel of the fine noise, odd. (The paper gives none: one snippet.)
+    start_fade : float
+        A drive that has to start at a given offset meets it exactly; what the smoothed chain lacks to it fades out
+        within this time. (The paper's starts in the right bin.) [s]
+    step : float
+        [s]
+    """
+
+    n_bins: int = N_BINS
+    smoothing_sigma: float = 0.6
+    smoothing_support: float = 1.0
+    fine_cap: float = 0.03
+    n_knots: int = N_KNOTS
+    n_taps: int = KERNEL_TAPS
+    start_fade: float = 1.0
+    step: float = STEP
+
+    def __post_init__(self) -> None:
+        for name in self.__struct_fields__:
+            if not 0 < getattr(self, name) < np.inf:
+                raise DriverProfileError(f"{name} {getattr(self, name)}, expected above 0")
+
+    @property
+    def smoothing_kernel(self) -> FloatArray:
+        """Gaussian weights that sum to 1, shape (2 * support / step + 1,). [-]"""
+        half = round(self.smoothing_support / self.step)
+        weights = np.exp(-0.5 * (np.arange(-half, half + 1) * self.step / self.smoothing_sigma) ** 2)
+        return np.asarray(weights / weights.sum())
+
+    @property
+    def fade_out(self) -> FloatArray:
+        """Share of what a start lacked that is still added, step by step, shape (start_fade / step,). [-]"""
+        n = max(1, round(self.start_fade / self.step))
+        return np.asarray(0.5 + 0.5 * np.cos(np.pi * np.arange(n) / n))
+
+
+PAPER_SETTINGS = TwoLevelSettings()
+
+
+class TwoLevelState(msgspec.Struct):
+    """Where drives are. The generators, of the coarse and of the fine part, draw one number per step and driver."""
+
+    chain: np.random.Generator
+    noise: np.random.Generator
+    bins: IntArray
+    """Last bin, shape (drivers,)."""
+    levels: FloatArray
+    """Last levels of the chain, before smoothing, shape (smoothing taps - 1, drivers). [-]"""
+    white: FloatArray
+    """Last values of the fine part's noise, before shaping, shape (kernel taps - 1, drivers). [-]"""
+    fade: FloatArray
+    """What is still added to meet a start, step by step, shape (k, drivers). [-]"""
+    clock: ClockState
+    """Of the coarse part."""
+    single: bool = True
+    """One driver, arrays without an axis of drivers."""
+
+
+class TwoLevelModel(CoreModel, frozen=True, eq=False, dict=True):
+    """Fitted two-level model: x = kappa + phi.
+
+    Raises `DriverProfileError` if counts and settings disagree, or counts or damping are none.
+
+    Parameters
+    ----------
+    settings : TwoLevelSettings
+    counts : array of int, shape (n_bins, n_bins)
+        Transitions of the coarse part before smoothing, from the row's bin to the column's in one step.
+    damping : array, shape (n_knots,)
+        Of the fine part's noise, at frequencies evenly spaced from 0 to half the sampling rate. [lane widths]
+    """
+
+    State: ClassVar[type] = TwoLevelState
+
+    settings: TwoLevelSettings
+    counts: IntArray
+    damping: FloatArray
+
+    def __post_init__(self) -> None:
+        set_once(self, counts=frozen_array(self.counts, np.int64), damping=frozen_array(self.damping))
+        if self.chain.n_bins != self.settings.n_bins:
+            raise DriverProfileError(f"counts of {self.chain.n_bins} bins, settings of {self.settings.n_bins}")
+        assert self.noise
+
+    @cached_property
+    def chain(self) -> MarkovChain:
+        """Coarse part, before smoothing."""
+        return MarkovChain(self.counts)
+
+    @cached_property
+    def noise(self) -> ShapedNoise:
+        """Fine part."""
+        return ShapedNoise(self.damping, self.settings.n_taps)
+
+    @property
+    def step(self) -> float:
+        """[s]"""
+        return self.settings.step
+
+    @property
+    def mean(self) -> float:
+        """Mean of the coarse part in the long run. [-]"""
+        return self.chain.mean
+
+    def stream(
+        self, seed: np.random.SeedSequence, start: Start | None = None, *, drivers: int | None = None
+    ) -> TwoLevelStream:
+        """Begin a drive; without `start` in a bin drawn from the stationary distribution. See `CoreModel.stream`."""
+        m = drivers or 1
+        noise = generator(seed, TwoLevelSeed.NOISE)
+        bins = _first_bins(self, seed, start, m)
+        half = len(self.settings.smoothing_kernel) // 2
+        state = TwoLevelState(
+            chain=generator(seed, TwoLevelSeed.CHAIN),
+            noise=noise,
+            bins=bins,
+            # Before its start the chain is taken to have stayed where it starts.
+            levels=np.tile(self.chain.centres[bins], (half + 1, 1)),
+            white=noise.random((len(self.noise.kernel) - 1, m)) - 0.5,
+            fade=np.empty((0, m)),
+            clock=ClockState(),
+            single=drivers is None,
+        )
+        stream = TwoLevelStream(self, state)
+        state.levels = np.concatenate([state.levels, stream.walk(half - 1)])
+        if start is not None:
+            state.fade = self.settings.fade_out[:, None] * _lack(stream, start)
+        return stream
+
+    def resume(self, state: TwoLevelState) -> TwoLevelStream:
+        """Go on from a state."""
+        return TwoLevelStream(self, state)
+
+
+class TwoLevelStream:
+    """See `CoreStream`."""
+
+    def __init__(self, model: TwoLevelModel, state: TwoLevelState) -> None:
+        self.mean = model.mean
+        self.state = state
+        self._table, self._centres = model.chain.alias_table, model.chain.centres
+        self._smoothing, self._kernel = model.settings.smoothing_kernel, model.noise.kernel
+
+    def take(self, n: int, rate: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
+        """Next n values of the coarse and of the fine part, shape (n,) or (n, drivers) [-]; see `CoreStream`."""
+        state = self.state
+        coarse = take_at_rate(state.clock, self.smoothed, n, rate)
+        fading = min(n, len(state.fade))
+        if fading:
+            coarse[:fading] += state.fade[:fading]
+            state.fade = state.fade[fading:]
+        white = np.concatenate([state.white, state.noise.random((n, len(state.bins))) - 0.5])
+        state.white = white[n:]
+        fine = convolve(white, self._kernel)
+        return (coarse[:, 0], fine[:, 0]) if state.single else (coarse, fine)
+
+    def walk(self, n: int) -> FloatArray:
+        """Next n levels of the chain, shape (n, drivers). [-]"""
+        state = self.state
+        bins = walk(self._table, state.bins, state.chain.random((n, len(state.bins))))
+        if n:
+            state.bins = bins[-1]
+        return np.asarray(self._centres[bins])
+
+    def smoothed(self, n: int) -> FloatArray:
+        """Next n values of the smoothed chain, shape (n, drivers). [-]"""
+        levels = np.concatenate([self.state.levels, self.walk(n)])
+        self.state.levels = levels[n:]
+        return convolve(levels, self._smoothing)
+
+
+def _first_bins(model: TwoLevelModel, seed: np.random.SeedSequence, start: Start | None, m: int) -> IntArray:
+    """Bin of each driver's first level, shape (m,)."""
+    if start is None:
+        return generator(seed, TwoLevelSeed.FIRST_BIN).choice(model.chain.n_bins, size=m, p=model.chain.stationary)
+    within = model.mean + (np.asarray(start.rel_offset) - model.mean) / start.spread
+    return np.broadcast_to(bin_of(within, model.chain.n_bins), m).copy()
+
+
+def _lack(stream: TwoLevelStream, start: Start) -> FloatArray:
+    """What the coarse part lacks at the first step to start as asked for, shape (drivers,) or (1,). [-]"""
+    coarse, fine = deepcopy(stream).take(1)
+    unscaled = (start.rel_offset - stream.mean - start.fine * fine[0]) / start.spread
+    return np.atleast_1d(stream.mean + unscaled - coarse[0])
+
+
+def _walk_body(uniform, drivers, n_bins, keep, other, states):  # type: ignore[no-untyped-def]
+    # states: each driver's last state first, then one per driver and step; all arrays flat, step by step
+    if drivers == 1:  # the same, faster: the last state stays in a register
+        state = states[0]
+        for i in range(len(uniform)):
+            scaled = uniform[i] * n_bins
+            column = int(scaled)
+            k = state * n_bins + column
+            state = column if scaled - column < keep[k] else other[k]
+            states[i + 1] = state
+        return
+    for i in range(len(uniform)):
+        scaled = uniform[i] * n_bins
+        column = int(scaled)
+        k = states[i] * n_bins + column
+        states[i + drivers] = column if scaled - column < keep[k] else other[k]
+
+
+_walk = JitKernel(_walk_body)
+
+
+def walk(table: AliasTable, states: IntArray, uniform: FloatArray) -> IntArray:
+    """States after each step of chains that run side by side, shape (n, drivers).
+
+    From `states`, shape (drivers,), with one number of `uniform`, shape (n, drivers), in [0, 1), per step and chain.
+    """
+    m = len(states)
+    flat = np.empty(m + uniform.size, dtype=np.int64)
+    flat[:m] = states
+    _walk(uniform.size, (uniform.ravel(), m, table.n_bins, table.keep, table.other), (flat,))
+    return flat[m:].reshape(-1, m)

@@ -1,0 +1,167 @@
+"""How a driver responds to a quantity: when, and how slowly. Block by block; a whole drive is one long block.
+
+References
+----------
+.. [1] K. J. Åström, B. Wittenmark, "Computer-Controlled Systems", 3rd ed., 1997, chapter 2: a lag sampled exactly.
+"""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.drivers.model.linear_filters import recur
+
+
+class ResponseState(msgspec.Struct):
+    """Where a response is."""
+
+    held: FloatArray | None = None
+    """Last rows of the quantity, as far back as they are still needed, shape (m, k)."""
+    taken: int = 0
+    """Rows of the quantity seen."""
+    given: int = 0
+    """Rows of the response given."""
+    settled: FloatArray | None = None
+    """Last response of each first-order lag, shape (order * k,)."""
+
+
+class Response:
+    """A shift in time, then equal first-order lags of gain 1 one after the other, of a quantity given block by block.
+
+    Row i of the response is due once all rows of its preview were given; before the first row and, at the end,
+    beyond the last one, the outermost row holds. The lag starts settled.
+
+    Parameters
+    ----------
+    step : float
+        Of the even time grid. [s]
+    lag_s : float
+        Delay; negative: preview. [s]
+    response_s : float
+        Time constant of each first-order lag; 0 for none. [s]
+    state : ResponseState, optional
+        To go on from.
+    order : int
+        Count of first-order lags: after two, a jump is a bend without a corner.
+    delay : int
+        Rows that everything comes later by, for who doesn't know what lies ahead.
+    """
+
+    def __init__(
+        self,
+        step: float,
+        lag_s: float,
+        response_s: float,
+        state: ResponseState | None = None,
+        *,
+        order: int = 1,
+        delay: int = 0,
+    ) -> None:
+        self.state = ResponseState() if state is None else state
+        self._order = order
+        whole, self._share = split_shift(lag_s / step)
+        self._whole = whole - delay
+        self._keep = float(np.exp(-step / response_s)) if response_s > 0 else None
+        self.ahead = max(0, self._whole + (1 if self._share else 0))
+        """Rows of preview."""
+
+    def take(self, values: FloatArray) -> FloatArray:
+        """What is due of the response after more rows of the quantity, shape (n, k); (m, k). [unit of the quantity]"""
+        self._add(values)
+        return self._due(max(self.state.given, self.state.taken - self.ahead))
+
+    def finish(self, values: FloatArray) -> FloatArray:
+        """All responses that are left once the last rows are given, shape (m, k). [unit of the quantity]"""
+        self._add(values)
+        return self._due(self.state.taken)
+
+    def _add(self, values: FloatArray) -> None:
+        state = self.state
+        state.held = values if state.held is None else np.concatenate([state.held, values])
+        state.taken += len(values)
+
+    def _due(self, until: int) -> FloatArray:
+        """Rows of the response from the first that wasn't given."""
+        state = self.state
+        assert state.held is not None
+        if until == state.given + 1:
+            response = self._single(state.held, state.given)
+        else:
+            response = self._lagged(self._shifted(state.held, state.given, until))
+        state.given = until
+        done = min(until + self._whole, state.taken - 1) - (state.taken - len(state.held))
+        if done > 0:
+            state.held = state.held[done:]
+        return response
+
+    def _single(self, held: FloatArray, row: int) -> FloatArray:
+        """One row of the response, by the operations of many, without their cost; shape (1, k)."""
+        at = row + self._whole
+        if at < 0:
+            value = held[0]
+        elif at >= self.state.taken - 1:
+            value = held[-1]
+        else:
+            at -= self.state.taken - len(held)
+            value = held[at] if not self._share else held[at] * (1.0 - self._share) + self._share * held[at + 1]
+        if self._keep is not None:
+            settled = self._settled(value)
+            for own in settled.reshape(self._order, -1):
+                own[:] = value = (1.0 - self._keep) * value + self._keep * own
+            self.state.settled = settled
+        return np.asarray(value[None, :])
+
+    def _shifted(self, held: FloatArray, first: int, until: int) -> FloatArray:
+        """Rows `first` to `until` of the shifted quantity, as an array of its own."""
+        last = self.state.taken - 1
+        begin, end = first + self._whole, until + self._whole  # rows of the quantity, apart from the share
+        at = last + 1 - len(held)
+        result = np.empty((until - first, held.shape[1]))
+        before, behind = min(max(-begin, 0), len(result)), min(max(end - last, 0), len(result))
+        inside = slice(before, len(result) - behind)
+        low = slice(begin + before - at, end - behind - at)
+        if inside.start < inside.stop:
+            result[inside] = held[low]
+            if self._share:
+                result[inside] *= 1.0 - self._share
+                result[inside] += self._share * held[low.start + 1 : low.stop + 1]
+        result[:before], result[len(result) - behind :] = held[:1], held[-1:]
+        return result
+
+    def _lagged(self, values: FloatArray) -> FloatArray:
+        """First-order lags, in place."""
+        if self._keep is None or not len(values):
+            return values
+        settled, keep = self._settled(values[0]), np.array([self._keep])
+        for own in settled.reshape(self._order, -1):
+            for k in range(values.shape[1]):
+                values[:, k] = recur(own[k : k + 1], (1.0 - self._keep) * values[:, k], keep)[1:]
+            own[:] = values[-1]
+        self.state.settled = settled
+        return values
+
+    def _settled(self, value: FloatArray) -> FloatArray:
+        """Where each lag is, as an array of its own; at the start, at the value."""
+        return np.tile(value, self._order) if self.state.settled is None else np.array(self.state.settled)
+
+
+def respond(values: FloatArray, step: float, lag_s: float, response_s: float, *, order: int = 1) -> FloatArray:
+    """Response to a whole drive's finite values, even in time, shape (n,) or (n, k), in their unit; see `Response`."""
+    values = np.asarray(values, dtype=np.float64)
+    if not len(values):
+        return values.copy()
+    response = Response(step, lag_s, response_s, order=order)
+    return response.finish(values.reshape(len(values), -1)).reshape(values.shape)
+
+
+def split_shift(steps: float) -> tuple[int, float]:
+    """Row i of a series delayed by `steps` is ``(1 - share) * values[i + whole] + share * values[i + whole + 1]``.
+
+    Gives `whole`, and `share` in [0, 1), the same for every row: rounding does not grow along the drive.
+    """
+    whole = math.floor(-steps)
+    return whole, -steps - whole

@@ -1,0 +1,225 @@
+"""Driver profile: a core model, the effects added to it, where both come from, and what it says of itself."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from enum import StrEnum
+from functools import lru_cache
+from typing import Annotated, Any
+
+import msgspec
+from msgspec import Meta, defstruct, field, structs
+
+from xosc_lateral.base.errors import DriverProfileError
+from xosc_lateral.drivers.model.core.base import CoreModel
+from xosc_lateral.drivers.model.core.registry import CORE_MODELS, any_model
+from xosc_lateral.drivers.model.effects import Effect, any_effect
+from xosc_lateral.drivers.model.records import Record, read_as, schema_hook, set_once
+from xosc_lateral.drivers.model.sensor.model import SensorModel
+
+SIDES = ("left", "right")
+
+COLUMNS = {side: (f"{side}_distance", f"{side}_is_truck", f"truck_{side}", f"car_{side}") for side in SIDES}
+"""Context columns by which a profile answers to vehicles on a side by itself."""
+
+
+class Basis(StrEnum):
+    """Where it is known from how a driver answers to neighbours on one side."""
+
+    MEASURED = "measured"
+    DECLARED = "declared"
+    POPULATION = "population"
+    UNKNOWN = "unknown"
+
+
+class Beside(Record, frozen=True):
+    """What is known of a driver's answer to vehicles on one side.
+
+    Of the basis `population` it was measured on many drivers, pair by pair: `convert` spreads their gaps as that
+    recording has them.
+    """
+
+    basis: Basis
+    seconds: Annotated[float, Meta(ge=0, description="Driving with somebody there. [s]")] = 0.0
+    shift: Annotated[float, Meta(description="With somebody alongside, positive left. [m]")] = 0.0
+    error: Annotated[float, Meta(ge=0, description="Standard error. [m]")] = 0.0
+
+
+POPULATION = {side: Beside(Basis.POPULATION) for side in SIDES}
+"""Of profiles whose effects are of the recording that the law of `enrich.give_way` was measured in."""
+
+
+class Provenance(Record, frozen=True):
+    """Where a profile comes from."""
+
+    source: Annotated[str, Meta(description="The drives in words.")] = ""
+    licence: Annotated[str, Meta(description="Of the drives.")] = ""
+    hours: Annotated[float, Meta(ge=0, description="Driving fitted, after cutting. [h]")] = 0.0
+    drives: Annotated[int, Meta(ge=0)] = 0
+    runs: Annotated[int, Meta(ge=0)] = 0
+    inputs: Annotated[Mapping[str, str], Meta(description="File name to SHA-256.")] = field(default_factory=dict)
+    fit: Annotated[Mapping[str, Any], Meta(description="Model and settings of the fit.")] = field(default_factory=dict)
+    evaluation: Annotated[Mapping[str, Any], Meta(description="Results on held-out drives.")] = field(
+        default_factory=dict
+    )
+    package_version: str = ""
+    notes: str = ""
+
+
+class Metadata(Record, frozen=True):
+    """What a profile is of, to be searched by; all of it is optional."""
+
+    version: str = ""
+    """Of the profile itself, as its owners count: "2", "1.3"."""
+    driver: str = ""
+    vehicle: str = ""
+    road: str = ""
+    """Whom and what was measured, and where: "professional", "truck", "motorway"."""
+    country: str = ""
+    """ISO 3166-1 alpha-2: "DE"."""
+    date: str = ""
+    """When the drives were recorded, ISO 8601: "2026-05", "2026-05-03/2026-06-01"."""
+    licence: str = ""
+    """Of the profile."""
+    tags: tuple[str, ...] = ()
+
+
+FORMAT = "xosc-lateral driver profile"
+
+VERSION = 2
+"""Of the file format."""
+
+MAX_LANE_WIDTH = 10.0
+"""Lanes that wide are none: 2 to 6 m is what measured ones have. [m]"""
+
+
+class DriverProfile(Record, frozen=True):
+    """What it takes to sample offsets. Raises `DriverProfileError` if it has no name or its lane width is no width.
+
+    Parameters
+    ----------
+    name : str
+        Its id: the same in the file, in the file's name and wherever it is looked up.
+    model : CoreModel
+        Base movement.
+    effects : tuple of Effect
+        In the order in which they were found.
+    lane_width : float
+        Median width of the lanes that it was fitted on; where a lane's own width is unknown it stands in.
+        Above 0, at most `MAX_LANE_WIDTH`. [m]
+    provenance : Provenance
+    metadata : Metadata
+    sensor : SensorModel, optional
+        What the sensor added to the drives it was fitted on, where that is known.
+    left_hand : bool
+        Fitted on left-hand traffic. On a road of the other hand it is sampled as in a mirror.
+    beside : mapping of str to Beside
+        By side, "left" and "right": whether its answer to neighbours there is known, and how.
+    """
+
+    later = ("left_hand", "beside")
+
+    name: str = field(name="id")
+    model: CoreModel
+    effects: tuple[Effect, ...] = ()
+    lane_width: float = 3.75
+    provenance: Provenance = field(default_factory=Provenance)
+    metadata: Metadata = field(default_factory=Metadata)
+    sensor: SensorModel | None = None
+    left_hand: bool = False
+    beside: Mapping[str, Beside] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not self.name:
+            raise DriverProfileError("a profile needs a name")
+        if not 0 < self.lane_width <= MAX_LANE_WIDTH:
+            raise DriverProfileError(
+                f"profile {self.name}: lane width {self.lane_width} m, expected above 0, at most {MAX_LANE_WIDTH:g} m"
+            )
+        for side in self.beside:
+            if side not in SIDES:
+                raise DriverProfileError(f"profile {self.name}: beside {side!r}, expected left or right")
+        set_once(self, effects=tuple(self.effects))
+
+    def __repr__(self) -> str:
+        known = self.provenance
+        effects = f"{len(self.effects)} effect{'' if len(self.effects) == 1 else 's'}"
+        return f"<DriverProfile {self.name}: {self.model.kind}, {effects}, {known.hours:g} h of {known.drives} drives>"
+
+    def with_effects(self, *effects: Effect, name: str | None = None) -> DriverProfile:
+        """A profile with further effects, under another name if one is given."""
+        return structs.replace(self, name=name or self.name, effects=(*self.effects, *effects))
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Context columns that its effects read."""
+        return tuple(sorted({column for effect in self.effects for column in effect.columns}))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain JSON values, as the profile file holds them."""
+        values = super().to_dict()
+        values["effects"] = [effect.to_dict() for effect in self.effects]
+        values["sensor"] = None if self.sensor is None else self.sensor.to_dict()
+        order = ("id", "metadata", "lane_width", "left_hand", "model", "effects", "beside", "sensor", "provenance")
+        return {"format": FORMAT, "version": VERSION, **{name: values[name] for name in order if name in values}}
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> DriverProfile:
+        """Back from `to_dict`.
+
+        Raises `DriverProfileError` if it is no profile, of another version, or contradicts itself; names the field and
+        where it stands.
+        """
+        present = _checked(values)
+        effects = present.get("effects")
+        effects = effects if isinstance(effects, list) else ()
+        kinds = [effect.get("kind") for effect in effects if isinstance(effect, Mapping)]
+        model = present.get("model")
+        kind = model.get("kind") if isinstance(model, Mapping) else None
+        read = read_as(file_type(str(kind), frozenset(map(str, kinds))), present)
+        return cls(**{name: getattr(read, name) for name in cls.__struct_fields__})
+
+
+def _checked(values: object) -> dict[str, Any]:
+    """A profile file's values without format and version; refused if it is none of ours, or of another version."""
+    if not isinstance(values, Mapping) or values.get("format") != FORMAT:
+        raise DriverProfileError(f'not a driver profile: "format" is not "{FORMAT}"')
+    version = values.get("version")
+    if version != VERSION or isinstance(version, bool):
+        newer = isinstance(version, int) and version > VERSION
+        cure = ": update the package" if newer else ""
+        raise DriverProfileError(f"file format {version!r}; this version of xosc-lateral reads {VERSION}{cure}")
+    return {name: value for name, value in values.items() if name not in ("format", "version")}
+
+
+@lru_cache(maxsize=16)
+def file_type(model: str, effects: frozenset[str]) -> type[DriverProfile]:
+    """A profile's type with all models and effects spelt out, for reading and for the JSON Schema.
+
+    By their kinds in the file; plug-ins are searched when one is not of this package.
+    """
+    known: Any = tuple[any_effect(effects), ...]  # type: ignore[misc]  # known only now
+    fields: list[Any] = [("model", any_model(model)), ("effects", known, ())]
+    made: Any = defstruct("DriverProfile", fields, bases=(DriverProfile,), frozen=True, kw_only=True)
+    return made  # type: ignore[no-any-return]
+
+
+def profile_schema() -> dict[str, Any]:
+    """JSON Schema of a profile file, generated from the types; plug-ins are not in it."""
+    schema = msgspec.json.schema(file_type(CORE_MODELS[0].model.kind, frozenset()), schema_hook=schema_hook)
+    own = schema["$defs"]["DriverProfile"]
+    head = {"format": {"const": FORMAT}, "version": {"const": VERSION}}
+    own["properties"] = head | own["properties"]
+    own["required"] = [*head, *own["required"]]
+    own["title"] = f"Driver profile of xosc-lateral, version {VERSION}"
+    own["description"] = "Offsets are relative to the lane width, positive to the left of travel."
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def sampling_hash(profile: DriverProfile) -> str:
+    """SHA-256 of what a profile's offsets depend on; what only describes it may change."""
+    values = profile.to_dict()
+    parts = {name: values[name] for name in ("lane_width", "model", "effects")}
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()

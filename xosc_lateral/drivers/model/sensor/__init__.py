@@ -1,0 +1,1 @@
+"""What a sensor adds to a drive: the noise and rounding of a profile's data."""

@@ -1,0 +1,1 @@
+"""Reads and writes every format; the only folder that touches the disk."""

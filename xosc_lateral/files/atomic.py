@@ -1,0 +1,63 @@
+"""Writing a file so that it is there completely, or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from xosc_lateral.files.source import refuse_guarded
+
+
+def write_atomically(path: Path | str, data: bytes | str, *, durable: bool = False) -> Path:
+    """Write bytes or UTF-8 text to a temporary file beside the output, then move it there; missing folders are made.
+
+    Raises `OSError`: Disk full, no permission: the output is as it was, and no temporary file stays behind.
+
+    `durable`: return only when the disk has it, so that not even a power cut takes it back. On a busy disk that is a
+    tenth of a second: for what ten thousand others depend on, not for each of the ten thousand.
+    """
+    content = data.encode() if isinstance(data, str) else data
+
+    def write(temporary: Path) -> None:
+        with temporary.open("wb") as file:
+            file.write(content)
+            if durable:
+                file.flush()
+                os.fsync(file.fileno())
+
+    return replace_atomically(path, write)
+
+
+def replace_atomically(path: Path | str, write: Callable[[Path], object]) -> Path:
+    """Let `write` fill a temporary file beside the output, then move it there: for writers that want a path.
+
+    Raises `FormatError`: The output is a file that was opened as an input (`source.guarding_inputs`); `OSError`: As for
+    `write_atomically`.
+    """
+    path = Path(path)
+    refuse_guarded(path)
+    with _temporary_beside(path) as temporary:
+        write(temporary)
+        temporary.replace(path)
+    return path
+
+
+@contextmanager
+def _temporary_beside(path: Path) -> Iterator[Path]:
+    # The suffix stays: some writers (Parquet, CSV.gz) choose the format by it.
+    path.parent.mkdir(parents=True, exist_ok=True)
+    descriptor, name = tempfile.mkstemp(prefix=f".{path.stem[:40]}.", suffix=f".tmp{path.suffix}", dir=path.parent)
+    os.close(descriptor)
+    temporary = Path(name)
+    mask = os.umask(0)
+    os.umask(mask)
+    try:
+        temporary.chmod(0o666 & ~mask)  # mkstemp makes it private; outputs are for everybody
+        yield temporary
+    finally:
+        with contextlib.suppress(FileNotFoundError):
+            temporary.unlink()

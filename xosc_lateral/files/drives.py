@@ -1,0 +1,165 @@
+"""Drive tables: CSV, CSV.gz or Parquet with one row per measured moment, read into `Drive`s."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.errors import FormatError, NotEnoughDataError
+from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.segment import CONTEXT_UNITS
+from xosc_lateral.drivers.drives.cleaning import MAX_MEDIAN_SPEED, MAX_OUTSIDE, OWN, clean_drive
+from xosc_lateral.drivers.drives.cuts import MIN_RUN
+from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.model.plausibility import first_implausible, implausible, implausible_rows, nobody
+from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping
+from xosc_lateral.files.tables import comma_numbers, indicators, listed, numbers_of, plain_cells, read_table
+
+MAX_LEVELS = 12
+"""A column of whole numbers with at most so many values holds levels, not a quantity."""
+
+
+def read_drives(paths: str | Path | Sequence[str | Path], mapping: MappingLike | None = None) -> list[Drive]:
+    """Read the drives of one or several tables.
+
+    Raises `FormatError` when a file can't be read, a column is missing, or its values can't be in the unit meant;
+    `NotEnoughDataError` when a file holds no drive with two rows of time, offset and lane width.
+
+    `paths`: tables; the suffix gives the format. `mapping`: what columns are called, and how tables are written; see
+    `formats.mapping`. Returns list of Drive: in the order of the files and of first appearance; a drive without a name
+    is called after its file. Rows are sorted by time, repeated times dropped, rows with a missing value left out (a
+    gap).
+    """
+    known = as_mapping(mapping)
+    files = [Path(path) for path in ([paths] if isinstance(paths, str | Path) else paths)]
+    if twice := {str(path) for path in files if files.count(path) > 1}:
+        raise FormatError("the table is named twice", path=min(twice))
+    return with_distinct_names(
+        [drive for path in files for drive in drives_of_table(read_table(path, known)[0], known, path)]
+    )
+
+
+def with_distinct_names(drives: Sequence[Drive]) -> list[Drive]:
+    """Drives of several tables; those of one name are called by their table as well."""
+    names = [drive.name for drive in drives]
+    return [
+        drive if names.count(drive.name) == 1 else replace(drive, name=f"{drive.source}:{drive.name}")
+        for drive in drives
+    ]
+
+
+def drives_of_table(table: pd.DataFrame, mapping: MappingLike, path: Path | str = "DataFrame") -> list[Drive]:
+    """Drives of a table that is in memory; `path` is what messages call it. Else see `read_drives`."""
+    path = Path(path)
+    table = translated(table, as_mapping(mapping), path)
+    if not len(table):
+        raise NotEnoughDataError(f"{path}: the table has no rows; {MIN_RUN:g} s of driving are needed")
+    columns = _numeric_columns(table, path)
+    levels = frozenset(name for name, values in columns.items() if _holds_levels(name, values))
+    _require_columns(columns, path)
+    names, every = _drive_names(table, path)
+    drives = [
+        clean_drive(name, {key: values[rows] for key, values in columns.items()}, levels, path)
+        for name, rows in zip(names, every, strict=True)
+    ]
+    found = [drive for drive in drives if drive is not None]
+    if not found:
+        what = f"no drive has two rows with time, offset and lane width; {MIN_RUN:g} s are needed"
+        raise NotEnoughDataError(f"{path}: {what}")
+    return found
+
+
+def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.DataFrame:
+    """The table under standard names and in standard units; what is not mapped stays as it is."""
+    table = table.rename(columns=lambda name: str(name).strip())
+    if not table.columns.is_unique:
+        twice = sorted(set(table.columns[table.columns.duplicated()]))
+        raise FormatError(f"column {twice[0]!r} appears twice", path=path, line=1)
+    taken = {source.column for source in mapping.columns.values()}
+    for name, source in mapping.columns.items():
+        if source.column not in table.columns:
+            what = f"no column {source.column!r} for {name}; there are {listed(table.columns)}"
+            raise FormatError(what, path=path, line=1)
+    own = [name for name in table.columns if name not in taken and name not in mapping.columns]
+    kept = {name: mapping.numbers(name, plain_cells(table[name]), path) for name in own}
+    for name, source in mapping.columns.items():
+        column = mapping.numbers(name, plain_cells(table[source.column]), path)
+        if name != "drive" and source.factor != 1.0:
+            column = pd.Series(numbers_of(column, path, name) * source.factor, index=column.index)
+        kept[name] = column
+    return pd.DataFrame(kept)
+
+
+def _numeric_columns(table: pd.DataFrame, path: Path) -> dict[str, FloatArray]:
+    """Columns that hold numbers or categories, as float64; infinite values count as missing, but for those of distances
+    to others: nobody is within reach."""
+
+    columns: dict[str, FloatArray] = {}
+    for name in table.columns:
+        if name == "drive":
+            continue
+        if name in (*OWN, "speed") or pd.api.types.is_numeric_dtype(table[name]):
+            columns[name] = _cleaned(table, name, path)
+        elif table[name].isna().all():
+            columns[name] = np.full(len(table), np.nan)
+        elif (numbers := comma_numbers(table[name])) is not None:
+            columns[name] = numbers.to_numpy(dtype=np.float64)
+        else:
+            columns |= indicators(name, table[name], table.get("drive"), MAX_LEVELS)
+    return columns
+
+
+def _cleaned(table: pd.DataFrame, name: str, path: Path) -> FloatArray:
+    """A column of numbers without what is none."""
+    values = numbers_of(table[name], path, name)
+    values[np.isinf(values) & ~nobody(name, values)] = np.nan
+    if name not in OWN:
+        _leave_out_nonsense(values, name, path)
+    return values
+
+
+def _leave_out_nonsense(values: FloatArray, name: str, path: Path) -> None:
+    """Glitches of a context column count as missing; a column that is full of them is another quantity."""
+    row = first_implausible(name, values)
+    if row is None or (name == "speed" and np.nanmedian(values) > MAX_MEDIAN_SPEED):
+        return  # a wrong unit is said per drive, with what to do
+    wrong = implausible_rows(name, values)
+    if wrong.mean() > MAX_OUTSIDE:
+        what = f"{implausible(name, float(values[row]))}, and {100 * wrong.mean():.0f} % of the rows are not"
+        raise FormatError(f"{what}; name the unit with --map", path=path, line=row + 2, element=f"column {name!r}")
+    values[wrong] = np.nan
+
+
+def _holds_levels(name: str, values: FloatArray) -> bool:
+    """Counts, indices and flags do; a speed that happens to be constant doesn't."""
+    if name in OWN or CONTEXT_UNITS.get(name, "-") != "-":
+        return False
+    known = values[~np.isnan(values)]
+    return bool(np.all(known == np.round(known)) and len(np.unique(known)) <= MAX_LEVELS)
+
+
+def _require_columns(columns: Mapping[str, FloatArray], path: Path) -> None:
+    what = ""
+    if "time" not in columns:
+        what = f"no column 'time'; there are {listed(columns)} (translate with --map time=COLUMN)"
+    elif not ({"offset", "lane_width"} <= columns.keys() or {"distance_left", "distance_right"} <= columns.keys()):
+        needed = "needs distance_left and distance_right, or offset and lane_width"
+        what = f"{needed}; there are {listed(columns)} (translate with --map NAME=COLUMN)"
+    if what:
+        raise FormatError(what, path=path, line=1)
+
+
+def _drive_names(table: pd.DataFrame, path: Path) -> tuple[list[str], list[NDArray[np.intp]]]:
+    if "drive" not in table.columns:
+        return [path.name.split(".")[0]], [np.arange(len(table))]
+    codes, names = table["drive"].factorize()
+    if (codes < 0).any():
+        raise FormatError("no value", path=path, line=int(np.argmax(codes < 0)) + 2, element="column 'drive'")
+    order = np.argsort(codes, kind="stable")
+    bounds = np.searchsorted(codes[order], np.arange(1, len(names)))
+    return [str(name) for name in names], list(np.split(order, bounds))

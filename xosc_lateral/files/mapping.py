@@ -1,0 +1,245 @@
+"""What foreign tables hold, in standard names: a mapping given word by word (``--map``) or saved in a file.
+
+A file is TOML: how tables are written (``encoding``, ``separator``, ``decimal``), ``[columns]`` with a line per
+standard name, as in ``--map``, ``[values.NAME]`` with the number that each text of a column stands for, ``[roles]``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from math import pi
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.segment import CONTEXT_UNITS
+from xosc_lateral.files.source import read_toml
+
+# Factors to SI. Degrees stay apart from radians only by their factor.
+_BY_QUANTITY = {
+    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3, "ft": 0.3048, "in": 0.0254},
+    "speed": {"m/s": 1.0, "km/h": 1 / 3.6, "kph": 1 / 3.6, "mph": 0.44704, "kn": 1852 / 3600},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
+    "angle": {"rad": 1.0, "deg": pi / 180},
+    "angular speed": {"rad/s": 1.0, "deg/s": pi / 180},
+    "acceleration": {"m/s2": 1.0, "g": 9.80665},
+    "curvature": {"1/m": 1.0, "1/km": 1e-3},
+    "number": {"-": 1.0, "%": 1e-2},
+    "rain": {"mm/h": 1.0},
+    "illuminance": {"lx": 1.0, "klx": 1e3},
+}
+
+UNITS: Mapping[str, tuple[str, float]] = MappingProxyType(
+    {unit: (quantity, by) for quantity, units in _BY_QUANTITY.items() for unit, by in units.items()}
+)
+"""Unit -> what it measures, and the factor to SI."""
+
+# Other spellings, as bus logs have them; in lower case and without spaces.
+_SPELLINGS = MappingProxyType(
+    {
+        **dict.fromkeys(("meter", "meters", "metre", "metres"), "m"),
+        **dict.fromkeys(("kmh", "kmph", "km/hr", "kph"), "km/h"),
+        **dict.fromkeys(("mps", "m/sec", "ms-1", "m.s-1"), "m/s"),
+        **dict.fromkeys(("sec", "second", "seconds"), "s"),
+        **dict.fromkeys(("msec",), "ms"),
+        **dict.fromkeys(("µs", "μs"), "us"),
+        **dict.fromkeys(("°", "grad", "degree", "degrees"), "deg"),
+        **dict.fromkeys(("radian", "radians"), "rad"),
+        **dict.fromkeys(("°/s", "deg/sec", "grad/s", "degree/s", "degrees/s"), "deg/s"),
+        **dict.fromkeys(("rad/sec",), "rad/s"),
+        **dict.fromkeys(("m/s^2", "m/s²", "m/s**2", "m/s/s", "mps2", "m/sec2", "m/sec^2"), "m/s2"),
+        **dict.fromkeys(("m^-1", "m-1", "m⁻¹", "rad/m"), "1/m"),
+        **dict.fromkeys(("percent", "prozent"), "%"),
+        **dict.fromkeys(("lux",), "lx"),
+        **dict.fromkeys(("1", "none", "unitless", "no_unit", "count", "counts", "bool", "enum"), "-"),
+    }
+)
+
+_TABLE_UNITS = MappingProxyType({"time": "s", "offset": "m", "distance_left": "m", "distance_right": "m"})
+
+
+def spelled(unit: str) -> str | None:
+    """The unit in the spelling of `UNITS`; empty where none is given, None where it is not known."""
+    plain = "".join(unit.split()).strip("[]()").lower()
+    known = _SPELLINGS.get(plain, plain)
+    return known if not known or known in UNITS else None
+
+
+def is_measured(unit: str) -> bool:
+    """Whether a unit of `UNITS` is that of a quantity, and not of a count, a flag or a share."""
+    return unit in UNITS and UNITS[unit][0] != "number"
+
+
+def factor(column: str, unit: str) -> float:
+    """Factor from `unit` to the unit that the standard table has `column` in (SI where it names none).
+
+    A unit with a leading minus turns the sign: ``-m`` for offsets counted to the right.
+
+    Raises `ValueError` for an unknown unit, or one that measures something else.
+    """
+    sign, name = (-1.0, unit[1:]) if unit.startswith("-") and unit != "-" else (1.0, unit)
+    if name not in UNITS:
+        raise ValueError(f"unknown unit {unit!r}; known: {', '.join(UNITS)}")
+    quantity, to_si = UNITS[name]
+    target = _TABLE_UNITS.get(column) or CONTEXT_UNITS.get(column)
+    if target is None:
+        return sign * to_si
+    wanted, target_to_si = UNITS[target]
+    if wanted != quantity:
+        raise ValueError(f"{column} is held in {target}, {unit} measures {quantity}")
+    return sign * to_si / target_to_si
+
+
+KEYS = ("encoding", "separator", "decimal", "columns", "values", "roles")
+
+
+@dataclass(frozen=True, slots=True)
+class ColumnSource:
+    """Where a column comes from in a foreign table: its header, and the factor to the standard unit."""
+
+    column: str
+    factor: float = 1.0
+    unit: str = ""
+    """As named by the user; empty: none was."""
+
+
+@dataclass(frozen=True, slots=True)
+class TableMapping:
+    """How to read foreign tables."""
+
+    columns: Mapping[str, ColumnSource] = field(default_factory=dict)  # by standard name
+    # values: by standard name, the number that a text stands for, in the standard unit
+    values: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    # roles: by standard name, where a column comes from ("road", say), for who asks what may be a cause
+    roles: Mapping[str, str] = field(default_factory=dict)
+    encoding: str | None = None  # encoding, separator: of text files; None: found out
+    separator: str | None = None
+    decimal: str = "."
+
+    def with_words(self, words: Mapping[str, str]) -> TableMapping:
+        """With further columns, as ``--map`` has them, in place of those of the same name."""
+        more = parse_map(f"{name}={column}" for name, column in words.items())
+        return replace(self, columns={**self.columns, **more}) if more else self
+
+    def numbers(self, name: str, column: pd.Series, path: Path) -> pd.Series:
+        """The column `name`, its texts as the numbers that they stand for.
+
+        Raises `FormatError`: for a text that stands for none.
+        """
+        if name not in self.values:
+            return column
+        known = {text.strip().lower(): number for text, number in self.values[name].items()}
+        texts = column.map(lambda cell: "" if pd.isna(cell) else _as_word(cell))
+        strange = texts[(texts != "") & ~texts.isin(list(known))]
+        if len(strange):
+            what = f"{strange.iloc[0]!r} is not in [values.{name}] of the mapping: {', '.join(self.values[name])}"
+            raise FormatError(what, path=path, line=int(strange.index[0]) + 2, element=f"column {name!r}")
+        return texts.map({**known, "": np.nan}).astype(np.float64)
+
+
+MappingLike: TypeAlias = "TableMapping | Mapping[str, str] | Mapping[str, ColumnSource] | str | Path"
+"""A mapping, words or sources by name as of ``--map``, or the file of one."""
+
+
+def as_mapping(given: MappingLike | None) -> TableMapping:
+    """Whatever stands for a mapping."""
+    if given is None:
+        return TableMapping()
+    if isinstance(given, TableMapping):
+        return given
+    if isinstance(given, str | Path):
+        return read_mapping(Path(given))
+    words = {name: entry for name, entry in given.items() if isinstance(entry, str)}
+    sources = {name: entry for name, entry in given.items() if isinstance(entry, ColumnSource)}
+    return TableMapping(sources).with_words(words)
+
+
+def _as_word(cell: object) -> str:
+    whole = isinstance(cell, float) and cell.is_integer()
+    return str(int(cell) if whole else cell).strip().lower()  # type: ignore[call-overload]
+
+
+def parse_map(words: Iterable[str]) -> dict[str, ColumnSource]:
+    """Read ``NAME=COLUMN`` or ``NAME=COLUMN:UNIT`` (``speed=v_kmh:km/h``, ``offset=lat:-cm``).
+
+    Raises `FormatError`: when a word has no ``=`` or its unit does not fit the column.
+    """
+    mapping: dict[str, ColumnSource] = {}
+    for word in words:
+        name, equals, rest = word.partition("=")
+        if not equals or not name or not rest:
+            raise FormatError(f"--map {word!r}: expected NAME=COLUMN or NAME=COLUMN:UNIT")
+        try:
+            mapping[name] = _source(name, rest)
+        except ValueError as error:
+            raise FormatError(f"--map {word!r}: {error}") from error
+    return mapping
+
+
+def _source(name: str, words: str) -> ColumnSource:
+    column, colon, unit = words.rpartition(":")
+    return ColumnSource(column, factor(name, unit), unit) if colon else ColumnSource(words)
+
+
+def read_mapping(path: Path) -> TableMapping:
+    """Read a mapping's file. Raises `FormatError`: it is no TOML, or holds what no mapping has; names the entry."""
+    values = read_toml(path, "no mapping in TOML and UTF-8")
+    if unknown := values.keys() - set(KEYS):
+        raise FormatError(f"unknown entry {min(unknown)!r}; there are {', '.join(KEYS)}", path=path)
+    for key in ("columns", "values", "roles"):
+        if not isinstance(values.get(key, {}), dict):
+            raise FormatError("expected a table of names", path=path, element=f"[{key}]")
+    decimal = values.get("decimal", ".")
+    if decimal not in (".", ","):
+        raise FormatError(f"decimal {decimal!r}, expected . or ,", path=path)
+    for key in ("encoding", "separator"):
+        if not isinstance(values.get(key, ""), str) or values.get(key) == "":
+            raise FormatError(f"{key} {values[key]!r}, expected a text", path=path)
+    return TableMapping(
+        {name: _column(name, entry, path) for name, entry in values.get("columns", {}).items()},
+        {name: _numbers(name, entry, path) for name, entry in values.get("values", {}).items()},
+        {name: _text(entry, path, f"[roles] {name}") for name, entry in values.get("roles", {}).items()},
+        values.get("encoding"),
+        values.get("separator"),
+        decimal,
+    )
+
+
+def _text(entry: Any, path: Path, where: str) -> str:
+    if not isinstance(entry, str) or not entry:
+        raise FormatError(f"{entry!r}, expected a text", path=path, element=where)
+    return entry
+
+
+def _column(name: str, entry: Any, path: Path) -> ColumnSource:
+    where = f"[columns] {name}"
+    if isinstance(entry, dict):  # a header with a colon, or a sign by itself
+        if unknown := entry.keys() - {"column", "unit", "sign"}:
+            raise FormatError(f"unknown {min(unknown)!r}; there are column, unit, sign", path=path, element=where)
+        if entry.get("sign", 1) not in (1, -1):
+            raise FormatError(f"sign {entry['sign']!r}, expected 1 or -1", path=path, element=where)
+        source = ColumnSource(_text(entry.get("column"), path, where))
+        unit, sign = entry.get("unit", ""), float(entry.get("sign", 1))
+        try:
+            return replace(source, factor=sign * (factor(name, unit) if unit else 1.0), unit=unit)
+        except (ValueError, AttributeError) as error:
+            raise FormatError(str(error), path=path, element=where) from error
+    try:
+        return _source(name, _text(entry, path, where))
+    except ValueError as error:
+        raise FormatError(str(error), path=path, element=where) from error
+
+
+def _numbers(name: str, entry: Any, path: Path) -> dict[str, float]:
+    where = f"[values.{name}]"
+    if not isinstance(entry, dict) or not entry:
+        raise FormatError("expected texts and the numbers that they stand for", path=path, element=where)
+    for text, number in entry.items():
+        if isinstance(number, str | dict | list) or not np.isfinite(float(number)):
+            raise FormatError(f"{text} = {number!r}, expected a number", path=path, element=where)
+    return {text: float(number) for text, number in entry.items()}

@@ -1,0 +1,189 @@
+"""One OpenDRIVE file into a `RoadNetwork`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from xosc_lateral.files.opendrive.document import RoadFile, XmlElement, open_document
+from xosc_lateral.files.opendrive.lane_sections import read_sections, speed_limit
+from xosc_lateral.files.opendrive.plan_view import Record, finish_elements, read_plan_view
+from xosc_lateral.world.road.geometry import ReferenceElement
+from xosc_lateral.world.road.network import RoadNetwork
+from xosc_lateral.world.road.piecewise import PiecewiseCubic
+from xosc_lateral.world.road.road import Connection, Junction, Road, RoadLink
+from xosc_lateral.world.road.surface import HeaderOffset, Shape, Surface
+
+LENGTH_TOLERANCE = 0.01
+"""road/@length and the end of its geometry may differ by this without a note. [m]"""
+
+FARTHEST = 1e8
+"""Largest coordinate; UTM stays below 1e7. [m]"""
+
+LONGEST = 1e6
+"""Longest road. The longest one in the field has 50 km. [m]"""
+
+
+def read_opendrive(path: str | PathLike[str]) -> RoadNetwork:
+    """Read one ``.xodr``; the network's `notes` name what was repaired, ignored or degenerate.
+
+    Raises `FormatError` if it is no OpenDRIVE, or can't be understood: file, line, element and value.
+    """
+    root, source = open_document(path)
+    elements = list(root.iterfind("road"))
+    if not elements:
+        raise source.error("no road", root)
+    _check_ids(elements, source)
+    plans = [read_plan_view(element, source) for element in elements]
+    lines = finish_elements(plans)
+    roads = tuple(_read_road(e, plan, line, source) for e, plan, line in zip(elements, plans, lines, strict=True))
+    junctions = tuple(_read_junction(element, source) for element in root.iterfind("junction"))
+    reference, offset = root.findtext("header/geoReference"), root.find("header/offset")
+    shift = () if offset is None else (source.number(offset, name, 0.0) for name in ("x", "y", "z", "hdg"))
+    return RoadNetwork(
+        roads=roads,
+        junctions=junctions,
+        path=source.path,
+        sha256=source.sha256,
+        notes=source.notes,
+        geo_reference=reference.strip() if reference and reference.strip() else None,
+        header_offset=HeaderOffset(*shift),
+    )
+
+
+def read_road(data: bytes, name: str) -> RoadNetwork:
+    """Read a road that is no file of its own, and that messages call by this name.
+
+    Raises `FormatError`: see `read_opendrive`.
+    """
+    with TemporaryDirectory() as folder:
+        path = Path(folder, f"{name}.xodr")
+        path.write_bytes(data)
+        return read_opendrive(path)
+
+
+def _check_ids(elements: Sequence[XmlElement], source: RoadFile) -> None:
+    seen: set[str] = set()
+    for element in elements:
+        road = element.get("id")
+        if road is None:
+            raise source.error("attribute 'id' is missing", element)
+        if road in seen:
+            raise source.error(f"second road with id={road!r}", element)
+        seen.add(road)
+
+
+def _read_road(
+    element: XmlElement, plan: Sequence[Record], line: tuple[ReferenceElement, ...], source: RoadFile
+) -> Road:
+    length = _length(element, plan, source)
+    rule = element.get("rule", "RHT").upper()
+    if rule not in ("RHT", "LHT"):
+        raise source.error(f"rule={element.get('rule')!r} is neither RHT nor LHT", element)
+    _check_places(element, plan, line, source)
+    sections, directions = read_sections(element, length, rule, source)
+    junction = element.get("junction", "-1")
+    return Road(
+        id=element.get("id", ""),
+        name=element.get("name", ""),
+        length=length,
+        rule=rule,
+        junction=None if junction in ("-1", "") else junction,
+        starts=tuple(s for s, _, _ in plan),
+        elements=line,
+        sections=sections,
+        surface=_read_surface(element, source),
+        speeds=_read_speeds(element, source),
+        directions=directions,
+        predecessor=_read_link(element, "predecessor"),
+        successor=_read_link(element, "successor"),
+    )
+
+
+def _check_places(
+    element: XmlElement, plan: Sequence[Record], line: tuple[ReferenceElement, ...], source: RoadFile
+) -> None:
+    for (s, length, _), part in zip(plan, line, strict=True):
+        for ds in (0.0, 0.5 * length, length):
+            x, y, _ = part.at(ds)
+            if not max(abs(x), abs(y)) <= FARTHEST:
+                raise source.error(
+                    f"at s={s + ds:g} m the road lies at x={x:g}, y={y:g}; limit {FARTHEST:g} m", element
+                )
+
+
+def _length(element: XmlElement, plan: Sequence[Record], source: RoadFile) -> float:
+    """road/@length, or the end of the geometry where the attribute is absent or reaches further."""
+    end = plan[-1][0] + plan[-1][1]
+    length = source.number(element, "length", end)
+    if length <= 0.0:
+        raise source.error(f"length={length:g} m is not positive", element)
+    if length > LONGEST:
+        raise source.error(f"length={length:g} m; limit {LONGEST:g} m", element)
+    if abs(length - end) > LENGTH_TOLERANCE:
+        used = min(length, end)
+        source.note(f"length={length:g} m, but the geometry ends at {end:g} m: {used:g} m used", element)
+    return min(length, end) if length - end > LENGTH_TOLERANCE else length
+
+
+def _read_surface(element: XmlElement, source: RoadFile) -> Surface:
+    crossfalls = element.findall("lateralProfile/crossfall")
+    fall = [(source.number(e, "s"), source.cubic(e), e.get("side", "both")) for e in crossfalls]
+    return Surface(
+        elevation=_profile(element, "elevationProfile/elevation", source),
+        superelevation=_profile(element, "lateralProfile/superelevation", source),
+        crossfall=(
+            PiecewiseCubic.from_records([(s, c) for s, c, side in fall if side != "right"], begin=0.0),
+            PiecewiseCubic.from_records([(s, c) for s, c, side in fall if side != "left"], begin=0.0),
+        )
+        if fall
+        else None,
+        shape=_read_shape(element, source),
+    )
+
+
+def _profile(element: XmlElement, tag: str, source: RoadFile) -> PiecewiseCubic:
+    records = [(source.number(e, "s"), source.cubic(e)) for e in element.iterfind(tag)]
+    return PiecewiseCubic.from_records(records, begin=0.0)
+
+
+def _read_shape(element: XmlElement, source: RoadFile) -> Shape | None:
+    stations: dict[float, list[tuple[float, tuple[float, float, float, float]]]] = {}
+    for e in element.iterfind("lateralProfile/shape"):
+        stations.setdefault(source.number(e, "s"), []).append((source.number(e, "t"), source.cubic(e)))
+    if not stations:
+        return None
+    ordered = sorted(stations)
+    profiles = (PiecewiseCubic.from_records(stations[s], begin=min(t for t, _ in stations[s])) for s in ordered)
+    return Shape(tuple(ordered), tuple(profiles))
+
+
+def _read_speeds(element: XmlElement, source: RoadFile) -> tuple[tuple[float, float], ...]:
+    speeds = []
+    for kind in element.iterfind("type"):
+        speed = kind.find("speed")
+        speeds.append((source.number(kind, "s", 0.0), float("inf") if speed is None else speed_limit(speed, source)))
+    return tuple(sorted(speeds))
+
+
+def _read_link(element: XmlElement, tag: str) -> RoadLink | None:
+    link = element.find(f"link/{tag}")
+    if link is None or link.get("elementId") is None:
+        return None
+    contact = link.get("contactPoint", "")
+    return RoadLink(link.get("elementType", "road"), link.get("elementId", ""), contact)
+
+
+def _read_junction(element: XmlElement, source: RoadFile) -> Junction:
+    connections = []
+    for e in element.iterfind("connection"):
+        connecting = e.get("connectingRoad") or e.get("linkedRoad")
+        incoming = e.get("incomingRoad")
+        if connecting is None or incoming is None:
+            source.note("junction connection without incoming or connecting road left out", e)
+            continue
+        lanes = tuple((source.integer(k, "from"), source.integer(k, "to")) for k in e.iterfind("laneLink"))
+        connections.append(Connection(incoming, connecting, e.get("contactPoint", "start"), lanes))
+    return Junction(element.get("id", ""), element.get("name", ""), tuple(connections))

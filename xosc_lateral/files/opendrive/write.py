@@ -1,0 +1,133 @@
+"""A road of our own as OpenDRIVE: a reference line in pieces, lanes whose widths are cubic pieces.
+
+Written with lxml, as scenarios are (`files/openscenario/write/build.py` says why).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from lxml import etree
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.files.openscenario.write.build import decimal, sub
+from xosc_lateral.files.output_paths import template_mark
+from xosc_lateral.world.road.road_from_tracks import ReferenceLine
+
+PIECE = 50.0
+"""Of a curved reference line: a cubic through both ends with their directions is off by less than a millimetre on a
+radius of 300 m (error of Hermite's cubic, PIECE^4 / (384 R^3)). [m]"""
+WIDTH_PIECE = 25.0
+"""Of a width that follows the traffic, half the import's spacing of knots. [m]"""
+SHOULDER = 3.0
+"""Hard shoulder [m]; RAA 2008 (guidelines for motorways), cross-section RQ 31."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class WrittenLane:
+    """A lane: its type and width."""
+
+    kind: str  # OpenDRIVE lane type
+    width: FloatArray  # start s [m] and the polynomial's a, b, c, d of each piece, shape (n, 5)
+
+    @classmethod
+    def even(cls, kind: str, width: float) -> WrittenLane:
+        """The same width everywhere. [m]"""
+        return cls(kind, np.array([[0.0, width, 0.0, 0.0, 0.0]]))
+
+    @classmethod
+    def through(cls, kind: str, s: FloatArray, width: FloatArray) -> WrittenLane:
+        """A smooth width through values at some s, shape (n,) each. [m]"""
+        from scipy.interpolate import CubicSpline
+
+        spline = CubicSpline(s, np.maximum(width, 0.0))
+        return cls(kind, np.column_stack([s[:-1], spline.c[::-1].T]))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class WrittenRoad:
+    """One road; lanes from the reference line outwards, the right ones driven along it."""
+
+    name: str
+    # plan: pieces: s, x, y [m], heading [rad], length [m]; and, of curves, aV .. dV behind bU .. dU: bU, cU, dU,
+    # cV, dV, shape (n, 5) or (n, 10)
+    plan: FloatArray
+    left: Sequence[WrittenLane]
+    right: Sequence[WrittenLane]
+    origin: tuple[float, float] = (0.0, 0.0)  # of its coordinates in the recording's [m]
+
+    def to_xml(self) -> str:
+        """The document, the same bytes each time."""
+        root = etree.Element("OpenDRIVE")
+        header = sub(root, "header", revMajor="1", revMinor="6", name=self.name, vendor="xosc-lateral")
+        if self.origin != (0.0, 0.0):
+            x, y = (decimal(value, 3) for value in self.origin)
+            sub(header, "offset", x=x, y=y, z="0", hdg="0")
+        length = float(self.plan[-1, 0] + self.plan[-1, 4])
+        road = sub(root, "road", name=self.name, length=decimal(length, 6), id="1", junction="-1", rule="RHT")
+        sub(road, "type", s="0", type="motorway")
+        plan = sub(road, "planView")
+        for piece in self.plan:
+            _geometry(plan, piece)
+        section = sub(sub(road, "lanes"), "laneSection", s="0")
+        for tag, lanes, sign in (("left", self.left, 1), ("center", (), 0), ("right", self.right, -1)):
+            side = sub(section, tag) if lanes or not sign else None
+            if side is not None and not sign:
+                sub(side, "lane", id="0", type="none", level="false")
+            numbered = [(sign * (k + 1), lane) for k, lane in enumerate(lanes)]
+            for number, lane in numbered[::-1] if sign > 0 else numbered:  # from left to right
+                assert side is not None
+                outer = lanes[abs(number)].kind if abs(number) < len(lanes) else ""
+                _lane(side, number, lane, outer)
+        etree.indent(root, "  ")
+        text = f"<?xml version='1.0' encoding='UTF-8'?>\n{etree.tostring(root, encoding='unicode')}\n"
+        return text + template_mark(text)
+
+
+def _geometry(plan: etree._Element, piece: FloatArray) -> None:
+    s, x, y, heading, length = piece[:5]
+    item = sub(
+        plan,
+        "geometry",
+        s=decimal(s, 6),
+        x=decimal(x, 6),
+        y=decimal(y, 6),
+        hdg=decimal(heading, 9),
+        length=decimal(length, 6),
+    )
+    if len(piece) == 5:
+        sub(item, "line")
+        return
+    names = ("bU", "cU", "dU", "cV", "dV")
+    values = {name: f"{value:.12g}" for name, value in zip(names, piece[5:], strict=True)}
+    sub(item, "paramPoly3", aU="0", aV="0", bV="0", **values, pRange="arcLength")
+
+
+def _lane(side: etree._Element, number: int, lane: WrittenLane, outer: str) -> None:
+    item = sub(side, "lane", id=str(number), type=lane.kind, level="false")
+    for s, a, b, c, d in lane.width:
+        values = {name: f"{value:.9g}" for name, value in zip("abcd", (a, b, c, d), strict=True)}
+        sub(item, "width", sOffset=decimal(s, 6), **values)
+    if lane.kind == "driving":
+        mark = "broken" if outer == "driving" else "solid"
+        sub(item, "roadMark", sOffset="0", type=mark, weight="standard", color="white", width="0.15")
+
+
+def curved_plan(line: ReferenceLine, origin: tuple[float, float]) -> FloatArray:
+    """A smooth line as cubic pieces over its length, shape (n, 10); see `WrittenRoad.plan`."""
+    edges = np.linspace(0.0, line.length, max(1, round(line.length / PIECE)) + 1)
+    place, way = line.place(edges, 0) - np.array(origin), line.place(edges, 1)
+    way = way / np.linalg.norm(way, axis=1, keepdims=True)
+    heading = np.arctan2(way[:-1, 1], way[:-1, 0])
+    length = np.diff(edges)
+    along = np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    step, ahead = np.diff(place, axis=0), way[1:]
+    u, v = (step * along).sum(axis=1), (step * across).sum(axis=1)
+    du, dv = (ahead * along).sum(axis=1), (ahead * across).sum(axis=1)
+    # Hermite's cubic over the length: at 0 the place 0 and the direction (1, 0), at the end (u, v) and (du, dv)
+    c_u, d_u = (3 * u / length - 2 - du) / length, (1 + du - 2 * u / length) / length**2
+    c_v, d_v = (3 * v / length - dv) / length, (dv - 2 * v / length) / length**2
+    return np.column_stack([edges[:-1], place[:-1], heading, length, np.ones(len(length)), c_u, d_u, c_v, d_v])

@@ -1,0 +1,116 @@
+"""Actions of init and events: global, user-defined, private."""
+
+from __future__ import annotations
+
+from msgspec import Struct
+
+from xosc_lateral.files.openscenario.context import Context, Reader, declared, read_struct
+from xosc_lateral.files.openscenario.element import XmlElement
+from xosc_lateral.files.openscenario.entities import read_environment
+from xosc_lateral.files.openscenario.positions import read_position
+from xosc_lateral.files.openscenario.private_actions import PRIVATE_ACTIONS
+from xosc_lateral.world.scenario.expressions import ExpressionError
+from xosc_lateral.world.scenario.global_actions import (
+    AddEntityAction,
+    DeleteEntityAction,
+    EnvironmentAction,
+    ModifyOperation,
+    ParameterModifyAction,
+    ParameterSetAction,
+    SetMonitorAction,
+    TrafficAction,
+    TrafficSignalControllerAction,
+    TrafficSignalStateAction,
+    UserDefinedAction,
+    VariableModifyAction,
+    VariableSetAction,
+)
+from xosc_lateral.world.scenario.place import Unsupported
+from xosc_lateral.world.scenario.storyboard import Action
+
+# Elements that only group others; what they hold is the action.
+GROUPING = {
+    "LongitudinalAction",
+    "LateralAction",
+    "RoutingAction",
+    "ControllerAction",
+    "AppearanceAction",
+    "TrailerAction",
+    "InfrastructureAction",
+    "TrafficSignalAction",
+}
+
+
+def read_actions(owner: XmlElement, name: str, context: Context) -> list[Action]:
+    """Actions in a PrivateAction, GlobalAction or UserDefinedAction element: one, or more in lenient files.
+
+    In version 1.0 a ControllerAction holds both an assignment and an override; the assignment comes first.
+    """
+    private = owner.tag == "PrivateAction"
+    readers = PRIVATE_ACTIONS if private else GLOBAL_ACTIONS
+    try:
+        scope = owner.scope.local_values()
+    except ExpressionError as error:
+        owner.fail(f"parameters that are declared around it: {error}")
+    contents = [owner] if owner.tag == "UserDefinedAction" else list(_contents(owner))
+    if not contents:
+        context.remark(owner, "contains no action: played as nothing")
+    actions = []
+    for element in contents:
+        reader = readers.get(element.tag)
+        content = reader(element, context) if reader else Unsupported(element.tag, element.place())
+        actions.append(Action(name, content, owner.place(), private, scope))
+    return actions
+
+
+def _contents(owner: XmlElement) -> list[XmlElement]:
+    found: list[XmlElement] = []
+    for child in owner.children():
+        found.extend(_contents(child) if child.tag in GROUPING else [child])
+    return found
+
+
+def _environment(e: XmlElement, context: Context) -> EnvironmentAction:
+    return EnvironmentAction(read_environment(e, context), place=e.place())
+
+
+def _entity(e: XmlElement, context: Context) -> AddEntityAction | DeleteEntityAction:
+    if (add := e.child("AddEntityAction")) is not None:
+        return AddEntityAction(context.entity(e), read_position(add.required("Position"), context), place=e.place())
+    e.required("DeleteEntityAction")
+    return DeleteEntityAction(context.entity(e), place=e.place())
+
+
+def _setting(sets: type[Struct], modifies: type[Struct]) -> Reader:
+    """Of a parameter or a variable."""
+
+    def read(e: XmlElement, context: Context) -> Struct:
+        if (change := e.child("SetAction")) is not None:
+            return read_struct(sets, e, context, value=change.text("value"))
+        rule = e.required("ModifyAction").required("Rule").required("AddValue", "MultiplyByValue")
+        return read_struct(modifies, e, context, operation=ModifyOperation(rule.tag), value=rule.number("value"))
+
+    return read
+
+
+def _traffic(e: XmlElement, _: Context) -> TrafficAction:
+    content = e.child()
+    return TrafficAction(content.tag if content else e.tag, place=e.place())
+
+
+def _user_defined(e: XmlElement, _: Context) -> UserDefinedAction:
+    command = e.child("CustomCommandAction")
+    if command is None:
+        return UserDefinedAction("", "", place=e.place())
+    return UserDefinedAction(command.text("type", ""), (command.xml.text or "").strip(), place=e.place())
+
+
+GLOBAL_ACTIONS: dict[str, Reader] = {
+    **declared(SetMonitorAction, TrafficSignalStateAction, TrafficSignalControllerAction),
+    "EnvironmentAction": _environment,
+    "EntityAction": _entity,
+    "ParameterAction": _setting(ParameterSetAction, ParameterModifyAction),
+    "VariableAction": _setting(VariableSetAction, VariableModifyAction),
+    "TrafficAction": _traffic,
+    "UserDefinedAction": _user_defined,
+}

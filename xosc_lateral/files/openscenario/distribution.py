@@ -1,0 +1,255 @@
+"""Read ParameterValueDistribution files: the concrete scenarios that a logical one stands for."""
+
+from __future__ import annotations
+
+import math
+import time
+import zlib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from decimal import Decimal, InvalidOperation
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from msgspec import Struct
+
+from xosc_lateral.base.limits import COMBINATIONS, DECIMAL_EXPONENT, DISTRIBUTION_TIME, PARAMETER_SETS
+from xosc_lateral.files.openscenario.catalogs import Boundary, Catalogs, allowed_roots
+from xosc_lateral.files.openscenario.context import Context, read_struct
+from xosc_lateral.files.openscenario.declarations import broken_constraint, declared_values, parameter_name, value_of
+from xosc_lateral.files.openscenario.element import XmlElement
+from xosc_lateral.files.openscenario.read import open_scenario, read_header
+from xosc_lateral.files.xml import read_xml
+from xosc_lateral.world.scenario.distribution import (
+    Deterministic,
+    DistributionError,
+    Histogram,
+    LogNormal,
+    Normal,
+    ParameterSet,
+    Poisson,
+    SteppedRange,
+    Stochastic,
+    Uniform,
+    ValueSets,
+    Weighted,
+)
+from xosc_lateral.world.scenario.parameters import Scope
+from xosc_lateral.world.scenario.place import Place
+
+MAX_REDRAWS = 1000
+"""Stochastic sets in a row that violate the scenario's constraints until reading gives up."""
+
+
+@dataclass(slots=True)
+class LogicalScenario:
+    """A scenario file and the values that its parameters take.
+
+    Parameters
+    ----------
+    path : Path
+        The distribution file.
+    scenario_file : Path
+        The scenario that it varies.
+    distribution : Deterministic or Stochastic
+    place : Place
+        Of the distribution.
+    discarded : int
+        Parameter sets left out so far because they violate the scenario's constraint groups.
+    """
+
+    path: Path
+    scenario_file: Path
+    distribution: Deterministic | Stochastic
+    place: Place
+    _scenario: XmlElement = field(repr=False)
+    discarded: int = 0
+    _declared: dict[str, str] = field(init=False, repr=False)
+    _constrained: list[XmlElement] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Find what the scenario declares, and which of it is constrained."""
+        self._declared = declared_values(self._scenario)
+        found = self._scenario.listed("ParameterDeclarations", "ParameterDeclaration")
+        self._constrained = [item for item in found if item.child("ConstraintGroup") is not None]
+
+    def parameter_sets(self, seed: int = 0) -> Iterator[ParameterSet]:
+        """Parameter sets that satisfy the scenario's constraint groups, in order, made when asked for.
+
+        Combinations of a deterministic distribution that violate them are left out; stochastic ones are drawn again.
+
+        Raises `FormatError`: A parameter that the scenario does not declare, or constraints that nothing satisfies.
+
+        Parameters
+        ----------
+        seed : int
+            For a stochastic distribution without a ``randomSeed`` of its own.
+        """
+        self.discarded, begin = 0, time.monotonic()
+        limit = PARAMETER_SETS if isinstance(self.distribution, Stochastic) else COMBINATIONS
+        if self.count > limit.value:
+            raise self.place.error(limit.refusal(self.count))
+        if isinstance(self.distribution, Deterministic):
+            for values in self.distribution:
+                if self._accepts(values):
+                    yield values
+                self._check_time(begin)
+            return
+        rng = np.random.default_rng(seed if self.distribution.seed is None else self.distribution.seed)
+        for _ in range(self.distribution.number_of_test_runs):
+            yield self._draw(self.distribution, rng)
+            self._check_time(begin)
+
+    def _check_time(self, begin: float) -> None:
+        took = time.monotonic() - begin
+        if took > DISTRIBUTION_TIME.value:
+            raise self.place.error(f"{DISTRIBUTION_TIME.refusal(took)}; constraints or limits leave out nearly all")
+
+    @property
+    def count(self) -> int:
+        """Parameter sets before the scenario's constraints; for a stochastic distribution the runs."""
+        if isinstance(self.distribution, Deterministic):
+            return math.prod(map(len, self.distribution.parts))
+        return self.distribution.number_of_test_runs
+
+    def _draw(self, distribution: Stochastic, rng: np.random.Generator) -> ParameterSet:
+        for _ in range(MAX_REDRAWS):
+            try:
+                values = distribution.sample(rng)
+            except DistributionError as error:
+                raise self.place.error(str(error)) from error
+            if self._accepts(values):
+                return values
+        raise self.place.error(f"{MAX_REDRAWS} draws in a row violate the constraints of {self.scenario_file}")
+
+    def _accepts(self, values: ParameterSet) -> bool:
+        for name in values:
+            if name not in self._declared:
+                raise self.place.error(f"parameter '{name}' is not declared in {self.scenario_file}")
+        if not self._constrained:
+            return True
+        scope = Scope({**self._declared, **values})
+        for declaration in self._constrained:
+            item = declaration.within(scope)
+            if broken_constraint(item, value_of(item)):
+                self.discarded += 1
+                return False
+        return True
+
+
+def read_distribution(path: Path | str, *, allowed: Iterable[Path] = ()) -> LogicalScenario:
+    """Read a ParameterValueDistribution file (1.1 and later).
+
+    Raises `FormatError` with file, line and element; user-defined distributions among others.
+
+    Parameters
+    ----------
+    path : path
+        The ``.xosc`` file.
+    allowed : iterable of path
+        Folders, besides the file's own and the two above it, that the scenario may lie in.
+    """
+    path = Path(path)
+    document, _ = read_xml(path)
+    root = open_scenario(document, path)
+    header = read_header(root)
+    owner = root.required("ParameterValueDistribution")
+    reference = owner.required("ScenarioFile")
+    boundary = Boundary(path.parent, allowed_roots(path, allowed))
+    scenario = boundary.inside(reference.text("filepath"), reference.place())
+    if not scenario.is_file():
+        reference.fail(f"scenario file '{reference.text('filepath')}' does not exist (looked for {scenario})")
+    content = owner.required("Deterministic", "Stochastic")
+    context = Context(header.version, Catalogs({}, boundary, []), [], {})
+    distribution = _deterministic(content) if content.tag == "Deterministic" else _stochastic(content, context)
+    inner, _ = read_xml(scenario)
+    return LogicalScenario(path, scenario, distribution, content.place(), open_scenario(inner, scenario))
+
+
+def _deterministic(owner: XmlElement) -> Deterministic:
+    parts: list[ValueSets | SteppedRange] = []
+    for item in owner.children():
+        if item.tag == "DeterministicMultiParameterDistribution":
+            parts.append(_value_sets(item.required("ValueSetDistribution")))
+        elif item.tag == "DeterministicSingleParameterDistribution":
+            parts.append(_single(item))
+        else:
+            item.fail("is not a deterministic distribution")
+    return Deterministic(tuple(parts))
+
+
+def _value_sets(owner: XmlElement) -> ValueSets:
+    sets = tuple(
+        {_name_of(a, "parameterRef"): a.text("value") for a in item.children("ParameterAssignment")}
+        for item in owner.children("ParameterValueSet")
+    )
+    return ValueSets(sets, owner.place())
+
+
+def _name_of(element: XmlElement, attribute: str) -> str:
+    """Name of a parameter: never a reference, even where a file writes it with a ``$``."""
+    return parameter_name(element.raw(attribute) or element.text(attribute))
+
+
+def _single(item: XmlElement) -> ValueSets | SteppedRange:
+    name = _name_of(item, "parameterName")
+    content = item.required("DistributionSet", "DistributionRange", "UserDefinedDistribution")
+    if content.tag == "DistributionSet":
+        return ValueSets(tuple({name: value.text("value")} for value in content.children("Element")), item.place())
+    if content.tag == "UserDefinedDistribution":
+        content.fail("user-defined distributions can't be drawn from")
+    limits = content.required("Range")
+    step, lower, upper = _decimal(content, "stepWidth"), _decimal(limits, "lowerLimit"), _decimal(limits, "upperLimit")
+    if step <= 0:
+        content.fail(f"stepWidth of {step} is not positive")
+    if upper < lower:
+        limits.fail(f"upperLimit {upper} is below lowerLimit {lower}")
+    if (values := (upper - lower) / step + 1) > COMBINATIONS.value:
+        content.fail(COMBINATIONS.refusal(float(values)))
+    return SteppedRange(name, lower, upper, step, item.place())
+
+
+def _decimal(element: XmlElement, name: str) -> Decimal:
+    element.number(name)  # refuses what is no finite number, with its place
+    text = element.text(name).strip()
+    try:
+        value = Decimal(text)
+    except InvalidOperation:
+        element.fail(f"{name}='{text[:60]}' is not a number")
+    exponent = value.as_tuple().exponent
+    if not isinstance(exponent, int) or max(abs(exponent), len(text)) > DECIMAL_EXPONENT.value:
+        element.fail(f"{name}='{text[:60]}': {DECIMAL_EXPONENT.what}, and digits, at most {DECIMAL_EXPONENT}")
+    return value
+
+
+def _stochastic(owner: XmlElement, context: Context) -> Stochastic:
+    runs = owner.integer("numberOfTestRuns")
+    if runs < 0:
+        owner.fail(f"numberOfTestRuns of {runs} is negative")
+    draws = []
+    for item in owner.children("StochasticDistribution"):
+        content = item.required(*_DRAWS, "UserDefinedDistribution")
+        if content.tag == "UserDefinedDistribution":
+            content.fail("user-defined distributions can't be drawn from")
+        draw: Any = read_struct(_DRAWS[content.tag], content, context)
+        draws.append((_name_of(item, "parameterName"), draw))
+    return Stochastic(tuple(draws), runs, _seed(owner))
+
+
+def _seed(owner: XmlElement) -> int | None:
+    """The file's seed is a double: whole ones as they are, others by their text."""
+    value = owner.optional_number("randomSeed")
+    if value is None:
+        return None
+    return int(value) if value == int(value) and value >= 0 else zlib.crc32(repr(value).encode())
+
+
+_DRAWS: Mapping[str, type[Struct]] = {
+    "ProbabilityDistributionSet": Weighted,
+    "Histogram": Histogram,
+    "UniformDistribution": Uniform,
+    "NormalDistribution": Normal,
+    "LogNormalDistribution": LogNormal,
+    "PoissonDistribution": Poisson,
+}

@@ -1,0 +1,134 @@
+"""Positions, routes and trajectories: they refer to one another, so they are read in one place."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from xosc_lateral.files.openscenario.context import Context, Reader, declared, read_struct
+from xosc_lateral.files.openscenario.element import XmlElement
+from xosc_lateral.files.openscenario.left_handed import mirrored, mirrored_shape
+from xosc_lateral.world.scenario.place import Unsupported
+from xosc_lateral.world.scenario.position import (
+    Clothoid,
+    ClothoidSpline,
+    FromCurrentEntity,
+    FromLaneCoordinates,
+    FromRoadCoordinates,
+    GeoPosition,
+    LanePosition,
+    Nurbs,
+    Polyline,
+    Position,
+    RelativeLanePosition,
+    RelativeObjectPosition,
+    RelativeRoadPosition,
+    RelativeWorldPosition,
+    RoadPosition,
+    Route,
+    RoutePosition,
+    Shape,
+    Trajectory,
+    TrajectoryPosition,
+    WorldPosition,
+)
+
+
+def read_position(owner: XmlElement, context: Context) -> Position:
+    """The position inside an element of type Position (``Position``, ``TargetPosition`` ...)."""
+    position: Position = _choice(owner, "position", _POSITIONS, context)
+    return mirrored(position) if context.left_handed else position
+
+
+def _choice(owner: XmlElement, what: str, readers: dict[str, Reader], context: Context) -> Any:
+    """The only child; one that nobody reads is unsupported."""
+    content = owner.child()
+    if content is None:
+        owner.fail(f"contains no {what}")
+    reader = readers.get(content.tag)
+    return Unsupported(content.tag, content.place()) if reader is None else context.nested(content, reader)
+
+
+def read_route(owner: XmlElement, context: Context) -> Route:
+    """Route, given inline or from a catalog, inside `owner`."""
+    return read_struct(Route, context.inline_or_entry(owner, "Route"), context)
+
+
+def read_trajectory(owner: XmlElement, context: Context) -> Trajectory:
+    """Trajectory, given inline, in a TrajectoryRef (1.1) or from a catalog, inside `owner`."""
+    inside = context.inline_or_entry(owner.child("TrajectoryRef") or owner, "Trajectory")
+    return read_struct(Trajectory, inside, context)
+
+
+def _shape(owner: XmlElement, context: Context) -> Shape:
+    shape: Shape = _choice(owner, "shape", _SHAPES, context)
+    return mirrored_shape(shape) if context.left_handed else shape
+
+
+def _road(e: XmlElement, context: Context) -> RoadPosition:
+    return read_struct(RoadPosition, e, context, road_id=_road_id(e))
+
+
+def _lane(e: XmlElement, context: Context) -> LanePosition:
+    return read_struct(LanePosition, e, context, road_id=_road_id(e))
+
+
+def _road_id(e: XmlElement) -> str:
+    """Road ids are text; one that came out of an expression or a number parameter gets its plain form back."""
+    text = e.text("roadId")
+    if text.endswith(".0000000000") and text[:-11].lstrip("-").isdigit():
+        return text[:-11]
+    return text
+
+
+def _relative_lane(e: XmlElement, context: Context) -> RelativeLanePosition:
+    ds, lanes = e.optional_number("ds"), e.optional_integer("dLane")
+    if ds is None and e.optional_number("dsLane") is None:
+        ds = 0.0
+    if lanes is None:
+        context.remark(e, "dLane is missing: taken as 0, the same lane")
+    return read_struct(RelativeLanePosition, e, context, d_lane=lanes or 0, ds=ds)
+
+
+def _route(e: XmlElement, context: Context) -> RoutePosition:
+    reference, owner = e.child("RouteRef"), e.child("InRoutePosition")
+    route = read_route(reference, context) if reference is not None else None
+    content = owner.child() if owner is not None else None
+    place = _in_route(content, context) if content else None
+    return read_struct(RoutePosition, e, context, route=route, in_route=place)
+
+
+_IN_ROUTE = declared(FromCurrentEntity, FromRoadCoordinates, FromLaneCoordinates)
+
+
+def _in_route(e: XmlElement, context: Context) -> Any:
+    reader = _IN_ROUTE.get(e.tag)
+    if reader is None:
+        context.remark(e)
+    return None if reader is None else reader(e, context)
+
+
+def _geo(e: XmlElement, context: Context) -> GeoPosition:
+    latitude, longitude = e.optional_number("latitude"), e.optional_number("longitude")
+    if latitude is None or longitude is None:
+        latitude, longitude = math.radians(e.number("latitudeDeg")), math.radians(e.number("longitudeDeg"))
+    return read_struct(GeoPosition, e, context, latitude=latitude, longitude=longitude)
+
+
+_POSITIONS: dict[str, Reader] = {
+    **declared(WorldPosition, RelativeWorldPosition, RelativeObjectPosition, RelativeRoadPosition, TrajectoryPosition),
+    "RoadPosition": _road,
+    "LanePosition": _lane,
+    "RelativeLanePosition": _relative_lane,
+    "RoutePosition": _route,
+    "GeoPosition": _geo,
+}
+
+
+def _nurbs(e: XmlElement, context: Context) -> Nurbs:
+    return read_struct(Nurbs, e, context, knots=tuple(knot.number("value") for knot in e.children("Knot")))
+
+
+_SHAPES: dict[str, Reader] = {**declared(Clothoid, Polyline, ClothoidSpline), "Nurbs": _nurbs}
+
+READERS: dict[object, Reader] = {Position: read_position, Shape: _shape, Route: read_route, Trajectory: read_trajectory}

@@ -1,0 +1,150 @@
+"""The mark that a file of ours carries: what made it, and from what.
+
+It is for people and for the check that nothing is converted twice. Anybody can write one: no permission depends on it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from io import BytesIO
+from pathlib import Path
+from typing import IO, Any
+
+from lxml import etree
+
+from xosc_lateral.base.errors import FormatError
+from xosc_lateral.files.atomic import replace_atomically
+from xosc_lateral.files.openscenario.element import line_of
+
+MARK = "xosc-lateral provenance: "
+HEADER_MARK = "[xosc-lateral: "
+CONTENT = "content_sha256"
+"""In the provenance: SHA-256 of the file without the provenance."""
+PENDING = "0" * 64
+"""In its place until it is known."""
+_BEGIN, _END = f"<!-- {MARK}".encode(), b"-->"
+
+
+def mark(root: etree._Element, provenance: Mapping[str, Any], summary: str) -> None:
+    """Write the provenance as a comment before the file header, and in short into its description."""
+    header = root.find("{*}FileHeader")
+    text = json.dumps(provenance, sort_keys=True, ensure_ascii=False, default=str)
+    comment = etree.Comment(f" {MARK}{_comment_safe(text)} ")
+    comment.tail = root.text  # the white space before the first child
+    root.insert(0 if header is None else root.index(header), comment)
+    if header is not None:
+        description = (header.get("description") or "").rstrip()
+        header.set("description", f"{description} {HEADER_MARK}{summary}]".strip())
+
+
+def provenance_of(root: etree._Element) -> Mapping[str, Any] | None:
+    """Provenance of a file of ours; empty if only the header's mark is left; None for anybody else's file."""
+    for comment in root.iterchildren(etree.Comment):
+        text = (comment.text or "").strip()
+        if text.startswith(MARK):
+            try:
+                found = json.loads(text[len(MARK) :])
+            except (ValueError, RecursionError):
+                return {}
+            return found if isinstance(found, dict) else {}
+    header = root.find("{*}FileHeader")
+    return {} if header is not None and HEADER_MARK in (header.get("description") or "") else None
+
+
+def facts_in(data: bytes) -> Mapping[str, Any] | None:
+    """Provenance in the bytes of a file of ours, which need not be well-formed any more; None: there is none."""
+    begin, end = _comment_in(data)
+    try:
+        found = json.loads(data[begin + len(_BEGIN) : end - len(_END)]) if begin < end else None
+    except (ValueError, RecursionError):
+        return None
+    return found if isinstance(found, dict) else None
+
+
+def content_hash(data: bytes) -> str:
+    """SHA-256 of a file of ours without its provenance, in hexadecimal."""
+    return hashlib.sha256(without_provenance(data)).hexdigest()
+
+
+def without_provenance(data: bytes) -> bytes:
+    """A file of ours without its provenance, which alone may differ where the content is the same."""
+    begin, end = _comment_in(data)
+    return data[:begin] + data[end:]
+
+
+def write_sealed(path: Path, pieces: Iterable[bytes], *, save: bool) -> tuple[str, str, bytes]:
+    """Write a document whose provenance holds `PENDING`, with the hash of its content in that place.
+
+    Parameters
+    ----------
+    path : Path
+    pieces : iterable of bytes
+        The document; its provenance is in the first one.
+    save : bool
+        Write it, piece by piece; else it comes back.
+
+    Returns
+    -------
+    tuple of str, str, bytes
+        SHA-256 of the file and of its content; the file if it was not to be written.
+    """
+    rest = iter(pieces)
+    first = next(rest)
+    begin, end = _comment_in(first)
+    place = first.find(PENDING.encode(), begin, end)
+    digest = hashlib.sha256(first[:begin])
+    digest.update(first[end:])
+
+    def whole() -> Iterator[bytes]:
+        yield first
+        for piece in rest:
+            digest.update(piece)
+            yield piece
+
+    def write_to(file: IO[bytes]) -> str:
+        file.writelines(whole())
+        if place >= 0:
+            file.seek(place)
+            file.write(digest.hexdigest().encode())
+        file.seek(0)
+        return hashlib.file_digest(file, "sha256").hexdigest()  # type: ignore[arg-type]
+
+    if not save:
+        memory = BytesIO()
+        return write_to(memory), digest.hexdigest(), memory.getvalue()
+    found = []
+
+    def write(temporary: Path) -> None:
+        with temporary.open("w+b") as file:
+            found.append(write_to(file))
+
+    replace_atomically(path, write)
+    return found[0], digest.hexdigest(), b""
+
+
+def _comment_in(data: bytes) -> tuple[int, int]:
+    """Where the provenance begins and ends; both at the end where there is none. [byte]"""
+    begin = data.find(_BEGIN)
+    end = data.find(_END, begin) if begin >= 0 else -1
+    return (begin, end + len(_END)) if end >= 0 else (len(data), len(data))
+
+
+def refuse_converted(root: etree._Element, path: object) -> None:
+    """`FormatError` for a file that was converted before: its offsets would be counted twice."""
+    found = provenance_of(root)
+    if found is None:
+        return
+    inputs = found.get("inputs")
+    # Seen from the scenario, which has no folder in its name then; a road or a catalog may lie beside it.
+    beside = [name for name in inputs if "/" not in name and name.endswith(".xosc")] if isinstance(inputs, dict) else []
+    hint = f"; convert {beside[0]} instead" if len(beside) == 1 else "; convert its source instead"
+    header = root.find("{*}FileHeader")
+    line = None if header is None else line_of(header)
+    raise FormatError(f"was converted by xosc-lateral already{hint}", path=path, line=line, element="FileHeader")
+
+
+def _comment_safe(text: str) -> str:
+    """JSON in which no ``--`` stands, which would end the comment, and which does not end in a dash."""
+    return text.replace("--", "-\\u002d").replace("--", "-\\u002d")

@@ -1,0 +1,244 @@
+"""Read an OpenSCENARIO file, leniently: what field files leave out or misspell is taken as meant where it is clear."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path, PureWindowsPath
+
+from lxml import etree
+from msgspec import Struct
+
+from xosc_lateral.base.errors import FormatError
+from xosc_lateral.files.openscenario.catalogs import Boundary, Catalogs, allowed_roots
+from xosc_lateral.files.openscenario.context import Context, read_struct
+from xosc_lateral.files.openscenario.declarations import read_declarations, read_variables
+from xosc_lateral.files.openscenario.element import XmlElement, local_name, means_true
+from xosc_lateral.files.openscenario.entities import read_entities
+from xosc_lateral.files.openscenario.storyboard import READERS
+from xosc_lateral.files.xml import read_document
+from xosc_lateral.world.scenario import (
+    FileHeader,
+    Scenario,
+    Storyboard,
+    TrafficSignalController,
+    Unsupported,
+)
+from xosc_lateral.world.scenario.parameters import Scope
+from xosc_lateral.world.scenario.place import Place
+from xosc_lateral.world.scenario.scenario import TrafficSignalPhase
+
+BOOLEANS = frozenset(
+    {
+        *("activateAnimation", "activateLateral", "activateLighting", "activateLongitudinal", "active", "alongRoute"),
+        *("animation", "closed", "continuous", "freeSpace", "freespace", "graphics", "lateral", "lighting"),
+        *("longitudinal", "loop", "oppositeLanes", "selectTriggeringEntities", "sensors", "traffic"),
+    }
+)
+"""Attributes that the standard calls Boolean, all versions."""
+
+
+def remark_spellings(root: XmlElement) -> list[Unsupported]:
+    """One remark for each attribute and word such as ``freespace="True"``, at its first place."""
+    found: dict[tuple[str, str], list[etree._Element]] = {}
+    for item in root.xml.iter("{*}*"):
+        declares = item.get("parameterType") == "boolean"
+        for name, value in item.attrib.items():
+            word = str(value).strip()
+            is_boolean = name in BOOLEANS or (declares and name == "value")
+            if is_boolean and means_true(word) and word not in ("true", "1"):
+                found.setdefault((str(name), word), []).append(item)
+    remarks = []
+    for (name, word), items in found.items():
+        place = XmlElement(items[0], root.path, root.scope).place()
+        times = "" if len(items) == 1 else f" ({len(items)} times)"
+        why = "the standard's word is 'true', and the reference player takes this one for false"
+        remarks.append(Unsupported(place.element, place, f"{name}='{word}' is read as true{times}; {why}"))
+    return remarks
+
+
+NEWEST = (1, 3)
+
+LEFT_HANDED = "written for CARLA: its left-handed coordinates are mirrored, its offsets count to the right"
+
+
+class RoadSearch(Struct, frozen=True):
+    """Where a road may lie besides where the scenario says: what the user names is allowed.
+
+    Raises `FormatError`: No such file, no such folder.
+
+    Parameters
+    ----------
+    file : Path or None
+        The road, whatever the scenario says.
+    folders : tuple of Path
+        Looked through for a file of the road's name.
+    """
+
+    file: Path | None = None
+    folders: tuple[Path, ...] = ()
+
+    def __post_init__(self) -> None:
+        for folder in self.folders:
+            if not folder.is_dir():
+                raise FormatError("no such folder to look for roads in", path=folder)
+        if self.file is not None and not self.file.is_file():
+            raise FormatError("no such road", path=self.file)
+
+
+NO_ROADS = RoadSearch()
+
+
+def read_scenario(
+    path: Path | str,
+    parameters: Mapping[str, str] | None = None,
+    *,
+    allowed: Iterable[Path] = (),
+    strict: bool = False,
+    roads: RoadSearch = NO_ROADS,
+) -> Scenario:
+    """Read a scenario with all that it takes from catalogs.
+
+    Raises `FormatError`: File, line, element and what is wrong: no XML, no scenario, a missing or malformed value, an
+    unknown entity, catalog or parameter, a reference that leads outside, a missing road file.
+
+    Parameters
+    ----------
+    path : path
+        The ``.xosc`` file.
+    parameters : mapping of str to str, optional
+        Values that override those of the file's parameter declarations.
+    allowed : iterable of path
+        Folders, besides the scenario's own and the two above it, that roads and catalogs may lie in.
+    strict : bool
+        Refuse a scenario whose vehicle catalog is missing, instead of playing a usual car and remarking it.
+    roads : RoadSearch
+        Where else its road may lie.
+
+    Returns
+    -------
+    Scenario
+    """
+    path = Path(path)
+    document = read_document(path)
+    root = open_scenario(document.root, path)
+    if root.child("ParameterValueDistribution") is not None:
+        root.fail("is a parameter value distribution, not a scenario: read the scenarios that it stands for")
+    if root.child("Storyboard") is None and root.child("Catalog") is not None:
+        root.fail("is a catalog, not a scenario")
+    remarks: list[Unsupported] = []
+    header = read_header(root)
+    if header.version > NEWEST:
+        remarks.append(Unsupported("FileHeader", root.place(), f"version 1.{header.minor} is read as 1.{NEWEST[1]}"))
+    remarks.extend(remark_spellings(root))
+    scope, values = read_declarations(root, dict(parameters or {}), remarks)
+    root = root.within(scope)
+    boundary = Boundary(path.parent, allowed_roots(path, allowed))
+    locations = _catalog_locations(root)
+    catalogs = Catalogs(locations, boundary, remarks)
+    context = Context(
+        header.version,
+        catalogs,
+        remarks,
+        {**READERS, TrafficSignalPhase: _phase},
+        strict=strict,
+        left_handed=header.is_left_handed,
+    )
+    if header.is_left_handed:
+        remarks.append(Unsupported("FileHeader", root.place(), LEFT_HANDED))
+    network = root.child("RoadNetwork")
+    logic = network.child("LogicFile", "Logics") if network else None
+    written = logic.text("filepath", "") if logic else ""
+    road_file = roads.file if network else None
+    if road_file is None and logic and written.strip():
+        road_file = _road_file(logic, written, boundary, remarks, roads)
+    found = network.listed("TrafficSignals", "TrafficSignalController") if network else ()
+    controllers = tuple(read_struct(TrafficSignalController, one, context) for one in found)
+    entities = read_entities(root, context)
+    storyboard = read_struct(Storyboard, root.required("Storyboard"), context)
+    return Scenario(
+        path=path,
+        header=header,
+        parameters=values,
+        variables=read_variables(root),
+        catalog_locations={kind: path.parent / written for kind, (written, _) in locations.items()},
+        road_file=road_file,
+        traffic_signal_controllers=controllers,
+        entities=entities,
+        storyboard=storyboard,
+        remarks=tuple(remarks),
+        input_hashes={path: document.sha256, **catalogs.used},
+        source=document.data,
+    )
+
+
+def open_scenario(document: etree._Element, path: Path) -> XmlElement:
+    """Root element of any OpenSCENARIO file."""
+    root = XmlElement(document, path, Scope({}))
+    if local_name(document).lower() != "openscenario":
+        root.fail(f"the root element is '{local_name(document)[:40]}', not OpenSCENARIO")
+    return root
+
+
+def read_header(root: XmlElement) -> FileHeader:
+    """File header; versions before 1.0 and after 1 are refused."""
+    header = root.child("FileHeader")
+    if header is None:
+        root.fail("FileHeader is missing")
+    # tools have written "1+" for what came after 1.1
+    minor_text = header.text("revMinor", "0").strip()
+    minor = int(minor_text[:-1]) if re.fullmatch(r"\d{1,3}\+", minor_text) else header.integer("revMinor", 0)
+    major = header.integer("revMajor", 1)
+    if major != 1:
+        header.fail(f"OpenSCENARIO {major}.{minor} is not read; versions 1.0 to 1.3 are, later 1.x as 1.3")
+    return FileHeader(major, minor, header.text("author", ""), header.text("description", ""), header.text("date", ""))
+
+
+def _catalog_locations(root: XmlElement) -> dict[str, tuple[str, Place]]:
+    owner = root.child("CatalogLocations")
+    locations = {}
+    for location in owner.children() if owner else ():
+        directory = location.child("Directory")
+        if directory is not None and directory.text("path", ""):
+            locations[location.tag] = (directory.text("path"), directory.place())
+    return locations
+
+
+def _road_file(
+    logic: XmlElement, written: str, boundary: Boundary, remarks: list[Unsupported], roads: RoadSearch
+) -> Path:
+    """The road where the scenario says, or else, like the reference player, a file of that name near the scenario.
+
+    Scenarios for CARLA name a town, without a suffix.
+    """
+    place, name = logic.place(), PureWindowsPath(written.strip()).name
+    try:
+        road = boundary.inside(written, place)
+        if road.is_file():
+            return road
+        missing = place.error(f"road file '{written}' does not exist (looked for {road})")
+    except FormatError as error:
+        missing = error
+    if is_town(written):
+        name += ".xodr"
+        missing = place.error(
+            f"road '{written}' is not beside the scenario; name its folder by --road-path or the file by --road"
+        )
+    folder = boundary.folder
+    beside = [near for near in (folder, folder / "xodr", folder.parent / "xodr") if boundary.holds(near / name)]
+    for near in (*beside, *roads.folders):
+        if name and (near / name).is_file():
+            remarks.append(Unsupported("LogicFile", place, f"'{written}' is taken from {near / name}"))
+            return near / name
+    raise missing
+
+
+def is_town(reference: str) -> bool:
+    """A road by its name in CARLA ("Town04"), not by its file."""
+    return bool(reference.strip()) and not any(sign in reference for sign in "./\\")
+
+
+def _phase(element: XmlElement, context: Context) -> TrafficSignalPhase:
+    shown = element.children("TrafficSignalState")
+    states = tuple((state.text("trafficSignalId"), state.text("state")) for state in shown)
+    return read_struct(TrafficSignalPhase, element, context, states=states)

@@ -1,0 +1,147 @@
+"""A scenario on its way to being written: its tree, which writers change, and what they need for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from lxml import etree
+
+from xosc_lateral.base.errors import FormatError, PlaybackError
+from xosc_lateral.files.openscenario.declarations import final, parameter_name
+from xosc_lateral.files.openscenario.element import at_node, child_of
+from xosc_lateral.files.openscenario.provenance import refuse_converted
+from xosc_lateral.files.openscenario.write import build
+from xosc_lateral.files.openscenario.write.target import STANDARD, TargetPlayer
+from xosc_lateral.files.openscenario.write.vertices import Vertices
+from xosc_lateral.files.xml import parse_xml, read_document
+from xosc_lateral.world.motion.nominal import NominalMotion
+from xosc_lateral.world.scenario import Action, Scenario
+from xosc_lateral.world.scenario.parameters import Scope
+from xosc_lateral.world.scenario.place import Unsupported
+
+
+class Draft:
+    """The scenario's tree, changed step by step into the output's.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        As read: its bytes are the starting point, so that comments, catalogs and vendor extensions survive.
+    motion : NominalMotion
+        The run.
+    target : TargetPlayer
+        Player and version that it is made for.
+
+    Raises
+    ------
+    FormatError
+        The scenario was converted before; a `PlaybackError` for a run of 0 s.
+    """
+
+    def __init__(self, scenario: Scenario, motion: NominalMotion, target: TargetPlayer = STANDARD) -> None:
+        self.scenario, self.motion, self.target = scenario, motion, target
+        self.root = parse_xml(scenario.source, scenario.path)
+        self._refuse()
+        self.version = target.version_for(scenario)
+        self.scope = global_scope(scenario)
+        self.vertices = Vertices(scenario.source)
+        self.removed: list[Unsupported] = []
+        """Controllers and actions that are no longer in the output although they are no motion, with reasons."""
+        self.notes: list[str] = []
+        """What else there is to say of the output, a line each."""
+
+    def _refuse(self) -> None:
+        """What was converted before, or is over before anything has moved."""
+        refuse_converted(self.root, self.scenario.path)
+        if self.motion.end_time <= 0.0:
+            trigger = self.scenario.storyboard.stop_trigger
+            place = self.scenario.storyboard.place if trigger is None else trigger.place
+            what = f"the scenario is over at 0 s ({self.motion.ended_by}): there is nothing to convert"
+            raise place.error(what, PlaybackError)
+
+    @property
+    def storyboard(self) -> etree._Element:
+        """In the tree."""
+        found = child_of(self.root, "Storyboard")
+        assert found is not None
+        return found
+
+    @property
+    def init_actions(self) -> etree._Element:
+        """What holds the actions of init, in the tree."""
+        init = child_of(self.storyboard, "Init")
+        assert init is not None
+        actions = child_of(init, "Actions")
+        return init if actions is None else actions
+
+    @cached_property
+    def untouched(self) -> etree._Element:
+        """The scenario as it is: where actions are copied from."""
+        return parse_xml(self.scenario.source, self.scenario.path)
+
+    def put_last(self, story: etree._Element) -> None:
+        """Add a story after all others."""
+        stop = child_of(self.storyboard, "StopTrigger")
+        place = len(self.storyboard) if stop is None else self.storyboard.index(stop)
+        build.insert_indented(self.storyboard, place, story)
+
+    def override_parameters(self) -> None:
+        """Write the values that parameters were played with, where they are not the file's own."""
+        declarations = self.root.findall("{*}ParameterDeclarations/{*}ParameterDeclaration")
+        own = Scope({parameter_name(item.get("name") or ""): item.get("value") or "" for item in declarations})
+        for item in declarations:
+            parameter = self.scenario.parameters.get(parameter_name(item.get("name") or ""))
+            if parameter is not None and own.value(parameter.name) != parameter.value:
+                item.set("value", parameter.value)
+
+
+def source_of(action: Action, scenario: Scenario, root: etree._Element) -> etree._Element:
+    """The element that an action was read from: in the scenario, whose unchanged parse `root` is, or in a catalog."""
+    if action.place.path == str(scenario.path):
+        return at_node(root, action.place.node)
+    return at_node(unchanged(Path(action.place.path), scenario), action.place.node)
+
+
+def unchanged(path: Path, scenario: Scenario) -> etree._Element:
+    """Root of a catalog that the scenario was read with; `FormatError` if it is another one now."""
+    document = read_document(path)
+    if scenario.input_hashes.get(path, document.sha256) != document.sha256:
+        raise FormatError("changed during the conversion", path=path)
+    return document.root
+
+
+def global_scope(scenario: Scenario) -> Scope:
+    """The values that the scenario was played with."""
+    return Scope({name: final(parameter.value) for name, parameter in scenario.parameters.items()})
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenScenario:
+    """What was written.
+
+    Parameters
+    ----------
+    path : Path
+    sha256 : str
+        Of the file's bytes.
+    content_sha256 : str
+        Of the file without its provenance.
+    converted : tuple of str
+        Entities that move otherwise than in the input.
+    removed : tuple of Unsupported
+        Controllers and actions that are no longer in the file although they are no motion, with reasons.
+    data : bytes
+        The file's bytes; empty if they were written.
+    notes : tuple of str
+        What the version or the player that it was made for lacks, a line each.
+    """
+
+    path: Path
+    sha256: str
+    content_sha256: str
+    converted: tuple[str, ...]
+    removed: tuple[Unsupported, ...]
+    data: bytes
+    notes: tuple[str, ...] = ()

@@ -1,0 +1,199 @@
+"""Where outputs go, and what may be written over.
+
+A path that ends in a slash, or is a folder, means a file of the usual name in it. The suffix decides the format. A file
+that this package did not write stays, unless the user says otherwise.
+"""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+import json
+import os
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from xosc_lateral.base.errors import FormatError
+from xosc_lateral.files.hashes import file_hash
+
+STDOUT = "-"
+"""Name of the standard output where an output is asked for."""
+
+
+LONGEST_NAME = 255
+"""Of a file, on all common systems. [byte]"""
+
+
+def file_name(name: str, what: str) -> str:
+    """A name that others gave, as the name of a file: the one gate to paths.
+
+    `what`: whose name it is, for the message. Raises `FormatError`: it could lead to another folder, or no file can
+    have it.
+    """
+    wrong = name in ("", ".", "..") or any(sign in "/\\" or sign < " " for sign in name)
+    if wrong or len(name.encode(errors="replace")) > LONGEST_NAME:
+        raise FormatError(f"{what} {name[:60]!r}: expected the name of a file, without a folder")
+    return name
+
+
+def path_below(folder: Path, name: str, what: str) -> Path:
+    """A path below a folder from names that others gave, with slashes. Raises `FormatError`: it leads elsewhere."""
+    return folder.joinpath(*(file_name(part, what) for part in name.split("/")))
+
+
+def output_file(output: str | Path, usual_name: str, suffixes: Sequence[str]) -> Path:
+    """Path of an output file, which in a folder has its usual name. Raises `FormatError` for another suffix.
+
+    `output`: as the user gave it. `suffixes`: formats that can be written, lower case with their dot.
+    """
+    path = output_folder(output) / file_name(usual_name, "name") if is_folder(output) else Path(output)
+    if not path.name.lower().endswith(tuple(suffixes)):
+        kind = path.suffix or "a file without suffix"
+        raise FormatError(f"can't write {kind}: expected a name ending in {' or '.join(suffixes)}", path=path)
+    return path
+
+
+def is_folder(output: str | Path) -> bool:
+    """Whether an output means a folder: it is one, or ends in a slash."""
+    text = str(output)
+    return text.endswith(("/", os.sep)) or Path(output).is_dir()
+
+
+def output_folder(output: str | Path) -> Path:
+    """Path of an output folder, which need not be there yet. Raises `FormatError` if a file is there."""
+    path = Path(output)
+    if path.is_file():
+        raise FormatError("is a file, expected a folder", path=path)
+    return path
+
+
+def claim(outputs: Iterable[Path | None], inputs: Iterable[Path] = (), *, force: bool = False) -> None:
+    """Refuse outputs that can't be meant, or that would replace somebody else's file, before any work is done.
+
+    Raises `FormatError`: see `refuse_outputs`; or a file is there that this package did not write, unless `force` is
+    given.
+    """
+    wanted = [output for output in outputs if output is not None]
+    refuse_outputs(wanted, inputs)
+    for output in wanted:
+        if not force and output.exists() and not is_own(output):
+            raise FormatError("exists and was not written by xosc-lateral; --force replaces it", path=output)
+
+
+def refuse_outputs(outputs: Iterable[Path | None], inputs: Iterable[Path] = ()) -> None:
+    """Refuse outputs that can't be meant, before any work is done and anything is written.
+
+    Raises `FormatError` if an output (None: not wanted) is a folder, an input (links resolved), or named twice, or its
+    folder can't be made or written to.
+    """
+    folders: dict[Path, str] = {}
+    taken = {real_path(path, folders): "is an input; choose another output" for path in inputs}
+    writable: set[Path] = set()
+    for output in outputs:
+        if output is None:
+            continue
+        if output.is_dir():
+            raise FormatError("is a folder, not a file to write to", path=output)
+        real = real_path(output, folders)
+        if (why := taken.get(real)) is not None:
+            raise FormatError(why, path=output)
+        taken[real] = "is named for two outputs"
+        if output.parent in writable:
+            continue
+        parent = next(folder for folder in output.absolute().parents if folder.exists())
+        if not parent.is_dir():
+            raise FormatError(f"can't be written: {parent} is a file, not a folder", path=output)
+        if not os.access(parent, os.W_OK | os.X_OK):
+            raise FormatError(f"can't be written: no permission to write to {parent}", path=output)
+        writable.add(output.parent)
+
+
+def real_path(path: Path, folders: dict[Path, str]) -> str:
+    """Path with links followed; `folders` remembers those of folders, for many files are in the same few."""
+    folder = path.parent
+    if path.is_symlink() or path.name in ("", ".."):
+        return os.path.realpath(path)
+    if folder not in folders:
+        folders[folder] = os.path.realpath(folder)
+    return f"{folders[folder].rstrip(os.sep)}{os.sep}{path.name}"
+
+
+# ---- whether a file is one that this package wrote: each format says so in its own place
+SIDECAR_SUFFIX = ".json"
+"""Beside ``out.csv`` lies ``out.csv.json``: a comment inside a CSV would stop most readers."""
+
+PACKAGE = b"xosc-lateral"
+
+_HEAD = 65_536
+"""The mark of a file of ours stands this near to its beginning. [byte]"""
+
+
+def is_own(path: Path) -> bool:
+    """Whether the provenance in a file, or beside it, says that this package wrote it. An empty file is nobody's."""
+    if path.stat().st_size == 0:
+        return True
+    name = path.name.lower()
+    for suffix, check in _CHECKS.items():
+        if name.endswith(suffix):
+            return check(path)
+    return _own_table(path)
+
+
+def template_mark(text: str) -> str:
+    """Comment at the end of a template's file that says whether it was edited since. `text` has none yet."""
+    return f"<!-- xosc-lateral template, sha256 {hashlib.sha256(text.rstrip().encode()).hexdigest()} -->\n"
+
+
+def _own_xml(path: Path) -> bool:
+    if b"xosc-lateral provenance: " in _head(path) or b"[xosc-lateral: " in _head(path):
+        return True
+    body, _, mark = path.read_bytes().rpartition(b"<!-- xosc-lateral template, sha256 ")
+    return bool(body) and mark.startswith(hashlib.sha256(body.rstrip()).hexdigest().encode())
+
+
+def _own_json(path: Path) -> bool:
+    try:
+        values = json.loads(path.read_bytes())
+    except (ValueError, RecursionError):
+        return False
+    if not isinstance(values, dict):
+        return False
+    provenance = values.get("provenance", {})
+    return bool(isinstance(provenance, dict) and provenance.get("package_version")) or _is_ours(values)
+
+
+def _own_table(path: Path) -> bool:
+    """A table is ours as long as it is what the file beside it says."""
+    sidecar = path.with_name(path.name + SIDECAR_SUFFIX)
+    try:
+        values = json.loads(sidecar.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return False
+    return isinstance(values, dict) and _is_ours(values) and values.get("sha256") == file_hash(path)
+
+
+def _own_parquet(path: Path) -> bool:
+    with path.open("rb") as file:
+        file.seek(max(0, path.stat().st_size - 4 * _HEAD))  # Parquet's metadata stand at its end
+        return PACKAGE in file.read() or b"xosc_lateral" in _head(path)
+
+
+# of other tables than Parquet the file beside them says so
+_CHECKS: dict[str, Callable[[Path], bool]] = {
+    ".xosc": _own_xml,
+    ".xodr": _own_xml,
+    ".json": _own_json,
+    ".parquet": _own_parquet,
+    ".html": lambda path: b'content="xosc-lateral ' in _head(path),
+    ".mcap": lambda path: PACKAGE in _head(path),  # its header and metadata are not compressed
+}
+
+
+def _is_ours(values: dict[str, Any]) -> bool:
+    return str(values.get("package", "")).startswith("xosc-lateral")
+
+
+def _head(path: Path) -> bytes:
+    with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as file:
+        return file.read(_HEAD)

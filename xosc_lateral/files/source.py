@@ -1,0 +1,214 @@
+"""The one gate through which input files are opened.
+
+Only regular files pass (a device or a fifo would be read for ever), only up to a size, and what is stated about a file
+afterwards is the hash of the bytes that were parsed: small files are read once into memory and hashed there, large ones
+are hashed through the same open file, which must not have changed meanwhile.
+
+Files that passed are remembered while `guarding_inputs` is on: the atomic writer replaces none of them, whatever name
+they go by.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import io
+import os
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+
+from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.limits import FILE_SIZE, PACKING_RATIO, UNPACKED_SIZE, UNPACKED_UNASKED, Limit
+
+IN_MEMORY = 64_000_000
+"""Files up to this are read once and parsed from memory. [byte]"""
+
+_KINDS = (
+    (stat.S_ISDIR, "a folder"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+    (stat.S_ISFIFO, "a fifo"),
+    (stat.S_ISSOCK, "a socket"),
+)
+
+REMEMBERED = 1000
+"""Hashes of so many files that were parsed are kept; a command states what it has just read."""
+
+_LAST_READ: dict[str, str] = {}  # path -> SHA-256 of the bytes that were parsed, the oldest first
+_GUARDED: ContextVar[set[tuple[int, int]] | None] = ContextVar("inputs", default=None)
+
+
+@dataclass(eq=False, slots=True)
+class Source:
+    """An input file that is open."""
+
+    path: Path
+    file: IO[bytes]  # at its beginning; readers may seek
+    size: int  # [byte]
+
+    def unpacked(self, size: int) -> None:
+        """Refuse a packed file that would take all memory; `size`: unpacked so far. [byte]
+
+        Raises `FormatError`: above `limits.UNPACKED_SIZE`, or above `UNPACKED_UNASKED` and `PACKING_RATIO`.
+        """
+        if size > UNPACKED_SIZE.bytes:
+            raise FormatError(UNPACKED_SIZE.refusal(size / 1e6), path=self.path)
+        ratio = size / max(self.size, 1)
+        if size > UNPACKED_UNASKED.bytes and ratio > PACKING_RATIO.value:
+            what = f"{PACKING_RATIO.refusal(ratio)} above {UNPACKED_UNASKED}; it looks like a decompression bomb"
+            raise FormatError(what, path=self.path)
+
+
+@dataclass(frozen=True, slots=True)
+class Content:
+    """A file's bytes, and their SHA-256."""
+
+    data: bytes
+    sha256: str
+
+
+def read_source(path: Path | str, limit: Limit = FILE_SIZE) -> Content:
+    """Bytes of an input file. Raises `FormatError`: see `open_source`."""
+    with open_source(path, limit) as source:
+        data = source.file.read(limit.bytes + 1)
+    if len(data) > limit.bytes:
+        raise FormatError(limit.refusal(len(data) / 1e6), path=path)
+    return Content(data, last_read(Path(path)))
+
+
+def read_toml(path: Path, otherwise: str) -> dict[str, Any]:
+    """What a file in TOML says. Raises `FormatError`, beginning with `otherwise`, if it is none; see `open_source`."""
+    import tomllib
+
+    try:
+        return tomllib.loads(read_source(path).data.decode("utf-8-sig"))
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise FormatError(f"{otherwise}: {error}", path=path) from error
+
+
+@contextmanager
+def open_source(path: Path | str, limit: Limit = FILE_SIZE) -> Iterator[Source]:
+    """Open an input file for reading.
+
+    Raises `FormatError`: It is not there, can't be read, is no regular file or larger than the limit, or changed while
+    it was being read.
+    """
+    path = Path(path)
+    with _opened(path) as file:
+        before = os.fstat(file.fileno())
+        if before.st_size > limit.bytes:
+            raise FormatError(limit.refusal(before.st_size / 1e6), path=path)
+        _guard(before)
+        if before.st_size <= IN_MEMORY:
+            data = file.read(IN_MEMORY + 1)
+            _remember(path, hashlib.sha256(data).hexdigest())
+            yield Source(path, io.BytesIO(data), len(data))
+            return
+        yield Source(path, file, before.st_size)
+        with os.fdopen(os.dup(file.fileno()), "rb") as again:
+            again.seek(0)
+            digest = hashlib.file_digest(again, "sha256").hexdigest()
+        after = os.fstat(file.fileno())
+        if (after.st_mtime_ns, after.st_size) != (before.st_mtime_ns, before.st_size):
+            raise FormatError("changed while it was being read; try again when it is complete", path=path)
+        _remember(path, digest)
+
+
+def last_read(path: Path) -> str:
+    """SHA-256 of the bytes that this process parsed under that path last; `KeyError` if it parsed none."""
+    return _LAST_READ[str(path)]
+
+
+def check_regular(path: Path) -> os.stat_result:
+    """State of a regular file. Raises `FormatError`: It is not there, or something else."""
+    try:
+        state = path.stat()
+    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
+        raise _unreadable(error, path) from error
+    if not stat.S_ISREG(state.st_mode):
+        what = next((name for is_kind, name in _KINDS if is_kind(state.st_mode)), "something else")
+        raise FormatError(f"is {what}, not a file", path=path)
+    return state
+
+
+def state_key(state: os.stat_result) -> tuple[int, ...]:
+    """Changes whenever a file is replaced or written to, also by tools that put its time of change back."""
+    return state.st_ino, state.st_ctime_ns, state.st_mtime_ns, state.st_size
+
+
+@contextmanager
+def guarding_inputs() -> Iterator[None]:
+    """While the block runs, no file that was opened as an input is replaced by an output."""
+    token = _GUARDED.set(set())
+    try:
+        yield
+    finally:
+        _GUARDED.reset(token)
+
+
+def guard_input(path: Path) -> None:
+    """Count a file as an input that was read earlier, from a cache, say; what is not there needs no guard."""
+    if _GUARDED.get() is not None and path.exists():
+        _guard(path.stat())
+
+
+def edit_in_place(path: Path) -> None:
+    """Take a file from the guarded ones: the user asked for a change of this very file."""
+    guarded = _GUARDED.get()
+    if guarded is not None:
+        state = path.stat()
+        guarded.discard((state.st_dev, state.st_ino))
+
+
+def refuse_guarded(target: Path) -> None:
+    """Refuse to replace an input; links of both kinds are seen through.
+
+    Raises `FormatError`: The target is a file that was opened as an input.
+    """
+    guarded = _GUARDED.get()
+    if guarded and target.exists():
+        state = target.stat()
+        if (state.st_dev, state.st_ino) in guarded:
+            raise FormatError("is an input; choose another output", path=target)
+
+
+def _remember(path: Path, digest: str) -> None:
+    _LAST_READ.pop(str(path), None)
+    _LAST_READ[str(path)] = digest
+    if len(_LAST_READ) > REMEMBERED:
+        _LAST_READ.pop(next(iter(_LAST_READ)), None)
+
+
+def _guard(state: os.stat_result) -> None:
+    guarded = _GUARDED.get()
+    if guarded is not None:
+        guarded.add((state.st_dev, state.st_ino))
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[IO[bytes]]:
+    check_regular(path)
+    try:
+        # Non-blocking: between the check and here it may have become a fifo that nobody writes to.
+        file = os.fdopen(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)), "rb")
+    except OSError as error:
+        raise _unreadable(error, path) from error
+    with file:
+        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            raise FormatError("is not a file", path=path)
+        try:
+            yield file
+        except OSError as error:
+            if error.errno not in (errno.EIO, errno.ESTALE, errno.ENOTCONN, errno.ENODEV):
+                raise
+            raise _unreadable(error, path) from error
+
+
+def _unreadable(error: OSError | ValueError, path: Path) -> FormatError:
+    what = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+    return FormatError(f"{what[:1].lower()}{what[1:]}", path=path)

@@ -1,0 +1,135 @@
+"""A shipped template: its settings, and what they change in the scenario and the road of its name.
+
+The scenario lies as a plain file in the folder ``templates``. Its declared parameters are settings of the same name;
+starts, times and speeds that follow from several settings, the road, the side of traffic and the weather are made here.
+"""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from xosc_lateral.base.shipped import shipped_folder
+from xosc_lateral.files.templates.motorway import Bend, Motorway, Straight, document
+from xosc_lateral.files.templates.parameter import Choice, Number, Parameter, Settings
+
+COMMON: tuple[Parameter, ...] = (
+    Choice("traffic", "right", ("right", "left"), "Side of the road that traffic keeps to."),
+    Choice("version", "1.2", ("1.2", "1.3"), "Version of OpenSCENARIO that is written."),
+    Number("lane_width", 3.75, 3.25, 4.25, "m", "Width of a driving lane."),
+    Number("wind_speed", 3.0, 0.0, 30.0, "m/s", "Mean speed of the wind."),
+    Number("wind_direction", 90.0, 0.0, 360.0, "deg", "Where it blows to at the road's start: 90 left, 270 right."),
+    Number("rain", 0.0, 0.0, 50.0, "mm/h", "Rain; the road is wet from 0.1 on."),
+    Number("time_of_day", 10.0, 0.0, 23.99, "h", "Time of day; the sun follows it."),
+)
+"""Settings of all templates."""
+
+_WET_GRIP = 0.7  # friction on a wet road over that on a dry one [-]
+_NOON_LIGHT = 100_000.0  # illuminance under a clear sky at noon [lx]
+_NIGHT_LIGHT = 1.0  # [lx]
+
+
+def motorway(settings: Settings, *alignment: Straight | Bend, reach: float, lanes: int = 2) -> Motorway:
+    """A road that goes on straight behind its bends until it is `reach` [m] long, by 100 m at least."""
+    rest = Straight(max(100.0, reach - sum(part.length for part in alignment)))
+    left_hand = settings.text("traffic") == "left"
+    return Motorway((*alignment, rest), lanes, settings.number("lane_width"), left_hand)
+
+
+@dataclass(frozen=True, slots=True)
+class Plot:
+    """What settings make of a template, by the names of its vehicles and events."""
+
+    motorway: Motorway
+    starts: Mapping[str, float] = field(default_factory=dict)  # vehicle -> s at the start [m]
+    speeds: Mapping[str, float] = field(default_factory=dict)  # vehicle or event -> target speed [m/s]
+    times: Mapping[str, float] = field(default_factory=dict)  # event -> time before which it does not begin [s]
+    distances: Mapping[str, float] = field(default_factory=dict)  # event -> distance below which it begins [m]
+
+
+@dataclass(frozen=True, slots=True)
+class Template:
+    """A maneuver-based scenario with its road, parameterised."""
+
+    name: str  # as on the command line, and of the files
+    summary: str  # one line
+    own_parameters: tuple[Parameter, ...]  # beside the common ones
+    plot: Callable[[Settings], Plot]  # settings to a `Plot`
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """All parameters, its own ones first."""
+        return self.own_parameters + COMMON
+
+    def files(self, chosen: Mapping[str, str] | None = None) -> dict[str, str]:
+        """File name -> text of the scenario and its road; same settings, same bytes.
+
+        Raises `XoscLateralError` for an unknown parameter or a value out of range.
+
+        `chosen`: parameters that differ from their defaults, as text.
+        """
+        settings = Settings(self.parameters, chosen or {})
+        plot = self.plot(settings)
+        scenario = (shipped_folder("templates") / f"{self.name}.xosc").read_text(encoding="utf-8")
+        return {
+            f"{self.name}.xosc": _filled(ET.fromstring(scenario), plot, settings),
+            f"{self.name}.xodr": plot.motorway.to_xml(self.name),
+        }
+
+
+def _filled(root: ET.Element, plot: Plot, settings: Settings) -> str:
+    """The scenario with what the settings say."""
+    _set(root, "FileHeader", revMinor=settings.text("version").split(".")[1])
+    for declared in root.iterfind("ParameterDeclarations/ParameterDeclaration"):
+        declared.set("value", f"{settings.number(declared.get('name', '')):g}")
+    if plot.motorway.left_hand:
+        for tag, attribute in (("LanePosition", "laneId"), ("AbsoluteTargetLane", "value")):
+            for lane in root.iter(tag):
+                lane.set(attribute, str(-int(lane.get(attribute, ""))))
+    _set_surroundings(root, settings)
+    vehicle, event = ".//Private[@entityRef='{}']//", ".//Event[@name='{}']//"
+    for name, s in plot.starts.items():
+        _set(root, vehicle.format(name) + "LanePosition", s=s)
+    for name, speed in plot.speeds.items():
+        kind = vehicle if root.find(vehicle.format(name)) is not None else event
+        _set(root, kind.format(name) + "AbsoluteTargetSpeed", value=speed)
+    for name, distance in plot.distances.items():
+        _set(root, event.format(name) + "RelativeDistanceCondition", value=distance)
+    times = {f"{event.format(name)}StartTrigger//": ("Start", round(time, 3)) for name, time in plot.times.items()}
+    for where, (word, time) in {**times, "Storyboard/StopTrigger//": ("Stop", settings.number("duration"))}.items():
+        _set(root, f"{where}Condition", name=f"{word}At{time}s")
+        _set(root, f"{where}SimulationTimeCondition", value=time)
+    return document(root)
+
+
+def _set(root: ET.Element, path: str, **values: float | str) -> None:
+    """Attributes of the first element at a path."""
+    element = root.find(path)
+    assert element is not None, f"the shipped scenario has {path}"
+    for name, value in values.items():
+        element.set(name, str(value))
+
+
+def _set_surroundings(root: ET.Element, settings: Settings) -> None:
+    """Weather, time of day and grip.
+
+    The sun is that of a midsummer day in middle latitudes: up at 5 h, at noon 60 degrees high, down at 19 h (rounded).
+    Azimuth as the standard counts it: 0 north, pi/2 east, pi south; 15 degrees an hour. The wind's direction is where
+    it blows to, from world x counter-clockwise; the templates' roads begin towards x.
+    """
+    rain, hour = settings.number("rain"), settings.number("time_of_day")
+    wet, minutes = rain >= 0.1, round(60.0 * hour)
+    _set(root, ".//TimeOfDay", dateTime=f"2024-06-21T{minutes // 60:02}:{minutes % 60:02}:00")
+    _set(root, ".//Weather", fractionalCloudCover="eightOktas" if wet else "twoOktas")
+    height = math.radians(60.0) * math.sin(math.pi * (hour - 5.0) / 14.0)
+    light = _NIGHT_LIGHT + (0.2 if wet else 1.0) * _NOON_LIGHT * max(0.0, math.sin(height))
+    azimuth = (math.pi + math.radians(15.0) * (hour - 12.0)) % (2.0 * math.pi)
+    _set(root, ".//Sun", azimuth=round(azimuth, 6), illuminance=round(light, 1), elevation=round(height, 6))
+    _set(root, ".//Fog", visualRange=5000 if wet else 20000)
+    kind = "rain" if rain > 0.0 else "dry"
+    _set(root, ".//Precipitation", precipitationType=kind, precipitationIntensity=rain)
+    direction = math.radians(settings.number("wind_direction")) % (2.0 * math.pi)
+    _set(root, ".//Wind", direction=round(direction, 6), speed=settings.number("wind_speed"))
+    _set(root, ".//RoadCondition", frictionScaleFactor=_WET_GRIP if wet else 1.0)

@@ -1,1 +1,0 @@
-"""The driver as a part of somebody else's running simulation."""

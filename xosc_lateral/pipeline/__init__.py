@@ -1,1 +1,0 @@
-"""From files to files: one scenario, or a whole database of them."""

@@ -1,1 +1,0 @@
-"""A recording's vehicles as maneuvers: speeds, lane changes, encounters, drivers. Numbers only, no files."""

@@ -1,0 +1,1 @@
+"""A room for every verb: its call, its work, its page."""

@@ -1,0 +1,1 @@
+"""Many conversions, unattended: jobs, workers, journal, manifest, verification."""

@@ -1,0 +1,305 @@
+"""Convert many scenarios: parallel, resumable, one bad scenario costing one row."""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from functools import partial
+from pathlib import Path
+
+from xosc_lateral.base.errors import FormatError, XoscLateralError
+from xosc_lateral.base.version import BEHAVIOUR, __version__
+from xosc_lateral.files.hashes import file_hash, file_state
+from xosc_lateral.workflows.batch.guard import JobLimitError, JobLimits, within_limits
+from xosc_lateral.workflows.batch.jobs import Batch, Job
+from xosc_lateral.workflows.batch.journal import Journal, folder_lock
+from xosc_lateral.workflows.batch.manifest import ManifestRow, Timing
+from xosc_lateral.workflows.batch.workers import WorkerDiedError, open_pool, run_tasks
+
+Converter = Callable[[Job], ManifestRow]
+"""Makes a job's output and describes it; raises an `XoscLateralError` when the input is at fault."""
+
+STATE = ".xosc-lateral"
+"""Folder inside the output folder, there only while a batch is unfinished: journal and lock."""
+
+_HALF_WRITTEN = re.compile(r"\..+\.[0-9a-z_]{8}\.tmp(\.\w+)?")
+"""Names that files have while they are being written (`formats.atomic`)."""
+
+_STOPPING = frozenset(
+    {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EMFILE, errno.ENFILE, errno.EIO, errno.ESTALE, errno.ENOTCONN}
+)
+"""Errors of the system that the next scenario would meet as well."""
+
+_KEPT = "what is finished is kept, run it again to go on"
+
+
+class JobState(StrEnum):
+    """What became of a job."""
+
+    WRITTEN = "written"
+    UP_TO_DATE = "up to date"
+    KEPT = "kept"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True, slots=True)
+class JobOutcome:
+    """What became of a job.
+
+    `row`: as in the manifest; `seconds`: the conversion took. [s]; `why`: why an output that was there is made anew, or
+    would be; empty: there was none.
+    """
+
+    state: JobState
+    row: ManifestRow
+    seconds: float
+    why: str = ""
+
+
+PROGRAM, SETTINGS, INPUTS = "another version made it", "settings differ", "inputs changed"
+CHANGES = frozenset({PROGRAM, SETTINGS, INPUTS})
+"""Why an output that is as it was written is not what a conversion would write now."""
+
+
+class BatchStoppedError(XoscLateralError):
+    """The run can't go on (disk full, no permission). What is finished is kept; run it again to go on."""
+
+
+def convert_many(
+    batch: Batch,
+    *,
+    workers: int = 1,
+    cluster: str | None = None,
+    again: bool = False,
+    keep_old: bool = False,
+    converter: Converter | None = None,
+    limits: JobLimits | None = None,
+    notify: Callable[[str], None] | None = None,
+) -> Iterator[JobOutcome]:
+    """Convert a batch and yield what became of each job as it comes: first what is up to date, then in any order.
+
+    The outputs, and the manifest written at the end, do not depend on the number of workers, on the order, or on how
+    often the run was interrupted. To stop early, close the iterator: what is finished is kept.
+
+    Parameters
+    ----------
+    batch : Batch
+        From `plan_batch`.
+    workers : int
+        Processes on this machine; -1: one per core; 0: this process itself, which a scenario can then take down.
+    cluster : str, optional
+        Address of a dask.distributed scheduler: its workers are used instead.
+    again : bool
+        Convert also what is up to date.
+    keep_old : bool
+        Leave outputs as they are whose inputs, settings or program have changed since.
+    converter : callable, optional
+        In place of `convert_job`; has to be picklable.
+    limits : JobLimits, optional
+        What one job may take.
+    notify : callable, optional
+        Gets a line for what a user has to know besides the outcomes (a manifest that can't be read, say).
+
+    Raises
+    ------
+    FolderInUseError
+        Another run writes into the folder.
+    BatchStoppedError
+        The folder can't be written, the disk is full. Everything finished so far is kept.
+    ClusterError
+        The cluster can't be reached, is gone, or its workers have another version of this package.
+
+    Examples
+    --------
+    >>> batch = plan_batch(["scenarios/"], "enriched/", variants=3)
+    >>> failed = [outcome.row for outcome in convert_many(batch, workers=-1) if outcome.row.error]
+    """
+    if converter is None:
+        from xosc_lateral.workflows.batch.convert_job import convert_job
+
+        converter = convert_job
+    try:
+        yield from _outcomes(
+            batch, partial(_run, converter, limits or JobLimits()), workers, cluster, again, keep_old, notify or _silent
+        )
+    except OSError as error:
+        where = error.filename or batch.folder
+        raise BatchStoppedError(f"{where}: {error.strerror or error}; {_KEPT}") from error
+
+
+def _silent(_: str) -> None:
+    pass
+
+
+def _outcomes(
+    batch: Batch,
+    work: Callable[[Job], _Reply],
+    workers: int,
+    cluster: str | None,
+    again: bool,
+    keep_old: bool,
+    notify: Callable[[str], None],
+) -> Iterator[JobOutcome]:
+    state = batch.folder / STATE
+    new = [folder for folder in (batch.folder, *batch.folder.parents) if not folder.exists()]
+    try:
+        yield from _locked(batch, work, workers, cluster, again, keep_old, notify, state)
+    finally:
+        _remove_empty([state, *new])
+
+
+def _locked(
+    batch: Batch,
+    work: Callable[[Job], _Reply],
+    workers: int,
+    cluster: str | None,
+    again: bool,
+    keep_old: bool,
+    notify: Callable[[str], None],
+    state: Path,
+) -> Iterator[JobOutcome]:
+    with folder_lock(state / "lock"):
+        _sweep(batch.folder)
+        with Journal(batch.folder, state / "journal.jsonl", notify) as journal:
+            todo, anew = [], {}
+            failed: set[Path] = set()
+            for job in batch.jobs:
+                former = journal.row(job.name) if job.name in journal else None
+                why = _why_anew(job, former, "" if former is None else journal.timing(job.name).state)
+                if former is not None and not again and (not why or (keep_old and why in CHANGES)):
+                    row = replace(former, error="", stale=bool(why))
+                    if row != former:
+                        journal.add(row, journal.timing(job.name))
+                    yield JobOutcome(JobState.KEPT if why else JobState.UP_TO_DATE, row, 0.0, why)
+                else:
+                    todo.append(job)
+                    anew[job.name] = why
+            if todo:
+                with open_pool(min(workers, len(todo)), cluster) as pool:
+                    for job, reply in run_tasks(pool, work, todo):
+                        outcome = _noted(job, reply, journal, anew[job.name])
+                        failed |= {job.output.parent} if outcome.row.error else set()
+                        yield outcome
+                _sweep(batch.folder)
+            _forget_missing(batch, journal)
+            journal.finish()
+            _remove_empty(
+                place for folder in failed for place in (folder, *folder.parents) if batch.folder in place.parents
+            )
+
+
+def _remove_empty(folders: Iterable[Path]) -> None:
+    """Those with nothing in them, inner ones first; a run that has just begun may have its lock there."""
+    for folder in folders:
+        with suppress(OSError):
+            folder.rmdir()
+
+
+@dataclass(frozen=True, slots=True)
+class _Reply:
+    """What comes back from a worker."""
+
+    row: ManifestRow
+    seconds: float
+    stop: str = ""
+    state: str = ""
+    """`file_state` of the output."""
+
+
+def _run(converter: Converter, limits: JobLimits, job: Job) -> _Reply:
+    """One job, in a worker. Whatever goes wrong with this one scenario ends up in its row."""
+    start = time.perf_counter()
+    if job.package_version != __version__:  # a worker of a cluster that came later
+        what = f"a worker has version {__version__}, the run was planned by {job.package_version}"
+        return _Reply(job.row(what), 0.0, what)
+    try:
+        row = job.row(job.error) if job.error else within_limits(converter, job, limits)
+    except JobLimitError as error:
+        row = job.row(f"{job.source}: {error}")
+    except OSError as error:
+        if error.errno in _STOPPING:
+            return _Reply(job.row(str(error)), 0.0, f"{job.output}: {error.strerror or error}")
+        row = job.row(_one_line(error))
+    except XoscLateralError as error:
+        row = job.row(_one_line(error))
+    except Exception as error:  # a bug of ours must not cost the other ten thousand; the row says that it is one
+        row = job.row(f"{job.source}: internal error: {type(error).__name__}: {_one_line(error)}{_origin(error)}")
+    written = not row.error and job.page is None  # while a page is written, much can happen to an output
+    return _Reply(row, time.perf_counter() - start, state=file_state(job.output) if written else "")
+
+
+def _noted(job: Job, reply: _Reply | WorkerDiedError, journal: Journal, why: str) -> JobOutcome:
+    if isinstance(reply, WorkerDiedError):
+        reply = _Reply(job.row(f"{job.source}: {reply}"), 0.0)
+    if reply.stop:
+        raise BatchStoppedError(f"{reply.stop}; {_KEPT}")
+    row = reply.row
+    if row.error and job.name in journal:
+        row = _kept(job, journal.row(job.name), row)
+    journal.add(row, Timing(reply.seconds, reply.state))
+    return JobOutcome(JobState.FAILED if row.error else JobState.WRITTEN, row, reply.seconds, why)
+
+
+def _kept(job: Job, former: ManifestRow, failed: ManifestRow) -> ManifestRow:
+    """The row of an output of a former run that can't be made anew: what it was made of, and why not now."""
+    there = bool(former.output_sha256) and _are({job.output: former.output_sha256})
+    return replace(former, error=failed.error, stale=True) if there else failed
+
+
+def _why_anew(job: Job, row: ManifestRow | None, state: str) -> str:
+    """Why an output is not what a conversion would write now; empty if it is, or if there is no output.
+
+    An output in the same `file_state` as when it was written is not read: `verify` does that.
+    """
+    if job.error or row is None or not row.output_sha256:
+        return "" if row is None else "could not be made"
+    if not (state and state == file_state(job.output)) and not _are({job.output: row.output_sha256}):
+        return "changed or gone"
+    if job.page is not None and not job.page.is_file():
+        return "its page is gone"
+    if row.behaviour != BEHAVIOUR:
+        return PROGRAM
+    if row.settings != job.fingerprint or row.scenario != job.scenario:
+        return SETTINGS
+    inputs = {Path(os.path.normpath(job.base / name)): value for name, value in row.inputs.items()}
+    return "" if _are(inputs) else INPUTS
+
+
+def _are(files: Mapping[Path, str]) -> bool:
+    """Whether files are there and have these hashes."""
+    try:
+        return all(file_hash(path) == value for path, value in files.items())
+    except (OSError, FormatError):
+        return False
+
+
+def _forget_missing(batch: Batch, journal: Journal) -> None:
+    """Rows of former runs stay as long as their output does; those of this run stay."""
+    planned = {job.name for job in batch.jobs}
+    for output in journal:
+        if output not in planned and not (batch.folder / output).is_file():
+            journal.forget(output)
+
+
+def _sweep(folder: Path) -> None:
+    """Remove what a killed run, or a killed worker of this one, was just writing."""
+    for path in folder.rglob(".*.tmp*"):
+        if _HALF_WRITTEN.fullmatch(path.name):
+            path.unlink(missing_ok=True)
+
+
+def _one_line(error: BaseException) -> str:
+    return " ".join(str(error).split())
+
+
+def _origin(error: BaseException) -> str:
+    trace = error.__traceback__
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    return "" if trace is None else f" ({Path(trace.tb_frame.f_code.co_filename).name}:{trace.tb_lineno})"

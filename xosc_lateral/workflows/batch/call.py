@@ -1,0 +1,228 @@
+"""`convert_many`: folders, globs, tables and frames of scenarios; parallel, resumable."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, Unpack
+
+from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.limits import JOB_MEMORY, JOB_TIMEOUT
+from xosc_lateral.files.output_paths import claim, output_folder
+from xosc_lateral.workflows.batch.batch import JobOutcome, JobState
+from xosc_lateral.workflows.batch.batch import convert_many as outcomes_of
+from xosc_lateral.workflows.batch.convert_job import write_batch_index
+from xosc_lateral.workflows.batch.guard import JobLimits
+from xosc_lateral.workflows.batch.jobs import Batch, plan_batch
+from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, read_manifest
+from xosc_lateral.workflows.batch.progress import Display, Summary, follow
+from xosc_lateral.workflows.batch.request import frame_requests
+from xosc_lateral.workflows.conversion.options import spelled_out
+from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
+from xosc_lateral.workflows.result import PathLike, Result
+
+if TYPE_CHECKING:
+    ScenariosLike = PathLike | pd.DataFrame | Sequence[PathLike]
+
+
+@spelled_out(ConvertSettings)
+def convert_many(
+    scenarios: ScenariosLike,
+    output: PathLike,
+    *,
+    variants: int = 1,
+    report: PathLike | None = None,
+    workers: int = 1,
+    cluster: str | None = None,
+    job_timeout: float = JOB_TIMEOUT.value,
+    job_memory: float = JOB_MEMORY.value,
+    keep_old: bool = False,
+    force: bool = False,
+    show: Literal["auto", "quiet", "json", "nothing"] = "nothing",
+    on_outcome: Callable[[Mapping[str, Any]], None] | None = None,
+    **options: Unpack[ConvertKeywords],
+) -> BatchResult:
+    """Convert many scenarios into a folder; what is up to date there already is left alone.
+
+    Parameters
+    ----------
+    scenarios : str, Path, DataFrame, or sequence of paths
+        A file, a folder (searched to the bottom), a glob, a table (CSV, Parquet) or frame with a column `scenario` and
+        if wanted `variants`, `profile:ENTITY`, `parameter:NAME` and names of options; or several of them.
+    output : str or Path
+        Folder; it mirrors the inputs, and holds `manifest.parquet` at the end.
+    variants : int
+        Outputs per scenario, each with offsets of its own.
+    report : str or Path, optional
+        Folder for a page per output, and an ``index.html`` that lists what needs attention first.
+    workers : int
+        Processes; -1: one per core.
+    cluster : str, optional
+        Address of a dask.distributed scheduler to work on.
+    job_timeout, job_memory : float
+        What one scenario may take; one that takes more fails. [s], [MB]
+    keep_old : bool
+        Leave outputs as they are whose inputs, settings or program have changed since; they count as stale.
+    force : bool
+        Replace files that this package did not write.
+    show : {"auto", "quiet", "json", "nothing"}
+        What is said on standard error meanwhile.
+    on_outcome : callable, optional
+        Called with each output's row of the manifest as it comes, with `state` and `seconds`.
+    options
+        `ConvertSettings`, for all of them.
+
+    Raises
+    ------
+    FormatError
+        An input that is not there or holds no scenario; two inputs with one output.
+    """
+    settings = replace(ConvertSettings.of(**options), names_may_lack=True)
+    if isinstance(scenarios, str | Path):
+        inputs: list[Any] = [scenarios]
+    elif isinstance(scenarios, Sequence):
+        inputs = list(scenarios)
+    else:
+        inputs = list(frame_requests(scenarios, settings, variants=variants))
+    batch = plan_batch(inputs, output_folder(output), settings, variants=variants, report=report)
+    if not len(batch):
+        raise FormatError(f"no scenario to convert{_left_out(batch)}", path=", ".join(map(str, inputs[:3])) or output)
+    _refuse_unknown_names(batch)
+    # A folder in an output's place is that output's failure alone.
+    claim((job.output for job in batch.jobs if not job.output.is_dir()), force=force)
+    limits = JobLimits(job_timeout, job_memory)
+    outcomes = outcomes_of(
+        batch, workers=workers, cluster=cluster, keep_old=keep_old, limits=limits, notify=_notifier(show)
+    )
+    became: dict[str, tuple[JobState, float]] = {}
+    summary = follow(_noted(outcomes, became, on_outcome), len(batch), Display(show))
+    index = None if report is None else write_batch_index(batch, Path(report))
+    return BatchResult(batch, summary, became, index)
+
+
+def _refuse_unknown_names(batch: Batch) -> None:
+    """An entity may be missing in some scenarios, but not in all."""
+    asked = dict[tuple[str, str], bool]()
+    texts = dict[Path, str]()
+    for job in batch.jobs:
+        given = job.settings
+        for option, names in (("--entity", given.entity), ("--only", given.only), ("--ego", given.ego)):
+            for name in names or ():
+                if not asked.get((option, name)):
+                    text = texts.setdefault(job.source, job.source.read_text("utf-8", errors="replace"))
+                    # A name may stand in an escaped form or in a parameter: then the conversion looks at it.
+                    asked[option, name] = f'"{name}"' in text or f"'{name}'" in text or not name.isidentifier()
+    for (option, name), found in asked.items():
+        if not found:
+            raise FormatError(f"{option} {name!r}: no scenario has such an entity", path=batch.base)
+
+
+def _noted(
+    outcomes: Iterator[JobOutcome],
+    became: dict[str, tuple[JobState, float]],
+    report_row: Callable[[Mapping[str, Any]], None] | None,
+) -> Iterator[JobOutcome]:
+    for outcome in outcomes:
+        became[outcome.row.output] = outcome.state, outcome.seconds
+        if report_row is not None:
+            report_row(_row(outcome.state, outcome.seconds, outcome.row))
+        yield outcome
+
+
+def _row(state: JobState, seconds: float, row: ManifestRow) -> dict[str, Any]:
+    return {"state": state.value, "seconds": round(seconds, 4), **row.to_dict()}
+
+
+def _notifier(show: str) -> Callable[[str], None] | None:
+    import sys
+
+    return None if show == "nothing" else lambda line: print(f"xosc-lateral: {line}", file=sys.stderr, flush=True)
+
+
+class BatchResult(Result):
+    """What became of a batch; of single outputs, `to_frame` and `to_dict` read it from the manifest."""
+
+    __slots__ = ("_batch", "_became", "_summary", "report")
+
+    def __init__(
+        self, batch: Batch, summary: Summary, became: dict[str, tuple[JobState, float]], report: Path | None
+    ) -> None:
+        self._batch, self._summary, self._became = batch, summary, became
+        self.report = report
+        """Index of the pages, if there are any."""
+
+    @property
+    def folder(self) -> Path:
+        """Of the outputs."""
+        return self._batch.folder
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user has to know of the whole: a shipped profile that one of their own hides, say."""
+        return self._batch.notes
+
+    @property
+    def failed(self) -> int:
+        """Scenarios that could not be converted; `to_frame` says why, in its column `error`."""
+        return self._summary.failed
+
+    @property
+    def with_warnings(self) -> int:
+        """Outputs with at least one warning."""
+        return self._summary.with_warnings
+
+    @property
+    def nobody_enriched(self) -> int:
+        """Outputs in which no entity got offsets."""
+        return sum(self._summary.nobody_enriched.values())
+
+    @property
+    def cut_off(self) -> tuple[str, ...]:
+        """Outputs whose runs end at the time limit, though their scenarios go on."""
+        return tuple(self._summary.cut_off)
+
+    def headline(self) -> str:
+        """One line."""
+        return f"{self.folder}: {self._summary.text()}"
+
+    def __str__(self) -> str:
+        report = [] if self.report is None else [f"report: {self.report}"]
+        lines = [self.headline() + _left_out(self._batch), *self.notes, *self._summary.remarks(), *report]
+        return "\n".join(lines)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per output: the manifest's columns, with `state` and `seconds`."""
+        return pd.DataFrame(self._rows())
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them."""
+        return {**self.totals(), "outputs": list(self._rows())}
+
+    def _rows(self) -> Iterator[dict[str, Any]]:
+        """Of this batch's outputs, sorted."""
+        manifest = self.folder / MANIFEST
+        if not manifest.is_file():
+            raise FormatError("is gone, so what became of single outputs is not known", path=manifest)
+        for row in read_manifest(manifest):
+            if row.output in self._became:
+                yield _row(*self._became[row.output], row)
+
+    def totals(self) -> dict[str, Any]:
+        """Plain values of the whole batch: the last line that ``--json`` prints."""
+        return {
+            "folder": str(self.folder),
+            "left_out": len(self._batch.left_out),
+            "notes": list(self.notes),
+            **self._summary.to_dict(),
+            **({} if self.report is None else {"report": str(self.report)}),
+        }
+
+
+def _left_out(batch: Batch) -> str:
+    from collections import Counter
+
+    kinds = Counter(kind.value for _, kind in batch.left_out)
+    listed = ", ".join(f"{count} {kind}{'s' if count > 1 else ''}" for kind, count in kinds.items())
+    return f"; left out: {listed}" if listed else ""

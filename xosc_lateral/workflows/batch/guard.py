@@ -1,0 +1,142 @@
+"""One job within limits of time and memory: what exceeds them ends as an error of that job.
+
+Time is watched from a thread beside the job, which raises an exception inside it; a job that does not even come to
+that (stuck in a library's code) takes its worker process with it, and the batch counts that as its row. Memory is
+limited by the system (`RLIMIT_AS`), so that one call that asks for too much fails at once, and watched as well.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TypeVar
+
+from xosc_lateral.base.errors import XoscLateralError
+from xosc_lateral.base.limits import JOB_MEMORY, JOB_TIMEOUT
+from xosc_lateral.base.rows import status_bytes
+
+
+@contextmanager
+def address_space(megabytes: float) -> Iterator[None]:
+    """Let this process map so much more memory; without effect where the system has no such limit, or in a thread."""
+    size = status_bytes(0)
+    if size == 0 or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    allowed = size + int(1e6 * megabytes)
+    if hard != resource.RLIM_INFINITY:
+        allowed = min(allowed, hard)
+    resource.setrlimit(resource.RLIMIT_AS, (allowed, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+
+
+Task = TypeVar("Task")
+
+Result = TypeVar("Result")
+
+POLL = 0.2
+"""How often time and memory are looked at. [s]"""
+
+GRACE = 30.0
+"""A job that has not ended so long after it was told to takes its worker process with it. [s]"""
+
+_worker_may_die = False
+
+
+class JobLimitError(XoscLateralError):
+    """A job took more time or memory than it may."""
+
+
+class _Interrupted(BaseException):
+    """Raised inside the job; no `except Exception` on the way holds it up."""
+
+
+@dataclass(frozen=True, slots=True)
+class JobLimits:
+    """What one job may take.
+
+    `timeout`: [s]; `memory`: on top of what the process has when the job begins. [MB]
+    """
+
+    timeout: float = JOB_TIMEOUT.value
+    memory: float = JOB_MEMORY.value
+
+
+def let_worker_die() -> None:
+    """This process is a worker that others replace: a job that does not end may take it down."""
+    global _worker_may_die
+    _worker_may_die = True
+
+
+def within_limits(work: Callable[[Task], Result], task: Task, limits: JobLimits) -> Result:
+    """Run ``work(task)``.
+
+    Raises `JobLimitError`: it took too long, or too much memory.
+    """
+    watch = _Watch(limits)
+    try:
+        with address_space(limits.memory), watch:
+            return work(task)
+    except MemoryError as error:
+        raise JobLimitError(_too_much(limits)) from error
+    except _Interrupted as error:
+        raise JobLimitError(watch.why) from error
+
+
+class _Watch:
+    """Interrupts the thread that it is entered in; outside it, no interruption can come any more."""
+
+    def __init__(self, limits: JobLimits) -> None:
+        self._limits, self.why = limits, ""
+        self._ended, self._lock = threading.Event(), threading.Lock()
+        self._job = threading.get_ident()
+        self._begin, self._resident = time.monotonic(), status_bytes(1)
+
+    def __enter__(self) -> None:
+        threading.Thread(target=self._run, daemon=True, name="watch job").start()
+
+    def __exit__(self, *_: object) -> None:
+        try:
+            with self._lock:
+                self._ended.set()
+        except _Interrupted:  # told to end in the very moment in which it ended
+            self._ended.set()
+            raise
+        if self.why:  # raised already or about to be: here, and not somewhere after us
+            time.sleep(POLL)
+
+    def _run(self) -> None:
+        while not self._ended.wait(POLL):
+            why = self._exceeded()
+            if not why:
+                continue
+            with self._lock:
+                if self._ended.is_set():
+                    return
+                self.why = why
+                ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(self._job), ctypes.py_object(_Interrupted))
+            if not self._ended.wait(GRACE) and _worker_may_die:
+                os._exit(1)
+            return
+
+    def _exceeded(self) -> str:
+        if time.monotonic() - self._begin > self._limits.timeout:
+            return f"took longer than {self._limits.timeout:g} s; --job-timeout raises the limit"
+        if status_bytes(1) - self._resident > 1e6 * self._limits.memory:
+            return _too_much(self._limits)
+        return ""
+
+
+def _too_much(limits: JobLimits) -> str:
+    return f"took more than {limits.memory:g} MB of memory; --job-memory raises the limit"

@@ -1,0 +1,290 @@
+"""A batch as a list of jobs: every output with its place in the tree, its settings and a fingerprint of them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from xosc_lateral.base.errors import FormatError, XoscLateralError
+from xosc_lateral.base.limits import BATCH_JOBS, VARIANTS
+from xosc_lateral.base.version import BEHAVIOUR, __version__
+from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.files.hashes import file_hash
+from xosc_lateral.files.openscenario.catalogs import require_folders
+from xosc_lateral.files.output_paths import real_path
+from xosc_lateral.files.profiles import find_profile, profile_hash
+from xosc_lateral.workflows.batch.manifest import ManifestRow, printable
+from xosc_lateral.workflows.batch.request import DocumentKind, Request, concrete, document_kind, find_requests
+from xosc_lateral.workflows.conversion.convert import numbered
+from xosc_lateral.workflows.conversion.drivers import AUTO_PROFILE, hidden_by_libraries, uses_auto
+from xosc_lateral.workflows.conversion.settings import AUTO, ConvertSettings
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One output to make; plain values, so that it can be sent to another process.
+
+    - `name`: path of the output below the output folder, with forward slashes: names its row in the manifest
+    - `scenario`: path of the input below `base`, with forward slashes
+    - `source`, `output`: absolute
+    - `base`: folder that the output tree mirrors. Absolute
+    - `fingerprint`: SHA-256 over everything but the input files and the program that decides on the output's bytes
+    - `error`: why it can't even be tried (a distribution that can't be read); empty normally
+    - `page`: where a report page about it is written, and its thumbnail beside that. Absolute
+    - `package_version`: of the process that planned it: a worker with another one refuses
+    """
+
+    name: str
+    scenario: str
+    source: Path
+    output: Path
+    base: Path
+    settings: ConvertSettings
+    variant: int
+    fingerprint: str
+    error: str = ""
+    page: Path | None = None
+    package_version: str = __version__
+
+    def row(self, error: str = "") -> ManifestRow:
+        """Its row as far as it is known before the conversion."""
+        scenario_sha256 = self._scenario_hash()
+        return ManifestRow(
+            output=self.name,
+            scenario=self.scenario,
+            scenario_sha256=scenario_sha256,
+            variant=self.variant + 1,
+            seed=self.settings.seed,
+            profile=self.settings.profile if isinstance(self.settings.profile, str) else self.settings.profile.name,
+            parameters=dict(sorted(self.settings.parameters.items())),
+            settings=self.fingerprint,
+            package_version=self.package_version,
+            behaviour=BEHAVIOUR,
+            with_sensor=self.settings.with_sensor,
+            player=self.settings.player.value,
+            only=None if self.settings.only is None else tuple(sorted(self.settings.only)),
+            options=self.settings.record(self.source.parent),
+            error=error,
+        )
+
+    def _scenario_hash(self) -> str:
+        """Of its file; empty where that can't be read."""
+        try:
+            scenario_sha256 = file_hash(self.source)
+        except (OSError, FormatError):
+            scenario_sha256 = ""
+        return scenario_sha256
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """What `convert_many` does.
+
+    - `folder`: output tree. Absolute
+    - `base`: folder that it mirrors. Absolute
+    - `jobs`: by name
+    - `left_out`: files found in folders that are not to be converted: catalogs, outputs of former conversions
+    - `notes`: what a user has to know before it begins, a line each
+    """
+
+    folder: Path
+    base: Path
+    jobs: tuple[Job, ...]
+    left_out: tuple[tuple[Path, DocumentKind], ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.jobs)
+
+
+def plan_batch(
+    inputs: Sequence[str | Path | Request],
+    folder: str | Path,
+    settings: ConvertSettings | None = None,
+    *,
+    variants: int = 1,
+    report: str | Path | None = None,
+) -> Batch:
+    """Plan a batch; nothing is converted or written yet.
+
+    - `inputs`: files, folders, globs, tables (see `find_requests`), or requests with settings of their own
+    - `folder`: output tree. It mirrors the inputs below their common folder: ``db/a/x.xosc`` of the input ``db``
+      becomes ``folder/a/x.xosc``, its variants ``folder/a/x_01.xosc`` and so on, the scenarios that a parameter value
+      distribution stands for ``folder/a/x_p00000.xosc`` and so on. A row of a table with settings of its own becomes
+      ``folder/a/x_PROFILE_HASH.xosc``: its profile, and a hash of what else it says
+    - `settings`: for every input that has none of its own
+    - `variants`: outputs per scenario
+    - `report`: folder for a report page per output, in a tree like that of the outputs
+
+    Raises `FormatError`: an input or allowed folder that isn't there, two inputs with the same output, an output on top
+    of an input; `DriverProfileError`: a profile that is unknown.
+    """
+    settings = settings or ConvertSettings()
+    require_folders(settings.allow)
+    for name in (settings.profile, *settings.entity.values()):
+        if isinstance(name, str) and name != AUTO:
+            file_hash(find_profile(name, settings.library))  # wrong for all is said once, wrong in a table's row there
+    root = _normal(Path(folder))
+    requests = [_absolute(request) for request in _all_requests(inputs, settings, variants, root)]
+    base = _common_folder(requests)
+    fingerprints = _Fingerprints()
+    jobs: dict[str, Job] = {}
+    left_out: list[tuple[Path, DocumentKind]] = []
+    asked: dict[Path, set[tuple[str, int, str]]] = {}
+    for request in requests:
+        if request.variants > VARIANTS.value:
+            raise FormatError(VARIANTS.refusal(request.variants), path=request.scenario)
+        kind = document_kind(request.scenario)
+        if kind in (DocumentKind.CATALOG, DocumentKind.CONVERTED) and not request.listed:
+            left_out.append((request.scenario, kind))
+            continue
+        before = asked.setdefault(request.scenario, set())
+        key = (fingerprints.of(request.settings, 0), request.variants, request.name)
+        if key in before:
+            continue  # named twice, by a folder and by itself, say
+        before.add(key)
+        for job in _jobs(request, kind, base, root, fingerprints):
+            earlier = jobs.setdefault(job.name, job)
+            if earlier is not job:
+                if earlier.source == job.source and earlier.fingerprint == job.fingerprint:
+                    continue  # the first variants of more
+                what = f"would be written twice: from {earlier.scenario} and from {job.scenario}"
+                what += " with other settings; a column `name` tells them apart" if earlier.source == job.source else ""
+                raise FormatError(what, path=job.output)
+            if len(jobs) > BATCH_JOBS.value:
+                raise FormatError(BATCH_JOBS.refusal(len(jobs)), path=request.scenario)
+    _refuse_overwriting(jobs.values())
+    pages = None if report is None else _normal(Path(report))
+    planned = (jobs[name] if pages is None else _with_page(jobs[name], pages) for name in sorted(jobs))
+    libraries = dict.fromkeys(request.settings.library for request in requests if uses_auto(request.settings))
+    notes = dict.fromkeys(note for folders in libraries for note in hidden_by_libraries(folders))
+    return Batch(root, base, tuple(planned), tuple(left_out), tuple(notes))
+
+
+def _with_page(job: Job, pages: Path) -> Job:
+    return replace(job, page=(pages / job.name).with_suffix(".html"))
+
+
+def _all_requests(
+    inputs: Sequence[str | Path | Request], settings: ConvertSettings, variants: int, root: Path
+) -> Iterator[Request]:
+    for given in inputs:
+        if isinstance(given, Request):
+            yield given
+        else:
+            yield from find_requests([given], settings, variants=variants, leave_out=root)
+
+
+def _absolute(request: Request) -> Request:
+    scenario = _normal(request.scenario)
+    base = scenario.parent if request.base is None else _normal(request.base)
+    return replace(request, scenario=scenario, base=base if base in scenario.parents else scenario.parent)
+
+
+def _normal(path: Path) -> Path:
+    """Absolute, without dots; symbolic links stay, for the tree mirrors names."""
+    return Path(os.path.normpath(path.absolute()))
+
+
+def _common_folder(requests: Sequence[Request]) -> Path:
+    bases = {str(request.base) for request in requests}
+    if not bases:
+        return Path.cwd()
+    try:
+        return Path(os.path.commonpath(bases))
+    except ValueError as error:  # two drives of a Windows machine
+        raise FormatError(f"inputs have no folder in common: {', '.join(sorted(bases)[:3])}") from error
+
+
+def _jobs(request: Request, kind: DocumentKind, base: Path, root: Path, fingerprints: _Fingerprints) -> Iterator[Job]:
+    relative = request.scenario.relative_to(base)
+    stem = request.name.removesuffix(relative.suffix) or f"{relative.stem}{request.label}"
+    for one in concrete(request, kind):
+        source, settings, error = one.source, one.settings, one.error
+        named = relative.with_name(f"{stem}{one.suffix}{relative.suffix}")
+        scenario = printable(Path(os.path.relpath(source, base)).as_posix())
+        for variant in range(request.variants):
+            output = numbered(named, variant, request.variants)
+            name = printable(output.as_posix())
+            if name != output.as_posix():
+                error = error or f"{printable(str(source))}: the file's name is not valid UTF-8; rename it"
+            yield Job(
+                name=name,
+                scenario=scenario,
+                source=source,
+                output=root / output,
+                base=base,
+                settings=settings,
+                variant=variant,
+                fingerprint=fingerprints.of(settings, variant),
+                error=error,
+            )
+
+
+def _refuse_overwriting(jobs: Iterable[Job]) -> None:
+    jobs = list(jobs)
+    sources = set(map(os.path.realpath, {job.source for job in jobs}))
+    folders: dict[Path, str] = {}
+    for job in jobs:
+        if real_path(job.output, folders) in sources:
+            raise FormatError("is an input: choose another output folder", path=job.output)
+
+
+def fingerprint(settings: ConvertSettings, variant: int) -> str:
+    """SHA-256 over everything but the input files that decides on an output's bytes, as it is now."""
+    return _Fingerprints().of(settings, variant)
+
+
+@dataclass(slots=True)
+class _Fingerprints:
+    """Hashes of settings; files that settings name count by their bytes, not by their place."""
+
+    _profiles: dict[tuple[str, tuple[Path, ...]], str] = field(default_factory=dict)
+    _last: tuple[ConvertSettings, dict[str, str]] | None = None
+
+    def of(self, settings: ConvertSettings, variant: int) -> str:
+        if self._last is None or self._last[0] is not settings:  # variants come one after another
+            self._last = settings, self._texts(settings)
+        texts = self._last[1] | {"variant": str(variant)}
+        text = ", ".join(f'"{name}": {texts[name]}' for name in sorted(texts))
+        return hashlib.sha256(f"{{{text}}}".encode()).hexdigest()
+
+    def _texts(self, settings: ConvertSettings) -> dict[str, str]:
+        """JSON of each setting."""
+        values = settings.record(Path()) | {"strict": settings.strict}
+        values["profile"] = self._profile(settings.profile, settings.library)
+        values["entity"] = {name: self._profile(one, settings.library) for name, one in settings.entity.items()}
+        for name, path in (("context", settings.context), ("road", settings.road)):
+            values[name] = None if path is None else _hash_or_missing(path)
+        return {name: json.dumps(value, sort_keys=True) for name, value in values.items()}
+
+    def _profile(self, name: str | DriverProfile, libraries: tuple[Path, ...]) -> str:
+        if isinstance(name, DriverProfile):
+            return profile_hash(name)
+        key = (name, libraries)
+        if key not in self._profiles:
+            self._profiles[key] = _profile_state(name, libraries)
+        return self._profiles[key]
+
+
+def _profile_state(name: str, libraries: tuple[Path, ...]) -> str:
+    """What a profile's name means now: its file's hash; "auto": that of what it chooses."""
+    try:
+        return _hash_or_missing(find_profile(AUTO_PROFILE if name == AUTO else name, libraries))
+    except (XoscLateralError, OSError):
+        return MISSING
+
+
+def _hash_or_missing(path: Path) -> str:
+    try:
+        return file_hash(path)
+    except (FormatError, OSError):
+        return MISSING
+
+
+MISSING = "missing"
+"""In place of the hash of a file that can't be read: its conversion says why, and the others go on."""

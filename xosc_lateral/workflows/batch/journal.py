@@ -1,0 +1,235 @@
+"""What a run has done so far, on disk at every moment: rows appended one by one, read again after a kill."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import socket
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Self
+
+from xosc_lateral.base.errors import FormatError, XoscLateralError
+from xosc_lateral.workflows.batch.manifest import (
+    MANIFEST,
+    TIMINGS,
+    ManifestRow,
+    Timing,
+    is_of_now,
+    read_manifest,
+    read_timings,
+    write_manifest,
+    write_timings,
+)
+
+
+class FolderInUseError(XoscLateralError):
+    """Another run writes into the folder."""
+
+
+@contextmanager
+def folder_lock(path: Path) -> Iterator[None]:
+    """Hold a lock file while the block runs.
+
+    The operating system's lock counts, not the file: it goes with the process, however that ends, so a file that a
+    killed run has left is no obstacle. What the file says (process and host) is for the message.
+
+    Raises `FolderInUseError`: when another process holds it; `OSError`: when the folder can't be written.
+    """
+    file = _open_locked(path)
+    try:
+        file.seek(0)
+        file.truncate()
+        json.dump({"pid": os.getpid(), "host": socket.gethostname()}, file)
+        file.flush()
+        yield
+    finally:
+        path.unlink(missing_ok=True)  # while still locked: who waits for it finds that it is gone and makes a new one
+        file.close()
+
+
+def _open_locked(path: Path) -> IO[str]:
+    while True:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            file = path.open("a+", encoding="utf-8")
+        except FileNotFoundError:
+            continue  # a run that just ended has taken the folder away again
+        if not _lock(file):
+            holder = _holder(file)
+            file.close()
+            raise FolderInUseError(
+                f"{path.parent.parent}: another run ({holder}) is writing into this folder; wait for it, or use another"
+            )
+        try:
+            if os.path.samestat(os.fstat(file.fileno()), path.stat()):
+                return file
+        except FileNotFoundError:
+            pass
+        file.close()  # its owner has removed it between our opening and locking it
+
+
+def _holder(file: IO[str]) -> str:
+    file.seek(0)
+    try:
+        values = json.loads(file.read())
+        return f"process {values['pid']} on {values['host']}"
+    except (ValueError, KeyError, TypeError):
+        return "starting right now"
+
+
+def _lock(file: IO[str]) -> bool:
+    """Take the operating system's lock without waiting; False: another process has it."""
+    try:
+        if sys.platform == "win32":
+            import msvcrt
+
+            file.seek(4096)  # beyond what is written there, which others must be able to read
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except (BlockingIOError, PermissionError):
+        return False
+    return True
+
+
+CLOCK_TICK = 20_000_000
+"""A file that is written to twice within the resolution of a file system's clock (4 ms on Linux, 16 ms on Windows) may
+look as if it had not been: what was written so shortly before is not known by its state. [ns]"""
+
+
+def _known(timing: Timing, now: int) -> Timing:
+    """With the state if an edit from `now` on [ns] would change it."""
+    changed = max(map(int, timing.state.split()[1:3]), default=now)
+    return timing if now - changed > CLOCK_TICK else Timing(timing.seconds)
+
+
+class Journal:
+    """Rows of an output folder, the newest of each output.
+
+    A file of JSON lines; a line that a kill cut short is dropped. Rows stay on disk: in memory is only where each one
+    begins, so that ten thousand of them cost a megabyte.
+
+    `folder`: output folder; rows of its manifest count until the journal has newer ones; `path`: the journal; `notify`:
+    gets a line if manifest or timings can't be read: they are put aside, and the run goes on without.
+    """
+
+    def __init__(self, folder: Path, path: Path, notify: Callable[[str], None]) -> None:
+        self._folder, self._path, self._notify = folder, path, notify
+        self._begin: dict[str, int] = {}
+        self._timings: dict[str, Timing] = {}
+        self._end = self._intact_end()
+        self._changed = bool(self._begin)
+        self._file = path.open("r+b" if path.exists() else "w+b")
+        self._file.truncate(self._end)
+        self._adopt_manifest()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        with suppress(OSError):  # every row has been flushed; what a full disk refused was never promised
+            self._file.close()
+        if not self._begin and error is not None:  # nothing was done
+            self._path.unlink(missing_ok=True)
+
+    def __contains__(self, output: str) -> bool:
+        return output in self._begin
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(tuple(self._begin))
+
+    def row(self, output: str) -> ManifestRow:
+        """The newest row of an output; `KeyError` if there is none."""
+        import msgspec
+
+        self._file.seek(self._begin[output])
+        return msgspec.convert(json.loads(self._file.readline())["row"], ManifestRow)  # was checked when it came in
+
+    def timing(self, output: str) -> Timing:
+        """Of the newest conversion of an output."""
+        return self._timings[output]
+
+    def add(self, row: ManifestRow, timing: Timing) -> None:
+        """Append a row. From the return on it survives the death of this process.
+
+        Raises `OSError`: when the disk is full; rows added before are still there.
+        """
+        self._changed = True
+        self._append(row, timing)
+
+    def _append(self, row: ManifestRow, timing: Timing) -> None:
+        line = json.dumps({"row": row.to_dict(), **timing._asdict()}).encode() + b"\n"
+        self._file.seek(self._end)
+        self._file.write(line)
+        self._file.flush()
+        self._begin[row.output] = self._end
+        self._timings[row.output] = timing
+        self._end += len(line)
+
+    def forget(self, output: str) -> None:
+        """Leave an output out of the manifest."""
+        self._changed = True
+        del self._begin[output]
+
+    def finish(self) -> None:
+        """Write manifest and timings, sorted by output, if they change; then the journal goes.
+
+        A kill in between leaves a journal that says the same as the manifest.
+        """
+        if self._changed:
+            outputs, now = sorted(self._begin), time.time_ns()
+            write_timings(((output, _known(self._timings[output], now)) for output in outputs), self._folder / TIMINGS)
+            write_manifest((self.row(output) for output in outputs), self._folder / MANIFEST)
+        self._file.close()
+        self._path.unlink()
+
+    def _intact_end(self) -> int:
+        """Index the lines there are; returns where the last whole one ends. [byte]"""
+        end = 0
+        if not self._path.exists():
+            return end
+        with self._path.open("rb") as file:
+            for line in file:
+                try:
+                    values = json.loads(line)
+                    output = ManifestRow.from_dict(values["row"]).output
+                    timing = Timing(float(values["seconds"]), str(values.get("state", "")))
+                    if not math.isfinite(timing.seconds):
+                        break
+                except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
+                    break
+                if not line.endswith(b"\n"):
+                    break
+                self._begin[output], self._timings[output] = end, timing
+                end += len(line)
+        return end
+
+    def _adopt_manifest(self) -> None:
+        timings, timings_path, path = dict[str, Timing](), self._folder / TIMINGS, self._folder / MANIFEST
+        with self._put_aside_if_damaged(TIMINGS):
+            timings = read_timings(timings_path)
+        with self._put_aside_if_damaged(MANIFEST):
+            for row in read_manifest(path):
+                if row.output not in self._begin:
+                    self._append(row, timings.get(row.output, Timing()))
+        self._changed |= not (timings_path.exists() and path.exists() and is_of_now(path))
+
+    @contextmanager
+    def _put_aside_if_damaged(self, name: str) -> Iterator[None]:
+        path = self._folder / name
+        try:
+            yield
+        except FormatError as error:
+            aside = path.with_suffix(f".damaged{path.suffix}")
+            path.replace(aside)
+            self._notify(f"{error}; it is put aside as {aside.name}, outputs that it named are made anew")

@@ -1,0 +1,260 @@
+"""What a batch is asked for: files, folders, globs and tables, as one list of scenarios with their settings."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from lxml import etree
+
+from xosc_lateral.base.errors import FormatError, XoscLateralError
+from xosc_lateral.base.limits import PARAMETER_SETS, XML_TREE
+from xosc_lateral.files.openscenario.element import local_name
+from xosc_lateral.files.openscenario.provenance import HEADER_MARK
+from xosc_lateral.files.output_paths import file_name
+from xosc_lateral.files.source import open_source
+from xosc_lateral.files.tables import TABLE_SUFFIXES, as_text, read_text_table
+from xosc_lateral.workflows.conversion.options import Option, as_it_is, whole
+from xosc_lateral.workflows.conversion.settings import OPTIONS, ConvertSettings
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class DocumentKind(Enum):
+    """What an OpenSCENARIO file holds."""
+
+    SCENARIO = "scenario"
+    CATALOG = "catalog"
+    DISTRIBUTION = "parameter value distribution"
+    CONVERTED = "converted scenario"
+
+
+_KINDS = dict.fromkeys(("CatalogLocations", "RoadNetwork", "Entities", "Storyboard"), DocumentKind.SCENARIO)
+_KINDS |= {"Catalog": DocumentKind.CATALOG, "ParameterValueDistribution": DocumentKind.DISTRIBUTION}
+"""By the first element that says it."""
+
+
+def document_kind(path: Path) -> DocumentKind:
+    """What a file holds, from its first elements; what can't be read counts as a scenario (its reader says why)."""
+    is_ours = False
+    try:
+        with open_source(path, XML_TREE) as source:
+            for _, element in etree.iterparse(
+                source.file,
+                events=("start",),
+                resolve_entities=False,
+                no_network=True,
+                load_dtd=False,
+                remove_comments=True,
+            ):
+                parent = element.getparent()
+                if parent is None or parent.getparent() is not None or not isinstance(element.tag, str):
+                    continue
+                name = local_name(element)
+                if name == "FileHeader" and HEADER_MARK in (element.get("description") or ""):
+                    is_ours = True
+                elif is_ours or name in _KINDS:
+                    return DocumentKind.CONVERTED if is_ours else _KINDS[name]
+    except (etree.XMLSyntaxError, FormatError, OSError, ValueError, LookupError):
+        return DocumentKind.SCENARIO
+    return DocumentKind.CONVERTED if is_ours else DocumentKind.SCENARIO
+
+
+SCENARIO_SUFFIX = ".xosc"
+
+COLUMNS = ("scenario", *(name for name, option in OPTIONS.items() if option.cell is not None), "variants", "name")
+
+PREFIXES = (*(option.prefix for option in OPTIONS.values() if option.prefix), "user:")
+"""What a table of scenarios may hold."""
+
+_VARIANTS = Option(whole(1), cell=as_it_is)
+
+_GLOB_CHARACTERS = frozenset("*?[")
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """One scenario to convert.
+
+    - `scenario`: a scenario, or a parameter value distribution that stands for several
+    - `variants`: outputs per scenario, each with offsets of its own
+    - `base`: folder whose layout below the output tree mirrors; None: the scenario's own
+    - `listed`: named one by one. What was merely found in a folder is left out if it is a catalog or was converted
+      already
+    - `label`: tells outputs of this scenario with these settings from its others: part of their names
+    - `name`: in place of the scenario's name and the label
+    """
+
+    scenario: Path
+    settings: ConvertSettings = field(default_factory=ConvertSettings)
+    variants: int = 1
+    base: Path | None = None
+    listed: bool = True
+    label: str = ""
+    name: str = ""
+
+
+class Concrete(NamedTuple):
+    """A scenario's file, a suffix of its output's name, its settings, and why it can't be converted, normally empty."""
+
+    source: Path
+    suffix: str
+    settings: ConvertSettings
+    error: str = ""
+
+
+def concrete(request: Request, kind: DocumentKind) -> Iterator[Concrete]:
+    """The scenarios that a file stands for: itself, or those of its distribution."""
+    from xosc_lateral.files.openscenario.distribution import read_distribution
+
+    scenario, settings = request.scenario, request.settings
+    if kind is not DocumentKind.DISTRIBUTION:
+        yield Concrete(scenario, "", settings)
+        return
+    try:
+        logical = read_distribution(scenario, allowed=settings.allow)
+        sets = list(islice(logical.parameter_sets(settings.seed), int(PARAMETER_SETS.value) + 1))
+        if len(sets) > PARAMETER_SETS.value:
+            raise FormatError(PARAMETER_SETS.refusal(logical.count), path=scenario)
+        if not sets:
+            raise FormatError("no set of parameters satisfies the scenario's constraints", path=scenario)
+    except (XoscLateralError, OSError) as error:
+        why = str(error)
+    except Exception as error:  # a bug of ours in one file must not cost the others; the row says that it is one
+        why = f"{scenario}: internal error: {type(error).__name__}: {error}"
+    else:
+        for index, values in enumerate(sets):
+            own = replace(settings, parameters={**values, **settings.parameters})
+            yield Concrete(logical.scenario_file, f"_p{index:05d}", own)
+        return
+    yield Concrete(scenario, "", settings, " ".join(why.split()))
+
+
+def find_requests(
+    inputs: Sequence[str | Path], settings: ConvertSettings, *, variants: int = 1, leave_out: Path | None = None
+) -> Iterator[Request]:
+    """Scenarios that files, folders, globs and tables name.
+
+    `inputs`: a ``.xosc`` file, a folder (searched to the bottom), a glob (``db/**/cut*.xosc``) or a table (CSV,
+    Parquet; see `read_request_table`); `settings`: for all of them; a table's columns go before it; `leave_out`: folder
+    that is not searched: the output's. Raises `FormatError`: an input that is not there, a glob that matches nothing, a
+    table that can't be read.
+    """
+    for given in inputs:
+        path = Path(given)
+        if path.is_dir():
+            found = list(_search(path, leave_out))
+            if not found:
+                raise FormatError(f"no {SCENARIO_SUFFIX} file in this folder or below", path=path)
+            yield from (Request(scenario, settings, variants, path, listed=False) for scenario in found)
+        elif path.exists() and path.name.lower().endswith(TABLE_SUFFIXES):
+            yield from read_request_table(path, settings, variants=variants)
+        elif path.exists():
+            yield Request(path, settings, variants)  # a device or a fifo: its reader says so
+        elif _GLOB_CHARACTERS & set(str(given)):
+            base, found = _matches(str(given), leave_out)
+            yield from (Request(scenario, settings, variants, base, listed=False) for scenario in found)
+        else:
+            raise FormatError("no such file or folder", path=given)
+
+
+def read_request_table(path: Path, settings: ConvertSettings, *, variants: int = 1) -> Iterator[Request]:
+    """Scenarios of a table, one a row.
+
+    Columns: ``scenario`` (path, from the table's folder), and if wanted those of `COLUMNS` and `PREFIXES`: ``name`` of
+    the output in place of the scenario's, ``variants``, ``profile:ENTITY``, ``only`` and ``ego`` with entities
+    separated by semicolons (ego ``none``: there is none), ``parameter:NAME``, ``parameters`` as a JSON object, and so
+    on; ``user:NAME`` is for the user. An empty cell leaves what `settings` says.
+
+    Raises `FormatError`: with the line of the table (the header is line 1).
+    """
+    yield from _table_requests(read_text_table(path), settings, variants, path.parent, path)
+
+
+def frame_requests(frame: pd.DataFrame, settings: ConvertSettings, *, variants: int = 1) -> Iterator[Request]:
+    """Scenarios of a frame with the columns of `read_request_table`; paths are as seen from the current folder."""
+    yield from _table_requests(as_text(frame), settings, variants, None, Path("DataFrame"))
+
+
+def _table_requests(
+    table: pd.DataFrame, settings: ConvertSettings, variants: int, base: Path | None, path: Path
+) -> Iterator[Request]:
+    if "scenario" not in table.columns:
+        known = ", ".join(map(str, table.columns[:12]))
+        raise FormatError(f"no column 'scenario'; there are {known}", path=path, line=1)
+    for name in map(str, table.columns):  # what is not understood is a setting that would be ignored
+        if name not in COLUMNS and not name.startswith(PREFIXES):
+            known = ", ".join((*COLUMNS, *(f"{prefix}NAME" for prefix in PREFIXES)))
+            raise FormatError(f"unknown column {name!r}; there are {known} (user: is for your own)", path=path, line=1)
+    folder = base or Path()
+    for number, row in enumerate(table.to_dict("records"), start=2):
+        cells = {str(name): text for name, value in row.items() if (text := str(value).strip())}
+        try:
+            scenario = cells.pop("scenario", "")
+            if not scenario or "\0" in scenario:
+                raise ValueError(f"scenario {scenario!r}: a path holds no zero byte" if scenario else "no scenario")
+            rows_variants = _VARIANTS.of_row("variants", variants, cells, folder)
+            row_settings = settings.of_row(cells, folder)
+            name = file_name(cells["name"], "name") if "name" in cells else ""
+        except ValueError as error:
+            raise FormatError(str(error), path=path, line=number) from error
+        yield Request(folder / scenario, row_settings, rows_variants, base, label=_label(cells), name=name)
+
+
+def _label(cells: Mapping[str, str]) -> str:
+    """What a row says of the settings, in short: the same in whatever table and at whatever place it stands."""
+    said = {name: text for name, text in cells.items() if name not in ("variants", "name") and name[:5] != "user:"}
+    profile = Path(said.get("profile", "")).stem
+    if not re.fullmatch(r"[\w.-]{1,60}", profile):
+        profile = ""
+    elif said.get("profile") == profile:  # a name says all, a path may be another folder's
+        del said["profile"]
+    listed = json.dumps(said, sort_keys=True).encode()
+    return "".join(f"_{part}" for part in (profile, hashlib.sha256(listed).hexdigest()[:8] if said else "") if part)
+
+
+def is_single(given: str | Path) -> bool:
+    """Whether an input is one scenario, or nothing that is there: neither folder, glob, table nor distribution."""
+    path = Path(given)
+    if path.is_file():
+        is_table = path.name.lower().endswith(TABLE_SUFFIXES)
+        return not is_table and document_kind(path) is not DocumentKind.DISTRIBUTION
+    return not path.is_dir() and not _GLOB_CHARACTERS & set(str(given))
+
+
+def _search(folder: Path, leave_out: Path | None) -> Iterator[Path]:
+    """Scenario files below a folder, sorted; hidden folders, output trees of former batches and `leave_out` aside."""
+    from xosc_lateral.workflows.batch.manifest import MANIFEST  # one scenario needs none
+
+    avoided = None if leave_out is None else leave_out.resolve()
+    for name, folders, files in os.walk(folder):
+        here = Path(name)
+        inner = sorted(one for one in folders if not one.startswith("."))
+        folders[:] = [
+            one for one in inner if (here / one).resolve() != avoided and not (here / one / MANIFEST).exists()
+        ]
+        for file in sorted(files):
+            if file.lower().endswith(SCENARIO_SUFFIX) and not file.startswith("."):
+                yield here / file
+
+
+def _matches(pattern: str, leave_out: Path | None) -> tuple[Path, list[Path]]:
+    """Folder before the first wild part, and files that match, sorted; hidden ones and those in `leave_out` aside."""
+    parts = Path(pattern).parts
+    wild = next(index for index, part in enumerate(parts) if _GLOB_CHARACTERS & set(part))
+    base = Path(*parts[:wild]) if wild else Path()
+    matching = sorted(base.glob(str(Path(*parts[wild:]))))
+    found = [path for path in matching if not any(part.startswith(".") for part in path.relative_to(base).parts)]
+    if not found:
+        raise FormatError("nothing matches", path=pattern)
+    avoided = None if leave_out is None else leave_out.resolve()
+    return base, [one for one in found if one.is_file() and (avoided is None or avoided not in one.resolve().parents)]

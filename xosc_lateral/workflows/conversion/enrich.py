@@ -1,0 +1,335 @@
+"""Sample offsets for every road-following segment of a played scenario and shift the paths by them."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.base.rows import blocks, columns, give_back, kept
+from xosc_lateral.drivers.model.drivability import drivable
+from xosc_lateral.drivers.model.plausibility import check_offsets
+from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.drivers.model.sampled_offsets import known_sensor, sensor_error
+from xosc_lateral.drivers.model.sampling import OffsetSampler
+from xosc_lateral.workflows.conversion.consequences import HalfWidths, gaps_of, lane_departures
+from xosc_lateral.workflows.conversion.give_way import SampledVehicle, give_way
+from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, Neighbours, SampledSegment
+from xosc_lateral.workflows.conversion.seen import NOTHING_SEEN, SAMPLE_STEP, Contexts, Seen, going_on, seen_by
+from xosc_lateral.world.motion.deviation import SETTLING_TIME, SampledDeviation, deviation_through
+from xosc_lateral.world.motion.gaps import Gap
+from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
+from xosc_lateral.world.motion.segments import SegmentSpan, cut_segments
+from xosc_lateral.world.motion.trajectory import WorldTrajectory, displace, distance_driven
+from xosc_lateral.world.road.network import RoadNetwork
+
+Drivers = Mapping[str, DriverProfile | str]
+"""Per entity the profile that drives it, or the reason why it gets none."""
+
+
+def enrich(
+    motion: NominalMotion,
+    network: RoadNetwork,
+    drivers: Drivers,
+    *,
+    seed: int,
+    variant: int = 0,
+    entropy: Mapping[str, Sequence[int]] | None = None,
+    context: Contexts | None = None,
+    trailers: Mapping[str, str] | None = None,
+    attempts: int = 1,
+    neighbours: Neighbours = Neighbours.BORROW,
+    with_sensor: bool = False,
+    uncertain: Collection[str] = (),
+    at_least: float = 0.0,
+) -> Enriched:
+    """Enrich a played scenario.
+
+    Parameters
+    ----------
+    motion : NominalMotion
+    network : RoadNetwork
+        The one that it was played on.
+    drivers : mapping of entity name to DriverProfile or str
+        A profile, or the reason why the entity is not enriched; an entity that is absent is not enriched.
+    seed, variant : int
+        Together with `entropy` and the entity's name they seed each entity's own random numbers, so that adding an
+        entity changes no other's offsets.
+    entropy : mapping of entity name to sequence of int, optional
+        Further seed words of each entity.
+    context : mapping of str to (time, values), optional
+        Context that the scenario doesn't state, or that replaces what it states; the same for all entities. [s]
+    trailers : mapping of str to str, optional
+        Entity that is pulled -> entity that pulls it: it follows in the tractor's track.
+    attempts : int
+        Sample anew up to so many times while vehicles touch or leave their lane that nominally don't; the best is kept.
+    neighbours : Neighbours
+        `profile`: every vehicle answers to those beside it as its profile alone has it. `borrow`: neighbours give way
+        to each other by a population's law, too, where a profile's answer is not known (`give_way`). `none`: nobody
+        answers to anybody beside him.
+    with_sensor : bool
+        Add what the sensor added to the drives that each profile was fitted on. Nobody drives that: it is added after
+        drivers have given way and after what nobody could drive was smoothed.
+    uncertain : collection of str
+        Entities whose motion will be another one, since it depends on a vehicle under test: nobody responds to where
+        they nominally are, nor do they to others.
+    at_least : float
+        Time for which each segment is sampled, should it last longer in another run. [s]
+
+    Raises
+    ------
+    DriverProfileError
+        When the sensor is asked for and a profile knows of none.
+    """
+    trailers, words = trailers or {}, entropy or {}
+    few = sum(len(entity.time) for entity in motion.entities) <= FEW and not context
+    run = (_run if few else _run.__wrapped__)(motion, network, frozenset(trailers), frozenset(uncertain), neighbours)
+
+    def drawn_for(index: int, attempt: int) -> _Drawn:
+        entity = motion.entities[index]
+        driver, spans = drivers.get(entity.name, "not chosen"), run.spans[index]
+        if isinstance(driver, str):
+            return _Drawn(entity, spans, why=driver)
+        whose, seen = run.seen.get(index, (None, None))
+        if seen is None or whose is not driver:
+            among = replace(motion, entities=(entity,)) if entity.name in uncertain else run.certain
+            seen = seen_by(driver, entity, among, network, spans, context or {}, neighbours)
+            if few:
+                run.seen[index] = driver, seen
+        own = np.random.SeedSequence(
+            [seed, variant, attempt, zlib.crc32(entity.name.encode()), *words.get(entity.name, ())]
+        )
+        return _draw(_Drawn(entity, spans, driver, seen), driver, own, with_sensor, round(at_least / SAMPLE_STEP))
+
+    best: Enriched | None = None
+    for attempt in range(max(1, attempts)):
+        drawn = [drawn_for(index, attempt) for index in range(len(motion.entities))]
+        if neighbours is Neighbours.BORROW:
+            drawn = _apart(drawn, motion, network, uncertain)
+        entities = tuple(_result(one, network) for one in drawn)
+        entities = _with_trailers(entities, network, trailers)
+        gaps_after = gaps_of(motion, [entity.trajectory for entity in entities])
+        departures = tuple(
+            found for entity in entities for found in lane_departures(entity, network, run.half_widths if few else None)
+        )
+        result = Enriched(motion, network, entities, run.gaps, gaps_after, departures, seed, variant, attempt)
+        if best is None or _trouble(result) < _trouble(best):
+            best = result
+        if not _trouble(result):
+            break
+    assert best is not None
+    return best
+
+
+def with_offsets(enriched: Enriched, names: Collection[str], factor: float, why: str) -> Enriched:
+    """With the offsets of some entities times a factor, and none where it is 0: `why` says the reason."""
+    entities = tuple(
+        _scaled(entity, enriched.network, factor, why) if entity.name in names else entity
+        for entity in enriched.entities
+    )
+    gaps_after = gaps_of(enriched.motion, [entity.trajectory for entity in entities])
+    departures = tuple(found for entity in entities for found in lane_departures(entity, enriched.network))
+    return replace(enriched, entities=entities, gaps_after=gaps_after, departures=departures)
+
+
+def _scaled(entity: EntityResult, network: RoadNetwork, factor: float, why: str) -> EntityResult:
+    if factor == 0.0:
+        return _untouched(entity.motion, entity.spans, why)
+    segments = tuple(
+        replace(segment, offset=factor * segment.offset, beyond=factor * segment.beyond) for segment in entity.segments
+    )
+    n = len(entity.deviation)
+    deviation = columns(n, ([factor * entity.deviation[rows]] for rows in blocks(n)))[0]
+    trajectory = displace(entity.motion, network, deviation)
+    return replace(entity, segments=segments, deviation=deviation, trajectory=trajectory)
+
+
+def _trouble(enriched: Enriched) -> int:
+    return len(enriched.new_contacts) + len(enriched.departures)
+
+
+class _Sample(NamedTuple):
+    """Offsets sampled on one segment."""
+
+    span: SegmentSpan
+    knots: IntArray
+    """Rows of the motion that were sampled."""
+    offset: FloatArray
+    """There. [m]"""
+    error: FloatArray
+    """What a sensor adds; zeros unless asked for. [m]"""
+    beyond: FloatArray
+    """How it would go on after the end. [m]"""
+
+
+@dataclass(frozen=True, eq=False)
+class _Drawn:
+    """One entity: what its driver sees, and what was sampled; `why` nothing was."""
+
+    motion: EntityMotion
+    spans: tuple[SegmentSpan, ...]
+    profile: DriverProfile | None = None
+    seen: Seen = NOTHING_SEEN  # without its segments once they are sampled: they are large
+    samples: tuple[_Sample, ...] = ()
+    why: str = ""
+
+    def deviation(self, rows: IntArray | None = None) -> FloatArray:
+        """On some rows or all, positive left. [m]"""
+        distance, reach = distance_driven(self.motion), SETTLING_TIME * self.motion.speed
+        through = deviation_through(
+            [
+                SampledDeviation(distance[one.knots], one.offset, (reach[one.knots[0]], reach[one.knots[-1]]))
+                for one in self.samples
+            ]
+        )
+        if rows is not None:
+            return through(distance[rows])
+        return columns(len(distance), ([through(distance[part])] for part in blocks(len(distance))))[0]
+
+
+FEW = 100_000
+"""Rows of all entities of a run up to which what drivers see is kept for its next variant: a run like that of 16 cars
+for two minutes then keeps about 10 MB. [-]"""
+
+
+class _Run(NamedTuple):
+    """What all variants of a run have in common."""
+
+    spans: tuple[tuple[SegmentSpan, ...], ...]
+    """Of each entity."""
+    gaps: tuple[Gap, ...]
+    """Of the nominal motion."""
+    certain: NominalMotion
+    """Those alone whose place is."""
+    seen: dict[int, tuple[DriverProfile, Seen]]
+    """By the number of the entity, its last driver and what he sees."""
+    half_widths: HalfWidths
+    """See `lane_departures`."""
+
+
+@lru_cache(maxsize=2)  # variants of one run come one after another
+def _run(
+    motion: NominalMotion,
+    network: RoadNetwork,
+    pulled: frozenset[str],
+    uncertain: frozenset[str],
+    neighbours: Neighbours,
+) -> _Run:
+    spans = tuple(cut_segments(entity, network, is_trailer=entity.name in pulled) for entity in motion.entities)
+    gaps = gaps_of(motion, [_nominal(entity) for entity in motion.entities])
+    certain = tuple(one for one in motion.entities if one.name not in uncertain)
+    return _Run(spans, gaps, replace(motion, entities=certain), {}, {})
+
+
+def _draw(blank: _Drawn, driver: DriverProfile, seed: np.random.SeedSequence, with_sensor: bool, least: int) -> _Drawn:
+    """With the offsets of one entity; each segment goes on to `least` rows."""
+    if not blank.seen.segments:
+        return replace(blank, why="no road-following segment")
+    sampler, sensor = OffsetSampler(driver, seed), known_sensor(driver) if with_sensor else None
+    samples: list[_Sample] = []
+    for span, knots, segment, side, responses in blank.seen.segments:
+        offset = side * sampler.sample(segment, responses=responses)
+        more = least - len(knots)
+        give_back(len(segment.time))
+        beyond = side * sampler.copy().sample(going_on(segment, more)) if more > 0 else np.empty(0)
+        who = f"profile {driver.name} for {blank.motion.name!r}"
+        check_offsets(offset, segment.lane_width[segment.inside], who, segment.time[segment.inside])
+        error = kept(sensor_error(sensor, offset, SAMPLE_STEP, seed, part=len(samples)))
+        samples.append(_Sample(span, knots, kept(offset), error, beyond))
+    return replace(blank, seen=blank.seen._replace(segments=()), samples=tuple(samples))
+
+
+def _apart(
+    drawn: Sequence[_Drawn], motion: NominalMotion, network: RoadNetwork, uncertain: Collection[str]
+) -> list[_Drawn]:
+    """Neighbours give way to each other, where it is certain that they meet."""
+    if uncertain:
+        certain = [one for one in drawn if one.motion.name not in uncertain]
+        moved = {one.motion.name: one for one in _apart(certain, motion, network, ())}
+        return [moved.get(one.motion.name, one) for one in drawn]
+    if len(drawn) < 2 or not any(one.samples for one in drawn):
+        return list(drawn)
+    every = max(1, round(SAMPLE_STEP / motion.step))
+    rows = np.arange(0, len(motion.entities[0].time), every)
+    moves = give_way(motion, network, [_sampled(one, rows) for one in drawn], rows)
+    return [
+        one if move is None else replace(one, samples=tuple(_moved(sample, rows, move) for sample in one.samples))
+        for one, move in zip(drawn, moves, strict=True)
+    ]
+
+
+def _moved(sample: _Sample, rows: IntArray, move: FloatArray) -> _Sample:
+    give_back(len(rows))
+    return sample._replace(offset=kept(sample.offset + np.interp(sample.knots, rows, move)))
+
+
+def _sampled(one: _Drawn, rows: IntArray) -> SampledVehicle:
+    """What its neighbours see of a vehicle on some rows: how it deviates, and where it could do so more."""
+    deviation, can_move = np.zeros(len(rows)), np.zeros(len(rows), dtype=np.bool_)
+    if one.samples:
+        deviation = one.deviation(rows)
+        for sample in one.samples:
+            can_move[(rows >= sample.span.first) & (rows <= sample.span.last)] = True
+    give_back(len(one.motion.time))
+    return SampledVehicle(one.motion, kept(deviation), kept(can_move), one.seen.responds, one.seen.alone)
+
+
+def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:
+    """Paths through the offsets, smoothed where nobody could drive them."""
+    entity = drawn.motion
+    if not drawn.samples:
+        return _untouched(entity, drawn.spans, drawn.why)
+    driven, bounds = zip(
+        *(drivable(one.offset, SAMPLE_STEP, entity.speed[one.knots]) for one in drawn.samples), strict=True
+    )
+    samples = tuple(
+        one._replace(offset=kept(offset + one.error)) for one, offset in zip(drawn.samples, driven, strict=True)
+    )
+    deviation = replace(drawn, samples=samples).deviation()
+    return EntityResult(
+        entity,
+        drawn.spans,
+        drawn.profile,
+        "",
+        tuple(SampledSegment(one.span, kept(entity.time[one.knots]), one.offset, one.beyond) for one in samples),
+        deviation,
+        displace(entity, network, deviation),
+        drawn.seen.neutral,
+        max(filter(None, bounds), key=lambda bound: bound.before.excess, default=None),
+    )
+
+
+def _with_trailers(
+    entities: tuple[EntityResult, ...], network: RoadNetwork, trailers: Mapping[str, str]
+) -> tuple[EntityResult, ...]:
+    """Trailers in their tractor's track: its deviation, where its coupling was one trailer length ago."""
+    results = {entity.name: entity for entity in entities}
+    for name in results:  # in file order, in which a tractor comes before what it pulls, also in a chain
+        tractor = results.get(trailers.get(name, ""))
+        if tractor is None or not tractor.deviation.any():
+            continue
+        trailer = results[name]
+        behind = float(np.hypot(trailer.motion.x[0] - tractor.motion.x[0], trailer.motion.y[0] - tractor.motion.y[0]))
+        distance = distance_driven(tractor.motion)
+        n = len(distance)
+        along = ([np.interp(distance[rows] - behind, distance, tractor.deviation)] for rows in blocks(n))
+        deviation = columns(n, along)[0]
+        trajectory = displace(trailer.motion, network, deviation)
+        results[name] = replace(trailer, deviation=deviation, trajectory=trajectory, why="follows its tractor")
+    return tuple(results.values())
+
+
+def _untouched(entity: EntityMotion, spans: tuple[SegmentSpan, ...], why: str) -> EntityResult:
+    no_deviation = np.broadcast_to(0.0, len(entity.time))
+    return EntityResult(entity, spans, None, why, (), no_deviation, _nominal(entity))
+
+
+def _nominal(entity: EntityMotion) -> WorldTrajectory:
+    return WorldTrajectory(
+        entity.time, entity.x, entity.y, entity.z, entity.heading, entity.pitch, entity.roll, entity.speed
+    )

@@ -1,0 +1,240 @@
+"""How users say a setting: in Python, as a word of the command line, in a cell of a table, in the configuration."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import MISSING, Field, dataclass, field, fields
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
+
+if TYPE_CHECKING:
+    from xosc_lateral.drivers.model.profile import DriverProfile
+
+
+PathLike: TypeAlias = str | Path
+ProfileLike: TypeAlias = "PathLike | DriverProfile"
+"""A profile, its path, or its name in the library."""
+Paths: TypeAlias = PathLike | Sequence[PathLike]
+
+NO_EGO = "none"
+"""In place of a vehicle under test: there is none."""
+
+Verb = TypeVar("Verb", bound=Callable[..., Any])
+
+Cell = Callable[[str, Path], Any]
+"""Text of a table's cell and the table's folder -> what a user would say in Python."""
+
+
+@dataclass(frozen=True, slots=True)
+class Option:
+    """How users say a setting.
+
+    - `read`: what they say in Python, a word of the command line or a cell of a table -> the field's value, or
+      `ValueError`
+    - `flags`: on the command line; empty: its name
+    - `kind`: type of the command line's value; None: several verbs share the option, and `cli.words` has it
+    - `words`: what else the command line says of it (help, limits)
+    - `cell`: reads the column of its name; None: a table has no such column
+    - `prefix`, `entry`: of columns that hold one entry each of a mapping
+    """
+
+    read: Callable[[Any], Any]
+    flags: tuple[str, ...] = ()
+    kind: Any = None
+    words: Mapping[str, Any] = field(default_factory=dict)
+    cell: Cell | None = None
+    prefix: str = ""
+    entry: Cell | None = None
+
+    def value(self, name: str, said: Any) -> Any:
+        """The field's value; `ValueError` with the option's name before it."""
+        try:
+            return self.read(said)
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"{name} {error}") from error
+
+    def of_row(self, name: str, before: Any, cells: Mapping[str, str], folder: Path) -> Any:
+        """What a row of a table says, else what was said before."""
+        try:
+            said = self.cell(cells[name], folder) if self.cell is not None and name in cells else None
+        except ValueError as error:
+            raise ValueError(f"{name} {error}") from error
+        if self.entry is not None:
+            keys = [key for key in cells if key.startswith(self.prefix)]
+            entries = {key.removeprefix(self.prefix): self.entry(cells[key], folder) for key in keys}
+            said = {**before, **(said or {}), **entries}
+        return before if said is None else self.value(name, said)
+
+
+def option(
+    default: Any,
+    read: Callable[[Any], Any],
+    *flags: str,
+    kind: Any = None,
+    cell: Cell | None = None,
+    prefix: str = "",
+    entry: Cell | None = None,
+    **words: Any,
+) -> Any:
+    """Declare a field that users can set; see `Option`."""
+    metadata = {"option": Option(read, flags, kind, words, cell, prefix, entry)}
+    if isinstance(default, dict):
+        return field(default_factory=dict, metadata=metadata)
+    return field(default=default, metadata=metadata)
+
+
+def settable(settings: type) -> list[Field[Any]]:
+    """The fields of some settings that users can set."""
+    return [item for item in fields(settings) if "option" in item.metadata]
+
+
+def options_of(settings: type) -> dict[str, Option]:
+    """What users can set of some settings, by name."""
+    return {item.name: item.metadata["option"] for item in settable(settings)}
+
+
+def values_of(settings: type, said: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of fields from what a user says; None: nothing is said.
+
+    Raises `TypeError`: there is no such option; `ValueError`: it can't have that value.
+    """
+    options = options_of(settings)
+    unknown = said.keys() - options.keys()
+    if unknown:
+        raise TypeError(f"no option {min(unknown)!r}; there are {', '.join(options)}")
+    return {name: options[name].value(name, value) for name, value in said.items() if value is not None}
+
+
+def spelled_out(settings: type) -> Callable[[Verb], Verb]:
+    """Name the options that a call takes as keywords in its signature, for help and completion."""
+
+    def with_options(verb: Verb) -> Verb:
+        signature = inspect.signature(verb)
+        own = [one for one in signature.parameters.values() if one.kind is not one.VAR_KEYWORD]
+        named = [
+            inspect.Parameter(
+                item.name,
+                inspect.Parameter.KEYWORD_ONLY,
+                default=None if item.default is MISSING else item.default,
+                annotation=item.type,
+            )
+            for item in settable(settings)
+        ]
+        verb.__signature__ = signature.replace(parameters=[*own, *named])  # type: ignore[attr-defined]
+        return verb
+
+    return with_options
+
+
+def names(said: str | Collection[str]) -> frozenset[str]:
+    """Of entities; in a text they are separated by semicolons."""
+    listed = [name.strip() for name in said.split(";")] if isinstance(said, str) else said
+    return frozenset(name for name in listed if name)
+
+
+def egos(said: str | Collection[str]) -> frozenset[str]:
+    """Vehicles under test; empty for "none"."""
+    found = names(said)
+    if NO_EGO in found and len(found) > 1:
+        raise ValueError(f"{', '.join(sorted(found))}: {NO_EGO!r} stands alone")
+    return found - {NO_EGO}
+
+
+def one_of(words: type[StrEnum]) -> Callable[[Any], StrEnum]:
+    """One of some words; a list of one from the configuration, too."""
+
+    def read(said: Any) -> StrEnum:
+        try:
+            return words(said[0] if isinstance(said, list) and len(said) == 1 else said)
+        except ValueError as error:
+            raise ValueError(f"{said!r}, expected one of {', '.join(words)}") from error
+
+    return read
+
+
+def whole(smallest: int) -> Callable[[str | int], int]:
+    """A whole number."""
+
+    def read(said: str | int) -> int:
+        try:
+            number = int(str(said).removesuffix(".0"))  # whole numbers with a missing one are often written as floats
+        except ValueError as error:
+            raise ValueError(f"{said!r} is not a whole number") from error
+        if number < smallest:
+            raise ValueError(f"{number}, at least {smallest}")
+        return number
+
+    return read
+
+
+def seconds(said: str | float) -> float:
+    """A length of time. [s]"""
+    number = float(said)
+    if not 0.0 < number < math.inf:
+        raise ValueError(f"{said!r} s, expected more than 0")
+    return number
+
+
+def paths(said: Paths) -> tuple[Path, ...]:
+    """One path or several."""
+    return (Path(said),) if isinstance(said, str | Path) else tuple(Path(path) for path in said)
+
+
+def profile(said: ProfileLike) -> str | DriverProfile:
+    """A profile, or its name or path."""
+    return str(said) if isinstance(said, Path) else said
+
+
+def profiles(said: Mapping[str, ProfileLike] | Collection[str]) -> dict[str, str | DriverProfile]:
+    """Entity -> profile."""
+    return {name: profile(value) for name, value in _pairs(said).items()}
+
+
+def texts(said: Mapping[str, object] | Collection[str]) -> dict[str, str]:
+    """Name -> value."""
+    return {name: str(value) for name, value in _pairs(said).items()}
+
+
+def _pairs(said: Mapping[str, Any] | Collection[str]) -> Mapping[str, Any]:
+    """A mapping, or words ``NAME=VALUE``."""
+    if isinstance(said, Mapping):
+        return said
+    found: dict[str, str] = {}
+    for word in said:
+        name, equals, value = word.partition("=")
+        if not equals or not name:
+            raise ValueError(f"{word!r}: expected NAME=VALUE")
+        if name in found:
+            raise ValueError(f"{name!r} is given twice")
+        found[name] = value
+    return found
+
+
+def as_it_is(text: str, _folder: Path) -> str:
+    """A cell's text."""
+    return text
+
+
+def beside(text: str, folder: Path) -> Path:
+    """A path as seen from the table's folder."""
+    return folder / text
+
+
+def profile_cell(text: str, folder: Path) -> str:
+    """A profile's name as it is; a path as seen from the table's folder."""
+    return str(folder / text) if text.endswith(".json") or "/" in text or "\\" in text else text
+
+
+def json_object(text: str, _folder: Path) -> dict[str, str]:
+    """Values of any kind as texts."""
+    try:
+        values: Any = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"{text[:80]!r} is not a JSON object: {error}") from error
+    if not isinstance(values, dict):
+        raise ValueError(f"{text!r} is not a JSON object")
+    return {str(name): value if isinstance(value, str) else json.dumps(value) for name, value in values.items()}

@@ -1,0 +1,243 @@
+"""The convert report: what enriching a scenario changed, for a person to judge."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from xosc_lateral.files.pages.page import KeyFigure, Page, Tone
+from xosc_lateral.workflows.conversion.result import ConvertedScenario, Enriched, EntityResult
+from xosc_lateral.workflows.conversion.text import WRITTEN_AS, beside_text, under_test
+from xosc_lateral.workflows.playing import figures as figures
+from xosc_lateral.workflows.playing.figures import COMFORTABLE
+from xosc_lateral.workflows.playing.page import add_notes
+from xosc_lateral.workflows.playing.scene import scene_of
+from xosc_lateral.world.motion.gaps import REACH, Gap
+
+MOST_PANELS, MOST_DYNAMICS = 12, 6
+"""Entities with panels of their own, for offsets and for dynamics; those with the largest offsets come first."""
+
+SELDOM = 0.01
+"""Share of the time beyond which lateral acceleration is rougher than people's. [-]"""
+
+GAP_TIMES = ("at [s]", "at [s] ")
+"""Headings of the times of the nominal and the enriched gap: a table's headings differ, if only by a blank."""
+
+
+def conversion_page(conversion: ConvertedScenario) -> str:
+    """HTML page on one converted scenario, self-contained; same input, same bytes."""
+    enriched = conversion.enriched
+    done = [entity for entity in enriched.entities if entity.is_enriched]
+    page = Page(f"{conversion.source.name}: lateral movement added")
+    page.lead(
+        (
+            f"{len(done)} of {len(enriched.entities)} entities now move inside their lanes as the chosen drivers do; "
+            "their maneuvers are unchanged."
+            if done
+            else "No entity was enriched; the reasons are listed below."
+        )
+        + f" The scenario runs for {enriched.motion.end_time:.1f} s (ended by the {enriched.motion.ended_by}). "
+        f"The result is in `{conversion.output.name}`."
+    )
+    page.key_figures(_key_figures(enriched, done))
+    page.lead(under_test(conversion))
+    for warning in conversion.warnings:
+        page.warning(warning)
+    page.section(
+        "Player",
+        "The scenario from above. Filled boxes are the enriched vehicles, dashed outlines their nominal places. A "
+        "lateral stretch above 1 widens the road, so that decimetres become visible. Click a vehicle to follow it, "
+        "point at it for its values, drag to look elsewhere.",
+    )
+    page.player(
+        scene_of(enriched.motion, enriched.network, enriched.entities), "Scenario from above, nominal and enriched"
+    )
+    _add_paths(page, enriched)
+    _add_offsets(page, enriched, done)
+    _add_dynamics(page, enriched, done)
+    _add_gaps(page, enriched)
+    page.section(
+        "Segments",
+        "Offsets are sampled where a vehicle simply follows its road. Everywhere else the table gives the reason why "
+        "not.",
+    )
+    page.figure(figures.timeline(enriched), "Coloured: road-following, by entity over time. Grey: not.", over_time=True)
+    rows = [
+        {"entity": entity.name, "from [s]": span.start, "to [s]": span.end, "what": span.kind.value}
+        for entity in enriched.entities
+        for span in entity.spans
+    ]
+    page.table(rows, "Segments of every entity", formats={"from [s]": ".2f", "to [s]": ".2f"})
+    add_notes(page, enriched.motion.notes)
+    return page.html(_provenance(conversion))
+
+
+def _provenance(conversion: ConvertedScenario) -> dict[str, object]:
+    made = conversion.provenance
+    return {
+        "scenario": conversion.source.name,
+        "output": conversion.output.name,
+        "under test": list(made.ego) or "none",
+        "written as": [f"{name}: {WRITTEN_AS[mode]}" for name, mode in made.modes.items()],
+        "neighbours": [
+            f"{one.name}: {beside_text(one.profile, made.options['neighbours'])}"
+            for one in conversion.enriched.entities
+            if one.is_enriched and one.profile is not None
+        ],
+        "seed": made.options["seed"],
+        "variant": made.variant,
+        "parameters set": [f"{name} = {value}" for name, value in made.options["parameters"].items()],
+        "profiles": [f"{entity}: {name} ({sha[:12]})" for entity, (name, sha) in made.profiles.items()],
+        "inputs": [f"{name} ({sha[:12]})" for name, sha in made.inputs.items()],
+        "output hash": conversion.output_sha256,
+    }
+
+
+def _add_paths(page: Page, enriched: Enriched) -> None:
+    page.section("Paths")
+    paths = figures.paths_stretched(enriched)
+    if paths is None:
+        page.text("No entity is on a road.")
+        return
+    page.figure(
+        paths,
+        "Position across the road (t) over position along it (s), with the scale across the road exaggerated. "
+        "Coloured: enriched. Dashed: nominal. Dots: where each entity starts. Bends of the road are drawn straight.",
+        "Lateral position of every vehicle along the road, nominal and enriched, with lane markings",
+    )
+
+
+def _add_offsets(page: Page, enriched: Enriched, done: Sequence[EntityResult]) -> None:
+    page.section("Offsets", "The distance between the enriched and the nominal path, positive to the left of travel.")
+    if done:
+        page.figure(
+            figures.offsets_over_time(enriched, _largest(done, MOST_PANELS)),
+            "Shaded: road-following segments, where offsets are sampled. Between two segments, the offset leads "
+            f"smoothly from one to the other.{_left_out(done, MOST_PANELS)}",
+            "Offset over time of each enriched entity",
+            over_time=True,
+        )
+        page.table(
+            [_entity_row(entity) for entity in done],
+            "Enriched entities. Acceleration and jerk are lateral, and what enriching adds to the nominal path.",
+            formats={"time [s]": ".1f", f"> {COMFORTABLE} m/s² [%]": ".1f"},
+        )
+    others = [{"entity": one.name, "reason": one.why} for one in enriched.entities if not one.is_enriched]
+    if others:
+        page.table(others, "Entities that keep their nominal motion")
+
+
+def _add_dynamics(page: Page, enriched: Enriched, done: Sequence[EntityResult]) -> None:
+    page.section("Speed and lateral dynamics")
+    page.figure(
+        figures.speeds_over_time(enriched.motion, enriched.entities),
+        "Coloured: enriched. Dashed: nominal. Lateral movement hardly changes the distance driven, and therefore "
+        "hardly changes the speed.",
+        "Speed over time of every entity",
+        over_time=True,
+    )
+    if done:
+        page.figure(
+            figures.accelerations_over_time(_largest(done, MOST_DYNAMICS)),
+            "Lateral acceleration beyond what curves and lane changes require. The band reaches "
+            f"{COMFORTABLE} m/s² to either side; real drivers rarely leave it while they keep their lane."
+            f"{_left_out(done, MOST_DYNAMICS)}",
+            "Added lateral acceleration over time",
+            over_time=True,
+        )
+
+
+def _add_gaps(page: Page, enriched: Enriched) -> None:
+    page.section(
+        "Gaps",
+        "The smallest free space between the bounding boxes of two vehicles that come within "
+        f"{REACH:g} m of each other.",
+    )
+    before = {gap.names: gap for gap in enriched.gaps_before}
+    after = {gap.names: gap for gap in enriched.gaps_after}
+    pairs = [(before.get(names), after.get(names)) for names in sorted(before | after)]
+    pairs.sort(key=lambda pair: min(gap.distance for gap in pair if gap is not None))
+    if not pairs:
+        page.text("No two vehicles come that close to each other.")
+        return
+    page.table(
+        [_gap_row(*pair) for pair in pairs],
+        "Pairs of vehicles, the closest first. Marked: pairs that touch in the enriched scenario only.",
+        formats=dict.fromkeys(("nominal [m]", "enriched [m]", "change [m]"), ".2f") | dict.fromkeys(GAP_TIMES, ".1f"),
+        tones=_tones(enriched, pairs),
+    )
+
+
+def _tones(enriched: Enriched, pairs: Sequence[tuple[Gap | None, Gap | None]]) -> dict[int, Tone]:
+    """Rows of pairs that touch only since they were enriched."""
+    touching = {gap.names for gap in enriched.new_contacts}
+    return {number: "bad" for number, pair in enumerate(pairs) if any(gap and gap.names in touching for gap in pair)}
+
+
+def _key_figures(enriched: Enriched, done: Sequence[EntityResult]) -> list[KeyFigure]:
+    if not done:
+        return []
+    offsets = np.concatenate([segment.offset for entity in done for segment in entity.segments])
+    added = np.concatenate([np.abs(entity.lateral_acceleration()) for entity in done])
+    rough = float(np.mean(added > COMFORTABLE))
+    figures_ = [
+        KeyFigure(f"{sum(entity.segment_seconds for entity in done):.0f} s", "road-following, all entities together"),
+        KeyFigure(
+            f"{offsets.std():.2f} m", "standard deviation of the offsets", f"largest {np.abs(offsets).max():.2f} m"
+        ),
+        KeyFigure(
+            f"{added.max():.2f} m/s²",
+            "largest added lateral acceleration",
+            f"above {COMFORTABLE} m/s² for {100.0 * rough:.1f} % of the time; real drivers rarely are, in their lane",
+            "bad" if rough > SELDOM else "",
+        ),
+    ]
+    if enriched.gaps_after:
+        after = min(enriched.gaps_after, key=lambda gap: gap.distance)
+        before = min(enriched.gaps_before, key=lambda gap: gap.distance, default=None)
+        nominal = "" if before is None else f"; nominally {before.distance:.2f} m"
+        if before is not None and before.names != after.names:
+            nominal += f", of {' and '.join(before.names)}"
+        tone: Tone = "bad" if enriched.new_contacts else ""
+        figures_.append(KeyFigure(f"{after.distance:.2f} m", "smallest gap", " and ".join(after.names) + nominal, tone))
+    return figures_
+
+
+def _entity_row(entity: EntityResult) -> dict[str, object]:
+    added, jerk = np.abs(entity.lateral_acceleration()), np.abs(entity.lateral_jerk())
+    return {
+        "entity": entity.name,
+        "profile": "" if entity.profile is None else entity.profile.name,
+        "segments": len(entity.segments),
+        "time [s]": entity.segment_seconds,
+        "std. deviation [m]": entity.offset_spread,
+        "max. offset [m]": float(np.abs(entity.deviation).max()),
+        "acc. rms [m/s²]": float(np.sqrt(np.mean(added**2))),
+        "acc. max. [m/s²]": float(added.max()),
+        f"> {COMFORTABLE} m/s² [%]": 100.0 * float(np.mean(added > COMFORTABLE)),
+        "jerk rms [m/s³]": float(np.sqrt(np.mean(jerk**2))),
+    }
+
+
+def _gap_row(before: Gap | None, after: Gap | None) -> dict[str, object]:
+    names = (before or after).names  # type: ignore[union-attr]
+    return {
+        "pair": " and ".join(names),
+        "nominal [m]": None if before is None else before.distance,
+        GAP_TIMES[0]: None if before is None else before.time,
+        "enriched [m]": None if after is None else after.distance,
+        GAP_TIMES[1]: None if after is None else after.time,
+        "change [m]": None if before is None or after is None else after.distance - before.distance,
+    }
+
+
+def _largest(entities: Sequence[EntityResult], most: int) -> list[EntityResult]:
+    """At most so many of them, those with the largest offsets, in their own order."""
+    ranked = sorted(entities, key=lambda entity: -float(np.abs(entity.deviation).max()))[:most]
+    return [entity for entity in entities if entity in ranked]
+
+
+def _left_out(entities: Sequence[EntityResult], most: int) -> str:
+    more = len(entities) - most
+    return f" {more} more with smaller offsets are left out." if more > 0 else ""

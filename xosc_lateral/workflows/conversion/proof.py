@@ -1,0 +1,117 @@
+"""What an effect does in a scenario: one stretch converted with it and without it, and the shift measured there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache, partial
+
+import numpy as np
+from msgspec.structs import replace
+
+from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.base.shipped import shipped_folder
+from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect
+from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.workflows.conversion.enrich import enrich
+from xosc_lateral.workflows.conversion.load import Played, play_scenario
+from xosc_lateral.workflows.conversion.result import Neighbours
+from xosc_lateral.workflows.conversion.seen import SAMPLE_STEP
+from xosc_lateral.world.surroundings.context import entity_context
+
+Converted = Callable[[str, int], FloatArray]
+"""Template, number of the vehicle -> deviations."""
+
+SCENARIOS = ("overtake-truck", "cut-in", "curves")
+"""Shipped templates, of which the one in which an effect moves somebody most is taken."""
+
+SEEDS = range(4)
+
+STEP = 0.1
+"""Of playback: stretches are stated to a second and shifts to a centimetre. [s]"""
+
+LEAST = 0.02
+"""A stretch on which an effect moves its driver by less is none. [m]"""
+
+
+@dataclass(frozen=True, slots=True)
+class Proof:
+    """A shift by one effect, measured between two conversions of a scenario with the same seeds.
+
+    - `columns`: what the effect goes by
+    - `scenario`: the template
+    - `vehicle`: who shows it most
+    - `start`, `end`: of the stretch: from its first to its last moment with half of the largest shift or more. [s]
+    - `shift`, `error`: mean over the stretch and over seeds, positive left, and its standard error over seeds. [m]
+    """
+
+    columns: tuple[str, ...]
+    scenario: str
+    vehicle: str
+    start: float
+    end: float
+    shift: float
+    error: float
+
+    def __str__(self) -> str:
+        """In words."""
+        side = "left" if self.shift > 0 else "right"
+        return (
+            f"{' and '.join(self.columns)}: in `{self.scenario}` {self.vehicle} drives {abs(self.shift):.2f} "
+            f"+- {self.error:.2f} m further {side} with it than without it, {self.start:.0f} to {self.end:.0f} s"
+        )
+
+
+def proofs_of(profile: DriverProfile, effects: Iterable[Effect] | None = None) -> list[Proof]:
+    """Of those effects of a profile (all by default) that move the mean and act in one of the `SCENARIOS`."""
+    chosen = profile.effects if effects is None else tuple(effects)
+    moving = [one for one in chosen if isinstance(one, ColumnEffect) and one.acts is Acts.LOCATION]
+    converted: Converted = cache(partial(_deviations, profile))  # the same for every effect
+    return [found for effect in moving if (found := _proof(profile, effect, converted)) is not None]
+
+
+def _proof(profile: DriverProfile, effect: ColumnEffect, converted: Converted) -> Proof | None:
+    stretches = [(name, *one) for name in SCENARIOS for one in _stretches(name, effect)]
+    if not stretches:
+        return None
+    name, vehicle, rows, _ = max(stretches, key=lambda one: one[-1])
+    without = replace(profile, effects=tuple(one for one in profile.effects if one != effect))
+    shifts = (converted(name, vehicle) - _deviations(without, name, vehicle))[:, rows].mean(axis=1)
+    driven = _played(name).motion.entities[vehicle]
+    begin, end = driven.time[rows[[0, -1]]].tolist()
+    error = float(shifts.std(ddof=1) / np.sqrt(len(shifts)))
+    return Proof(effect.columns, name, driven.name, begin, end, float(shifts.mean()), error)
+
+
+@cache
+def _played(name: str) -> Played:
+    """A template with its own settings, played."""
+    return play_scenario(shipped_folder("templates") / f"{name}.xosc", step=STEP)
+
+
+@cache
+def _contexts(name: str) -> tuple[tuple[IntArray, Mapping[str, FloatArray]], ...]:
+    """Of each of its vehicles: rows `SAMPLE_STEP` apart, and what the driver knows there."""
+    played = _played(name)
+    every = round(SAMPLE_STEP / played.motion.step)
+    grids = [np.arange(0, len(entity.time), every) for entity in played.motion.entities]
+    return tuple((grid, entity_context(played.motion, played.network, k, grid)) for k, grid in enumerate(grids))
+
+
+def _stretches(name: str, effect: ColumnEffect) -> Iterator[tuple[int, IntArray, float]]:
+    """Vehicles that an effect moves: number, rows on which it does by half of its most or more, and how far. [m]"""
+    for number, (grid, context) in enumerate(_contexts(name)):
+        strength = effect.strength(SAMPLE_STEP, context)
+        if strength is None or not np.isfinite(strength).any():
+            continue
+        most = float(np.nanmax(np.abs(strength)))
+        if most >= LEAST:
+            yield number, grid[np.abs(strength) >= 0.5 * most], most
+
+
+def _deviations(profile: DriverProfile, name: str, vehicle: int) -> FloatArray:
+    """How far from the nominal path one vehicle drives in conversions, shape (seeds, rows). [m]"""
+    played = _played(name)
+    drivers = {played.motion.entities[vehicle].name: profile}
+    found = [enrich(played.motion, played.network, drivers, seed=k, neighbours=Neighbours.PROFILE) for k in SEEDS]
+    return np.array([one.entities[vehicle].deviation for one in found])

@@ -1,0 +1,201 @@
+"""What enriching and converting a scenario give, as data: the writer, the report and the manifest read it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.drivers.model.drivability import Bound
+from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.world.motion.gaps import Gap
+from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
+from xosc_lateral.world.motion.segments import SegmentSpan
+from xosc_lateral.world.motion.trajectory import WorldTrajectory, leaps
+from xosc_lateral.world.road.network import RoadNetwork
+
+
+class Neighbours(StrEnum):
+    """What a conversion does where a profile's own answer to neighbours is not known, or whether there is any."""
+
+    PROFILE = "profile"
+    BORROW = "borrow"
+    NONE = "none"
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class SampledSegment:
+    """Offsets sampled on one road-following segment."""
+
+    span: SegmentSpan  # the segment
+    time: FloatArray  # every 0.2 s from the segment's start, shape (n,) [s]
+    offset: FloatArray  # added to the nominal offset, positive left, shape (n,) [m]
+    # beyond: how it would go on after the segment's end, should that come later, shape (k,) [m]
+    beyond: FloatArray = field(default_factory=lambda: np.empty(0))
+
+    def later(self) -> tuple[FloatArray, FloatArray]:
+        """Times after the segment's end, and offsets there. [s], [m]"""
+        time = self.time[-1] + (self.time[1] - self.time[0]) * np.arange(1, len(self.beyond) + 1)
+        return time[time > self.span.end], self.beyond[time > self.span.end]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class EntityResult:
+    """One entity, nominal and enriched."""
+
+    motion: EntityMotion  # nominal
+    spans: tuple[SegmentSpan, ...]  # all of its motion, road-following or not
+    profile: DriverProfile | None  # None: not enriched, `why` says the reason
+    why: str  # why it was not enriched; empty if it was
+    segments: tuple[SampledSegment, ...]
+    deviation: FloatArray  # of the enriched path from the nominal one, positive left, shape (rows,) [m]
+    trajectory: WorldTrajectory  # the enriched path (the nominal one if not enriched)
+    # neutral: context columns that the profile's effects ask for and that were not known: without effect
+    neutral: tuple[str, ...] = ()
+    # bound: that sampled movement was smoothed since nobody could have driven it: the worst segment's
+    bound: Bound | None = None
+
+    @property
+    def name(self) -> str:
+        """The entity's name."""
+        return self.motion.name
+
+    @property
+    def is_enriched(self) -> bool:
+        """Whether offsets were sampled for it."""
+        return bool(self.segments)
+
+    @property
+    def segment_seconds(self) -> float:
+        """Time in road-following segments that got offsets. [s]"""
+        return sum(segment.span.end - segment.span.start for segment in self.segments)
+
+    @property
+    def offset_spread(self) -> float:
+        """Standard deviation of the sampled offsets; 0 if there are none. [m]"""
+        return float(np.std(np.concatenate([segment.offset for segment in self.segments]))) if self.segments else 0.0
+
+    def lateral_acceleration(self) -> FloatArray:
+        """Second time derivative of the deviation, shape (rows,): what enriching added. [m/s2]"""
+        return _derivative(_derivative(self.deviation, self.motion.time), self.motion.time)
+
+    def lateral_jerk(self) -> FloatArray:
+        """Third time derivative of the deviation, shape (rows,). [m/s3]"""
+        return _derivative(self.lateral_acceleration(), self.motion.time)
+
+
+def _derivative(values: FloatArray, time: FloatArray) -> FloatArray:
+    return np.gradient(values, time[1] - time[0]) if len(time) > 2 else np.zeros_like(values)
+
+
+@dataclass(frozen=True, slots=True)
+class LaneDeparture:
+    """An enriched vehicle whose reference point leaves the lane that its nominal motion keeps."""
+
+    name: str
+    time: float
+    beyond: float
+    """How far beyond the marking. [m]"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Enriched:
+    """A played scenario with lifelike lateral movement."""
+
+    motion: NominalMotion
+    network: RoadNetwork
+    entities: tuple[EntityResult, ...]  # in the scenario's order, all of them
+    # gaps_before, gaps_after: smallest gaps of the pairs that come near each other, nominal and enriched
+    gaps_before: tuple[Gap, ...]
+    gaps_after: tuple[Gap, ...]
+    departures: tuple[LaneDeparture, ...]
+    seed: int  # seed, variant, attempt: what the samples were drawn with; `attempt` counts resamplings on request
+    variant: int
+    attempt: int
+
+    def entity(self, name: str) -> EntityResult:
+        """The entity of that name; `KeyError` if there is none."""
+        for entity in self.entities:
+            if entity.name == name:
+                return entity
+        raise KeyError(name)
+
+    @property
+    def new_contacts(self) -> tuple[Gap, ...]:
+        """Pairs that touch now and did not before."""
+        before: Mapping[tuple[str, str], Gap] = {gap.names: gap for gap in self.gaps_before}
+        return tuple(
+            gap for gap in self.gaps_after if gap.touches and not (gap.names in before and before[gap.names].touches)
+        )
+
+    def warnings(self) -> tuple[str, ...]:
+        """What a user has to know, a line each."""
+        lines = [
+            f"{a} and {b} touch at {gap.time:.1f} s (in the nominal motion they do not)"
+            for gap in self.new_contacts
+            for a, b in [gap.names]
+        ]
+        lines += [
+            f"{departure.name} leaves its lane at {departure.time:.1f} s by {departure.beyond:.2f} m"
+            for departure in self.departures
+        ]
+        lines += [line for entity in self.entities for line in _jumps(entity)]
+        lines += [
+            f"{entity.name}: {', '.join(entity.neutral)} not known in the scenario: no effect of theirs"
+            for entity in self.entities
+            if entity.neutral
+        ]
+        lines += [f"{entity.name}: {entity.bound}" for entity in self.entities if entity.bound is not None]
+        return tuple(lines)
+
+
+def _jumps(entity: EntityResult) -> list[str]:
+    return [
+        f"{entity.name} jumps {length:.1f} m at {time:.1f} s, as in the nominal motion: the lane that it follows "
+        "ends, or its road has a gap; a lane change before it would avoid that"
+        for time, length in leaps(entity.motion)
+    ]
+
+
+@dataclass(frozen=True, slots=True)
+class ConversionProvenance:
+    """What went into an output: enough to make the same bytes again."""
+
+    package_version: str
+    behaviour: int  # `version.BEHAVIOUR` of the program
+    scenario: str  # where the scenario lies, as seen from the output
+    # inputs: file name, as seen from the scenario -> SHA-256 of every file that was read (scenario, road,
+    # catalogs, context)
+    inputs: Mapping[str, str]
+    profiles: Mapping[str, tuple[str, str]]  # enriched entity -> name and SHA-256 of its profile
+    options: Mapping[str, Any]  # what was asked for: `ConvertSettings.record`
+    variant: int  # from 1, as in file names
+    version: str  # of the standard that was written
+    ego: tuple[str, ...]  # vehicles under test: left as they are. Empty: there is none, and everything is replayed
+    modes: Mapping[str, str]  # vehicle that was enriched -> "trajectory" or "lane-offset"
+    content_sha256: str  # of the output without its provenance
+
+    @property
+    def mode(self) -> str:
+        """Of all vehicles that were enriched: "trajectory", "lane-offset", "mixed"; empty: nobody was."""
+        found = sorted(set(self.modes.values()))
+        return "mixed" if len(found) > 1 else "".join(found)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ConvertedScenario:
+    """One converted scenario."""
+
+    source: Path
+    output: Path
+    output_sha256: str  # SHA-256 of the output's bytes
+    enriched: Enriched  # nominal and enriched motion, segments, gaps
+    provenance: ConversionProvenance
+    warnings: tuple[str, ...]  # what a user has to know, a line each
+    data: bytes = b""  # the converted scenario, if it was not to be written
+    is_replay: bool = True  # everything happens by the clock of the nominal run, whoever drives

@@ -1,0 +1,197 @@
+"""What the driver of a vehicle sees on the road-following segments of its motion.
+
+A driver of right-hand traffic does to the left, in left-hand traffic, what he does to the right at home: the overtaking
+lane, the hard shoulder and the seat have changed sides. So his context is mirrored, the profile sampled in it, and its
+offsets are mirrored back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.rows import blocks, kept
+from xosc_lateral.base.segment import Segment
+from xosc_lateral.drivers.fitting.answers import basis_of
+from xosc_lateral.drivers.model.profile import COLUMNS, SIDES, Basis, DriverProfile
+from xosc_lateral.drivers.model.sampled_offsets import FUTURE, PAST
+from xosc_lateral.drivers.model.sampling import Responses, responses_to
+from xosc_lateral.workflows.conversion.result import Neighbours
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
+from xosc_lateral.world.motion.segments import SegmentSpan
+from xosc_lateral.world.road.network import RoadNetwork
+from xosc_lateral.world.surroundings.context import entity_context
+
+SAMPLE_STEP = 0.2
+"""Step of the driver model. [s]"""
+
+NEIGHBOURS = frozenset(column for columns in COLUMNS.values() for column in columns)
+"""Columns by which a profile responds to neighbours by itself."""
+
+NO_WIDTH = 0.01
+"""A lane narrower than this is none. [m]"""
+
+OTHER_SIGN = ("curvature", "crossfall")
+"""Positive to the one side, negative to the other."""
+
+_SIDES = {"left": "right", "right": "left"}
+
+Contexts = Mapping[str, tuple[FloatArray, FloatArray]]
+"""Columns that a scenario doesn't state, or that replace what it states, as times [s] and values."""
+
+
+class SeenSegment(NamedTuple):
+    """A road-following segment as its driver sees it."""
+
+    span: SegmentSpan
+    knots: IntArray
+    """Rows of the motion that are sampled, shape (n,)."""
+    segment: Segment
+    """In a mirror where the profile is one of the other hand's traffic: `side` is -1 then, else 1."""
+    side: float
+    responses: Responses
+    """See `responses_to`."""
+
+
+class Seen(NamedTuple):
+    """All that a driver sees on his way, and how he answers to neighbours."""
+
+    segments: tuple[SeenSegment, ...] = ()
+    neutral: tuple[str, ...] = ()
+    """Context columns that his profile asks for and that are not known."""
+    responds: frozenset[str] = frozenset()
+    """Sides on which the profile responds to neighbours by itself, as its population does."""
+    alone: frozenset[str] = frozenset()
+    """Sides on which that is known of the driver himself: nothing is borrowed."""
+
+
+NOTHING_SEEN = Seen()
+
+
+def seen_by(
+    driver: DriverProfile,
+    entity: EntityMotion,
+    motion: NominalMotion,
+    network: RoadNetwork,
+    spans: tuple[SegmentSpan, ...],
+    contexts: Contexts,
+    neighbours: Neighbours,
+) -> Seen:
+    """What the driver of an entity sees; `motion` is the run with those alone whose place beside him is certain."""
+    index = next(k for k, one in enumerate(motion.entities) if one is entity)
+    every = max(1, round(SAMPLE_STEP / motion.step))
+    segments: list[SeenSegment] = []
+    neutral, responds, alone = set[str](), set[str](), set[str]()
+    for span in spans:
+        knots = kept(np.arange(span.first, span.last + 1, every))
+        if not span.is_road_following or len(knots) < 2:
+            continue
+        _refuse_no_width(entity, span, network)
+        segment = _segment(motion, network, index, knots, every, contexts)
+        if neighbours is Neighbours.NONE:
+            segment = _with_nobody_beside(segment)
+        neutral |= {column for column in driver.columns if column not in segment.context}
+        is_left_hand = network.roads[int(entity.road[knots[0]])].rule == "LHT"
+        other_hand = is_left_hand != driver.left_hand
+        responds |= sides_known(driver, {Basis.POPULATION}, other_hand=other_hand)
+        alone |= sides_known(driver, {Basis.MEASURED, Basis.DECLARED}, other_hand=other_hand)
+        segment, side = (mirrored(segment), -1.0) if other_hand else (segment, 1.0)
+        segments.append(SeenSegment(span, knots, segment, side, responses_to(segment, driver)))
+    return Seen(tuple(segments), tuple(sorted(neutral)), frozenset(responds), frozenset(alone))
+
+
+def sides_known(driver: DriverProfile, known: set[Basis], *, other_hand: bool) -> set[str]:
+    """Sides of the road, "left" and "right", on which the driver's answer to neighbours is known in such a way."""
+    return {other_side(side) if other_hand else side for side in SIDES if basis_of(driver, side) in known}
+
+
+def _refuse_no_width(entity: EntityMotion, span: SegmentSpan, network: RoadNetwork) -> None:
+    """A lane may begin or end with no width, but nobody follows one that has none all along."""
+    for rows in blocks(span.last + 1, span.first):
+        if network.lane_width(entity.road[rows], entity.lane[rows], entity.s[rows]).max() >= NO_WIDTH:
+            return
+    raise FormatError(
+        f"lane {entity.lane[span.first]} has no width where {entity.name!r} follows it",
+        path=network.path,
+        element=f"road {network.road_ids[entity.road[span.first]]!r}",
+    )
+
+
+def _segment(
+    motion: NominalMotion, network: RoadNetwork, index: int, knots: IntArray, every: int, contexts: Contexts
+) -> Segment:
+    """The segment on its knots, with context before and after as far as the entity's motion is one piece."""
+    entity = motion.entities[index]
+    start = max(0, knots[0] - every * round(PAST / SAMPLE_STEP))
+    stop = min(len(entity.time), knots[-1] + every * round(FUTURE / SAMPLE_STEP) + 1)
+    earlier, later = (
+        np.flatnonzero(((activity & Activity.TELEPORTED) != 0) | ((activity & Activity.ACTIVE) == 0))
+        for activity in (entity.activity[start : knots[0] + 1], entity.activity[knots[-1] + 1 : stop])
+    )
+    before = (knots[0] - start - int(earlier.max(initial=0))) // every
+    after = int(later.min(initial=stop - knots[-1] - 1)) // every
+    grid = np.arange(knots[0] - before * every, knots[-1] + after * every + 1, every)
+    context = entity_context(motion, network, index, grid)
+    for name, (time, values) in contexts.items():
+        context[name] = np.interp(entity.time[grid], time, values)
+    lane_width = _filled(context["lane_width"], slice(before, len(grid) - after))
+    return Segment(entity.time[grid], lane_width, context["speed"], context, before, after)
+
+
+def _filled(values: FloatArray, inside: slice) -> FloatArray:
+    """Lane widths with the nearest one inside the segment where the margins hold none (off the road)."""
+    filled = values.copy()
+    filled[: inside.start][np.isnan(filled[: inside.start])] = values[inside.start]
+    filled[inside.stop :][np.isnan(filled[inside.stop :])] = values[inside.stop - 1]
+    return filled
+
+
+def _with_nobody_beside(segment: Segment) -> Segment:
+    nobody = {
+        name: np.full_like(values, np.nan if name.endswith("distance") else 0.0)
+        for name, values in segment.context.items()
+        if name in NEIGHBOURS
+    }
+    return replace(segment, context={**segment.context, **nobody})
+
+
+def going_on(segment: Segment, rows: int) -> Segment:
+    """So many rows that follow a segment where everything stays as at its end."""
+    last = segment.inside.stop
+    held = np.append(np.arange(last), np.full(rows, last - 1))
+    time = np.append(segment.time[:last], segment.time[last - 1] + SAMPLE_STEP * np.arange(1, rows + 1))
+    context = {name: values[held] for name, values in segment.context.items()}
+    return Segment(time, segment.lane_width[held], segment.speed[held], context, before=last, after=0)
+
+
+def mirrored(segment: Segment) -> Segment:
+    """The segment with left and right exchanged.
+
+    Columns change places whose names differ in the word `left` or `right` alone (`left_distance`, `truck_right`);
+    curvature and crossfall change their sign, the wind its side; lanes are counted from the other edge. A column of
+    another name stays.
+    """
+    return replace(segment, context=mirrored_context(segment.context))
+
+
+def mirrored_context(context: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Context columns with left and right exchanged; shapes and units as they are."""
+    found = {other_side(name): values for name, values in context.items()}
+    for name in OTHER_SIGN:
+        if name in found:
+            found[name] = -found[name]
+    if "wind_direction" in found:
+        found["wind_direction"] = -found["wind_direction"] % 360.0
+    if "lane_index" in found and "lane_count" in found:
+        found["lane_index"] = found["lane_count"] - 1.0 - found["lane_index"]
+    return found
+
+
+def other_side(name: str) -> str:
+    """The name with the words `left` and `right` exchanged."""
+    return "_".join(_SIDES.get(word, word) for word in name.split("_"))

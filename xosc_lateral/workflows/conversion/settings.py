@@ -1,0 +1,273 @@
+"""What a user can choose for a conversion, declared once.
+
+Python's keywords, the options of the command line, the columns of a table of scenarios and the keys of the
+configuration file that decide a conversion are all made from the fields of `ConvertSettings`.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, TypedDict
+
+from xosc_lateral.base.errors import FormatError
+from xosc_lateral.files.configuration import SETTINGS, configuration
+from xosc_lateral.files.openscenario.read import RoadSearch
+from xosc_lateral.files.openscenario.write.target import Player, TargetPlayer, target
+from xosc_lateral.workflows.conversion import options as say
+from xosc_lateral.workflows.conversion.options import Option, PathLike, Paths, ProfileLike, option
+from xosc_lateral.workflows.conversion.result import Neighbours
+
+if TYPE_CHECKING:
+    from xosc_lateral.drivers.model.profile import DriverProfile
+
+STEP = 0.02
+"""Of playback, as in the reference logs. [s]"""
+
+AUTO = "auto"
+"""Profile name for the shipped population, and for nobody who has no driver (a trailer, a tram)."""
+
+
+class OutputMode(StrEnum):
+    """How offsets are written: by vehicle as it depends on a vehicle under test, or the same for all."""
+
+    AUTO = "auto"
+    TRAJECTORY = "trajectory"
+    LANE_OFFSET = "lane-offset"
+
+
+@dataclass(frozen=True, slots=True)
+class ConvertSettings:
+    """Settings of one conversion, as plain values that a batch can send and hash.
+
+    Parameters
+    ----------
+    profile : DriverProfile, path or name
+        Of every vehicle; "auto": the shipped population's, `motorway`.
+    seed : int
+        Same inputs, seed and variant: same bytes.
+    entity : mapping of str to DriverProfile, path or name
+        Entity -> profile, before `profile`.
+    only : collection of str
+        Enrich these alone; the others stay as they are.
+    ego : collection of str
+        Vehicles under test, which are left as they are, beside those that the scenario leaves to somebody else (an
+        external controller, CARLA's `ego_vehicle`); ("none",): there is none.
+    neighbours : {"profile", "borrow", "none"}
+        How drivers answer to vehicles beside them: as the profile alone says; by a population's law, too, where the
+        profile's answer is not known; not at all. Without: as configured, else "borrow".
+    context : str or Path
+        Table of context over time that the scenario doesn't state: `time` [s], and a column each.
+    parameters : mapping
+        Scenario parameters that replace those declared.
+    library : path or paths
+        Folders with further profiles.
+    mode : {"auto", "trajectory", "lane-offset"}
+        Play maneuvers out, or keep them and add lane offsets between them; "auto" decides by vehicle: lane offsets for
+        those whose motion depends on a vehicle under test.
+    player : {"standard", "esmini", "carla"}
+        Who is to play it: nobody in particular, or a player with ways of its own.
+    version : str
+        Of the standard, "1.0" to "1.4"; without it the input's (1.0 for CARLA). What an older version lacks is sampled,
+        or left out and named in `Conversion.warnings`.
+    allow : path or paths
+        Folders, besides those around the scenario, that its road and catalogs may lie in.
+    road : str or Path
+        OpenDRIVE file, whatever the scenario says.
+    road_path : path or paths
+        Folders with roads that a scenario knows by name ("Town04").
+    attempts : int
+        Sample anew up to so many times while vehicles touch or leave their lane that nominally don't.
+    time_limit : float
+        Where a run is cut off; without it a scenario that never ends after 60 s, one with an end after an hour. [s]
+    with_sensor : bool
+        Add the sensor error of the drives that profiles were fitted on, for tests of a perception chain; without, the
+        driver alone is written.
+    strict : bool
+        A missing vehicle catalog is an error, instead of a note and a usual car.
+
+    Raises
+    ------
+    ValueError
+        A version of the standard that can't be written, or that the player does not read.
+    """
+
+    # What is said of one option stays together.
+    # fmt: off
+    profile: str | DriverProfile = option(
+        AUTO, say.profile, "--profile", "-p", kind=str, cell=say.profile_cell,
+        help="Name or path of a driver profile; auto: motorway, the population.",
+    )
+    seed: int = option(0, say.whole(0), cell=say.as_it_is)
+    entity: Mapping[str, str | DriverProfile] = option(
+        {}, say.profiles, kind=list[str] | None, metavar="NAME=PROFILE", prefix="profile:", entry=say.profile_cell,
+        help="Profile of one entity; may be repeated.",
+    )
+    only: frozenset[str] | None = option(
+        None, say.names, kind=list[str] | None, metavar="NAME", cell=say.as_it_is,
+        help="Enrich only this entity; may be repeated.",
+    )
+    ego: frozenset[str] | None = option(
+        None, say.egos, kind=list[str] | None, metavar="NAME", cell=say.as_it_is,
+        help="Vehicle under test: left as it is; may be repeated. Those with an external controller are found by "
+        "themselves. none: there is none.",
+    )
+    neighbours: Neighbours = option(
+        Neighbours.BORROW, say.one_of(Neighbours), kind=Neighbours | None, cell=say.as_it_is, show_default=False,
+        help="How drivers answer to vehicles beside them: as their profile alone says; borrow: by a population's law "
+        "where that is not known (default); none: not at all.",
+    )
+    context: Path | None = option(
+        None, Path, kind=Path | None, cell=say.beside,
+        help="Table of context over time (columns time, wind_speed, ...).",
+    )
+    parameters: Mapping[str, str] = option(
+        {}, say.texts, "--set", cell=say.json_object, prefix="parameter:", entry=say.as_it_is
+    )
+    library: tuple[Path, ...] = option((), say.paths)
+    mode: OutputMode = option(
+        OutputMode.AUTO, say.one_of(OutputMode), kind=OutputMode, cell=say.as_it_is,
+        help="trajectory: play the maneuvers out; lane-offset: keep them reactive; auto: by vehicle, as it depends on "
+        "a vehicle under test.",
+    )
+    player: Player = option(
+        Player.STANDARD, say.one_of(Player), "--for", kind=Player, cell=say.as_it_is,
+        help="Who plays it: standard, or made for esmini or CARLA's ScenarioRunner.",
+    )
+    version: str | None = option(
+        None, str, kind=str | None, metavar="1.0..1.4", cell=say.as_it_is, show_default=False,
+        help="Version of OpenSCENARIO to write; default: the input's.",
+    )
+    allow: tuple[Path, ...] = option((), say.paths)
+    road: Path | None = option(None, Path, cell=say.beside)
+    road_path: tuple[Path, ...] = option((), say.paths)
+    attempts: int = option(
+        1, say.whole(1), "--resample", kind=int, cell=say.as_it_is, min=1,
+        help="Attempts at most, while vehicles collide or leave their lane.",
+    )
+    time_limit: float | None = option(None, say.seconds, cell=say.as_it_is)
+    with_sensor: bool = option(False, bool)
+    strict: bool = option(
+        False, bool, "--strict", kind=bool,
+        help="Exit with 1 on warnings, a missing vehicle catalog, or no entity enriched.",
+    )
+    # fmt: on
+    names_may_lack: bool = False
+    """`entity`, `only` and `ego` apply where an entity of that name exists: one of many scenarios."""
+    step: float = STEP
+
+    def __post_init__(self) -> None:
+        _ = self.target
+
+    @classmethod
+    def of(cls, **options: Any) -> ConvertSettings:
+        """Settings from what a user says, else as configured; None: nothing is said.
+
+        Raises what `values_of` does; `FormatError`: it is the configuration that says so; there is no such road, or
+        folder of roads.
+        """
+        path, configured = configuration()
+        values = say.values_of(cls, options)
+        for name in (SETTINGS - values.keys()) & configured.keys():
+            try:
+                values[name] = OPTIONS[name].value(name, configured[name])
+            except ValueError as error:
+                raise FormatError(str(error), path=path) from error
+        made = cls(**values)
+        _ = made.roads
+        return made
+
+    def of_row(self, cells: Mapping[str, str], folder: Path) -> ConvertSettings:
+        """What a row of a table says comes before; paths in it are as seen from the table's folder."""
+        return replace(
+            self, **{name: one.of_row(name, getattr(self, name), cells, folder) for name, one in OPTIONS.items()}
+        )
+
+    def record(self, folder: Path) -> dict[str, Any]:
+        """What decides an output, as plain JSON values; files as seen from a folder.
+
+        Where files are looked for is no part of it, for their hashes are known; nor what refuses more or less.
+        """
+        names = [name for name in (*OPTIONS, "step") if name not in NOT_RECORDED]
+        return {name: _plain(name, getattr(self, name), folder) for name in names}
+
+    @classmethod
+    def of_record(cls, values: Mapping[str, Any], folder: Path) -> ConvertSettings:
+        """Settings from what `record` gave; `ValueError` for a value that can't be."""
+        found: dict[str, Any] = {"step": float(values.get("step", STEP)), "names_may_lack": True}
+        for name, said in values.items():
+            one = OPTIONS.get(name)
+            if one is not None and said is not None:
+                if one.entry is not None:
+                    said = {key: one.entry(text, folder) for key, text in dict(said).items()}
+                elif one.cell is not None and isinstance(said, str):
+                    said = one.cell(said, folder)
+                found[name] = one.value(name, said)
+        return cls(**found)
+
+    @property
+    def target(self) -> TargetPlayer:
+        """Player and version of the standard to write for."""
+        return target(self.player.value, self.version)
+
+    @property
+    def roads(self) -> RoadSearch:
+        """Where the road may lie besides where the scenario says."""
+        return RoadSearch(self.road, self.road_path)
+
+
+OPTIONS: Mapping[str, Option] = say.options_of(ConvertSettings)
+"""What users can set, by name."""
+
+
+class ConvertKeywords(TypedDict, total=False):
+    """The same names for type checkers, with what a call may be given."""
+
+    profile: ProfileLike
+    seed: int
+    entity: Mapping[str, ProfileLike] | None
+    only: Collection[str] | None
+    ego: Collection[str] | None
+    neighbours: Literal["profile", "borrow", "none"] | None
+    context: PathLike | None
+    parameters: Mapping[str, object] | None
+    library: Paths
+    mode: Literal["auto", "trajectory", "lane-offset"]
+    player: Literal["standard", "esmini", "carla"]
+    version: str | None
+    allow: Paths
+    road: PathLike | None
+    road_path: Paths
+    attempts: int
+    time_limit: float | None
+    with_sensor: bool
+    strict: bool
+
+
+NOT_RECORDED = frozenset({"library", "allow", "road_path", "strict"})
+
+
+def _plain(name: str, value: Any, folder: Path) -> Any:
+    """A setting as a JSON value."""
+    if isinstance(value, Mapping):
+        return {key: _plain("profile" if name == "entity" else "", one, folder) for key, one in sorted(value.items())}
+    if name == "profile":
+        if not isinstance(value, str):
+            return value.name
+        return relative(Path(value), folder) if value.endswith(".json") or Path(value).name != value else value
+    if isinstance(value, Path):
+        return relative(value, folder)
+    if isinstance(value, StrEnum):
+        return value.value
+    return sorted(value) if isinstance(value, frozenset) else value
+
+
+def relative(path: Path, folder: Path) -> str:
+    """Path as seen from a folder, with forward slashes: the same on every machine."""
+    try:
+        return Path(os.path.relpath(os.path.realpath(path), os.path.realpath(folder))).as_posix()
+    except ValueError:  # another drive of a Windows machine
+        return path.resolve().as_posix()

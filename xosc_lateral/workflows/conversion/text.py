@@ -1,0 +1,106 @@
+"""What a conversion did, as text and as plain values."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from xosc_lateral.drivers.fitting.answers import basis_of, beside_line, borrows
+from xosc_lateral.drivers.model.profile import SIDES, DriverProfile
+from xosc_lateral.workflows.conversion.result import ConversionProvenance, ConvertedScenario, Neighbours
+from xosc_lateral.world.motion.gaps import Gap
+
+WRITTEN_AS = {"trajectory": "a trajectory", "lane-offset": "lane offsets"}
+
+
+def as_text(conversion: ConvertedScenario, report: Path | None = None) -> str:
+    """What was done, what was not, what to know."""
+    lines = [f"{conversion.source if conversion.data else conversion.output}"]
+    lines.append(f"  {under_test(conversion)}")
+    for entity in conversion.enriched.entities:
+        if entity.is_enriched and entity.profile is not None:
+            mode = conversion.provenance.modes.get(entity.name, "")
+            lines.append(
+                f"  {entity.name}: {len(entity.segments)} segments, {entity.segment_seconds:.1f} s, "
+                f"offsets {entity.offset_spread:.2f} m (standard deviation), profile {entity.profile.name}, "
+                f"as {WRITTEN_AS.get(mode, mode)}"
+            )
+            lines.append(f"    neighbours: {beside_text(entity.profile, conversion.provenance.options['neighbours'])}")
+        else:
+            lines.append(f"  {entity.name}: as in the scenario ({entity.why})")
+    if conversion.provenance.options["with_sensor"]:
+        lines.append("  offsets include the sensor error of the drives that the profiles were fitted to")
+    lines += [f"  note: {note.what}" for note in conversion.enriched.motion.notes]
+    lines += [f"  warning: {warning}" for warning in conversion.warnings]
+    if report is not None:
+        lines.append(f"report: {report}")
+    return "\n".join(lines)
+
+
+def beside_text(profile: DriverProfile, neighbours: str) -> str:
+    """How a driver answers to vehicles beside him, and where that is known from, in a line."""
+    if neighbours == Neighbours.NONE:
+        return "no answer (--neighbours none)"
+    may_borrow = neighbours == Neighbours.BORROW
+    lines = []
+    for side in SIDES:
+        borrowed = ": borrowed from the population" if may_borrow and borrows(profile, side) else ""
+        lines.append(beside_line(profile, side) + borrowed)
+    return "; ".join(lines)
+
+
+def under_test(conversion: ConvertedScenario) -> str:
+    """Who is under test, in a line."""
+    egos = conversion.provenance.ego
+    if egos:
+        return f"under test, left as written: {', '.join(egos)}"
+    return "no vehicle under test: " + (
+        "everything is replayed" if conversion.is_replay else "maneuvers that stay react to the run"
+    )
+
+
+def facts(conversion: ConvertedScenario, report: Path | None = None) -> dict[str, Any]:
+    """Plain values about a conversion, rounded to what they are read for: a micrometre, a microsecond."""
+    enriched = conversion.enriched
+    return {
+        "source": str(conversion.source),
+        "output": None if conversion.data else str(conversion.output),
+        "report": None if report is None else str(report),
+        "sha256": conversion.output_sha256,
+        "end_time": round(enriched.motion.end_time, 6),
+        "ended_by": enriched.motion.ended_by,
+        "ego": list(conversion.provenance.ego),
+        "entities": [
+            {
+                "name": entity.name,
+                "profile": entity.profile.name if entity.is_enriched and entity.profile is not None else None,
+                "why_not": entity.why,
+                "neighbours": _beside_facts(entity.profile) if entity.is_enriched else None,
+                "mode": conversion.provenance.modes.get(entity.name),
+                "segments": [[round(segment.span.start, 6), round(segment.span.end, 6)] for segment in entity.segments],
+                "offset_spread": round(entity.offset_spread, 6),
+                "neutral_context": list(entity.neutral),
+            }
+            for entity in enriched.entities
+        ],
+        "gap_before": _smallest(enriched.gaps_before),
+        "gap_after": _smallest(enriched.gaps_after),
+        "notes": [asdict(note) for note in enriched.motion.notes],
+        "warnings": list(conversion.warnings),
+        "provenance": provenance_record(conversion.provenance),
+    }
+
+
+def _beside_facts(profile: DriverProfile | None) -> dict[str, str] | None:
+    return None if profile is None else {side: basis_of(profile, side).value for side in SIDES}
+
+
+def provenance_record(provenance: ConversionProvenance) -> dict[str, Any]:
+    """Provenance of a conversion as plain values."""
+    profiles = {name: {"name": profile, "sha256": sha} for name, (profile, sha) in provenance.profiles.items()}
+    return asdict(provenance) | {"profiles": profiles}
+
+
+def _smallest(gaps: tuple[Gap, ...]) -> float | None:
+    return min((round(gap.distance, 6) for gap in gaps), default=None)

@@ -1,0 +1,244 @@
+"""`live`: drivers in a simulation that runs, from its start to its end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from xosc_lateral.base.errors import SimulationError
+from xosc_lateral.base.lazy import pd
+from xosc_lateral.files.output_paths import claim, output_file
+from xosc_lateral.workflows.conversion.result import Neighbours
+from xosc_lateral.workflows.result import PathLike, Paths, ProfileLike, Result, given_profile
+
+if TYPE_CHECKING:
+    from xosc_lateral.workflows.live.scene import Scene
+    from xosc_lateral.world.scenario.entity import Entity
+
+STATES = ("time", "name", "x", "y", "h", "speed", "road", "lane", "s", "offset", "driver", "steered")
+"""Columns of a run: where vehicles are; offset from the lane's centre, positive left; the driver's; if it counts."""
+
+ROW = (*STATES, "z", "pitch", "roll")
+"""The same with what only a trace has."""
+
+
+def live_esmini(
+    scenario: PathLike,
+    library: Any,
+    *,
+    profile: ProfileLike = "motorway",
+    profiles: Mapping[str, ProfileLike] | None = None,
+    ego: Sequence[str] = (),
+    seed: int = 0,
+    duration: float = 3600.0,
+    step: float = 0.01,
+    window: bool = False,
+    neighbours: str = Neighbours.BORROW,
+    folders: Paths = (),
+) -> LiveRun:
+    """Play a scenario in esmini with drivers in its vehicles.
+
+    Parameters
+    ----------
+    scenario : path
+    library : path, ctypes.CDLL, or object with the same functions
+        ``libesminiLib.so``, ``esminiLib.dll``: the user's own.
+    profile, profiles
+        Who drives; by vehicle where it is another.
+    ego : sequence of str
+        Vehicles under test: none of our drivers.
+    duration, step : float
+        [s]
+    window : bool
+        Open esmini's.
+    folders : path or paths
+        With further profiles.
+
+    Raises
+    ------
+    SimulationError, FormatError
+        In one line.
+    """
+    from xosc_lateral.workflows.live.esmini import EsminiTraffic
+    from xosc_lateral.workflows.live.esmini_library import open_player
+    from xosc_lateral.workflows.live.scene import Scene
+
+    chosen = given_profile(profile, folders)
+    others = {name: given_profile(one, folders) for name, one in (profiles or {}).items()}
+    if not Path(scenario).is_file():
+        raise FileNotFoundError(2, "No such file or directory", str(scenario))
+    player = open_player(library, scenario, window=window)
+    rows: list[tuple[Any, ...]] = []
+    events: list[tuple[float, str, int]] = []
+    try:
+
+        def note(_name: bytes, _kind: int, state: int, path: bytes) -> None:
+            events.append((round(player.SE_GetSimulationTime(), 6), path.decode(errors="replace"), state))
+
+        traffic = EsminiTraffic(
+            player, scenario, chosen, ego=ego, seed=seed, profiles=others, neighbours=Neighbours(neighbours),
+            on_element=note,
+        )  # fmt: skip
+        traffic.steer(0.0)
+        for k in range(round(duration / step) + 1):
+            time = player.SE_GetSimulationTime()
+            for name, state in traffic.states().items():
+                move = traffic.moves.get(name, (float("nan"), False))
+                place = (state.road, state.lane, state.s, traffic.offset_of(state))
+                pose = (state.x, state.y, state.h, state.speed)
+                rows.append((time, name, *pose, *place, *move, state.z, state.p, state.r))
+            if player.SE_GetQuitFlag() == 1 or k == round(duration / step):
+                break
+            traffic.steer(step)
+            if player.SE_StepDT(step) != 0:
+                raise SimulationError(f"{scenario}: {player.where} stopped at {time:g} s")
+            traffic.settle(step)
+    finally:
+        player.SE_Close()
+    settings = {"scenario": Path(scenario).name, "profile": chosen.name, "seed": seed}
+    scene = Scene(traffic.entities, lambda: traffic.network, ego)
+    return LiveRun(rows, settings, traffic.warnings, events, scene)
+
+
+def live_sumo(
+    config: PathLike,
+    *,
+    profile: ProfileLike = "motorway",
+    profiles: Mapping[str, ProfileLike] | None = None,
+    ego: Sequence[str] = (),
+    seed: int = 0,
+    duration: float = 86_400.0,
+    lateral_resolution: float | None = None,
+    options: Sequence[str] = (),
+    neighbours: str = Neighbours.BORROW,
+    folders: Paths = (),
+) -> LiveRun:
+    """Run a SUMO simulation with drivers in its vehicles; the extra `sumo`.
+
+    Parameters
+    ----------
+    config : path
+        ``.sumocfg``; SUMO's own random seed is as it says.
+    lateral_resolution : float, optional
+        Switches the sublane model on, if the configuration does not. [m]
+    options : sequence of str
+        Further words of SUMO's command line.
+    profile, profiles, ego, seed, duration, neighbours, folders
+        See `live_esmini`.
+
+    Raises
+    ------
+    SimulationError
+        In one line.
+    """
+    from xosc_lateral.workflows.live.scene import Scene, sumo_entity, sumo_network
+    from xosc_lateral.workflows.live.sumo import SumoTraffic, start
+
+    chosen = given_profile(profile, folders)
+    others = {name: given_profile(one, folders) for name, one in (profiles or {}).items()}
+    if not Path(config).is_file():
+        raise FileNotFoundError(2, "No such file or directory", str(config))
+    sublane = [] if lateral_resolution is None else ["--lateral-resolution", f"{lateral_resolution:g}"]
+    connection = start(["-c", str(config), *sublane, *options])
+    rows: list[tuple[Any, ...]] = []
+    entities: dict[str, Entity] = {}
+    collisions = teleports = 0
+    try:
+        net = str(connection.simulation.getOption("net-file"))
+        traffic = SumoTraffic(
+            connection, chosen, ego=ego, seed=seed, profiles=others, neighbours=Neighbours(neighbours)
+        )
+        end = float(connection.simulation.getTime()) + duration
+        configured = float(connection.simulation.getEndTime())  # of which SUMO makes nothing by itself here
+        end = min(end, configured) if configured > 0.0 else end
+        while connection.simulation.getMinExpectedNumber() > 0 and connection.simulation.getTime() < end - 1e-9:
+            traffic.steer()
+            connection.simulationStep()
+            time = float(connection.simulation.getTime())
+            collisions += len(connection.simulation.getCollisions())
+            teleports += connection.simulation.getStartingTeleportNumber()
+            for name, x, y, h, speed, lane, s, offset in traffic.states():
+                move = traffic.moves.get(name, (float("nan"), False))
+                edge, _, index = lane.rpartition("_")
+                z = float(connection.vehicle.getPosition3D(name)[2])
+                rows.append((time, name, x, y, h, speed, edge, int(index), s, offset, *move, z, 0.0, 0.0))
+                if name not in entities:
+                    entities[name] = sumo_entity(connection.vehicle, name)
+    finally:
+        connection.close()
+    settings = {"scenario": Path(config).name, "profile": chosen.name, "seed": seed}
+    warnings = [f"SUMO reports {count} {what}" for count, what in ((collisions, "collisions"), (teleports, "teleports"))
+                if count]  # fmt: skip
+    scene = Scene(tuple(entities.values()), partial(sumo_network, net), ego, is_road=False)
+    return LiveRun(rows, settings, [*traffic.warnings, *warnings], scene=scene)
+
+
+class LiveRun(Result):
+    """A run of a simulation with drivers in it."""
+
+    __slots__ = ("_rows", "_scene", "_settings", "events", "warnings")
+
+    def __init__(
+        self,
+        rows: Sequence[tuple[Any, ...]],
+        settings: Mapping[str, Any],
+        warnings: Sequence[str],
+        events: Sequence[tuple[float, str, int]] = (),
+        scene: Scene | None = None,
+    ) -> None:
+        self._rows = pd.DataFrame(rows, columns=list(ROW))
+        self._settings, self._scene = dict(settings), scene
+        self.warnings = tuple(warnings)
+        """What a user has to know, a line each."""
+        self.events = tuple(events)
+        """Changes of storyboard elements: time [s], path, state."""
+
+    def headline(self) -> str:
+        """One line."""
+        rows = self._rows
+        names, steered = rows["name"].nunique(), rows["name"][rows["steered"].astype(bool)].nunique()
+        time = rows["time"].iloc[-1] if len(rows) else 0.0
+        source, profile, seed = (self._settings[key] for key in ("scenario", "profile", "seed"))
+        return f"{source}: {time:g} s, {steered} of {names} vehicles driven by {profile}, seed {seed}"
+
+    def __str__(self) -> str:
+        return "\n".join([self.headline(), *(f"  warning: {warning}" for warning in self.warnings)])
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per vehicle and step, see `STATES`; SI units, offsets positive left of travel."""
+        return self._rows[list(STATES)]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them: what ran, without its rows."""
+        return {"rows": len(self._rows), "warnings": list(self.warnings), **self._settings}
+
+    def write(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the table: ``.csv``, ``.csv.gz`` or ``.parquet``, with its provenance."""
+        from xosc_lateral.files.output_tables import output_suffixes, write_frame
+
+        output = output_file(path, "states.csv", output_suffixes())
+        claim([output], force=force)
+        write_frame(self.to_frame(), output, self._settings)
+        return output
+
+    def write_osi(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write an ASAM OSI trace (extra `osi`): ``.mcap`` or ``.osi``, one `GroundTruth` per step.
+
+        Raises
+        ------
+        SimulationError
+            If the run says nothing of its vehicles, or SUMO's network can't be made a road.
+        """
+        from xosc_lateral.files.osi.extra import SUFFIXES
+        from xosc_lateral.files.osi.write import host_of, write_osi
+        from xosc_lateral.workflows.live.scene import motion_of
+
+        if self._scene is None:
+            raise SimulationError("the run says nothing of its vehicles and its road: there is no trace of it")
+        output = output_file(path, f"{Path(self._settings['scenario']).stem}_gt.mcap", SUFFIXES)
+        claim([output], force=force)
+        network = self._scene.network()
+        motion = motion_of(self._rows, self._scene, network)
+        return write_osi(output, motion, network, host=host_of(motion, self._scene.ego), description=self.headline())

@@ -1,0 +1,117 @@
+"""The library of esmini, as its user has it (``libesminiLib.so``, ``esminiLib.dll``), by ctypes."""
+
+from __future__ import annotations
+
+import ctypes as c
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from xosc_lateral.base.errors import SimulationError
+
+
+class ObjectState(c.Structure):
+    """``SE_ScenarioObjectState``, as esmini 3 has it."""
+
+    _fields_: ClassVar[list[Any]] = (
+        [("id", c.c_int), ("model_id", c.c_int), ("ctrl_type", c.c_int)]
+        + [(name, c.c_double) for name in ("timestamp", "x", "y", "z", "h", "p", "r")]
+        + [("road", c.c_uint32), ("junction", c.c_uint32), ("t", c.c_double), ("lane", c.c_int)]
+        + [(name, c.c_double) for name in ("offset_t", "s", "speed", "center_x", "center_y", "center_z")]
+        + [(name, c.c_double) for name in ("width", "length", "height")]
+        + [("type", c.c_int), ("category", c.c_int), ("wheel_angle", c.c_double), ("wheel_rot", c.c_double)]
+        + [("visibility", c.c_int)]
+    )
+
+
+StoryboardCallback = c.CFUNCTYPE(None, c.c_char_p, c.c_int, c.c_int, c.c_char_p)
+
+FUNCTIONS: dict[str, tuple[Any, ...]] = {
+    "SE_Init": (c.c_int, c.c_char_p, c.c_int, c.c_int, c.c_int, c.c_int),
+    "SE_StepDT": (c.c_int, c.c_double),
+    "SE_Close": (None,),
+    "SE_GetQuitFlag": (c.c_int,),
+    "SE_GetSimulationTime": (c.c_double,),
+    "SE_GetNumberOfObjects": (c.c_int,),
+    "SE_GetId": (c.c_int, c.c_int),
+    "SE_GetObjectName": (c.c_char_p, c.c_int),
+    "SE_GetObjectState": (c.c_int, c.c_int, c.c_void_p),
+    "SE_GetODRFilename": (c.c_char_p,),
+    "SE_ReportObjectLateralPosition": (c.c_int, c.c_int, c.c_double),
+    "SE_RegisterStoryBoardElementStateChangeCallback": (None, StoryboardCallback),
+}
+"""What is called: type of the answer, types of the arguments."""
+
+OPTIONAL = {"SE_SetLogFilePath": (None, c.c_char_p), "SE_LogToConsole": (None, c.c_bool)}
+"""What is called where it is there."""
+
+
+class Player:
+    """An esmini library, its functions by name; the types that a user has declared on them stay as they are.
+
+    Raises `SimulationError`: if it can't be loaded, or lacks a function.
+    """
+
+    def __init__(self, library: Any) -> None:
+        self.where = str(library) if isinstance(library, str | Path) else "the given library"
+        if isinstance(library, str | Path):
+            try:
+                library = c.CDLL(str(library))
+            except OSError as error:
+                raise SimulationError(f"{self.where}: no library that can be loaded ({error})") from error
+        for name, (result, *arguments) in (FUNCTIONS | OPTIONAL).items():
+            if not hasattr(library, name):
+                if name in OPTIONAL:
+                    continue
+                raise SimulationError(f"{self.where}: has no function {name}; the library of esmini 3 is needed")
+            own = c.CFUNCTYPE(result, *arguments)((name, library)) if isinstance(library, c.CDLL) else None
+            setattr(self, name, own or getattr(library, name))
+        self._is_known = False
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Callable[..., Any]: ...
+
+    def state(self, number: int) -> ObjectState | None:
+        """Of an object; None if there is none of that number.
+
+        Raises `SimulationError`: if the library's structure is another than ours.
+        """
+        state = ObjectState()
+        if not self._is_known:
+            self._compare(number)
+        return state if self.SE_GetObjectState(number, c.addressof(state)) == 0 else None
+
+    def _compare(self, number: int) -> None:
+        """Refuse another structure than ours: longer, shorter, or with something else first."""
+        size, spare = c.sizeof(ObjectState), 256
+        buffer = (c.c_ubyte * (size + spare)).from_buffer(bytearray([_UNTOUCHED] * (size + spare)))
+        if self.SE_GetObjectState(number, c.addressof(buffer)) != 0:
+            return
+        end = ObjectState.visibility
+        last, beyond = bytes(buffer[end.offset : end.offset + end.size]), bytes(buffer[size:])
+        if last.count(_UNTOUCHED) == len(last) or beyond.count(_UNTOUCHED) < spare or buffer[0] != number & 0xFF:
+            raise SimulationError(
+                f"{self.where}: another SE_ScenarioObjectState than the {size} bytes of esmini 3; a library of that "
+                "version is needed"
+            )
+        self._is_known = True
+
+
+_UNTOUCHED = 0xA5
+"""A byte that nobody writes by chance at every place."""
+
+
+def open_player(library: Any, scenario: str | Path, *, window: bool = False) -> Player:
+    """A library that has opened a scenario; quiet, without a log file.
+
+    Raises `SimulationError`: if it is none, or can't open the scenario.
+    """
+    player = Player(library)
+    if hasattr(player, "SE_SetLogFilePath"):
+        player.SE_SetLogFilePath(b"")
+    if hasattr(player, "SE_LogToConsole"):
+        player.SE_LogToConsole(False)
+    if player.SE_Init(str(scenario).encode(), 0, int(window), 0, 0) != 0:
+        raise SimulationError(f"{scenario}: {player.where} can't open it")
+    return player

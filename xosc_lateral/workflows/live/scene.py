@@ -1,0 +1,105 @@
+"""What ran in somebody else's simulation, as a motion that our own outputs take: its vehicles, its road, its rows."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from xosc_lateral.base.errors import SimulationError
+from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
+from xosc_lateral.world.road.network import RoadNetwork
+from xosc_lateral.world.scenario.entity import BoundingBox, Entity
+from xosc_lateral.world.scenario.enums import EntityCategory, VehicleCategory
+from xosc_lateral.world.scenario.place import Place
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+KINDS = {
+    "bicycle": VehicleCategory.BICYCLE, "bus": VehicleCategory.BUS, "coach": VehicleCategory.BUS,
+    "delivery": VehicleCategory.VAN, "motorcycle": VehicleCategory.MOTORBIKE, "moped": VehicleCategory.MOTORBIKE,
+    "trailer": VehicleCategory.TRUCK, "tram": VehicleCategory.TRAM, "truck": VehicleCategory.TRUCK,
+}  # fmt: skip
+"""Vehicle class of SUMO -> category of OpenSCENARIO; a car for the rest. SUMO's ``trailer`` is a truck with one."""
+
+
+SEEN = ("x", "y", "z", "heading", "pitch", "roll", "speed", "s", "offset")
+"""Of `EntityMotion`, what the rows of a run say."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """Who was there, and where."""
+
+    entities: Sequence[Entity]
+    network: Callable[[], RoadNetwork]  # reads the road
+    ego: Sequence[str] = ()  # vehicles under test
+    is_road: bool = True  # rows have road and lane by the ids of the network; else they are found from positions
+
+
+def motion_of(rows: pd.DataFrame, scene: Scene, network: RoadNetwork) -> NominalMotion:
+    """The rows of a `LiveRun` by vehicle and time; a vehicle is active where there is a row of it."""
+    times = np.unique(rows["time"])
+    index = {name: k for k, name in enumerate(network.road_ids)}
+    found = []
+    for entity in scene.entities:
+        own = rows[rows["name"] == entity.name].rename(columns={"h": "heading"})
+        seen: dict[str, Any] = {name: own[name].to_numpy(dtype=np.float64) for name in SEEN}
+        seen |= {
+            "road": [index.get(str(road), -1) for road in own["road"]],
+            "lane": own["lane"].to_numpy(dtype=np.int32),
+        }
+        if len(own) and not scene.is_road:
+            there = network.world_to_lane(*(seen[name] for name in ("x", "y", "z", "heading")))
+            seen |= {"road": there.road, "lane": there.lane, "s": there.s}
+        columns: dict[str, Any] = {name: np.zeros(len(times)) for name in (*SEEN, "heading_relative")}
+        columns |= {name: np.zeros(len(times), dtype=np.int32) for name in ("road", "lane")}
+        columns["activity"] = np.zeros(len(times), dtype=np.uint8)
+        at = np.searchsorted(times, own["time"])
+        for name, values in {**seen, "activity": int(Activity.ACTIVE)}.items():
+            columns[name][at] = values
+        found.append(EntityMotion(entity=entity, time=times, **columns))
+    step = float(times[1] - times[0]) if len(times) > 1 else 0.0
+    return NominalMotion(step, tuple(found), (), float(times[-1]) if len(times) else 0.0, "simulation", ())
+
+
+def sumo_entity(vehicles: Any, name: str) -> Entity:
+    """A vehicle of SUMO, whose positions are those of the middle of its front."""
+    length, width, height = (float(getattr(vehicles, f"get{what}")(name)) for what in ("Length", "Width", "Height"))
+    return Entity(
+        name, EntityCategory.VEHICLE, Place("", None, "vehicle"),
+        BoundingBox(-0.5 * length, 0.0, 0.5 * height, length, width, height),
+        KINDS.get(vehicles.getVehicleClass(name), VehicleCategory.CAR),
+    )  # fmt: skip
+
+
+def sumo_network(net: str) -> RoadNetwork:
+    """The road of a SUMO network, by SUMO's own ``netconvert``.
+
+    Raises `SimulationError`: if that is not there, or can't.
+    """
+    try:
+        from sumo import SUMO_HOME
+
+        program: str | None = str(Path(SUMO_HOME) / "bin" / "netconvert")
+    except ImportError:
+        program = shutil.which("netconvert")
+    if program is None:
+        raise SimulationError(
+            "SUMO's netconvert, which gives a trace its lanes, is not there: install xosc-lateral[sumo]"
+        )
+    with tempfile.TemporaryDirectory() as folder:
+        road = Path(folder) / f"{Path(net).name.removesuffix('.gz').removesuffix('.net.xml')}.xodr"
+        words = [program, "--sumo-net-file", net, "--opendrive-output", str(road), "--output.original-names"]
+        done = subprocess.run(words, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            raise SimulationError(f"{net}: netconvert makes no OpenDRIVE of it: {' '.join(done.stderr.split())[:200]}")
+        return read_opendrive(road)

@@ -1,0 +1,130 @@
+"""Drivers over a pipe: one line of JSON in, one out, for benches in any language; `docs/schemas/live.json` has both."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from xosc_lateral.base.errors import SimulationError
+from xosc_lateral.base.segment import CONTEXT_UNITS
+from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.workflows.live.surroundings import OpenDriveRoads, Places
+from xosc_lateral.workflows.live.traffic import Moment, Traffic
+
+SIZE = {"length": 4.6, "width": 1.9, "center_x": 1.4}
+"""Of a vehicle that nobody knows the size of: a usual car's, from its rear axle. [m]"""
+
+_PLACE = ("road", "lane", "s")
+
+
+class Pipe:
+    """Answers line by line.
+
+    `road`: OpenDRIVE file: vehicles may then say `road`, `lane` and `s`, and see each other there.
+    """
+
+    def __init__(self, profile: DriverProfile, *, seed: int = 0, road: str | Path | None = None) -> None:
+        self.network = None if road is None else read_opendrive(road)
+        roads = None if self.network is None else OpenDriveRoads(self.network)
+        left_hand = self.network is not None and any(one.rule == "LHT" for one in self.network.roads)
+        self.traffic = Traffic(profile, seed=seed, roads=roads, left_hand=left_hand)
+        self._columns: set[str] = set()
+
+    def answers(self, lines: Iterable[str]) -> Iterator[str]:
+        """One line for each; what can't be used is answered by an `error`, and the next line goes on."""
+        for line in lines:
+            if line.strip():
+                try:
+                    yield json.dumps(self.answer(line), allow_nan=False)
+                except SimulationError as error:
+                    yield json.dumps({"error": " ".join(str(error).split())})
+
+    def answer(self, line: str) -> dict[str, Any]:
+        """To one line.
+
+        Raises `SimulationError`: if it can't be used; nothing has changed then.
+        """
+        try:
+            given = json.loads(line)
+        except json.JSONDecodeError as error:
+            raise SimulationError(f"no JSON: {error}") from error
+        if not isinstance(given, dict):
+            raise SimulationError("a line has to be a JSON object")
+        if "save" in given:
+            return {"state": self.traffic.to_dict()}
+        if "restore" in given:
+            self.traffic.restore(given["restore"])
+            return {"restored": len(self.traffic)}
+        vehicles = given.get("vehicles")
+        if not isinstance(vehicles, dict) or not all(isinstance(one, dict) for one in vehicles.values()):
+            raise SimulationError("`vehicles` has to be an object of objects, by name")
+        moves = self.traffic.step(_number(given, "time", "the line"), self._moment(vehicles))
+        columns = (moves.offset.tolist(), moves.rate.tolist(), moves.heading.tolist(), moves.steered.tolist())
+        return {
+            "time": given["time"],
+            "vehicles": {
+                name: {"offset": offset, "rate": rate, "heading": heading, "steered": steered}
+                for name, offset, rate, heading, steered in zip(vehicles, *columns, strict=True)
+            },
+        }
+
+    def _moment(self, vehicles: Mapping[str, Mapping[str, Any]]) -> Moment:
+        seen = [(f"vehicle {name!r}", one) for name, one in vehicles.items()]
+        known = set(CONTEXT_UNITS) - {"speed", "lane_width", "is_truck"}
+        self._columns |= {name for _, one in seen for name in one if name in known}
+        placed = self.network is not None and all(all(key in one for key in _PLACE) for _, one in seen)
+        places = self._places(seen) if placed else None
+        if self.network is not None and not placed and seen:
+            raise SimulationError(f"with a road, every vehicle says {', '.join(_PLACE)}")
+        width = np.array([_number(one, "lane_width", who, 0.0 if placed else None) for who, one in seen])
+        if places is not None and self.network is not None:
+            on = places.road >= 0
+            width[on] = self.network.lane_width(places.road[on], places.lane[on], places.s[on])
+            width[~on] = 1.0
+        return Moment(
+            tuple(vehicles),
+            np.array([_number(one, "speed", who) for who, one in seen]),
+            width,
+            np.array([_number(one, "offset", who, 0.0) for who, one in seen]),
+            np.array([bool(one.get("following", True)) for _, one in seen], dtype=np.bool_)
+            & (True if places is None else places.road >= 0),
+            np.array([bool(one.get("driven", True)) for _, one in seen], dtype=np.bool_),
+            np.array([bool(one.get("is_truck", False)) for _, one in seen], dtype=np.bool_),
+            base=np.array([_number(one, "base", who, 0.0) for who, one in seen]),
+            context={
+                name: np.array([_number(one, name, who, float("nan")) for who, one in seen]) for name in self._columns
+            },
+            places=places,
+        )  # fmt: skip
+
+    def _places(self, seen: list[tuple[str, Mapping[str, Any]]]) -> Places:
+        assert self.network is not None
+        roads = {name: index for index, name in enumerate(self.network.road_ids)}
+        road = np.array([roads.get(str(one["road"]), -1) for _, one in seen], dtype=np.int64)
+        lane = np.array([int(_number(one, "lane", who)) for who, one in seen], dtype=np.int64)
+        s, offset = (np.array([_number(one, key, who, 0.0) for who, one in seen]) for key in ("s", "offset"))
+        for row in range(len(seen)):
+            if road[row] >= 0 and not self.network.has_lane_at(int(road[row]), int(lane[row]), float(s[row])):
+                road[row] = -1
+        on, pose = road >= 0, np.zeros((3, len(seen)))
+        pose[0, ~on] = 1e9  # beyond everybody's sight
+        if on.any():
+            poses = self.network.lane_to_world(road[on], lane[on], s[on], offset[on])
+            centre = self.network.lane_to_world(road[on], lane[on], s[on])
+            pose[:, on] = poses.x, poses.y, centre.heading
+        size = [np.array([_number(one, key, who, usual) for who, one in seen]) for key, usual in SIZE.items()]
+        return Places(pose[0], pose[1], pose[2], road, lane, s, size[0], size[1], size[2])
+
+
+def _number(one: Mapping[str, Any], name: str, who: str, missing: float | None = None) -> float:
+    value = one.get(name, missing)
+    if value is None and name in one and name in CONTEXT_UNITS and name not in ("speed", "lane_width"):
+        return float("nan")  # JSON's way to say that there is none
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise SimulationError(f"{who}: {name} is {json.dumps(value)}, expected a number")
+    return float(value)

@@ -1,0 +1,328 @@
+"""Drivers of the vehicles of a running simulation: once per step they get what it knows, and say where they are.
+
+A driver goes on at the model's step (5 Hz), on what he sees at that moment; in between he follows the curve of
+`driver.upsampling`. What he sees he responds to a little later than in a conversion, which knows what comes
+(`OffsetStream.preview`). Where a maneuver has moved a vehicle, its path leads over from there to the driver's.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.base.errors import SimulationError
+from xosc_lateral.drivers.model.group import OffsetGroup
+from xosc_lateral.drivers.model.plausibility import first_implausible, implausible
+from xosc_lateral.drivers.model.profile import Basis, DriverProfile, sampling_hash
+from xosc_lateral.workflows.conversion.result import Neighbours
+from xosc_lateral.workflows.conversion.seen import mirrored_context, sides_known
+from xosc_lateral.workflows.live.paths import DRIVER, SPEEDS, Moves, drive_on
+from xosc_lateral.workflows.live.surroundings import Places, Roads, give_way_now, look_around
+from xosc_lateral.world.surroundings.context import STEERING
+
+FORMAT = "xosc-lateral live traffic"
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """What a simulation knows at one moment: a row per vehicle, shape (n,) each.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Each once.
+    speed : array
+        Along the road. [m/s]
+    lane_width : array
+        [m]
+    offset : array
+        Where the vehicle is now, from the lane's centre, positive LEFT of travel. [m]
+    following : array of bool
+        It follows the road: no maneuver moves it sideways, and its lateral place is its driver's.
+    driven : array of bool
+        It has a driver of ours; the vehicle under test has none, and is seen by the others.
+    is_truck : array of bool
+    base : array, optional
+        Nominal offset that the driver's is added to (what a lane offset action left); 0 without. [m]
+    context : mapping of str to array
+        Further context columns, or ones that replace what places say; NaN: there is none.
+    places : Places, optional
+        For the vehicles around. Without, nobody knows of anybody but by `context`.
+    """
+
+    names: tuple[str, ...]
+    speed: FloatArray
+    lane_width: FloatArray
+    offset: FloatArray
+    following: BoolArray
+    driven: BoolArray
+    is_truck: BoolArray
+    base: FloatArray | None = None
+    context: Mapping[str, FloatArray] = field(default_factory=dict)
+    places: Places | None = None
+
+    @cached_property
+    def nominal(self) -> FloatArray:
+        """`base`, or zeros. [m]"""
+        return np.zeros(len(self.names)) if self.base is None else self.base
+
+
+class Traffic:
+    """The drivers of many vehicles.
+
+    Parameters
+    ----------
+    profile : DriverProfile
+        Who drives.
+    profiles : mapping of str to DriverProfile, optional
+        By vehicle, where it is another.
+    seed : int
+        A vehicle's random numbers follow from it and the vehicle's name, as in a conversion: same seed, same drivers.
+    roads : Roads, optional
+        Of the simulation; without, `Moment.places` serve for giving way alone.
+    neighbours : Neighbours
+        See `enrich.enrich`.
+    left_hand : bool
+        One keeps left here.
+
+    Examples
+    --------
+    >>> traffic = Traffic(profile, seed=1)
+    >>> moves = traffic.step(time, moment)
+    """
+
+    def __init__(
+        self,
+        profile: DriverProfile,
+        *,
+        profiles: Mapping[str, DriverProfile] | None = None,
+        seed: int = 0,
+        roads: Roads | None = None,
+        neighbours: Neighbours = Neighbours.BORROW,
+        left_hand: bool = False,
+    ) -> None:
+        self.seed = seed
+        self._roads, self._neighbours, self._left_hand = roads, neighbours, left_hand
+        self._profiles: dict[str, DriverProfile] = {"": profile, **(profiles or {})}
+        self._step = profile.model.step
+        for one in self._profiles.values():
+            if one.model.step != self._step:
+                raise ValueError(f"{one.name} has steps of {one.model.step} s, {profile.name} of {self._step} s")
+        self._groups: dict[str, tuple[OffsetGroup, list[str]]] = {}
+        self._names: list[str] = []
+        self._index: dict[str, int] = {}
+        self._state = np.zeros(0, dtype=DRIVER)
+        self._time: float | None = None
+        self._knots = 0
+        self._columns: tuple[str, ...] | None = None
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def step(self, time: float, moment: Moment) -> Moves:
+        """Where everybody is at a time of the simulation, not earlier than the last one [s].
+
+        From what is known then: how the last step of the simulation has left everybody. Raises `SimulationError` if a
+        number is NaN or none that a road has, time runs backwards, or a context column is missing that was there.
+        Nothing has changed then: the next good moment goes on.
+        """
+        _check(time, self._time, moment)
+        context = self._context(moment) if self.is_due(time) else None
+        there = np.flatnonzero(moment.driven)
+        who = self._present([moment.names[k] for k in there])
+        passed = None if self._time is None else time - self._time
+        self._time = time
+        if context is not None:
+            self._advance(time, moment, context, there, who)
+        rate, heading = np.zeros((2, len(moment.names)))
+        moves = Moves(moment.offset.copy(), rate, heading, np.zeros(len(moment.names), dtype=np.bool_))
+        if len(there):
+            rows = (moment.speed[there], moment.offset[there], moment.nominal[there], moment.following[there])
+            u = min(max(time / self._step - (self._knots - 1), 0.0), 1.0)
+            self._state[who], found = drive_on(self._state[who], u, self._step, passed, *rows)
+            for values, own in zip(moves, found, strict=True):
+                values[there] = own
+        return moves
+
+    # ---- who is there ------------------------------------------------------------------------------------------------
+    def _present(self, names: list[str]) -> IntArray:
+        """Drivers of these vehicles, shape (n,): those of others have gone, new ones have come."""
+        if names != self._names:
+            gone = self._index.keys() - set(names)
+            if gone:
+                self._keep(gone)
+            new = [name for name in names if name not in self._index]
+            self._names += new
+            self._index.update({name: k for k, name in enumerate(self._names)})
+            self._state = np.concatenate([self._state, np.zeros(len(new), dtype=DRIVER)])
+        return np.array([self._index[name] for name in names], dtype=np.int64)
+
+    def _keep(self, gone: set[str]) -> None:
+        self._state = self._state[[name not in gone for name in self._names]]
+        self._names = [name for name in self._names if name not in gone]
+        self._index = {name: k for k, name in enumerate(self._names)}
+        for key, (group, members) in self._groups.items():
+            group.keep(np.array([name not in gone for name in members], dtype=np.bool_))
+            self._groups[key] = (group, [name for name in members if name not in gone])
+
+    def seed_of(self, name: str) -> np.random.SeedSequence:
+        """The random numbers of a vehicle's driver: those of a conversion with this seed."""
+        return np.random.SeedSequence([self.seed, 0, 0, zlib.crc32(name.encode())])
+
+    def _profile_key(self, name: str) -> str:
+        return name if name in self._profiles else ""
+
+    # ---- model steps -------------------------------------------------------------------------------------------------
+    def is_due(self, time: float) -> bool:
+        """Whether `step` at `time` [s] will look at the context: lane widths and places matter then only."""
+        return time >= self._step * self._knots - 1e-9 or self._time is None
+
+    def _context(self, moment: Moment) -> dict[str, FloatArray]:
+        """What everybody sees, checked before anything changes."""
+        found: dict[str, FloatArray] = {"speed": moment.speed, "is_truck": moment.is_truck.astype(np.float64)}
+        acceleration = np.zeros(len(moment.names))
+        for row, name in enumerate(moment.names):
+            k = self._index.get(name)
+            if k is not None and self._state["begun"][k]:
+                acceleration[row] = (moment.speed[row] - self._state["speeds"][k, 0]) / (SPEEDS - 1) / self._step
+        found["acceleration"] = acceleration
+        if moment.places is not None and self._roads is not None:
+            found |= look_around(self._roads, moment.places, moment.offset, moment.is_truck)
+        found |= {name: np.asarray(values, dtype=np.float64) for name, values in moment.context.items()}
+        found["lane_width"] = moment.lane_width
+        if self._columns is not None and (missing := set(self._columns) - found.keys()):
+            raise SimulationError(f"the simulation says nothing of {min(missing)!r}, which it did before")
+        for name, values in found.items():
+            if (row_ := first_implausible(name, values)) is not None:
+                raise SimulationError(f"vehicle {moment.names[row_]!r}: {implausible(name, float(values[row_]))}")
+        return found
+
+    def _advance(
+        self,
+        time: float,
+        moment: Moment,
+        context: dict[str, FloatArray],
+        there: IntArray,
+        who: IntArray,
+    ) -> None:
+        """On to the model step that is now, or to the last one of those that have passed."""
+        if self._columns is None:
+            self._columns = tuple(sorted(context))
+            self._knots = max(self._knots, int(np.floor(time / self._step + 1e-9)))
+        due = int(np.floor(time / self._step + 1e-9)) + 1 - self._knots
+        self._knots += due
+        row, width = {moment.names[k]: k for k in there.tolist()}, context["lane_width"]
+        for name in row:
+            key = self._profile_key(name)
+            if key not in self._groups:
+                self._groups[key] = (OffsetGroup(self._profiles[key], self._columns), [])
+            if not self._state["begun"][self._index[name]] and name not in self._groups[key][1]:
+                group, members = self._groups[key]
+                group.add([self.seed_of(name)])
+                members.append(name)
+        for key, (group, members) in self._groups.items():
+            if not members:
+                continue
+            rows, drivers = np.array([row[name] for name in members]), [self._index[name] for name in members]
+            other_hand = self._profiles[key].left_hand != self._left_hand
+            seen = mirrored_context(context) if other_hand else context
+            for _ in range(due):
+                curve = group.advance(
+                    {name: seen[name][rows] for name in self._columns}, self._width(drivers, width[rows])
+                )
+            self._state["curve"][drivers] = -curve if other_hand else curve
+        state = self._state
+        new = who[~state["begun"][who]]
+        state["speeds"][new] = moment.speed[there][~state["begun"][who], None]
+        state["begun"][who] = True
+        state["speeds"][who] = np.column_stack([state["speeds"][who, 1:], moment.speed[there]])
+        state["wanted"][who] = self._aside(moment, there, who)[there]
+
+    def _width(self, drivers: list[int], width: FloatArray) -> FloatArray:
+        """The lane's, a first-order lag behind what it is: a border of two widths is no jump of the path. [m]"""
+        before = np.where(self._state["width"][drivers] > 0.0, self._state["width"][drivers], width)
+        self._state["width"][drivers] = width + (before - width) * np.exp(-self._step / STEERING)
+        return np.asarray(self._state["width"][drivers])
+
+    def _aside(self, moment: Moment, there: IntArray, who: IntArray) -> FloatArray:
+        """How far everybody wants to move aside, shape (n,). [m]"""
+        if moment.places is None or self._neighbours is not Neighbours.BORROW:
+            return np.zeros(len(moment.names))
+        known = {f"{word}_{side}": np.zeros(len(moment.names), dtype=np.bool_)
+                 for word in ("responds", "alone") for side in ("left", "right")}  # fmt: skip
+        for key, (_, members) in self._groups.items():
+            profile = self._profiles[key]
+            other_hand = profile.left_hand != self._left_hand
+            rows = there[np.isin(who, [self._index[name] for name in members])]
+            for word, basis in (("responds", {Basis.POPULATION}), ("alone", {Basis.MEASURED, Basis.DECLARED})):
+                for side in sides_known(profile, basis, other_hand=other_hand):
+                    known[f"{word}_{side}"][rows] = True
+        lateral = np.where(moment.following, moment.offset - moment.nominal, 0.0)
+        deviation = lateral.copy()
+        deviation[there] -= np.where(moment.following[there], self._state["aside"][who], 0.0)
+        can_move = moment.driven & moment.following
+        return give_way_now(moment.places, lateral, deviation, can_move, known, left_hand=self._left_hand)
+
+    # ---- state -------------------------------------------------------------------------------------------------------
+    def to_dict(self) -> dict[str, Any]:
+        """All that changes while driving, as plain JSON values."""
+        return {
+            "format": FORMAT,
+            "version": 1,
+            "seed": self.seed,
+            "profiles": {key: sampling_hash(profile) for key, profile in self._profiles.items()},
+            "time": self._time,
+            "knots": self._knots,
+            "columns": self._columns,
+            "drivers": {
+                name: [np.asarray(value).tolist() for value in own]
+                for name, own in zip(self._names, self._state.tolist(), strict=True)
+            },
+            "groups": {key: {"members": members, **group.to_dict()} for key, (group, members) in self._groups.items()},
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Go on from what `to_dict` gave; the same profiles, settings and roads were given at the start.
+
+        Raises `SimulationError` if it is no such state, or one of other profiles.
+        """
+        if not isinstance(state, Mapping) or state.get("format") != FORMAT or state.get("version") != 1:
+            raise SimulationError(f'not a state of live traffic: "format" is not "{FORMAT}", or its version is not 1')
+        if state["profiles"] != {key: sampling_hash(profile) for key, profile in self._profiles.items()}:
+            raise SimulationError("the state of live traffic belongs to other profiles")
+        self.seed, self._time, self._knots = int(state["seed"]), state["time"], int(state["knots"])
+        self._columns = None if state["columns"] is None else tuple(state["columns"])
+        self._names = list(state["drivers"])
+        self._index = {name: k for k, name in enumerate(self._names)}
+        rows = [tuple(tuple(one) if isinstance(one, list) else one for one in own) for own in state["drivers"].values()]
+        self._state = np.array(rows, dtype=DRIVER)
+        self._groups = {}
+        for key, saved in state["groups"].items():
+            group = OffsetGroup(self._profiles[key], self._columns or ())
+            group.restore(saved, [self.seed_of(name) for name in saved["members"]])
+            self._groups[key] = (group, list(saved["members"]))
+
+
+def _check(time: float, before: float | None, moment: Moment) -> None:
+    if not np.isfinite(time) or (before is not None and time < before):
+        raise SimulationError(
+            f"the simulation's time is {time:g} s" + ("" if before is None else f" after {before:g} s")
+        )
+    columns = {"speed": moment.speed, "lane width": moment.lane_width, "offset": moment.offset, "base": moment.nominal}
+    if moment.places is not None:
+        columns |= {name: getattr(moment.places, name) for name in ("x", "y", "heading", "s")}
+    for what, values in columns.items():
+        if len(values) != len(moment.names):
+            raise ValueError(f"{what}: {len(values)} rows for {len(moment.names)} vehicles")
+        bad = ~np.isfinite(values)
+        if what == "lane width":
+            bad |= ~(values > 0.0)
+        if bad.any():
+            row = int(np.flatnonzero(bad)[0])
+            raise SimulationError(f"vehicle {moment.names[row]!r} at {time:g} s: {what} is {values[row]}")

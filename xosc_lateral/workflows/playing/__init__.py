@@ -1,0 +1,1 @@
+"""`play`, `segments`, `view` and templates: nominal motion as tables, scenes and pages."""

@@ -1,0 +1,268 @@
+"""`play` and `segments`: a scenario's nominal motion, and where offsets will be sampled."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from msgspec import structs
+
+from xosc_lateral.base.lazy import pd
+from xosc_lateral.files.hashes import parsed_hashes
+from xosc_lateral.files.openscenario.read import RoadSearch
+from xosc_lateral.files.output_paths import claim, output_file
+from xosc_lateral.workflows.conversion.load import Played, play_scenario
+from xosc_lateral.workflows.conversion.settings import STEP
+from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths, write_page
+from xosc_lateral.world.motion.segments import SegmentRow, cut_segments
+
+if TYPE_CHECKING:
+    from xosc_lateral.files.pages.figure import Figure
+
+
+def play(
+    scenario: PathLike,
+    *,
+    step: float = STEP,
+    time_limit: float | None = None,
+    parameters: Mapping[str, object] | None = None,
+    allow: Paths = (),
+    road: PathLike | None = None,
+    road_path: Paths = (),
+    strict: bool = False,
+) -> Playback:
+    """Play a scenario's maneuvers, without offsets.
+
+    Parameters
+    ----------
+    scenario : str or Path
+        Maneuver-based OpenSCENARIO file.
+    step : float
+        Length of a frame. [s]
+    time_limit : float, optional
+        Where a run is cut off; without it a scenario that never ends after 60 s, one with an end after an hour. [s]
+    parameters : mapping, optional
+        Scenario parameters that replace those declared.
+    allow : path or paths
+        Folders, besides those around the scenario, that its road and catalogs may lie in.
+    road : str or Path, optional
+        The road, whatever the scenario says.
+    road_path : path or paths
+        Folders to look for a road by its name ("Town04").
+    strict : bool
+        A missing vehicle catalog is an error, instead of a note and a usual car.
+
+    Raises
+    ------
+    FormatError, PlaybackError
+        With file, line and element.
+    """
+    values = {name: str(value) for name, value in (parameters or {}).items()}
+    return Playback(
+        play_scenario(
+            Path(scenario),
+            parameters=values,
+            step=step,
+            time_limit=time_limit,
+            allowed=as_paths(allow),
+            roads=RoadSearch(None if road is None else Path(road), as_paths(road_path)),
+            strict=strict,
+        )
+    )
+
+
+def segments(
+    scenario: PathLike | Playback,
+    *,
+    step: float = STEP,
+    time_limit: float | None = None,
+    parameters: Mapping[str, object] | None = None,
+    allow: Paths = (),
+) -> Segments:
+    """Road-following segments of every entity, and why the rest is none; see `play`."""
+    played = (
+        scenario
+        if isinstance(scenario, Playback)
+        else play(scenario, step=step, time_limit=time_limit, parameters=parameters, allow=allow)
+    )
+    return Segments(scenario_segments(played._played))
+
+
+class Playback(Result):
+    """Nominal motion: what the maneuvers alone give."""
+
+    __slots__ = ("_played",)
+
+    def __init__(self, played: Played) -> None:
+        self._played = played
+
+    @property
+    def scenario(self) -> Path:
+        """The file."""
+        return self._played.scenario.path
+
+    @property
+    def entities(self) -> tuple[str, ...]:
+        """In the scenario's order."""
+        return tuple(entity.name for entity in self._played.motion.entities)
+
+    @property
+    def end_time(self) -> float:
+        """[s]"""
+        return self._played.motion.end_time
+
+    @property
+    def ended_by(self) -> str:
+        """What ended the run: its stop trigger, the time limit, ..."""
+        return self._played.motion.ended_by
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was not played, or not as written: a line each, with file and line."""
+        return tuple(map(str, self._played.motion.notes))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """That the time limit cut the run off."""
+        note = self._played.motion.cut_off
+        return () if note is None else (str(note),)
+
+    def headline(self) -> str:
+        """One line."""
+        noted = f", {len(self.notes)} notes" if self.notes else ""
+        ended = f"ended by: {self.ended_by}"
+        return f"{self.scenario.name}: {len(self.entities)} entities, {self.end_time:.2f} s ({ended}){noted}"
+
+    def __str__(self) -> str:
+        warned = [f"  warning: {line}" for line in self.warnings]
+        return "\n".join([self.headline(), *(f"  note: {note}" for note in self.notes), *warned])
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per entity and step: `time,name,x,y,z,h,speed,road,lane,offset_t,s`, SI units."""
+        from xosc_lateral.files.states import states_frame
+
+        return states_frame(self._played.motion, self._played.network)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them."""
+        return {
+            "scenario": str(self.scenario),
+            "end_time": round(self.end_time, 6),
+            "ended_by": self.ended_by,
+            "step": self._played.motion.step,
+            "entities": list(self.entities),
+            "notes": list(self.notes),
+            "warnings": list(self.warnings),
+            "provenance": self._provenance(),
+        }
+
+    def plot(self) -> Figure | None:
+        """Paths across the road over along it; None when no entity is on a road."""
+        from xosc_lateral.workflows.conversion.enrich import enrich
+        from xosc_lateral.workflows.playing.figures import paths_stretched
+
+        return paths_stretched(enrich(self._played.motion, self._played.network, {}, seed=0))
+
+    def csv(self) -> str:
+        """The table as text."""
+        from xosc_lateral.files.states import states_csv
+
+        return states_csv(self._played.motion, self._played.network)
+
+    def write(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the table: ``.csv``, ``.csv.gz`` or ``.parquet``."""
+        from xosc_lateral.files.output_tables import output_suffixes, write_table
+
+        output = output_file(path, f"{self.scenario.stem}.csv", output_suffixes())
+        claim([output], self._inputs(), force=force)
+        write_table(output, self._provenance(), frame=self.to_frame, text=self.csv)
+        return output
+
+    def page(self) -> str:
+        """A self-contained HTML page that plays the scenario."""
+        from xosc_lateral.workflows.playing.page import view_page
+
+        motion, network = self._played.motion, self._played.network
+        return view_page(motion, network, source=self.scenario.name, provenance=self._provenance())
+
+    def write_page(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the page that plays the scenario; into a folder as ``NAME_view.html``."""
+        return write_page(path, f"{self.scenario.stem}_view.html", self.page, inputs=self._inputs(), force=force)
+
+    def write_osi(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write an ASAM OSI trace (extra `osi`): ``.mcap`` or ``.osi``, one `GroundTruth` per step."""
+        from xosc_lateral.files.osi.extra import SUFFIXES
+        from xosc_lateral.files.osi.write import host_of, write_osi
+        from xosc_lateral.world.scenario.under_test import vehicles_under_test
+
+        output = output_file(path, f"{self.scenario.stem}_gt.mcap", SUFFIXES)
+        claim([output], self._inputs(), force=force)
+        motion, network = self._played.motion, self._played.network
+        host = host_of(motion, vehicles_under_test(self._played.scenario))
+        return write_osi(output, motion, network, host=host, description=f"{self.scenario.name}, as its maneuvers say")
+
+    def _inputs(self) -> list[Path]:
+        scenario = self._played.scenario
+        return [*scenario.input_files, *([scenario.road_file] if scenario.road_file else [])]
+
+    def _provenance(self) -> dict[str, Any]:
+        return {"inputs": parsed_hashes(self._inputs())}
+
+
+class Segments(Result):
+    """Segments of all entities, road-following or not."""
+
+    __slots__ = ("_rows",)
+
+    def __init__(self, rows: tuple[SegmentRow, ...]) -> None:
+        self._rows = rows
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def headline(self) -> str:
+        """One line."""
+        following = [row for row in self._rows if row.road_following]
+        seconds = sum(row.end - row.start for row in following)
+        entities = len({row.entity for row in self._rows})
+        return f"{len(following)} road-following segments of {entities} entities, {seconds:.1f} s"
+
+    def __str__(self) -> str:
+        width = max((len(row.entity) for row in self._rows), default=0)
+        return "\n".join(
+            f"{row.entity:<{width}}  {row.start:8.2f} - {row.end:8.2f} s  "
+            + (f"road {row.road} lane {row.lane}: road-following" if row.road_following else f"no: {row.why}")
+            for row in self._rows
+        )
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per segment: `entity`, `start`, `end` [s], `road_following`, `why`, `road`, `lane`."""
+        names = ("entity", "start", "end", "road_following", "why", "road", "lane")
+        return pd.DataFrame([[getattr(row, name) for name in names] for row in self._rows], columns=list(names))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them."""
+
+        rows = [structs.asdict(row) for row in self._rows]
+        return {"segments": [row | {"start": round(row["start"], 6), "end": round(row["end"], 6)} for row in rows]}
+
+
+def scenario_segments(played: Played) -> tuple[SegmentRow, ...]:
+    """All segments of all entities, in the scenario's order and in order of time."""
+    rows = []
+    for motion in played.motion.entities:
+        for span in cut_segments(motion, played.network, is_trailer=motion.name in played.trailers):
+            index = int(motion.road[span.first])
+            rows.append(
+                SegmentRow(
+                    entity=motion.name,
+                    start=span.start,
+                    end=span.end,
+                    road_following=span.is_road_following,
+                    why="" if span.is_road_following else span.kind.value,
+                    road=played.network.road_ids[index] if index >= 0 else "",
+                    lane=int(motion.lane[span.first]) if index >= 0 else 0,
+                )
+            )
+    return tuple(rows)

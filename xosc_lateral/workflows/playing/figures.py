@@ -1,0 +1,208 @@
+"""Figures of a scenario: paths over the road, and what happens over time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.files.pages.chart import DASHED, ENRICHED, GRID, INK, MUTED, NOMINAL, SHADE, Panel, color_of, label_of
+from xosc_lateral.files.pages.figure import Figure
+from xosc_lateral.workflows.conversion.result import Enriched, EntityResult
+from xosc_lateral.workflows.playing.road_lines import lane_surfaces, markings
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
+from xosc_lateral.world.road.network import DRIVING
+
+Rows = NDArray[np.int64]
+
+ROW_STEP = 0.1
+"""Rows that are drawn. [s]"""
+
+MARGIN = 30.0
+"""Road that is drawn before and after the paths. [m]"""
+
+MOST_ROADS = 3
+"""Roads that are drawn stretched, those on which most time is spent."""
+
+MOST_NAMED = 12
+"""Entities up to which a figure of all has a legend."""
+
+COMFORTABLE = 0.5
+"""Lateral acceleration that real drivers seldom exceed while they keep their lane, beyond what the road asks. [m/s2]"""
+
+
+# ---- over the road ---------------------------------------------------------------------------------------------------
+def _extents_on_roads(enriched: Enriched) -> dict[int, tuple[float, float]]:
+    """Road -> the s that vehicles cover on it; most time spent first."""
+    covered: dict[int, list[FloatArray]] = {}
+    for entity in enriched.entities:
+        motion = entity.motion
+        here = (motion.activity & Activity.ACTIVE) != 0
+        for road in np.unique(motion.road[here & (motion.road >= 0)]).tolist():
+            covered.setdefault(road, []).append(motion.s[here & (motion.road == road)])
+    whole = {road: np.concatenate(parts) for road, parts in covered.items()}
+    order = sorted(whole, key=lambda road: -len(whole[road]))
+    return {road: (float(whole[road].min()), float(whole[road].max())) for road in order}
+
+
+def shown_rows(motion: EntityMotion) -> Rows:
+    """Rows that are drawn, 0.1 s apart, shape (k,)."""
+    step = motion.time[1] - motion.time[0] if len(motion.time) > 1 else ROW_STEP
+    return np.arange(0, len(motion.time), max(1, round(ROW_STEP / step)))
+
+
+def _breaks(motion: EntityMotion, rows: Rows) -> NDArray[np.bool_]:
+    """Rows at which a line has to break: the entity is absent, or was placed anew since the row before."""
+    bad = ((motion.activity & Activity.ACTIVE) == 0) | ((motion.activity & Activity.TELEPORTED) != 0)
+    bad[0] = (motion.activity[0] & Activity.ACTIVE) == 0
+    counted = np.cumsum(bad)
+    return np.diff(counted[rows], prepend=int(bad[0])) > 0 if len(rows) else np.zeros(0, dtype=bool)
+
+
+def broken(values: FloatArray, breaks: NDArray[np.bool_]) -> FloatArray:
+    """NaN where a line has to break, shape (k,). [unit of the values]"""
+    return np.where(breaks, np.nan, values)
+
+
+def paths_stretched(enriched: Enriched) -> Figure | None:
+    """Paths as t over s on the roads on which most time is spent; across is drawn far larger than along.
+
+    None when no entity is on a road.
+    """
+    roads = list(_extents_on_roads(enriched).items())[:MOST_ROADS]
+    if not roads:
+        return None
+    figure = Figure(len(roads), height=185.0, legend=len(enriched.entities) <= MOST_NAMED)
+    for panel, (road, (first, last)) in zip(figure.panels, roads, strict=True):
+        panel.x.limits, panel.y.limits = (first - MARGIN, last + MARGIN), _shown_t(enriched, road)
+        for kind, s, right, left in lane_surfaces(enriched.network, road, *panel.x.limits):
+            if kind in DRIVING:
+                panel.band(s, right, left, SHADE)
+        for mark, s, t in markings(enriched.network, road, *panel.x.limits):
+            panel.line(s, t, MUTED, width=0.8, dashes="5 3" if "broken" in mark.type else "")
+        for number in range(len(enriched.entities)):
+            _draw_path(panel, enriched, number, road)
+        panel.x.grid = panel.y.grid = False
+        panel.title, panel.y.label = f"Road {enriched.network.road_ids[road]}", "t [m]"
+        panel.x.label = "s along the road [m]"
+    return figure
+
+
+def _draw_path(panel: Panel, enriched: Enriched, number: int, road: int) -> None:
+    """One entity's way on a road, nominal and enriched, and a dot where it begins."""
+    entity = enriched.entities[number]
+    motion = entity.motion
+    rows = shown_rows(motion)
+    here = (motion.road[rows] == road) & ((motion.activity[rows] & Activity.ACTIVE) != 0)
+    if not here.any():
+        return
+    kept = rows[here]
+    breaks = _breaks(motion, rows)[here] | (np.diff(kept, prepend=kept[0] - 1) > 2 * (rows[-1] - rows[0]) / len(rows))
+    breaks[0] = False
+    color = color_of(number) if entity.is_enriched else INK
+    sign = np.where(np.cos(motion.heading_relative[kept]) >= 0.0, 1.0, -1.0)
+    nominal, shifted = (
+        enriched.network.offset_to_t(road, motion.lane[kept], motion.s[kept], motion.offset[kept] + added)
+        for added in (0.0, sign * entity.deviation[kept])
+    )
+    panel.line(motion.s[kept], broken(nominal, breaks), NOMINAL, width=0.9, dashes=DASHED, label="nominal")
+    panel.line(motion.s[kept], broken(shifted, breaks), color, label=label_of(entity.name))
+    panel.dots(motion.s[kept[:1]], shifted[:1], color, size=5.0)
+
+
+def _shown_t(enriched: Enriched, road: int) -> tuple[float, float]:
+    """Range of t that holds the vehicles' lanes with a metre to spare."""
+    edges = []
+    for motion in (entity.motion for entity in enriched.entities):
+        here = np.flatnonzero(motion.road == road)[::25]
+        centre = enriched.network.lane_centre_t(road, motion.lane[here], motion.s[here])
+        half = 0.5 * enriched.network.lane_width(road, motion.lane[here], motion.s[here])
+        edges += [centre - half, centre + half]
+    t = np.concatenate(edges)
+    return float(t.min()) - 1.0, float(t.max()) + 1.0
+
+
+def thumbnail(enriched: Enriched) -> str:
+    """A small SVG document of all paths from above, the scale across the road exaggerated."""
+    figure = Figure(width=200.0, height=56.0, axes=False)
+    (panel,) = figure.panels
+    paths = {}
+    for number, entity in enumerate(enriched.entities):
+        rows = np.flatnonzero((entity.motion.activity & Activity.ACTIVE) != 0)
+        if len(rows):
+            kept = rows[:: max(1, len(rows) // 60)]
+            paths[number] = entity.trajectory.x[kept] + 1j * entity.trajectory.y[kept]
+    longest = max(paths.values(), key=lambda path: float(abs(path[-1] - path[0])), default=np.zeros(1))
+    along = np.exp(-1j * np.angle(longest[-1] - longest[0]))  # it goes from left to right
+    for number, path in paths.items():
+        color = color_of(number) if enriched.entities[number].is_enriched else MUTED
+        turned = (path - longest[0]) * along
+        panel.line(turned.real, turned.imag, color)
+        panel.dots(turned.real[:1], turned.imag[:1], color, size=5.0)
+    return figure.svg()
+
+
+# ---- over time -------------------------------------------------------------------------------------------------------
+def offsets_over_time(enriched: Enriched, entities: Sequence[EntityResult]) -> Figure:
+    """What was added to each entity's nominal offset, road-following segments shaded."""
+    figure = Figure(len(entities), height=54.0, share_x="all", share_y="all")
+    reach = max(0.5, 1.1 * max(float(np.abs(entity.deviation).max()) for entity in entities))
+    for panel, entity in zip(figure.panels, entities, strict=True):
+        rows = shown_rows(entity.motion)
+        for span in entity.spans:
+            if span.is_road_following:
+                panel.across(span.start, span.end, GRID, opacity=0.5)
+        panel.level(color=NOMINAL, dashes=DASHED)
+        number = [each.name for each in enriched.entities].index(entity.name)
+        name = label_of(entity.name)
+        panel.line(entity.motion.time[rows], entity.deviation[rows], color_of(number), label=name)
+        panel.title, panel.x.label, panel.y.limits = name, "time [s]", (-reach, reach)
+    figure.panels[len(entities) // 2].y.label = "offset [m]"
+    return figure
+
+
+def speeds_over_time(motion: NominalMotion, entities: Sequence[EntityResult] = ()) -> Figure:
+    """Speed of every entity, enriched and nominal where there are results."""
+    motions = [entity.motion for entity in entities] or motion.entities
+    figure = Figure(height=160.0, legend=0 < len(motions) <= MOST_NAMED)
+    (panel,) = figure.panels
+    for number, one in enumerate(motions):
+        rows = shown_rows(one)
+        absent = (one.activity[rows] & Activity.ACTIVE) == 0
+        speed = entities[number].trajectory.speed if entities else one.speed
+        panel.line(one.time[rows], broken(speed[rows], absent), color_of(number), label=label_of(one.name))
+        if entities:
+            panel.line(one.time[rows], broken(one.speed[rows], absent), NOMINAL, dashes=DASHED, label="nominal")
+    panel.y.holds = (0.0,)
+    panel.x.label, panel.y.label = "time [s]", "speed [m/s]"
+    return figure
+
+
+def accelerations_over_time(entities: Sequence[EntityResult]) -> Figure:
+    """Lateral acceleration that was added to each entity's motion, over a band that real drivers keep to."""
+    figure = Figure(len(entities), height=54.0, share_x="all", share_y="all")
+    for panel, entity in zip(figure.panels, entities, strict=True):
+        rows = shown_rows(entity.motion)
+        time, added = entity.motion.time[rows], entity.lateral_acceleration()[rows]
+        panel.band(time[[0, -1]], -COMFORTABLE, COMFORTABLE, GRID, opacity=0.5)
+        panel.line(time, added, ENRICHED, label="added")
+        panel.title, panel.x.label = label_of(entity.name), "time [s]"
+    figure.panels[len(entities) // 2].y.label = "[m/s²]"
+    return figure
+
+
+def timeline(enriched: Enriched) -> Figure:
+    """When each entity follows its road, and when not."""
+    count = len(enriched.entities)
+    figure = Figure(height=20.0 * count)
+    (panel,) = figure.panels
+    for number, entity in enumerate(enriched.entities):
+        for span in entity.spans:
+            color = color_of(number) if span.is_road_following else GRID
+            panel.line((span.start, span.end), (number, number), color, width=11.0, label=span.kind.value)
+    panel.y.ticks = [(number, label_of(entity.name)) for number, entity in enumerate(enriched.entities)]
+    panel.y.limits, panel.y.grid = (count - 0.5, -0.5), False
+    panel.x.label = "time [s]"
+    return figure

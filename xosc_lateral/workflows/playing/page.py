@@ -1,0 +1,62 @@
+"""The page of a played scenario, before anything is converted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from xosc_lateral.files.pages.page import Page
+from xosc_lateral.workflows.playing.figures import speeds_over_time
+from xosc_lateral.workflows.playing.scene import scene_of
+from xosc_lateral.world.motion.nominal import NominalMotion, Note
+from xosc_lateral.world.road import RoadNetwork
+
+
+def view_page(motion: NominalMotion, network: RoadNetwork, *, source: str, provenance: Mapping[str, object]) -> str:
+    """HTML page with the player, self-contained; same input, same bytes.
+
+    Parameters
+    ----------
+    motion : NominalMotion
+        As played.
+    network : RoadNetwork
+        That it was played on.
+    source : str
+        File name, for the reader.
+    provenance : mapping
+        Shown in the footer.
+    """
+    page = Page(Path(source).name)
+    count = len(motion.entities)
+    page.lead(
+        f"{count} {'entity' if count == 1 else 'entities'}, {motion.end_time:.1f} s (ended by the {motion.ended_by}). "
+        "The maneuvers are played as the scenario states them, without added lateral movement."
+    )
+    page.section(
+        "Player",
+        "The scenario from above. A lateral stretch above 1 widens the road. Click a vehicle to follow it, point at it "
+        "for its values, drag to look elsewhere.",
+    )
+    page.player(scene_of(motion, network), "Scenario from above")
+    page.section("Speed")
+    page.figure(
+        speeds_over_time(motion),
+        "Speed over time. Click to take the player to that time.",
+        "Speed over time of every entity",
+        over_time=True,
+    )
+    add_notes(page, motion.notes)
+    return page.html(provenance)
+
+
+def add_notes(page: Page, notes: Sequence[Note]) -> None:
+    """The section on what was not played as the scenario states it."""
+    page.section("Not played as written")
+    if not notes:
+        page.text("Nothing: every action and condition was played as the scenario states it.")
+        return
+    rows = [
+        {"what": note.what, "element": note.element, "file": Path(note.path).name, "line": str(note.line or "")}
+        for note in notes
+    ]
+    page.table(rows, "What was left out or played differently")

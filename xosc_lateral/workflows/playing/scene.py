@@ -1,0 +1,180 @@
+"""A played scenario as plain values for the player of a page: vehicles over time, roads around them, packed small."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.rows import true_slices
+from xosc_lateral.workflows.conversion.result import EntityResult
+from xosc_lateral.workflows.playing.road_lines import lane_surfaces, markings
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
+from xosc_lateral.world.motion.trajectory import WorldTrajectory
+from xosc_lateral.world.road import RoadNetwork
+from xosc_lateral.world.road.geometry import simplify
+from xosc_lateral.world.road.network import DRIVING
+
+RowArray = NDArray[np.int64]
+
+FRAME = 0.1
+"""Between two frames; the player interpolates, which is off by 6 mm at 5 m/s2. [s]"""
+
+MOST_FRAMES = 60_000
+"""Frames of all entities together beyond which they are spaced farther apart: what a browser takes at once."""
+
+MILLI, ANGLE, LINE = 1e-3, 1e-4, 5e-3
+"""Resolution of positions [m] and speeds [m/s]; of headings, 0.5 mm at the end of a car of 5 m [rad]; of lines [m]."""
+
+REACH = 250.0
+"""Roads are shown as far as this around every place where a vehicle was. [m]"""
+
+PIECE = 200.0
+"""Length of one piece of a lane or marking: pieces out of sight are not drawn. [m]"""
+
+TOLERANCE = 0.01
+"""Lines are simplified to this: less than a tenth of a marking's width. [m]"""
+
+
+def scene_of(motion: NominalMotion, network: RoadNetwork, results: Sequence[EntityResult] = ()) -> str:
+    """JSON for the player: results with the nominal motion as ghosts, or the nominal motion alone."""
+    given: list[tuple[EntityMotion, EntityResult | None]] = [(one.motion, one) for one in results]
+    given = given or [(one, None) for one in motion.entities]
+    shown = [(number, entity, result) for number, (entity, result) in enumerate(given) if _present(entity).any()]
+    rows = _rows(motion, len(shown))
+    places = [np.column_stack([entity.x, entity.y])[_present(entity)] for _, entity, _ in shown]
+    # whole metres near the first place: coordinates stay small on roads with geographic ones
+    origin = np.round(places[0][0]) if places else np.zeros(2)
+    scene = {
+        "step": round(float(rows[1] - rows[0]) * motion.step if len(rows) > 1 else FRAME, 9),
+        "frames": len(rows),
+        "entities": [_entity(network, number, each, result, rows, origin) for number, each, result in shown],
+        **_roads(network, np.concatenate(places) if places else np.empty((0, 2)), origin),
+    }
+    # "<" would end the script element that holds this
+    return json.dumps(scene, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c")
+
+
+def packed(values: ArrayLike, resolution: float) -> dict[str, Any]:
+    """One column of finite values, small as text: the resolution `r`, and in units of it `d`, each less the one before.
+
+    The first stands as it is. `static/player.js` adds them up again.
+    """
+    whole = np.rint(np.asarray(values, dtype=np.float64) / resolution).astype(np.int64)
+    return {"r": resolution, "d": np.diff(whole, prepend=0).tolist()}
+
+
+def _rows(motion: NominalMotion, entities: int) -> RowArray:
+    count = len(motion.entities[0].time) if motion.entities else 0
+    frames = max(1, count * motion.step / FRAME * entities)
+    every = max(1, round(FRAME / motion.step)) * int(np.ceil(frames / MOST_FRAMES))
+    return np.arange(0, count, every)
+
+
+# ---- vehicles --------------------------------------------------------------------------------------------------------
+def _present(motion: EntityMotion) -> NDArray[np.bool_]:
+    return np.asarray((motion.activity & Activity.ACTIVE) != 0)
+
+
+def _entity(
+    network: RoadNetwork,
+    number: int,
+    motion: EntityMotion,
+    result: EntityResult | None,
+    rows: RowArray,
+    origin: FloatArray,
+) -> dict[str, Any]:
+    box = motion.entity.bounding_box
+    placed = np.cumsum((motion.activity & Activity.TELEPORTED) != 0)[rows]
+    values: dict[str, Any] = {
+        "name": motion.name,
+        "number": number,
+        "length": box.length,
+        "width": box.width,
+        "ahead": box.center_x,
+        "left": box.center_y,
+        "present": [[part.start, part.stop - 1] for part in true_slices(_present(motion)[rows])],
+        "jumps": (1 + np.flatnonzero(np.diff(placed))).tolist(),  # frames that nobody reaches by moving
+        "lanes": _lane_changes(network, motion, rows),
+        "course": packed(np.unwrap(_filled(_course(motion)[rows])), ANGLE),
+        "nominal": _path(motion, rows, origin),
+        "offset": packed(_filled(motion.offset[rows]), MILLI),
+    }
+    if result is not None and result.is_enriched:
+        values["enriched"] = _path(result.trajectory, rows, origin)
+        values["added"] = packed(_filled(result.deviation[rows]), MILLI)
+    return values
+
+
+def _course(motion: EntityMotion) -> FloatArray:
+    """Direction of the lane where the entity is, the way that it drives; its own heading off the roads. [rad]"""
+    turned = np.arctan(np.tan(motion.heading_relative))  # against s, half a turn is no deviation
+    return np.asarray(motion.heading - np.where(motion.road >= 0, turned, 0.0))
+
+
+def _path(path: EntityMotion | WorldTrajectory, rows: RowArray, origin: FloatArray) -> dict[str, Any]:
+    return {
+        "x": packed(_filled(path.x[rows] - origin[0]), MILLI),
+        "y": packed(_filled(path.y[rows] - origin[1]), MILLI),
+        "h": packed(np.unwrap(_filled(path.heading[rows])), ANGLE),
+        "v": packed(_filled(path.speed[rows]), MILLI),
+    }
+
+
+def _filled(values: FloatArray) -> FloatArray:
+    """Numbers instead of NaN, where an entity is absent: nobody sees them there."""
+    return np.nan_to_num(np.asarray(values, dtype=np.float64))
+
+
+def _lane_changes(network: RoadNetwork, motion: EntityMotion, rows: RowArray) -> list[tuple[int, str, int]]:
+    """Frame, road id and lane id wherever one of them is new; no road: off the road."""
+    road, lane = motion.road[rows], motion.lane[rows]
+    is_new = np.append(True, (np.diff(road) != 0) | (np.diff(lane) != 0))[: len(rows)]
+    return [(int(k), network.road_ids[road[k]] if road[k] >= 0 else "", int(lane[k])) for k in np.flatnonzero(is_new)]
+
+
+# ---- roads -----------------------------------------------------------------------------------------------------------
+def _roads(network: RoadNetwork, places: FloatArray, origin: FloatArray) -> dict[str, list[dict[str, Any]]]:
+    """Lanes and markings near some places, shape (n, 2) [m], as seen from the origin.
+
+    Lanes are polygons with their `type`; marks are lines with `type`, `color`, `width` [m] and `start` (s, so that
+    dashes go on from piece to piece) [m].
+    """
+    lanes, marks = [], []
+    cells = {(int(i), int(k)) for i, k in np.unique(np.floor(places / REACH), axis=0)}
+    near = {(i + a, k + b) for i, k in cells for a in (-1, 0, 1) for b in (-1, 0, 1)}
+
+    def line(road: int, s: FloatArray, t: FloatArray) -> FloatArray:
+        poses = network.road_to_world(road, s, t)
+        places = np.column_stack([poses.x, poses.y]) - origin
+        return places[simplify(places[:, 0], places[:, 1], TOLERANCE)]
+
+    def drawn(places: FloatArray, **what: Any) -> dict[str, Any]:
+        return what | {"x": packed(places[:, 0], LINE), "y": packed(places[:, 1], LINE)}
+
+    for road in range(len(network.roads)):
+        for first, last in _pieces_near(network, road, near):
+            for kind, s, right, left in lane_surfaces(network, road, first, last):
+                if (left - right).max() >= TOLERANCE:
+                    outline = np.concatenate([line(road, s, left), line(road, s, right)[::-1]])
+                    lanes.append(drawn(outline, type="driving" if kind in DRIVING else kind))
+            for mark, s, t in markings(network, road, first, last):
+                what = {"type": mark.type, "color": mark.color, "width": mark.width, "start": round(float(s[0]), 2)}
+                marks.append(drawn(line(road, s, t), **what))
+    return {"lanes": lanes, "marks": marks}
+
+
+def _pieces_near(network: RoadNetwork, road: int, near: set[tuple[int, int]]) -> Iterator[tuple[float, float]]:
+    """Parts of a road, as (first, last) s, that lie in those squares, at most `PIECE` long each."""
+    length = network.roads[road].length
+    edges = np.linspace(0.0, length, max(1, int(np.ceil(length / PIECE))) + 1).tolist()
+    for first, last in pairwise(edges):
+        poses = network.road_to_world(road, np.linspace(first, last, 5))
+        cells = np.floor(np.column_stack([poses.x, poses.y]) / REACH)
+        if last > first and any((int(i), int(k)) in near for i, k in cells):
+            yield first, last

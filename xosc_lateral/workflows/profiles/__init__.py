@@ -1,0 +1,1 @@
+"""Verbs about profiles: fit, sample, evaluate, compare, close the loop."""

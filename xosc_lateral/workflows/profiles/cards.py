@@ -1,0 +1,294 @@
+"""Profiles for people: a list, and a card each."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.normal import NORMAL_95
+from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, keeping_of
+from xosc_lateral.drivers.evaluation.metrics import DURATION, MovementSummary, free_runs, summarise, summary_of
+from xosc_lateral.drivers.evaluation.spectra import spectrum
+from xosc_lateral.drivers.fitting.answers import basis_of, beside_line
+from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect
+from xosc_lateral.drivers.model.profile import SIDES, DriverProfile, Provenance
+from xosc_lateral.files.pages.chart import SAMPLED
+from xosc_lateral.files.pages.figure import Figure
+from xosc_lateral.files.pages.page import KeyFigure, Page, format_value
+from xosc_lateral.files.profiles import FIELDS, Entry, facts_of, profile_hash
+
+CHANGED: Mapping[Acts, str] = {
+    Acts.LOCATION: "mean offset",
+    Acts.SPREAD: "spread",
+    Acts.RATE: "rate of mean reversion",
+    Acts.FINE: "fine noise",
+}
+"""What a column effect changes, in words."""
+
+FEW = 10
+"""Drives below which a profile is taken to be of one driver."""
+
+SHOWN_DRIVERS, SHOWN_S = 4, 120.0
+"""Sample paths that are drawn, and their length. [s]"""
+
+PROSE = ("", "lane", "sure", "source", "licence")
+"""Rows of a card that are wrapped in the terminal."""
+
+
+# ---- the list --------------------------------------------------------------------------------------------------------
+def list_text(entries: Sequence[Entry]) -> str:
+    """One line per profile: name, model, hours, drives, effects, where from; what is wrong with a file, in a line."""
+    width = max((len(entry.name) for entry in entries if entry.profile is not None), default=0)
+    lines = [_list_line(entry.name, entry.profile, width) for entry in entries if entry.profile is not None]
+    lines += [f"! {entry.problem}" for entry in entries if entry.problem]
+    for entry in entries:
+        if entry.hidden_by is not None:
+            shipped = "the shipped profile" if entry.is_shipped else str(entry.path)
+            lines.append(f"! {entry.hidden_by} hides {shipped} {entry.name!r}")
+    return "\n".join(lines) or "no profiles"
+
+
+def _list_line(name: str, profile: DriverProfile, width: int) -> str:
+    known, tags = profile.provenance, "".join(f"#{tag} " for tag in profile.metadata.tags)
+    return (
+        f"{name:{width}s}  {profile.model.kind:14s} {known.hours:6.2f} h  {known.drives:4d} drives  "
+        f"{len(profile.effects)} effects  {tags}{known.notes or known.source}"
+    ).rstrip()
+
+
+def list_record(entries: Sequence[Entry]) -> list[dict[str, Any]]:
+    """The same as plain values."""
+    return [
+        {
+            "id": entry.name,
+            "path": str(entry.path),
+            "problem": entry.problem,
+            "hidden_by": None if entry.hidden_by is None else str(entry.hidden_by),
+            **({} if entry.profile is None else _listed(entry.profile)),
+        }
+        for entry in entries
+    ]
+
+
+def _listed(profile: DriverProfile) -> dict[str, Any]:
+    known = profile.provenance
+    return {
+        **_identity(profile),
+        "hours": known.hours,
+        "drives": known.drives,
+        "effects": len(profile.effects),
+        "notes": known.notes,
+        "source": known.source,
+    }
+
+
+def _identity(profile: DriverProfile) -> dict[str, Any]:
+    facts = facts_of(profile)
+    return {
+        "metadata": {name: facts[name] for name in FIELDS} | {"tags": list(profile.metadata.tags)},
+        "sha256": profile_hash(profile),
+        "model": profile.model.kind,
+    }
+
+
+# ---- one profile -----------------------------------------------------------------------------------------------------
+def card(profile: DriverProfile) -> dict[str, Any]:
+    """Everything that a person asks first, as plain values."""
+    return {
+        "id": profile.name,
+        **_identity(profile),
+        "effects": [effect.to_dict() for effect in profile.effects],
+        "neighbours": {side: basis_of(profile, side).value for side in SIDES},
+        "lane_width": profile.lane_width,
+        "summary": rounded(asdict(summary_of(profile))),
+        "lane_keeping": keeping_record(keeping_of(profile)),
+        "provenance": profile.provenance.to_dict(),
+    }
+
+
+def rounded(values: Mapping[str, float]) -> dict[str, float]:
+    """To 0.1 mm and the like."""
+    return {name: round(value, 4) for name, value in values.items()}
+
+
+def keeping_record(keeping: LaneKeeping) -> dict[str, Any]:
+    """The figures of lane keeping and their standard errors, as plain values."""
+    values = asdict(keeping)
+    errors = rounded(values.pop("errors"))
+    return {**rounded(values), "errors": errors}
+
+
+def card_text(profile: DriverProfile) -> str:
+    """The card for the terminal."""
+    lines = [profile.name]
+    for label, value in [("", profile.provenance.notes), *card_rows(profile, summary_of(profile))]:
+        parts = textwrap.wrap(value, 100) if label in PROSE else [value]
+        lines += [f"  {label if k == 0 else '':10s} {part}" for k, part in enumerate(parts)]
+    return "\n".join([*lines, f"  {'sha256':10s} {profile_hash(profile)}"])
+
+
+def card_rows(profile: DriverProfile, summary: MovementSummary) -> list[tuple[str, str]]:
+    """What there is to know of a profile, a line each: label and words; an empty one has nothing to say."""
+    known, keeping = profile.provenance, keeping_of(profile)
+    side = "left" if summary.mean_offset > 0 else "right"
+    count = len(profile.effects)
+    effects = "1 effect" if count == 1 else f"{count or 'no'} effects"
+    rows = [
+        ("model", f"{profile.model.kind}, {effects}, lane width {profile.lane_width:.2f} m"),
+        *(("effect", effect_line(effect)) for effect in profile.effects),
+        ("neighbours", "; ".join(beside_line(profile, side) for side in SIDES)),
+        ("mean", f"{abs(summary.mean_offset):.2f} m to the {side} of the lane centre"),
+        ("spread", f"{_spread(known, summary)}; 90 % within {summary.low:+.2f} to {summary.high:+.2f} m"),
+        ("speed", f"{summary.lateral_speed:.3f} m/s lateral (rms)"),
+        ("lane", keeping.words),
+        ("sure", _sureness(known, keeping)),
+        ("fitted on", _amount(known)),
+        ("source", known.source),
+        ("licence", known.licence),
+        *(("input", f"{name} sha256 {digest}") for name, digest in known.inputs.items()),
+        *_outcome(known),
+    ]
+    return [(label, words) for label, words in rows if words]
+
+
+def effect_line(effect: Effect) -> str:
+    """An effect in a line: what it changes, by which columns, of what shape; a hidden one by its parameters."""
+    if isinstance(effect, ColumnEffect):
+        lag = f", {abs(effect.lag_s):g} s {'ahead' if effect.lag_s < 0 else 'behind'}" if effect.lag_s else ""
+        response = f", response time {effect.response_time:g} s" if effect.response_time else ""
+        return f"{CHANGED[effect.acts]} by {' and '.join(effect.columns)} ({effect.shape}{lag}{response})"
+    plain = {name: value for name, value in effect.to_dict().items() if not isinstance(value, list | dict)}
+    kind = str(plain.pop("kind")).replace("-", " ")
+    return f"{kind}: " + ", ".join(f"{name} {format_value(value)}" for name, value in plain.items())
+
+
+def _spread(known: Provenance, summary: MovementSummary) -> str:
+    """Standard deviation of the offset: of one driver, or of all and within one."""
+    within = f" over all drivers, {summary.spread_within:.2f} m within one driver over {DURATION / 60:g} min"
+    return f"{summary.spread:.2f} m{'' if known.drives == 1 else within}"
+
+
+def _sureness(known: Provenance, keeping: LaneKeeping) -> str:
+    """How well one driver's mean and spread are known from so much driving; empty where it is of many or unknown."""
+    independent = 3600.0 * known.hours / (2.0 * keeping.memory) if keeping.memory else 0.0
+    if "derived_from" in known.fit or not 0.0 < known.drives < FEW or independent < 1.0:
+        return ""
+    mean = NORMAL_95 * keeping.sdlp / independent**0.5
+    spread = NORMAL_95 * keeping.sdlp / (2.0 * independent) ** 0.5
+    return (
+        f"from {60 * known.hours:.3g} min his mean is known to +- {mean:.2f} m, his SDLP to +- {spread:.2f} m (95 %), "
+        "other days apart"
+    )
+
+
+def _amount(known: Provenance) -> str:
+    """What a profile was fitted on: time, vehicles, runs."""
+    vehicles = "1 vehicle" if known.drives == 1 else f"{known.drives} vehicles"
+    time = f"{60 * known.hours:.1f} min" if known.hours < 1 else f"{known.hours:.2f} h"
+    return f"{time}, {vehicles}, {known.runs} runs"
+
+
+def _outcome(known: Provenance) -> list[tuple[str, str]]:
+    """How a closed loop came to the profile, if one did, and its evaluation on held-out drives."""
+    try:
+        return list(_outcome_items(known.fit.get("closed_loop"), known.evaluation))
+    except (AttributeError, KeyError, TypeError, ValueError):  # anybody may write there what they like
+        return [("evaluation", "not as this package writes it")]
+
+
+def _outcome_items(loop: Mapping[str, Any] | None, evaluation: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    if loop:
+        found = ", ".join(loop["found"]) or "nothing"
+        yield "loop", f"started from a {loop['base']} model, seed {loop['seed']}; found: {found}"
+    if short := evaluation.get("snippets"):
+        scores = (
+            f"distance {short['mean_distance']:.3f}, between real drivers {short['mean_floor']:.3f}, "
+            f"ratio {short['mean_ratio']:.2f}, worst {short['worst_metric']} {short['worst_ratio']:.2f}"
+        )
+        yield "held out", f"{evaluation.get('held_out', '')}: {scores}"
+    if (error := evaluation.get("spectrum_error_db")) is not None:
+        differs = f"the driver alone differs from what was recorded by {error:.1f} dB"
+        yield "spectrum", f"{differs} (rms over frequency bands)"
+    if evaluation.get("told_apart"):
+        yield "own driver", str(evaluation["told_apart"])
+
+
+# ---- the page --------------------------------------------------------------------------------------------------------
+def card_page(profile: DriverProfile, seed: int = 0) -> str:
+    """HTML page; same profile and seed, same bytes.
+
+    Parameters
+    ----------
+    profile : DriverProfile
+    seed : int
+        Of the free runs that are drawn and summed up.
+    """
+    runs, step = free_runs(profile, seed), profile.model.step
+    summary, known = summarise(runs, step), profile.provenance
+    side = "left" if summary.mean_offset > 0 else "right"
+    within = "" if known.drives == 1 else f"one driver over {DURATION / 60:g} min: {summary.spread_within:.2f} m"
+    page = Page(f"Driver profile {profile.name}")
+    page.lead(known.notes)
+    page.key_figures(
+        [
+            KeyFigure(f"{abs(summary.mean_offset):.2f} m", f"mean offset, to the {side}"),
+            KeyFigure(f"{summary.spread:.2f} m", "standard deviation over all drivers", within),
+            KeyFigure(
+                f"{summary.low:+.2f} to {summary.high:+.2f}\N{NO-BREAK SPACE}m",
+                "5 % to 95 %",
+                "positive: left of the lane centre",
+            ),
+            KeyFigure(f"{summary.lateral_speed:.3f} m/s", "lateral speed", "root mean square"),
+        ]
+    )
+    page.section("Sample paths")
+    page.figure(
+        _paths(runs, step),
+        "Offsets of drivers drawn from the profile, in steady traffic on a straight road.",
+        "Offsets over time of several sampled drivers",
+    )
+    page.section("Distribution and spectrum")
+    page.figure(
+        _places(runs, step),
+        "Left: distribution of the offset. Right: its power spectral density.",
+        "Density of the offset, and its spectrum",
+    )
+    page.section("What it is and where it comes from")
+    rows = [(label, words.replace("+-", "±")) for label, words in card_rows(profile, summary) if label != "input"]
+    page.table([{"": label, "what is known": words} for label, words in rows])
+    return page.html(
+        {
+            "profile sha256": profile_hash(profile),
+            "inputs": {name: digest[:12] for name, digest in known.inputs.items()},
+            "seed of the free runs": seed,
+        }
+    )
+
+
+def _paths(runs: FloatArray, step: float) -> Figure:
+    shown = runs[:SHOWN_DRIVERS, : round(SHOWN_S / step) + 1]
+    figure = Figure(len(shown), height=48.0, share_x="all", share_y="all")
+    for number, (panel, run) in enumerate(zip(figure.panels, shown, strict=True), start=1):
+        panel.level()
+        panel.line(step * np.arange(len(run)), run, SAMPLED, label=f"driver {number}")
+        panel.title, panel.x.label = f"Driver {number}", "time [s]"
+    figure.panels[len(shown) // 2].y.label = "offset [m]"
+    return figure
+
+
+def _places(runs: FloatArray, step: float) -> Figure:
+    figure = Figure(1, 2)
+    place, spectral = figure.panels
+    density, edges = np.histogram(runs, np.linspace(-1.2, 1.2, 97), density=True)
+    place.steps(edges, density, SAMPLED, label="density")
+    power = spectrum(list(runs), step)
+    spectral.line(power.frequency, power.density, SAMPLED, label="power density")
+    spectral.x.log = spectral.y.log = True
+    place.title, place.x.label, place.y.label = "Distribution", "offset [m], positive to the left", "density [1/m]"
+    spectral.title, spectral.x.label, spectral.y.label = "Spectrum", "frequency [Hz]", "power density [m²/Hz]"
+    return figure

@@ -1,0 +1,136 @@
+"""`evaluate`: how true a profile is to measured drives."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from xosc_lateral.base.lazy import pd
+from xosc_lateral.files.mapping import MappingLike
+from xosc_lateral.workflows.result import (
+    DrivesLike,
+    GivenDrives,
+    PathLike,
+    Paths,
+    ProfileLike,
+    Result,
+    given_drives,
+    given_profile,
+    naming,
+    write_page,
+)
+
+if TYPE_CHECKING:
+    from xosc_lateral.drivers.evaluation.realism import Realism
+    from xosc_lateral.drivers.evaluation.scores import ProfileScores
+    from xosc_lateral.drivers.model.profile import DriverProfile
+    from xosc_lateral.files.pages.figure import Figure
+
+
+def evaluate(
+    profile: ProfileLike,
+    drives: DrivesLike,
+    *,
+    seed: int = 0,
+    classify: bool = True,
+    columns: MappingLike | None = None,
+    library: Paths = (),
+) -> Evaluation:
+    """Score a profile beside other real drivers, and by the paper's four evaluations.
+
+    Parameters
+    ----------
+    profile : DriverProfile, path or name
+    drives, columns
+        See `read_drives`.
+    seed : int
+        Same inputs and seed: same numbers.
+    classify : bool
+        Train classifiers to separate sampled and measured (extra `classifier`; a minute or two for some hours).
+    library : path or paths
+        Folders with further profiles.
+
+    Raises
+    ------
+    NotEnoughDataError
+        Too little is left after cutting to compare.
+    """
+    from xosc_lateral.drivers.drives.cuts import all_runs
+    from xosc_lateral.drivers.evaluation.scores import score_profile
+
+    driver = given_profile(profile, library)
+    given = given_drives(drives, columns)
+    with naming(given):
+        scores = score_profile(driver, all_runs(given.drives), seed=seed, classify=classify)
+    return Evaluation(scores, driver, given)
+
+
+class Evaluation(Result):
+    """Scores of a profile on measured drives."""
+
+    __slots__ = ("_given", "_scores", "profile")
+
+    def __init__(self, scores: ProfileScores, profile: DriverProfile, given: GivenDrives) -> None:
+        self._scores, self._given = scores, given
+        self.profile = profile
+
+    @property
+    def ratio(self) -> float:
+        """Mean distance of the ten metrics over that between real drivers; 1: as close as these. [-]"""
+        return self._scores.snippets.ratio
+
+    @property
+    def realism(self) -> Realism:
+        """The fair measure: every condition's distances, those between real drivers (`floor`), and classifiers."""
+        return self._scores.realism
+
+    @property
+    def worst(self) -> tuple[str, float]:
+        """The block that does worst, and its ratio to real drivers; see `to_frame`. [-]"""
+        from xosc_lateral.workflows.profiles.evaluation_page import worst_block
+
+        return worst_block(self._scores)
+
+    def headline(self) -> str:
+        """One line."""
+        block, ratio = self.worst
+        hours = f"{self._scores.hours:.2f} h of {self._scores.drives} drives"
+        return f"{self.profile.name} on {hours}: worst {block}, {ratio:.2f} times that between real drivers"
+
+    def __str__(self) -> str:
+        from xosc_lateral.workflows.profiles.evaluation_page import evaluation_text
+
+        return evaluation_text(self._scores, self.profile, self._given.inputs)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per metric and snippet length: `seconds`, `metric`, `distance`, `floor`, `ratio`."""
+        rows = [
+            {"seconds": one.seconds, "metric": name, "distance": distance, "floor": one.floor.by_metric[name]}
+            for one in (self._scores.snippets, self._scores.long_snippets)
+            if one is not None
+            for name, distance in one.distances.by_metric.items()
+        ]
+        frame = pd.DataFrame(rows)
+        return frame.assign(ratio=frame["distance"] / frame["floor"])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them."""
+        from xosc_lateral.workflows.profiles.evaluation_page import evaluation_record
+
+        return evaluation_record(self._scores, self.profile, self._given.inputs)
+
+    def plot(self) -> Figure:
+        """Violins of the ten metrics, measured beside sampled."""
+        from xosc_lateral.workflows.profiles.violins import violin_figure
+
+        shown = self._scores.evaluations[3]
+        return violin_figure(shown.real, shown.artificial)
+
+    def write_report(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the HTML page."""
+        from xosc_lateral.workflows.profiles.evaluation_page import evaluation_page
+
+        name, given = f"{self.profile.name}_evaluation.html", self._given
+        made = partial(evaluation_page, self._scores, self.profile, given.inputs)
+        return write_page(path, name, made, inputs=given.files, force=force)

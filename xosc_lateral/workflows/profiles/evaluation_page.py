@@ -1,0 +1,303 @@
+"""Scores of a profile as text, JSON and a report with the paper's violins."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from xosc_lateral.base.version import __version__
+from xosc_lateral.drivers.evaluation.lane_keeping import NEAR_MARKING
+from xosc_lateral.drivers.evaluation.metrics import METRICS
+from xosc_lateral.drivers.evaluation.parts import PartEvaluation
+from xosc_lateral.drivers.evaluation.realism import Realism
+from xosc_lateral.drivers.evaluation.record import scores_to_dict
+from xosc_lateral.drivers.evaluation.scores import SNIPPET, ProfileScores, SnippetScores
+from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.files.pages.chart import MEASURED, SAMPLED
+from xosc_lateral.files.pages.figure import Figure
+from xosc_lateral.files.pages.page import KeyFigure, Page, Tone
+from xosc_lateral.files.profiles import profile_hash
+from xosc_lateral.workflows.profiles.realism_text import (
+    FAMILIES,
+    condition_groups,
+    indicator_rows,
+    ratio_rows,
+    realism_lines,
+    start_fade_note,
+)
+from xosc_lateral.workflows.profiles.violins import LABELS, violin_figure
+
+
+def trace_figure(scores: ProfileScores) -> Figure:
+    """Measured offsets on the left, sampled ones of the same drives on the right, on one scale."""
+    figure = Figure(len(scores.traces), 2, height=50.0, share_x="all", share_y="all")
+    for number, trace in enumerate(scores.traces):
+        sides = ((trace.real, MEASURED, "measured"), (trace.sampled, SAMPLED, "sampled"))
+        for panel, (values, color, label) in zip(figure.row(number), sides, strict=True):
+            panel.level()
+            panel.line(trace.step * np.arange(len(values)), values, color, label=label)
+            panel.title, panel.x.label = f"{trace.drive}, {label}", "time [s]"
+    figure.row(len(scores.traces) // 2)[0].y.label = "offset [m]"
+    return figure
+
+
+def spectrum_figure(scores: ProfileScores) -> Figure:
+    """Power density and autocorrelation, measured and sampled."""
+    figure = Figure(1, 2, height=180.0, legend=True)
+    power, memory = figure.panels
+    memory.level()
+    for one, correlation, color, label in (
+        (scores.spectrum_real, scores.autocorrelation_real, MEASURED, "measured"),
+        (scores.spectrum_sampled, scores.autocorrelation_sampled, SAMPLED, "sampled"),
+    ):
+        power.line(one.frequency, one.density, color, label=label)
+        memory.line(scores.lags, correlation, color, label=label)
+    power.x.log = power.y.log = memory.x.log = True
+    power.title, power.x.label, power.y.label = "Spectrum", "frequency [Hz]", "power density [m²/Hz]"
+    memory.title, memory.x.label, memory.y.label = "Autocorrelation", "lag [s]", "correlation [-]"
+    return figure
+
+
+CLOSE, FAR = 1.2, 2.0
+"""Ratios to the distance between real drivers up to which a metric is marked good, and from which it is marked bad."""
+
+
+def evaluation_text(scores: ProfileScores, profile: DriverProfile, inputs: Mapping[str, str]) -> str:
+    """A table for the terminal."""
+    block, ratio = worst_block(scores)
+    lines = [
+        f"{scores.profile} on {scores.hours:.2f} h of {scores.drives} drives ({scores.runs} runs), seed {scores.seed}",
+        *([FITTED] if _fitted_on(profile, inputs) else []),
+        f"worst comparison: {block}, {ratio:.2f} times that between real drivers",
+        *realism_lines(scores.realism),
+        "as in the paper: from the same start, without the sensor; real drivers are compared without a common start",
+        *_snippet_lines(scores.snippets),
+    ]
+    if note := start_fade_note(profile):
+        lines.append(f"  {note}")
+    if scores.long_snippets is not None:
+        lines += _snippet_lines(scores.long_snippets)
+    lines.append("mean distance of the four evaluations (coarse + fine):")
+    lines += [
+        f"  ({one.number}) {one.coarse} + {one.fine}: {one.distances.mean:.3f}, worst {one.distances.worst} "
+        f"{one.distances.by_metric[one.distances.worst]:.3f}"
+        for one in scores.evaluations
+    ]
+    lines.append(f"spectrum: differs by {scores.spectrum_error:.1f} dB (rms over bands)")
+    for name, one in (("measured", scores.margins_real), ("sampled", scores.margins_sampled)):
+        lines.append(
+            f"near a marking, {name}: {100 * one.share_near:.2f} % of the time, "
+            f"{one.excursions_per_hour:.1f} times an hour"
+        )
+    return "\n".join(lines)
+
+
+FITTED = "The profile was fitted to these drives: the scores say how well it describes them, not how it does on others."
+
+
+def evaluation_record(scores: ProfileScores, profile: DriverProfile, inputs: Mapping[str, str]) -> dict[str, Any]:
+    """The scores and what is needed to get them again, as plain values."""
+    block, ratio = worst_block(scores)
+    worst = {"worst": {"block": block, "ratio": round(ratio, 3)}}
+    return {**worst, **scores_to_dict(scores), "provenance": _provenance(scores, profile, inputs)}
+
+
+def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mapping[str, str]) -> str:
+    """HTML page: scores beside those of real drivers, violins, spectra, and traces; same scores, same bytes."""
+    page = Page(f"Evaluation of {scores.profile}")
+    page.lead(
+        f"{scores.hours:.1f} h of measured driving ({scores.drives} drives), compared with offsets sampled from the "
+        f"profile `{scores.profile}` under the same context. Distances are Wasserstein distances in units of the "
+        "measured metric's standard deviation. Beside each stands the distance between real drivers: of measured data "
+        "from other measured data."
+    )
+    worst, ratio = worst_block(scores)
+    worst_figure = KeyFigure(
+        f"{ratio:.2f}", f"worst comparison: {worst}", "1: as close as other real drivers", _tone(ratio)
+    )
+    page.key_figures([worst_figure, *_key_figures(scores.realism)])
+    if _fitted_on(profile, inputs):
+        page.warning(FITTED)
+    _add_realism(page, scores.realism)
+    page.section("Traces")
+    page.figure(
+        trace_figure(scores),
+        "Left: offsets as measured. Right: sampled, from the same start and under the same context. The curves are not "
+        "meant to coincide: two drives of the same driver do not either. What should agree is how they move.",
+        "Measured and sampled offsets over time, drive by drive",
+    )
+    page.section(
+        f"Ten metrics of {scores.snippets.seconds:g} s snippets",
+        "As in the paper: sampled from the same start, without the sensor; real drivers are compared without a common "
+        f"start. {start_fade_note(profile)}",
+    )
+    _add_metrics(page, scores.snippets)
+    _add_violins(page, scores.evaluations[3], "Measured (left, blue) beside sampled (right) snippets.")
+    if scores.long_snippets is not None:
+        page.section(
+            f"Snippets of {scores.long_snippets.seconds:g} s",
+            "The same metrics of longer snippets, which show slow movement.",
+        )
+        _add_metrics(page, scores.long_snippets)
+    page.section(
+        "The four evaluations",
+        "Which part of the model falls short? The coarse and fine parts of measured snippets (split as in Neis and "
+        "Beyerer, 2024) and those of the profile are combined. Evaluation (1) combines the measured coarse part with "
+        "the measured fine part, shifted in time: the best that the split allows.",
+    )
+    page.table([_part_row(one) for one in scores.evaluations])
+    for one in scores.evaluations[:3]:
+        _add_violins(page, one, f"({one.number}) Coarse part {one.coarse}, fine part {one.fine}.")
+    page.section("Spectrum and autocorrelation")
+    page.figure(
+        spectrum_figure(scores),
+        "Left: power spectral density of the offset. Right: autocorrelation about the mean over all drivers.",
+        "Measured and sampled spectrum and autocorrelation",
+    )
+    page.section(
+        "Near the markings",
+        f"How often the reference point comes within {NEAR_MARKING:g} m of a marking (half the width of a car, and a "
+        "margin).",
+    )
+    page.table(
+        [
+            {
+                "drives": name,
+                "time near a marking [%]": 100.0 * one.share_near,
+                "excursions [1/h]": one.excursions_per_hour,
+                "largest offset [m]": one.largest,
+            }
+            for name, one in (("measured", scores.margins_real), ("sampled", scores.margins_sampled))
+        ]
+    )
+    return page.html(_provenance(scores, profile, inputs))
+
+
+def _add_realism(page: Page, realism: Realism) -> None:
+    """The fair measure, and lane keeping."""
+    page.section(
+        "Compared with other real drivers",
+        "Differences between sampled and measured driving, divided by the differences between measured drivers: a "
+        "ratio of 1 is as close as other real drivers are. Where sampled snippets start at the measured offset, so do "
+        "the other drivers' snippets; free runs have no given start. Recordings contain the driver and the sensor. A "
+        "classifier that does not separate sampled from measured snippets has an AUC of 0.5; in brackets, the 95 % "
+        "interval over resampled drives. With context, the classifier also sees what was around the vehicle. A context "
+        "column that follows from the vehicle's own movement, such as its steering angle, gives sampled movement away.",
+    )
+    for heading, group in condition_groups(realism).items():
+        page.table(ratio_rows(group), heading)
+    page.section("Lane keeping")
+    formats = {"measured": ".4g", "sampled": ".4g", "distance [sd]": ".3f", "real drivers [sd]": ".3f"}
+    for one in realism.conditions:
+        if not one.condition.same_start:
+            page.table(indicator_rows(one), one.condition.name, formats=formats)
+    real, sampled = (
+        f"{each.between:.4f}, {each.within:.4f} and {each.inside:.4f} m²"
+        for each in (realism.variance_real, realism.variance_sampled)
+    )
+    page.text(
+        f"Variance between drivers, within drivers and inside snippets of {SNIPPET:g} s: {real} measured, "
+        f"{sampled} sampled."
+    )
+
+
+def _add_violins(page: Page, one: PartEvaluation, caption: str) -> None:
+    page.figure(
+        violin_figure(one.real, one.artificial),
+        f"{caption} Bars: minimum, mean, maximum.",
+        f"Ten pairs of violins; mean distance {one.distances.mean:.3f}.",
+    )
+
+
+def _part_row(one: PartEvaluation) -> dict[str, object]:
+    shown = ("std", "range", "diff_mean", "diff_std")
+    return {
+        "evaluation": f"({one.number})",
+        "coarse part": one.coarse,
+        "fine part": one.fine,
+        "mean distance": one.distances.mean,
+        **{LABELS[name]: one.distances.by_metric[name] for name in shown},
+    }
+
+
+def _metric_rows(scores: SnippetScores) -> list[tuple[str, float, float]]:
+    """Each metric and their mean: name, distance, and that between real drivers, in standard deviations."""
+    rows = [(LABELS[name], scores.distances.by_metric[name], scores.floor.by_metric[name]) for name in METRICS]
+    return [*rows, ("mean", scores.distances.mean, scores.floor.mean)]
+
+
+def _add_metrics(page: Page, scores: SnippetScores) -> None:
+    rows = _metric_rows(scores)
+    page.table(
+        [{"metric": name, "distance": one, "real drivers": real, "ratio": one / real} for name, one, real in rows],
+        f"{scores.count} snippets of {scores.seconds:g} s; distances in standard deviations of the measured metric",
+        formats={"distance": ".3f", "real drivers": ".3f", "ratio": ".2f"},
+        tones={number: _tone(one / real) for number, (_, one, real) in enumerate(rows[:-1])},
+    )
+
+
+def _snippet_lines(scores: SnippetScores) -> list[str]:
+    return [
+        f"{scores.count} snippets of {scores.seconds:g} s      distance  real drivers  ratio",
+        *(f"  {name:24s}  {one:8.3f}  {real:12.3f}  {one / real:5.2f}" for name, one, real in _metric_rows(scores)),
+    ]
+
+
+def _key_figures(realism: Realism) -> list[KeyFigure]:
+    """Of the shortest free runs: how near, how well separated."""
+    figures = []
+    slow = next((one for one in realism.conditions if one.condition.slow), None)
+    free = next((one for one in realism.conditions if not one.condition.slow and not one.condition.same_start), None)
+    if slow is not None:
+        ratio = slow.families["metrics"].ratio
+        figures.append(KeyFigure(f"{ratio:.2f}", "ten metrics / real drivers", slow.condition.name, _tone(ratio)))
+    for one in (slow, free):
+        if one is not None and one.alone is not None:
+            what = ", with the sensor" if one.with_sensor else ""
+            figures.append(KeyFigure(f"{one.alone.auc:.2f}", "classifier AUC", f"{one.condition.name}{what}"))
+    return figures
+
+
+def blocks_of(scores: ProfileScores) -> dict[str, float]:
+    """Every block of the fair measure as a ratio to what other real drivers get: 1 is as good as it gets. [-]
+
+    Families of differences by condition; the classifiers: 1 at AUC 0.5, 2 at AUC 1.
+    """
+    blocks = {}
+    for one in scores.realism.conditions:
+        for family, beside in one.families.items():
+            if isfinite(beside.ratio):
+                blocks[f"{FAMILIES[family]}, {one.condition.name}"] = beside.ratio
+        for name, area in (("classifier", one.alone), ("classifier with context", one.jointly)):
+            if area is not None:
+                blocks[f"{name}, {one.condition.name}"] = 1.0 + 2.0 * max(area.auc - 0.5, 0.0)
+    return blocks
+
+
+def worst_block(scores: ProfileScores) -> tuple[str, float]:
+    """Name and ratio of the block that does worst."""
+    blocks = blocks_of(scores)
+    worst = max(blocks, key=blocks.__getitem__)
+    return worst, blocks[worst]
+
+
+def _tone(ratio: float) -> Tone:
+    return "good" if ratio <= CLOSE else "bad" if ratio >= FAR else ""
+
+
+def _fitted_on(profile: DriverProfile, inputs: Mapping[str, str]) -> bool:
+    return not set(profile.provenance.inputs.values()).isdisjoint(inputs.values())
+
+
+def _provenance(scores: ProfileScores, profile: DriverProfile, inputs: Mapping[str, str]) -> dict[str, Any]:
+    return {
+        "profile": profile.name,
+        "profile_sha256": profile_hash(profile),
+        "inputs": dict(inputs),
+        "fitted_on_these": _fitted_on(profile, inputs),
+        "seed": scores.seed,
+        "package_version": __version__,
+    }

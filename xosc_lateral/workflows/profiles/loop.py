@@ -1,0 +1,195 @@
+"""`close_loop`: what a profile lacks, found, added and scored held out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from xosc_lateral.base.lazy import pd
+from xosc_lateral.files.mapping import MappingLike
+from xosc_lateral.files.output_paths import claim, output_folder
+from xosc_lateral.workflows.result import (
+    DrivesLike,
+    GivenDrives,
+    PathLike,
+    Paths,
+    ProfileLike,
+    Result,
+    given_drives,
+    given_profile,
+    naming,
+)
+
+if TYPE_CHECKING:
+    from xosc_lateral.drivers.loop.close import LoopResult
+    from xosc_lateral.drivers.model.profile import DriverProfile
+    from xosc_lateral.files.pages.figure import Figure
+
+
+def close_loop(
+    drives: DrivesLike,
+    profile: ProfileLike | None = None,
+    *,
+    seed: int = 0,
+    name: str = "refined",
+    leave_out: Collection[str] = (),
+    roles: Mapping[str, str] | None = None,
+    columns: MappingLike | None = None,
+    library: Paths = (),
+    progress: Callable[[float, str], None] | None = None,
+) -> ClosedLoop:
+    """Find what measured drives do and a profile doesn't, trace it to an effect, add it, score it held out.
+
+    Parameters
+    ----------
+    drives, columns
+        See `read_drives`.
+    profile : DriverProfile, path or name, optional
+        To start from; without, one is fitted first.
+    seed : int
+        Same inputs and seed: same result.
+    name : str
+        Of the refined profile.
+    leave_out : collection of str
+        Columns not to look at.
+    roles : mapping of str to str, optional
+        What columns are: column -> road, weather, traffic, time, own, driver or unknown. Road, weather and traffic are
+        never dismissed as consequences of the car's movement, own movement and time are never causes. Default: what a
+        mapping file says in `[roles]`, then by name and values.
+    library : path or paths
+        Folders with further profiles.
+    progress : callable, optional
+        Told the share that is done, 0 to 1, and what is being done.
+
+    Raises
+    ------
+    NotEnoughDataError
+        Too little road-following is left after cutting.
+    FormatError
+        A role that there is not, or of a column that the drives lack.
+    """
+    from dataclasses import replace
+
+    from msgspec.structs import replace as with_fields
+
+    from xosc_lateral.drivers.loop import close
+    from xosc_lateral.drivers.model.profile import Provenance
+    from xosc_lateral.files.mapping import as_mapping
+
+    base = None if profile is None else given_profile(profile, library)
+    given = given_drives(drives, columns)
+    # a mapping file serves many tables: what it says of columns that these lack is no mistake
+    there = {"lane_width"}.union(*(drive.context for drive in given.drives))
+    of_file = {name: role for name, role in as_mapping(columns).roles.items() if name in there}
+    with naming(given):
+        result = close.close_loop(
+            given.drives,
+            base,
+            seed=seed,
+            name=name,
+            provenance=Provenance(source=", ".join(given.inputs), inputs=dict(given.inputs)),
+            excluded=list(leave_out),
+            roles={**of_file, **(roles or {})},
+            progress=progress or (lambda share, what: None),
+        )
+    if base is not None:
+        result = replace(result, refined=with_fields(result.refined, left_hand=base.left_hand))
+    return ClosedLoop(result, given)
+
+
+class ClosedLoop(Result):
+    """What was missing, how sure and how big; the refined profile; the error before and after."""
+
+    __slots__ = ("_given", "_proofs", "_result")
+
+    def __init__(self, result: LoopResult, given: GivenDrives) -> None:
+        self._result, self._given = result, given
+        self._proofs: tuple[str, ...] | None = None
+
+    @property
+    def profile(self) -> DriverProfile:
+        """The refined profile."""
+        return self._result.refined
+
+    @property
+    def base(self) -> DriverProfile:
+        """The profile before."""
+        return self._result.base
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """Names of the effects that were found."""
+        return tuple(finding.effect for finding in self._result.findings)
+
+    @property
+    def proofs(self) -> tuple[str, ...]:
+        """For each effect on the mean that was found: a scenario converted with it and without, in words."""
+        from xosc_lateral.workflows.conversion.proof import proofs_of
+
+        if self._proofs is None:
+            found = [effect for effect in self.profile.effects if effect not in self.base.effects]
+            self._proofs = tuple(map(str, proofs_of(self.profile, found)))
+        return self._proofs
+
+    @property
+    def error_before(self) -> float:
+        """On held-out stretches. [m]"""
+        return self._result.error_before
+
+    @property
+    def error_after(self) -> float:
+        """On held-out stretches. [m]"""
+        return self._result.error_after
+
+    @property
+    def floor(self) -> float:
+        """Sampling error of the measured drives: how far random halves of them are from all of them. [m]"""
+        return self._result.floor
+
+    def headline(self) -> str:
+        """One line."""
+        found = ", ".join(self.findings) or "no effect added"
+        error = f"error {self.error_before:.4f} -> {self.error_after:.4f} m"
+        return f"{found}; {error} ({self.floor:.4f} m between halves of the drives)"
+
+    def __str__(self) -> str:
+        from xosc_lateral.workflows.profiles.loop_page import loop_text
+
+        return loop_text(self._result)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per finding: `effect`, `kind`, `columns`, `lag_s`, `response_s`, `shape`, `size_m`, `p_value`, ..."""
+        names = ["effect", "kind", "columns", "lag_s", "response_s", "shape", "size_m", "p_value"]
+        return pd.DataFrame(self.to_dict()["findings"], columns=[*names, "error_before", "error_after"])
+
+    def to_dict(self) -> dict[str, Any]:
+        """`report.json`: plain values, as ``--json`` prints them."""
+        from xosc_lateral.workflows.profiles.loop_json import finite, loop_record
+
+        record: dict[str, Any] = finite(loop_record(self._result, self._given.files))
+        record["provenance"]["inputs"] = dict(self._given.inputs)
+        return record
+
+    def plot(self) -> Figure:
+        """Residual by context, before and after."""
+        from xosc_lateral.workflows.profiles.loop_figures import residual_figure
+
+        return residual_figure(self._result, "mean")
+
+    def write_report(self, folder: PathLike, *, force: bool = False) -> Path:
+        """Write `report.html` and `report.json` into a folder."""
+        from xosc_lateral.files.atomic import write_atomically
+        from xosc_lateral.files.json_text import canonical_json
+        from xosc_lateral.workflows.profiles.loop_page import loop_page
+
+        output = output_folder(folder)
+        claim(self.report_files(output), self._given.files, force=force)
+        write_atomically(output / "report.json", canonical_json(self.to_dict()) + "\n")
+        write_atomically(output / "report.html", loop_page(self._result, self._given.files, self.proofs))
+        return output
+
+    @staticmethod
+    def report_files(folder: Path) -> tuple[Path, Path]:
+        """Files that `write_report` writes."""
+        return folder / "report.json", folder / "report.html"

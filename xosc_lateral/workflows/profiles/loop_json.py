@@ -1,0 +1,145 @@
+"""A closed loop as strict JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from xosc_lateral.base.normal import NORMAL_95
+from xosc_lateral.base.version import __version__
+from xosc_lateral.drivers.evaluation.distances import Distances
+from xosc_lateral.drivers.loop.close import Finding, LoopResult
+from xosc_lateral.drivers.loop.feedback import Feedback
+from xosc_lateral.drivers.loop.selection import Gain
+from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.files.hashes import parsed_hashes
+from xosc_lateral.files.profiles import profile_hash
+from xosc_lateral.workflows.profiles.loop_words import feedback_words, lack_of_fit_words, meaning
+
+MEASURE = (
+    "root mean square of measured minus expected over cells (mean and spread by fifths of every column, spread by "
+    "time, movement by frequency band, quantiles of local spread) on held-out blocks, m"
+)
+
+
+def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
+    """`report.json` as plain values: what people and machines ask of a closed loop, and the provenance."""
+    error = {"before": result.error_before, "after": result.error_after, "floor": result.floor}
+    return {
+        "drives": list(result.names),
+        "base_profile": _profile(result.base) | {"given": result.given},
+        "refined_profile": _profile(result.refined),
+        "held_out": result.held_out,
+        "columns": [column_record(column, result) for column in sorted(result.identified.usable.roles)],
+        "findings": [finding_record(finding) | {"meaning": meaning(finding, result)} for finding in result.findings],
+        "consequences": [_feedback(item) for item in result.identified.usable.feedback],
+        "rejected": [
+            {"columns": list(item.columns), "look": item.component, "p_value": item.p_value, "why": item.why}
+            | {"taken_back": item.was_found}
+            for item in result.identified.selection.rejected
+        ],
+        "unused": [{"column": column, "why": why} for column, why in result.identified.usable.unused.items()],
+        "error": {"measure": MEASURE, **error},
+        "held_out_gain": _gain(result.identified.total),
+        "returned_base": result.identified.returned_base or None,
+        "unexplained": _unexplained(result),
+        "residual": [
+            {"group": group.name, "before": group.before, "after": group.after, "floor": group.floor}
+            for group in result.lack_of_fit.groups
+        ],
+        "metrics": {when: _metrics(getattr(result.scores, when)) for when in ("before", "after", "floor")},
+        "provenance": {"package_version": __version__, "seed": result.seed, "inputs": parsed_hashes(tables)},
+    }
+
+
+def column_record(column: str, result: LoopResult) -> dict[str, Any]:
+    """What a column was taken for, by whom, and what was done with it."""
+    usable = result.identified.usable
+    assigned = usable.roles[column]
+    follows = any(item.column == column for item in usable.feedback)
+    used = "consequence" if follows else usable.unused.get(column, "tested as a cause")
+    return {"column": column, "role": assigned.role.value, "by": assigned.source or None, "use": used}
+
+
+def _interval(finding: Finding) -> list[float]:
+    """Of its size, 95 %. [m], or a factor"""
+    about = NORMAL_95 * finding.size_error
+    return [finding.size_m - about, finding.size_m + about]
+
+
+def _feedback(item: Feedback) -> dict[str, Any]:
+    return {
+        "column": item.column,
+        "why": feedback_words(item),
+        "doubtful": item.doubtful,
+        "coherence": item.coherence,
+        "predicted_share": item.predicted_share,
+        "function_of_offset": item.function,
+    }
+
+
+def _unexplained(result: LoopResult) -> dict[str, Any]:
+    return {
+        "measure": "root of error after squared minus floor squared, m",
+        "size_m": result.lack_of_fit.unexplained,
+        "p_value": result.lack_of_fit.p_value,
+        "clear": result.lack_of_fit.clear,
+        "where": [group.name for group in result.lack_of_fit.where] if result.lack_of_fit.clear else [],
+        "sentence": lack_of_fit_words(result),
+    }
+
+
+def finding_record(finding: Finding) -> dict[str, Any]:
+    """One finding, as DESIGN has it, with its uncertainty and what the profile got."""
+    return {
+        "effect": finding.effect,
+        "kind": finding.kind,
+        "columns": list(finding.columns),
+        "lag_s": finding.lag_s,
+        "response_s": finding.response_s,
+        "shape": finding.shape,
+        "size_m": finding.size_m,
+        "size_error": finding.size_error,
+        "p_value": finding.p_value,
+        "error_before": finding.error_before,
+        "error_after": finding.error_after,
+        "measure": f"{finding.measure}, m",
+        "alike": sorted({name for columns in finding.alike for name in columns} - set(finding.columns)),
+        "instead": [list(columns) for columns in finding.alike],
+        "interval": _interval(finding),
+        "held_out_gain": _gain(finding.gain),
+        "added": [effect.to_dict() for effect in finding.effects],
+    }
+
+
+def finite(value: Any) -> Any:
+    """The same with plain floats, and None for what is not finite."""
+    if isinstance(value, Mapping):
+        return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    if isinstance(value, bool | int | str) or value is None:
+        return value
+    number = float(value)
+    return number if isfinite(number) else None
+
+
+def _gain(gain: Gain | None) -> dict[str, Any] | None:
+    if gain is None:
+        return None
+    return {"mean_nat_per_block": gain.mean, "interval": list(gain.interval), "chosen_in_folds": gain.folds}
+
+
+def _profile(profile: DriverProfile) -> dict[str, Any]:
+    return {
+        "name": profile.name,
+        "model": profile.model.kind,
+        "sha256": profile_hash(profile),
+        "effects": len(profile.effects),
+    }
+
+
+def _metrics(distances: Distances | None) -> dict[str, float]:
+    return {} if distances is None else dict(distances.by_metric)

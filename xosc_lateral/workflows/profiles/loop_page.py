@@ -1,0 +1,289 @@
+"""A closed loop for a person: what was missing, how sure, how big, and what is left."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from xosc_lateral.drivers.loop.close import Finding, LoopResult
+from xosc_lateral.drivers.loop.held_out import SNIPPET_ROWS
+from xosc_lateral.drivers.loop.residual import GroupError
+from xosc_lateral.drivers.model.effects import ColumnEffect
+from xosc_lateral.files.hashes import parsed_hashes
+from xosc_lateral.files.pages.page import KeyFigure, Page, Tone
+from xosc_lateral.files.profiles import profile_hash
+from xosc_lateral.workflows.profiles.loop_figures import (
+    DRAWINGS,
+    effect_figure,
+    residual_figure,
+    spectrum_figure,
+    traces_figure,
+)
+from xosc_lateral.workflows.profiles.loop_json import column_record
+from xosc_lateral.workflows.profiles.loop_words import (
+    CERTAIN,
+    COMPONENT_WORDS,
+    SPREAD,
+    feedback_words,
+    group_words,
+    lack_of_fit_words,
+    meaning,
+    others_words,
+    outcome,
+    size_words,
+    taken_back_words,
+)
+from xosc_lateral.workflows.profiles.violins import LABELS, violin_figure
+
+NAMED_DRIVES = 3  # So many drives are named in the title; more are counted.
+LEFT_ROWS = 8  # Rows of the table of what is left.
+FAR, CLOSE = (
+    2.0,
+    1.2,
+)  # Ratios to halves of the drives from which a number is marked bad, and up to which it is marked good. [-]
+
+
+def loop_text(result: LoopResult) -> str:
+    """The outcome in a few lines; what is left is worked out unless it is given."""
+    lines = [f"{finding_sentence(finding)} (p = {finding.p_value:.1e})" for finding in result.findings]
+    lines = lines or ["no effect added"]
+    lines += [f"{taken_back_words(item)}: {item.why}" for item in result.identified.taken_back]
+    for item in result.identified.usable.feedback:
+        sure = "possibly a" if item.doubtful else "a"
+        lines.append(f"{item.column}: {sure} consequence of the car's movement, not used as a cause")
+    error = f"held-out error {result.error_before:.4f} m before, {result.error_after:.4f} m after"
+    lines.append(f"{error} ({result.floor:.4f} m between halves of the drives)")
+    lines.append(lack_of_fit_words(result))
+    return "\n".join(lines)
+
+
+def finding_sentence(finding: Finding) -> str:
+    """One finding in a line."""
+    when = ""
+    if finding.lag_s is not None:
+        early = f"{-finding.lag_s:.1f} s ahead" if finding.lag_s < 0 else f"lag {finding.lag_s:.1f} s"
+        when = f", {early}, response time {finding.response_s:.1f} s"
+    alike = f"; {others_words(finding)} would explain it about as well" if finding.alike else ""
+    size = "" if finding.kind == "memory" else f", {size_words(finding)}"
+    return f"{finding.effect}: {finding.shape}{size}{when}{alike}"
+
+
+def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] = ()) -> str:
+    """HTML page; same result, same bytes. `proofs`: what findings do in a scenario, in words."""
+    names = ", ".join(result.names) if len(result.names) <= NAMED_DRIVES else f"{len(result.names)} drives"
+    page = Page(f"Closed loop: {names}")
+    page.lead(outcome(result))
+    page.key_figures(_numbers(result))
+    page.lead(lack_of_fit_words(result))
+    page.section("Columns, and what they are taken for")
+    page.table(
+        [column_record(column, result) for column in sorted(result.identified.usable.roles)],
+        "Role of every column, by whom it was given, and its use. Road, weather and traffic that are declared are "
+        "never dismissed as consequences; own movement and time are never causes; all others are tested. Declare with "
+        "`--role COLUMN=ROLE`.",
+    )
+    _add_findings(page, result, proofs)
+    _add_residuals(page, result)
+    _add_movement(page, result)
+    page.section("Consequences of the car's own movement")
+    feedback = result.identified.usable.feedback
+    page.text(
+        "These columns are, or may be, brought about by the car's own movement, as the angle of a steering wheel is. "
+        "They are not used as causes."
+        if feedback
+        else "None."
+    )
+    if feedback:
+        page.table([{"column": item.column, "reason": feedback_words(item)} for item in feedback])
+    page.section(
+        "Tested and rejected",
+        "The strongest candidate of each component that was not significant, and what was found and taken back.",
+    )
+    rejected = result.identified.selection.rejected
+    page.table(
+        [
+            {
+                "component": COMPONENT_WORDS.get(item.component, item.component),
+                "strongest candidate": ", ".join(item.columns) or None,
+                "p-value": item.p_value,
+                "reason": item.why,
+            }
+            for item in rejected
+        ],
+        formats={"p-value": ".2g"},
+    )
+    page.items(f"`{column}` was not tested: {why}." for column, why in result.identified.usable.unused.items())
+    page.section("How to read this page")
+    page.items(line.format(n_runs=len(result.scored.runs_after), certain=f"{CERTAIN:g}") for line in HOW_TO_READ)
+    return page.html(
+        {
+            "base profile": f"{result.base.name} {profile_hash(result.base)[:12]}",
+            "refined profile": f"{result.refined.name} {profile_hash(result.refined)[:12]}",
+            "held out": result.held_out,
+            "seed": result.seed,
+            **{name: value[:16] for name, value in parsed_hashes(tables).items()},
+        }
+    )
+
+
+HOW_TO_READ = (
+    "Offset: distance of the rear axle from the lane centre, positive to the left of travel.",
+    "Error: the root mean square of measured minus expected over all groups of statistics, on blocks that were used "
+    "neither to choose nor to fit the base, the effects or their sizes. The expectation is the mean of {n_runs} "
+    "simulated runs of the profile under the same context.",
+    "Between halves: the same difference between random halves of the measured blocks and all of them. At that size, "
+    "no mean, spread or frequency band distinguishes the profile from the driver.",
+    "p-value: how often a table without this effect would show one as strong. It is family-wise: all columns, lags "
+    "and shapes that were tested count. Below {certain} it is extrapolated; read it as certain.",
+    "Lag: negative if the driver looks ahead. Response: time constant of a first-order lag, after which about two "
+    "thirds of the response have happened.",
+)
+
+
+def _add_findings(page: Page, result: LoopResult, proofs: Sequence[str]) -> None:
+    page.section("What the profile lacked")
+    if not result.findings:
+        stays = "stays as it was given" if result.given else "is the base that was fitted to these drives"
+        page.text(f"Nothing was added: the profile {stays}.")
+        return
+    timed = any(finding.lag_s is not None for finding in result.findings)
+    page.table(
+        [_finding_row(finding, timed) for finding in result.findings],
+        "Size ± two standard errors: the change from the 5 % to the 95 % quantile of the driving quantity, or an "
+        "amplitude. Errors are held-out errors of the statistic that shows the effect best.",
+        formats={
+            **{"lag [s]": "+.1f", "response [s]": ".1f", "p-value": ".1e"},
+            **{"error before [mm]": ".1f", "error after [mm]": ".1f"},
+        },
+    )
+    for finding in result.findings:
+        page.heading(_capital(finding.effect))
+        page.text(meaning(finding, result))
+        _add_picture(page, result, finding)
+    if proofs:
+        said = "The same stretch converted with an effect and without it, four seeds; the shift is measured there."
+        page.table([{"in a scenario": one} for one in proofs], said)
+    applied = (
+        "`sample --context` and `convert` apply it where the context has the columns, and name the columns that are "
+        "missing."
+        if any(finding.columns for finding in result.findings)
+        else "Effects without a column are drawn anew for every simulated vehicle."
+    )
+    page.text(f"The refined profile `{result.refined.name}` contains what was found. {applied}")
+
+
+def _add_picture(page: Page, result: LoopResult, finding: Finding) -> None:
+    effect = finding.effects[0] if finding.effects else None
+    if not isinstance(effect, ColumnEffect):
+        draw, caption = DRAWINGS[effect.kind if effect is not None else finding.kind]
+        page.figure(draw(result, finding), caption, f"{_capital(finding.effect)}: {caption}")
+    elif finding.statistic in result.scored.real:
+        page.figure(
+            effect_figure(result, finding),
+            "Left: the fitted effect and the measured offsets, less the drives' own means and all other effects (bars "
+            "and band: two standard errors). Right: means of held-out blocks, by fifths of the effect.",
+            f"Curve of {finding.effect} over measured points, and measured against expected before and after.",
+        )
+
+
+def _add_residuals(page: Page, result: LoopResult) -> None:
+    page.section(
+        "Residual by context",
+        "Measured minus expected offset on held-out blocks, by quantile groups of every column and by time; the values "
+        "of the column stand below each panel. The band is the sampling error (95 %): residuals within it are no sign "
+        "of a lack of fit.",
+    )
+    page.text("" if result.identified.usable.columns else "The table has no column that varies.")
+    for what, words in (("mean", "mean offset"), ("spread", SPREAD)):
+        if any(name.startswith(f"{what} by ") and " by effect: " not in name for name in result.scored.real):
+            page.figure(
+                residual_figure(result, what),
+                f"Residual of the {words}, before (grey) and after (orange). Columns of the effects come first.",
+                f"Residual of the {words} by every context column.",
+            )
+    groups = sorted(result.lack_of_fit.groups, key=lambda group: -group.unexplained)[:LEFT_ROWS]
+    page.table(
+        [_group_row(group, result) for group in groups],
+        f"The {len(groups)} of {len(result.lack_of_fit.groups)} groups of statistics with the largest residual above "
+        "that between halves: root mean square of measured minus expected [mm]. All groups are in report.json.",
+        formats={"before": ".1f", "after": ".1f", "between halves": ".1f", "ratio": ".2f"},
+        tones={k: "bad" for k, group in enumerate(groups) if group.after > FAR * group.floor},
+    )
+
+
+def _add_movement(page: Page, result: LoopResult) -> None:
+    page.section("Movement")
+    page.figure(
+        traces_figure(result),
+        "Offsets as measured, and one simulated run of the profile before and of the profile after under the same "
+        "context, on blocks that neither was fitted to. The curves are not meant to coincide: two drives of the same "
+        "driver do not either. What should agree is how they move.",
+        "Measured and simulated offsets over time, drive by drive",
+    )
+    page.figure(
+        spectrum_figure(result),
+        "Power spectral density within held-out blocks. Where a profile's curve lies in the band, its movement is "
+        "like the measured one at that frequency.",
+        "Spectra, measured, before and after.",
+    )
+    scores, seconds = result.scores, (SNIPPET_ROWS - 1) * result.coarse.timeline.step
+    if scores.before is None or scores.after is None or scores.floor is None:
+        page.text(f"There are too few snippets of {seconds:g} s to compare metrics.")
+        return
+    before, after, floor = scores.before.by_metric, scores.after.by_metric, scores.floor.by_metric
+    page.table(
+        [
+            {"metric": LABELS[name], "before": before[name], "after": after[name], "between halves": floor[name]}
+            for name in before
+        ],
+        f"Ten metrics of snippets of {seconds:g} s: distance from the measured ones, in standard deviations of these",
+        formats={"before": ".3f", "after": ".3f", "between halves": ".3f"},
+        tones={k: _tone(after[name], floor[name]) for k, name in enumerate(before)},
+    )
+    page.figure(
+        violin_figure(scores.real, scores.sampled_after, scores.sampled_before, ("measured", "profile")),
+        f"Ten metrics of snippets of {seconds:g} s: measured (left, blue), profile after (right, orange), profile "
+        "before (dashed). Bars: minimum, mean, maximum.",
+        "Ten violins, measured beside the profile after and before.",
+    )
+
+
+def _numbers(result: LoopResult) -> list[KeyFigure]:
+    tone: Tone = "bad" if result.lack_of_fit.clear else "good" if result.findings else ""
+    return [
+        KeyFigure(f"{1000 * result.error_before:.1f} mm", "error before", "of the base profile"),
+        KeyFigure(f"{1000 * result.error_after:.1f} mm", "error after", "of the refined profile", tone=tone),
+        KeyFigure(f"{1000 * result.floor:.1f} mm", "between halves", "random halves of the drives against all of them"),
+    ]
+
+
+def _finding_row(finding: Finding, timed: bool) -> dict[str, object]:
+    """A row of the table of effects; lag and response only where one of them has any."""
+    timing: dict[str, object] = {"lag [s]": finding.lag_s, "response [s]": finding.response_s} if timed else {}
+    return {
+        "effect": finding.effect,
+        "shape": finding.shape,
+        "size": size_words(finding),
+        **timing,
+        "p-value": finding.p_value,
+        "error before [mm]": 1000.0 * finding.error_before,
+        "error after [mm]": 1000.0 * finding.error_after,
+    }
+
+
+def _group_row(group: GroupError, result: LoopResult) -> dict[str, object]:
+    return {
+        "group": group_words(group.name, result),
+        "before": 1000.0 * group.before,
+        "after": 1000.0 * group.after,
+        "between halves": 1000.0 * group.floor,
+        "ratio": group.after / group.floor if group.floor > 0 else None,
+    }
+
+
+def _tone(value: float, floor: float) -> Tone:
+    return "bad" if value > FAR * floor else "good" if value <= CLOSE * floor else ""
+
+
+def _capital(words: str) -> str:
+    return words[:1].upper() + words[1:]

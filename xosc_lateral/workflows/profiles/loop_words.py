@@ -1,0 +1,343 @@
+"""A closed loop in plain words: what an effect means, how sure it is, what is left."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.base.segment import CONTEXT_UNITS
+from xosc_lateral.drivers.loop.close import Finding, LoopResult
+from xosc_lateral.drivers.loop.feedback import BAND, FUNCTION, Feedback
+from xosc_lateral.drivers.loop.selection import Rejected
+from xosc_lateral.drivers.loop.timeline import LOCAL_S
+from xosc_lateral.drivers.model.effects import Acts, Angular, ColumnEffect, Levels, Magnitude, Product
+
+CERTAIN = 1e-4  # p-values below this are extrapolated far beyond the null's sample: "certain", and no better known. [-]
+NAMED_GROUPS = 4  # So many groups with the most left unexplained are named.
+GAP = "\N{NO-BREAK SPACE}"  # Between a number and its unit: they stay on one line.
+SPREAD = f"spread within {LOCAL_S:g}{GAP}s"  # What the local standard deviation is called in figures.
+
+# Signs that a reader of a figure has to know.
+HINTS: Mapping[str, str] = MappingProxyType(
+    {
+        "curvature": "positive in left bends",
+        "crossfall": "positive: falls to the right",
+        "grade": "positive: rises ahead",
+        "lane_index": "0 is the rightmost lane",
+        "wind_direction": "90: blows to the left",
+    }
+)
+
+# What is asked of each component.
+COMPONENT_WORDS: Mapping[str, str] = MappingProxyType(
+    {
+        "mean": "a column that changes the mean offset",
+        "between": "a column that goes with the mean offset of whole drives",
+        "spread": "a column that changes the spread",
+        "slow_spread": "a column that changes the spread of slow movement",
+        "fine_noise": "a column that changes the fine noise",
+        "time_spread": "a spread that changes smoothly with time",
+        "regimes": "regimes of small and large spread",
+        "cycle": "a periodic oscillation",
+        "time_mean": "a mean offset that changes with time, smoothly or by a step",
+    }
+)
+
+# Groups of cells whose own name is not plain.
+_PLAIN_GROUPS: Mapping[str, str] = MappingProxyType(
+    {
+        "movement by band": "standard deviation by frequency band",
+        "spread by time": "spread by sixths of the drive",
+        "mean by effect: step 0": "mean before and after it",
+    }
+)
+
+_HIDDEN: Mapping[str, str] = MappingProxyType(
+    {
+        "periodic": "The car oscillates at a steady frequency, whatever the road and the traffic do.",
+        "drift": (
+            "The mean position changes smoothly over the drive, and no column explains it: a driver who settles, or a "
+            "camera whose calibration depends on temperature."
+        ),
+        "step": (
+            "From one moment on the car keeps to another position in the lane, and no column changes at that time: a "
+            "recalibrated camera, for example, or a change of driver."
+        ),
+        "scale": "The spread about the mean position changes smoothly over the drive: fatigue, or learning.",
+        "regime": (
+            "The movement switches between two levels of spread, and no column predicts when: distraction, for example."
+        ),
+        "memory": (
+            "How the car moves depends on more than its position one step ago. The core model is replaced by "
+            "`autoregressive`, which has a longer memory."
+        ),
+        "population": (
+            "The drivers keep to different positions and move by different amounts. The refined profile draws a driver "
+            "for every vehicle."
+        ),
+    }
+)
+
+
+def column_label(column: str, *, hint: bool = True) -> str:
+    """A column with its unit where that is known, and what its sign means, for axes."""
+    unit = CONTEXT_UNITS.get(column, "").replace("m/s2", "m/s²").replace("-", "")
+    sign = HINTS.get(column, "") if hint else ""
+    return column + (f" [{unit}]" if unit else "") + (f" ({sign})" if sign else "")
+
+
+def product_label(effect: Product) -> str:
+    """Both factors of a product."""
+    return " × ".join(str(factor) for factor in effect.factors)
+
+
+def size_words(finding: Finding) -> str:
+    """Size with two standard errors and its unit, and in words to which side; where others are, in a driver's words."""
+    effect = finding.effects[0] if finding.effects else None
+    if finding.kind != "location" or not isinstance(effect, ColumnEffect):
+        return _size(finding)
+    side = "left" if finding.size_m > 0 else "right"
+    rises = "as it rises" if len(finding.columns) == 1 else "from the low to the high end"
+    plain = f"{_size(finding).lstrip('+-')} further {side} {rises}"
+    return beside_words(effect, _share_of_error(finding)) or plain
+
+
+def _share_of_error(finding: Finding) -> float:
+    return 2.0 * finding.size_error / abs(finding.size_m) if finding.size_m else 0.0
+
+
+def _size(finding: Finding) -> str:
+    size, about = finding.size_m, 2.0 * finding.size_error
+    if finding.kind == "memory":
+        return f"factor{GAP}{size:.2f}"
+    spread = f"{GAP}±{GAP}{about:.2f}" if about else ""
+    if finding.kind in ("scale", "dynamics", "regime"):
+        return f"factor{GAP}{size:.2f}{spread}"
+    sign = "+" if finding.kind in ("location", "step", "drift") else ""
+    what = {"population": "means scatter by ", "periodic": "amplitude "}.get(finding.kind, "")
+    return f"{what}{size:{sign}.2f}{spread}{GAP}m"
+
+
+def p_value_words(p_value: float) -> str:
+    """How often tables without the effect show one as strong, in words."""
+    if p_value < CERTAIN:
+        return "practically never"
+    return f"in 1 of {1.0 / p_value:,.0f} tables".replace(",", GAP)
+
+
+def when_words(finding: Finding) -> str:
+    """Lag and response, or nothing; what goes with whole drives has neither."""
+    if finding.lag_s is None or finding.response_s is None:
+        return "What counts is the mean of each drive, not changes within a drive." if finding.columns else ""
+    lag = finding.lag_s
+    start = "at once" if abs(lag) < 0.1 else f"{-lag:.1f} s in advance" if lag < 0 else f"{lag:.1f} s later"
+    slow = f", with a response time of {finding.response_s:.1f} s" if finding.response_s > 0 else ""
+    return f"The driver responds {start}{slow}."
+
+
+def meaning(finding: Finding, result: LoopResult) -> str:
+    """What an effect means, in sentences that need no statistics."""
+    effect = finding.effects[0] if finding.effects else None
+    words = [
+        _column_sentence(finding, effect, result) if isinstance(effect, ColumnEffect) else _hidden_sentence(finding),
+        when_words(finding),
+        f"Without this effect, one as strong is found {p_value_words(finding.p_value)} (p = {finding.p_value:.1e}).",
+    ]
+    if finding.alike:
+        words.append(
+            f"{others_words(finding, '`')} would explain it about as well; these drives cannot tell which it is."
+        )
+    measure = _PLAIN_GROUPS.get(finding.statistic, finding.measure)
+    change = f"{_cm(finding.error_before)} before, {_cm(finding.error_after)} now"
+    words.append(f"Error of the {measure} on held-out blocks: {change}.")
+    return " ".join(word for word in words if word)
+
+
+def others_words(finding: Finding, mark: str = "") -> str:
+    """Columns of each other effect that explains as much, each name between marks; empty: there is none."""
+    return ", or ".join(
+        " with ".join(f"{mark}{name}{mark}" for name in columns)
+        + (" alone" if set(columns) < set(finding.columns) else "")
+        for columns in finding.alike
+    )
+
+
+def feedback_words(item: Feedback) -> str:
+    """Why a column is no cause, in a sentence."""
+    if item.source:
+        by = "declared to be" if item.source == "declared" else "by its name"
+        return f"it is {by} the car's own movement"
+    if item.function >= FUNCTION:
+        return f"it is a function of the present {item.of} (squared coherence {item.function:.2f}), as a warning is"
+    shared = f"above {BAND[0]:g}{GAP}Hz, where drivers hardly respond, its squared coherence with the {item.of} is"
+    share = f"the movement predicts {100 * item.predicted_share:.1f}{GAP}% of its changes"
+    verdict = "it may follow from the car's own movement" if item.doubtful else "it follows from the car's own movement"
+    declare = f"; if it cannot, declare what it is: `--role {item.column}=road`" if item.doubtful else ""
+    return f"{shared} {item.coherence:.2f}, and {share}: {verdict}{declare}"
+
+
+def outcome(result: LoopResult) -> str:
+    """What was found and what became of it, in sentences that are true of every outcome."""
+    found, back = result.findings, result.identified.taken_back
+    words = []
+    if found:
+        names = "; ".join(f"{finding.effect} ({size_words(finding)})" for finding in found)
+        words.append(f"{len(found)} effect{'s' * (len(found) > 1)} found and added to the profile: {names}.")
+    elif not back:
+        words.append("No significant effect was found, and none was added.")
+    if back:
+        names = "; ".join(f"{taken_back_words(item)}: {item.why}" for item in back)
+        number = f"{len(back)} {'more ' * bool(found)}" + ("effects were" if len(back) > 1 else "effect was")
+        words.append(f"{number} found and taken back ({names}).")
+        words += [] if found else ["Nothing was added: the base profile is returned."]
+    return " ".join(words)
+
+
+def taken_back_words(item: Rejected) -> str:
+    """What was found and is not kept."""
+    by = f" ({' and '.join(item.columns)})" if item.columns else ""
+    return f"{COMPONENT_WORDS.get(item.component, item.component)}{by}"
+
+
+def lack_of_fit_words(result: LoopResult) -> str:
+    """What is left unexplained, in a sentence."""
+    left = result.lack_of_fit
+    if left.unexplained == 0.0:
+        return (
+            "Taken together, the residuals do not exceed the difference between halves of the drives: what the profile "
+            "still misses is within chance."
+        )
+    if not left.clear:
+        return (
+            "The remaining residual is not significant: the error after is above that between halves, but "
+            f"{100 * left.p_value:.0f}{GAP}% of random halves of these drives differ as much from the whole."
+        )
+    where = ", ".join(
+        f"{group_words(group.name, result)} ({_mm(group.after)}, between halves {_mm(group.floor)})"
+        for group in left.where[:NAMED_GROUPS]
+    )
+    return (
+        f"Unexplained residual of {_mm(left.unexplained)}: the error after ({_mm(result.error_after)}) lies "
+        f"clearly above that between halves ({_mm(result.floor)}), and no effect was found that explains the rest."
+        + (f" It stands out in: {where}." if where else "")
+    )
+
+
+def group_words(name: str, result: LoopResult) -> str:
+    """A group of cells as a reader would call it."""
+    for finding in result.findings:
+        own = finding.statistic.partition(" by effect: ")[2]
+        if own and name.endswith(f" by effect: {own}"):
+            return f"{name.partition(' by ')[0]} by the effect of {' and '.join(finding.columns) or finding.effect}"
+    return _PLAIN_GROUPS.get(name, name)
+
+
+def _hidden_sentence(finding: Finding) -> str:
+    sentence = _HIDDEN.get(finding.kind, "")
+    detail = f"{finding.shape}; {size_words(finding)}"
+    return f"{sentence} ({detail[0].upper()}{detail[1:]}.)"
+
+
+# Where a driver is, by the column that says so.
+OTHERS: Mapping[str, str] = MappingProxyType(
+    {
+        "left_distance": "beside vehicles on his left",
+        "right_distance": "beside vehicles on his right",
+        "car_left": "beside cars on his left",
+        "car_right": "beside cars on his right",
+        "truck_left": "beside trucks on his left",
+        "truck_right": "beside trucks on his right",
+        "left_is_truck": "when the next vehicle on his left is a truck",
+        "right_is_truck": "when the next vehicle on his right is a truck",
+        "lead_distance": "behind a vehicle ahead",
+        "lead_is_truck": "when the vehicle ahead is a truck",
+        "oncoming_distance": "when somebody comes towards him",
+    }
+)
+
+FAR = 200.0  # Free space at which others count as far away. [m]
+
+
+def beside_words(effect: ColumnEffect, error: float = 0.0) -> str:
+    """An effect of others on the mean offset in a driver's words, "moves 0.22 m left beside trucks on his right, from
+    40 m on"; empty for another effect. `error`: of the shift, as a share of it.
+
+    By where the effect puts him, whatever the sign of a distance: with somebody alongside, less with nobody near. The
+    range is where 1/e of the shift is left.
+    """
+    if effect.acts is not Acts.LOCATION or len(effect.columns) != 1 or effect.columns[0] not in OTHERS:
+        return ""
+    column = effect.columns[0]
+    if not column.endswith("distance"):
+        off, on = effect.weighed(effect.quantity({column: np.array([0.0, 1.0])}))
+        return _moves(float(on - off), error, OTHERS[column], "")
+    free = np.linspace(0.0, FAR, 2001)
+    place = effect.weighed(effect.quantity({column: free}))
+    shift = place - place[-1]
+    largest = int(np.argmax(np.abs(shift)))
+    near = np.flatnonzero(np.abs(shift) >= np.abs(shift[largest]) * np.exp(-1.0))
+    begins = f", from {free[near[-1]]:.0f}{GAP}m on" if near[-1] > 0 and free[near[-1]] < FAR - 1.0 else ""
+    return _moves(float(shift[largest]), error, OTHERS[column], begins)
+
+
+def _moves(shift: float, error: float, where: str, begins: str) -> str:
+    about = f"{GAP}±{GAP}{abs(shift) * error:.2f}" if error else ""
+    return f"moves {abs(shift):.2f}{about}{GAP}m {'left' if shift > 0 else 'right'} {where}{begins}"
+
+
+def _column_sentence(finding: Finding, effect: ColumnEffect, result: LoopResult) -> str:
+    if words := beside_words(effect, _share_of_error(finding)):
+        return f"The driver {words} (`{effect.columns[0]}`)."
+    more = finding.size_m > (0.0 if effect.acts is Acts.LOCATION else 1.0)
+    size = _size(finding).lstrip("+-")
+    if effect.acts is Acts.LOCATION:
+        does = f"drives {size} further {'left' if more else 'right'}"
+        subject = "the car"
+    else:
+        subject = {
+            Acts.SPREAD: "the movement about the mean",
+            Acts.FINE: "the fine noise",
+            Acts.RATE: "the rate of mean reversion",
+        }[effect.acts]
+        does = f"changes by a {size}"
+    return f"{_between(effect, result)}, {subject} {does}."
+
+
+def _between(effect: ColumnEffect, result: LoopResult) -> str:
+    coarse = result.coarse
+    inside = coarse.timeline.valid
+    if isinstance(effect, Levels):
+        levels = " or ".join(f"{level:g}" for level in effect.levels)
+        return f"Where `{effect.column}` is {levels}, compared with elsewhere"
+    if isinstance(effect, Product):
+        return f"From the low to the high end of `{product_label(effect)}` (the middle 90 % of the time)"
+    column = effect.columns[0]
+    if isinstance(effect, Angular):
+        return f"From the `{column}` of the weakest to that of the strongest effect (the middle 90 % of the time)"
+    return _over_values(effect, column, coarse.context[column][inside])
+
+
+def _over_values(effect: ColumnEffect, column: str, seen: NDArray[np.float64]) -> str:
+    """From where to where a column of these values goes."""
+    seen = seen[np.isfinite(seen)]
+    name = f"`{column}`"
+    if isinstance(effect, Magnitude):
+        seen, name = np.abs(seen), f"the magnitude of `{column}`"
+    if set(np.unique(seen)) <= {0.0, 1.0}:
+        return f"While `{column}` is on"
+    low, high = np.quantile(seen, [0.05, 0.95])
+    unit = CONTEXT_UNITS.get(column, "")
+    unit = "" if unit in ("", "-") else f" {unit}"
+    name += f" ({HINTS[column]})" if column in HINTS else ""
+    return f"As {name} goes from {low:.3g} to {high:.3g}{unit} (5 % and 95 % quantile of these drives)"
+
+
+def _cm(value: float) -> str:
+    return f"{100.0 * value:.1f}{GAP}cm"
+
+
+def _mm(value: float) -> str:
+    return f"{1000.0 * value:.0f}{GAP}mm"

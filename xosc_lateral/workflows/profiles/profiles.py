@@ -1,0 +1,301 @@
+"""`read_profile`, `write_profile`, `list_profiles`, `compare_profiles`: the library of drivers."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.lazy import pd
+from xosc_lateral.files.output_paths import claim, output_file, output_folder
+from xosc_lateral.workflows.result import PathLike, Paths, ProfileLike, Result, as_paths, given_profile, write_page
+
+if TYPE_CHECKING:
+    from xosc_lateral.drivers.evaluation.profile_comparison import Compared
+    from xosc_lateral.drivers.fitting.derive import Derived
+    from xosc_lateral.drivers.model.profile import DriverProfile
+    from xosc_lateral.files.pages.figure import Figure
+    from xosc_lateral.files.profiles import Entry
+
+PROFILE_SUFFIXES = (".json",)
+
+
+def read_profile(profile: PathLike, library: Paths = ()) -> DriverProfile:
+    """Read a profile by its path or its name.
+
+    Parameters
+    ----------
+    profile : str or Path
+        ``motorway`` or ``somewhere/mine.json``. A name is looked up in `library`, in the folders of
+        ``XOSC_LATERAL_LIBRARY`` and of the configuration file, among those of plug-ins and those shipped.
+    library : path or paths
+        Folders with further profiles.
+
+    Raises
+    ------
+    DriverProfileError
+        No profile of that name; lists those that are there.
+    FormatError
+        The file is not there, or no valid profile.
+    """
+    return given_profile(profile, library)
+
+
+def write_profile(profile: DriverProfile, path: PathLike, *, force: bool = False) -> Path:
+    """Write a profile file; in a folder it is called after the profile. Same profile, same bytes.
+
+    Raises
+    ------
+    FormatError
+        The file is there and no profile that this package wrote.
+    """
+    from xosc_lateral.files import profiles
+
+    output = output_file(path, f"{profile.name}.json", PROFILE_SUFFIXES)
+    claim([output], force=force)
+    profiles.write_profile(profile, output)
+    return output
+
+
+def write_card(profile: DriverProfile, path: PathLike, *, force: bool = False) -> Path:
+    """Write a profile's card as a page: what it does, where it comes from, how true it is."""
+    from xosc_lateral.workflows.profiles.cards import card_page
+
+    return write_page(path, f"{profile.name}.html", lambda: card_page(profile), force=force)
+
+
+def derive_profile(
+    base: ProfileLike = "motorway",
+    *,
+    name: str = "",
+    preset: str | None = None,
+    library: Paths = (),
+    **asked: float | str | None,
+) -> Derived:
+    """A driver from stated figures: what a profile does, made larger, slower or elsewhere until it has them.
+
+    Parameters
+    ----------
+    base : DriverProfile, path or name
+        Gives what is not stated; of a population its typical driver.
+    name : str
+        Id of the new profile; else the preset's or the base's name with ``-derived``.
+    preset : str, optional
+        One of `identification.stated_figures.PRESETS`: figures with a source.
+    library : path or paths
+        Folders with further profiles.
+    **asked
+        Fields of `identification.stated_figures.Asked`: ``sdlp=0.25``.
+
+    Raises
+    ------
+    DriverProfileError
+        If figures contradict each other, are too far from the base's, or no car could drive them.
+    """
+    from dataclasses import replace
+
+    from msgspec import structs
+
+    from xosc_lateral.drivers.fitting.derive import derive
+    from xosc_lateral.drivers.fitting.stated_figures import Asked, preset_called
+    from xosc_lateral.files.profiles import profile_hash
+
+    known = given_profile(base, library)
+    chosen = None if preset is None else preset_called(preset)
+    stated = {key: value for key, value in asked.items() if value is not None}
+    figures = Asked(**stated) if chosen is None else replace(chosen.asked, **stated)  # type: ignore[arg-type]
+    made = derive(known, figures, name or preset or f"{known.name}-derived", preset=chosen)
+    origin = made.profile.provenance
+    origin = structs.replace(origin, fit={"derived_from": known.name, "sha256": profile_hash(known), **origin.fit})
+    return made._replace(profile=structs.replace(made.profile, provenance=origin))
+
+
+def list_profiles(
+    library: Paths = (), *, tags: Collection[str] = (), where: Mapping[str, str] | None = None
+) -> ProfileList:
+    """Everything in the library: `library`, the environment's and the configuration's folders, shipped, plug-ins'.
+
+    A file that is no valid profile is listed with what is wrong with it.
+
+    Parameters
+    ----------
+    library : path or paths
+        Folders with further profiles.
+    tags : collection of str
+        List only profiles that carry all of them.
+    where : mapping of str to str, optional
+        List only profiles with this metadata: ``{"country": "DE"}``.
+    """
+    from xosc_lateral.files.profiles import matching, read_library
+
+    entries = read_library(as_paths(library))
+    return ProfileList(matching(entries, tags, where or {}) if tags or where else entries)
+
+
+def add_profile(
+    profile: ProfileLike,
+    library: PathLike,
+    *,
+    name: str | None = None,
+    tags: Collection[str] = (),
+    metadata: Mapping[str, str] | None = None,
+    force: bool = False,
+) -> Path:
+    """Put a profile into a library's folder, under its id, with tags and metadata.
+
+    Parameters
+    ----------
+    profile : DriverProfile, path or name
+    library : str or Path
+        Folder; made if it is missing.
+    name : str, optional
+        Its id there; else the one that it has.
+    tags : collection of str
+        Added to those that it has.
+    metadata : mapping of str to str, optional
+        `version`, `driver`, `vehicle`, `road`, `country`, `date`, `licence`.
+    force : bool
+        Replace a profile of that id.
+
+    Raises
+    ------
+    FormatError
+        There is a profile of that id.
+    """
+    from xosc_lateral.files import profiles
+    from xosc_lateral.files.profiles import described
+
+    folders = [library] if Path(library).is_dir() else []
+    added = described(given_profile(profile, folders), name=name, add_tags=tags, fields=metadata)
+    output = output_folder(library) / f"{added.name}.json"
+    if output.exists() and not force:
+        raise FormatError("there is a profile of this id; --name gives it another, --force replaces it", path=output)
+    profiles.write_profile(added, output)
+    return output
+
+
+def tag_profile(
+    name: PathLike,
+    library: Paths = (),
+    *,
+    add: Collection[str] = (),
+    remove: Collection[str] = (),
+    metadata: Mapping[str, str] | None = None,
+) -> DriverProfile:
+    """Change tags and metadata of a profile in its file.
+
+    Raises
+    ------
+    FormatError
+        It comes with the package, or can't be read.
+    """
+    from xosc_lateral.files import profiles
+    from xosc_lateral.files.profiles import described, own_path
+    from xosc_lateral.files.source import edit_in_place
+
+    path = own_path(str(name), as_paths(library))
+    changed = described(profiles.read_profile(path), add_tags=add, remove_tags=remove, fields=metadata)
+    edit_in_place(path)
+    profiles.write_profile(changed, path)
+    return changed
+
+
+def compare_profiles(*profiles: ProfileLike, seed: int = 0, library: Paths = ()) -> ProfileComparison:
+    """How profiles differ in even traffic: a summary of each, and the distance of each from each.
+
+    Parameters
+    ----------
+    profiles : DriverProfile, path or name
+        Two or more.
+    seed : int
+        Of the free runs that are compared.
+    library : path or paths
+        Folders with further profiles.
+    """
+    from xosc_lateral.drivers.evaluation.profile_comparison import compare
+
+    if len(profiles) < 2:
+        raise ValueError(f"{len(profiles)} profile to compare, two are needed")
+    return ProfileComparison(compare([given_profile(profile, library) for profile in profiles], seed))
+
+
+class ProfileList(Result):
+    """Profiles of a library; those that can't be read among them, with the reason."""
+
+    __slots__ = ("entries",)
+
+    def __init__(self, entries: Sequence[Entry]) -> None:
+        self.entries = tuple(entries)
+
+    def __iter__(self) -> Iterator[Entry]:
+        return iter(self.entries)
+
+    def __len__(self) -> int:
+        return len(self.entries)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of those that can be read, each once."""
+        return tuple(dict.fromkeys(entry.name for entry in self.entries if entry.profile is not None))
+
+    def headline(self) -> str:
+        """One line."""
+        broken = sum(entry.profile is None for entry in self.entries)
+        return f"{len(self.names)} profiles{f', {broken} that cannot be read' if broken else ''}"
+
+    def __str__(self) -> str:
+        from xosc_lateral.workflows.profiles.cards import list_text
+
+        return list_text(self.entries)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per file."""
+        return pd.DataFrame(self.to_dict()["profiles"])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them."""
+        from xosc_lateral.workflows.profiles.cards import list_record
+
+        return {"profiles": list_record(self.entries)}
+
+
+class ProfileComparison(Result):
+    """Profiles side by side."""
+
+    __slots__ = ("_compared",)
+
+    def __init__(self, compared: Compared) -> None:
+        self._compared = compared
+
+    def headline(self) -> str:
+        """One line."""
+        return ", ".join(self._compared.names)
+
+    def __str__(self) -> str:
+        from xosc_lateral.workflows.profiles.comparison_page import comparison_text
+
+        return comparison_text(self._compared)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Mean distance of the ten metrics of each profile (row) from each (column), in standard deviations."""
+        names = self._compared.names
+        return pd.DataFrame(self._compared.distance, index=names, columns=names)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them."""
+        from xosc_lateral.workflows.profiles.comparison_page import comparison_record
+
+        return comparison_record(self._compared)
+
+    def plot(self) -> Figure:
+        """Spread, spectrum and sample paths side by side."""
+        from xosc_lateral.workflows.profiles.comparison_page import comparison_figure
+
+        return comparison_figure(self._compared)
+
+    def write_report(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the HTML page."""
+        from xosc_lateral.workflows.profiles.comparison_page import comparison_page
+
+        return write_page(path, "profiles.html", lambda: comparison_page(self._compared), force=force)

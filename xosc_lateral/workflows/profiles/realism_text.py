@@ -1,0 +1,127 @@
+"""The fair measure as lines and table rows: the headline of `evaluate`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from xosc_lateral.drivers.evaluation.classifier import TwoSampleResult
+from xosc_lateral.drivers.evaluation.lane_keeping import INDICATORS
+from xosc_lateral.drivers.evaluation.realism import ConditionScores, Realism
+from xosc_lateral.drivers.model.core.base import ModelKind
+from xosc_lateral.drivers.model.profile import DriverProfile
+
+FAMILIES: Mapping[str, str] = {
+    "metrics": "ten metrics",
+    "lane_keeping": "lane keeping",
+    "spectrum": "spectrum",
+    "memory": "autocorrelation",
+    "energy_score": "energy score",
+    "variogram_score": "variogram score",
+}
+"""Kinds of difference, for readers."""
+
+AREAS: Mapping[str, str] = {
+    "alone": "classifier AUC",
+    "jointly": "classifier AUC, movement and context",
+    "floor": "classifier AUC, real drivers",
+}
+
+INDICATOR_LABELS: Mapping[str, str] = {
+    "sdlp": "SDLP [m]",
+    "tlc_min": "smallest time to line crossing [s]",
+    "tlc_median": "median time to line crossing [s]",
+    "beyond_wandering_zone": "share of time beyond the wandering zone (UN R157)",
+    "near_marking": "share of time near a marking",
+    "lateral_acceleration": "lateral acceleration, rms [m/s²]",
+    "lateral_jerk": "lateral jerk, rms [m/s³]",
+}
+
+START_FADE = (
+    "The two-level model fades from the measured start into its own movement within the first second, which raises "
+    "diff. std of snippets with the same start slightly."
+)
+"""Said where that metric is judged: 5 % on the motorway recording, with and without the fade."""
+
+
+def start_fade_note(profile: DriverProfile) -> str:
+    """What a reader of metrics from the same start has to know about the profile's model; empty: nothing."""
+    return START_FADE if profile.model.kind == ModelKind.TWO_LEVEL else ""
+
+
+def condition_groups(realism: Realism) -> dict[str, list[ConditionScores]]:
+    """Conditions that differ in length alone, the most telling first: heading -> by length."""
+    groups: dict[str, list[ConditionScores]] = {}
+    for one in sorted(realism.conditions, key=lambda one: (not one.condition.slow, one.condition.same_start)):
+        start = "same start" if one.condition.same_start else "free runs"
+        band = "below 0.5 Hz" if one.condition.slow else "all that was recorded"
+        what = "driver and sensor" if one.with_sensor else "driver"
+        groups.setdefault(f"{start}, {band} ({what})", []).append(one)
+    return groups
+
+
+def ratio_rows(group: list[ConditionScores]) -> list[dict[str, object]]:
+    """A row for each family and each classifier, a column for each length."""
+    rows: list[dict[str, object]] = []
+    for family, label in FAMILIES.items():
+        if any(family in one.families for one in group):
+            cells = {_length(one): _ratio(one, family) for one in group}
+            rows.append({"ratio to real drivers": label, **cells})
+    for key, label in AREAS.items():
+        areas = {_length(one): getattr(one, key) for one in group}
+        if any(area is not None for area in areas.values()):
+            rows.append({"ratio to real drivers": label, **{length: _area(area) for length, area in areas.items()}})
+    return rows
+
+
+def indicator_rows(scores: ConditionScores) -> list[dict[str, object]]:
+    """A row for each lane-keeping indicator: means, distance, that between real drivers."""
+    rows: list[dict[str, object]] = []
+    for name in INDICATORS:
+        real, sampled = scores.means[name]
+        beside = scores.named[name]
+        rows.append(
+            {
+                "indicator": INDICATOR_LABELS[name],
+                "measured": real,
+                "sampled": sampled,
+                "distance [sd]": beside.value,
+                "real drivers [sd]": beside.floor,
+            }
+        )
+    return rows
+
+
+def realism_lines(realism: Realism) -> list[str]:
+    """For the terminal."""
+    lines = ["compared with other real drivers (1: as close as they are; AUC 0.5: not distinguishable)"]
+    for heading, group in condition_groups(realism).items():
+        lines.append(f"  {heading:46s}" + "".join(f"{_length(one):>18s}" for one in group))
+        for row in ratio_rows(group):
+            label, *cells = row.values()
+            lines.append(f"    {label!s:44s}" + "".join(f"{cell!s:>18s}" for cell in cells))
+    if all(one.alone is None for one in realism.conditions):
+        lines.append("    classifier AUC: not computed")
+    shown = next((one for one in realism.conditions if not one.condition.same_start), None)
+    if shown is not None:
+        lines.append(f"lane keeping, {shown.condition.name:24s} measured    sampled   distance  real drivers [sd]")
+        for label, real, sampled, distance, floor in (row.values() for row in indicator_rows(shown)):
+            lines.append(f"  {label!s:40s}{real:8.4f}  {sampled:9.4f}  {distance:9.3f}  {floor:12.3f}")
+    before, made = realism.variance_real, realism.variance_sampled
+    lines.append(
+        f"variance between drivers, within drivers, inside snippets [m²]: "
+        f"measured {before.between:.4f}, {before.within:.4f}, {before.inside:.4f}; "
+        f"sampled {made.between:.4f}, {made.within:.4f}, {made.inside:.4f}"
+    )
+    return lines
+
+
+def _length(one: ConditionScores) -> str:
+    return f"{one.condition.seconds:g} s"
+
+
+def _ratio(one: ConditionScores, family: str) -> str:
+    return f"{one.families[family].ratio:.2f}" if family in one.families else ""
+
+
+def _area(area: TwoSampleResult | None) -> str:
+    return "" if area is None else f"{area.auc:.2f} ({area.low:.2f}-{area.high:.2f})"

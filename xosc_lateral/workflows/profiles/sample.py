@@ -1,0 +1,194 @@
+"""`sample`: offsets alone, from a profile."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from xosc_lateral.base.lazy import pd
+from xosc_lateral.files.mapping import MappingLike
+from xosc_lateral.files.output_paths import claim, output_file
+from xosc_lateral.workflows.result import (
+    DrivesLike,
+    GivenDrives,
+    PathLike,
+    Paths,
+    ProfileLike,
+    Result,
+    given_drives,
+    given_profile,
+    naming,
+)
+
+if TYPE_CHECKING:
+    from xosc_lateral.drivers.drives.drive import Drive
+    from xosc_lateral.drivers.model.profile import DriverProfile
+    from xosc_lateral.drivers.model.sampled_offsets import SampledOffsets
+    from xosc_lateral.files.pages.figure import Figure
+
+
+def sample(
+    profile: ProfileLike,
+    *,
+    like: DrivesLike | None = None,
+    context: DrivesLike | None = None,
+    duration: float | None = None,
+    seed: int = 0,
+    snippet: float = 10.0,
+    speed: float = 30.0,
+    lane_width: float | None = None,
+    with_sensor: bool = False,
+    columns: MappingLike | None = None,
+    library: Paths = (),
+) -> Offsets:
+    """Sample offsets; one of `like`, `context` and `duration` says for what.
+
+    Parameters
+    ----------
+    profile : DriverProfile, path or name
+    like : drives, optional
+        For each measured snippet of `snippet` seconds one of the same length, start and context.
+    context : drives, optional
+        One free run per drive, under its context.
+    duration : float, optional
+        One free run of this length, at constant `speed` [m/s] in lanes of `lane_width` (the profile's). [s]
+    with_sensor : bool
+        Add what the sensor added to the drives that the profile was fitted on, for tests of a perception chain.
+    seed : int
+        Same inputs and seed: same offsets.
+    columns : mapping of str to str, TableMapping, or path, optional
+        See `read_drives`.
+    library : path or paths
+        Folders with further profiles.
+    """
+    from xosc_lateral.drivers.model.sampled_offsets import sample_context, sample_free, sample_like
+
+    if sum(choice is not None for choice in (like, context, duration)) != 1:
+        raise ValueError("one of like, context and duration is needed")
+    driver = given_profile(profile, library)
+    if duration is not None:
+        made = list(sample_free(driver, duration, seed, speed=speed, lane_width=lane_width, with_sensor=with_sensor))
+        settings: dict[str, Any] = {"duration_s": duration, "speed": speed}
+        unknown = [column for column in driver.columns if column not in {"speed", "lane_width"}]
+        return Offsets(driver, made, seed, None, settings, [_neutral("a free run", unknown)] if unknown else [])
+    given = given_drives(like if like is not None else context, columns)  # type: ignore[arg-type]
+    warnings = _unknown_columns(driver, given.drives)
+    if like is not None:
+        with naming(given):
+            made = list(sample_like(driver, given.drives, snippet, seed, with_sensor=with_sensor))
+        return Offsets(driver, made, seed, given, {"snippet_s": snippet}, warnings)
+    return Offsets(
+        driver, list(sample_context(driver, given.drives, seed, with_sensor=with_sensor)), seed, given, {}, warnings
+    )
+
+
+def _unknown_columns(profile: DriverProfile, drives: Sequence[Drive]) -> list[str]:
+    """Columns that the profile's effects read and tables lack, in one line for those that the same drives lack.
+
+    A column that a table has and that is empty all through a drive is known: there is none (no lane to that side).
+    """
+    lacking: dict[tuple[str, ...], list[str]] = {}
+    for column in profile.columns:
+        names = tuple(d.name for d in drives if column not in _known(d))
+        lacking.setdefault(names, []).append(column)
+    found = [
+        _neutral(f"drive {names[0]}" if len(names) == 1 else f"{len(names)} of {len(drives)} drives", columns)
+        for names, columns in lacking.items()
+        if names
+    ]
+    return found
+
+
+def _known(drive: Drive) -> set[str]:
+    return {"lane_width", *drive.context, *drive.empty}
+
+
+def _neutral(where: str, columns: Sequence[str]) -> str:
+    return f"{where}: {', '.join(columns)} not known, left without effect"
+
+
+class Offsets(Result):
+    """Sampled offsets."""
+
+    __slots__ = ("_given", "_made", "_settings", "profile", "seed", "warnings")
+
+    def __init__(
+        self,
+        profile: DriverProfile,
+        made: Sequence[SampledOffsets],
+        seed: int,
+        given: GivenDrives | None,
+        settings: dict[str, Any],
+        warnings: Sequence[str],
+    ) -> None:
+        self._made, self._given, self._settings = made, given, settings
+        self.profile = profile
+        self.seed = seed
+        self.warnings = tuple(warnings)
+        """What a user has to know, a line each."""
+
+    def __len__(self) -> int:
+        return sum(len(one.time) for one in self._made)
+
+    def headline(self) -> str:
+        """One line."""
+        runs = "snippets" if "snippet_s" in self._settings else "runs"
+        return f"{len(self)} offsets of {self.profile.name}, {len(self._made)} {runs}, seed {self.seed}"
+
+    def __str__(self) -> str:
+        return "\n".join([self.headline(), *(f"  warning: {warning}" for warning in self.warnings)])
+
+    def to_frame(self) -> pd.DataFrame:
+        """Columns `drive`, `time` [s], `offset` [m]; of snippets also `snippet` and `offset_real` [m]."""
+        import numpy as np
+
+        is_snippet = "snippet_s" in self._settings
+        names = ["drive", "snippet", "time", "offset", "offset_real"] if is_snippet else ["drive", "time", "offset"]
+        lengths = [len(one.time) for one in self._made]
+        columns = {}
+        for name in names:
+            values = [getattr(one, name) for one in self._made]
+            columns[name] = np.repeat(values, lengths) if name in ("drive", "snippet") else np.concatenate(values)
+        return pd.DataFrame(columns)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them: what was sampled, without the offsets themselves."""
+        return {
+            "rows": len(self),
+            "runs": len(self._made),
+            "warnings": list(self.warnings),
+            "provenance": self._provenance(),
+        }
+
+    def plot(self, *, most: int = 6) -> Figure:
+        """Offset over time of the first runs; measured ones beside them where there are any."""
+        from xosc_lateral.workflows.conversion.frames import offsets_figure
+
+        return offsets_figure(self._made[:most])
+
+    def csv(self) -> str:
+        """The table as text."""
+        from xosc_lateral.files.output_tables import csv_text
+
+        return csv_text(self.to_frame())
+
+    def write(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the table: ``.csv``, ``.csv.gz`` or ``.parquet``, with its provenance."""
+        from xosc_lateral.files.output_tables import output_suffixes, write_frame
+
+        output = output_file(path, f"{self.profile.name}.csv", output_suffixes())
+        claim([output], () if self._given is None else self._given.files, force=force)
+        write_frame(self.to_frame(), output, self._provenance())
+        return output
+
+    def _provenance(self) -> dict[str, Any]:
+        from xosc_lateral.files.profiles import profile_hash
+
+        return {
+            "seed": self.seed,
+            "profile": self.profile.name,
+            "profile_sha256": profile_hash(self.profile),
+            "inputs": {} if self._given is None else dict(self._given.inputs),
+            **self._settings,
+        }

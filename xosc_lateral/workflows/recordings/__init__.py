@@ -1,0 +1,1 @@
+"""`import` and `reconstruct`: other people's recordings into drives, and into scenarios."""

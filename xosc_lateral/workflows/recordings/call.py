@@ -1,0 +1,141 @@
+"""`reconstruct`: from a recording to a maneuver-based scenario, its road, and the drivers who drove."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Unpack
+
+from xosc_lateral.base.lazy import pd
+from xosc_lateral.files.mapping import MappingLike
+from xosc_lateral.files.output_paths import claim, output_folder
+from xosc_lateral.workflows.conversion.options import spelled_out, values_of
+from xosc_lateral.workflows.recordings.reconstruct import (
+    Reconstructed,
+    ReconstructKeywords,
+    ReconstructSettings,
+    drivers_table,
+    fitted_profiles,
+    reconstruct_recording,
+)
+from xosc_lateral.workflows.result import PathLike, Result
+
+
+@spelled_out(ReconstructSettings)
+def reconstruct(
+    recording: PathLike,
+    output: PathLike | None = None,
+    *,
+    format: str | None = None,  # noqa: A002 (as in `import_drives`)
+    road: PathLike | None = None,
+    columns: MappingLike | None = None,
+    force: bool = False,
+    **options: Unpack[ReconstructKeywords],
+) -> Reconstruction:
+    """Turn a recording into maneuvers, a road and drivers.
+
+    Parameters
+    ----------
+    recording : str or Path
+        Tracks of several vehicles: DLR Highway Traffic, levelX, an OSI trace, CommonRoad, or a table.
+    output : str or Path, optional
+        Folder to write to, see `Reconstruction.write`; without it nothing is written.
+    format : str, optional
+        "dlr-ht", "levelx", "osi", "commonroad" or "tracks"; without it, told from the file's name.
+    road : str or Path, optional
+        OpenDRIVE file, for recordings that come without their lanes.
+    columns : dict, path or TableMapping, optional
+        Name -> ``COLUMN[:UNIT]`` for tables of tracks, or a saved mapping's file.
+    force : bool
+        Replace files that this package did not write.
+    options
+        `pipeline.reconstruct.ReconstructSettings`: which part and which vehicles, and what is written of them.
+
+    Raises
+    ------
+    FormatError, NotEnoughDataError
+    """
+    from xosc_lateral.workflows.recordings.recordings import read_recording
+
+    settings = ReconstructSettings(**values_of(ReconstructSettings, options))
+    traffic = read_recording(Path(recording), kind=format, road=None if road is None else Path(road), columns=columns)
+    result = Reconstruction(reconstruct_recording(traffic, settings))
+    if output is not None:
+        result.write(output, force=force)
+    return result
+
+
+class Reconstruction(Result):
+    """A scenario with its road and drivers, and how near it is to the recording."""
+
+    __slots__ = ("_made", "outputs")
+
+    def __init__(self, made: Reconstructed) -> None:
+        self._made = made
+        self.outputs: tuple[Path, ...] = ()
+        """Files that were written."""
+
+    @property
+    def name(self) -> str:
+        """Of the files, without suffix."""
+        return self._made.traffic.name
+
+    @property
+    def scenario(self) -> str:
+        """The OpenSCENARIO document."""
+        return self._made.scenario
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Vehicles, and parts of them, that are not in the scenario: a line each, with the reason."""
+        return self._made.recording.left_out
+
+    def headline(self) -> str:
+        """One line."""
+        return str(self).splitlines()[0]
+
+    def __str__(self) -> str:
+        from xosc_lateral.workflows.recordings.page import as_text
+
+        return as_text(self.to_dict())
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per vehicle: when it is there, its maneuvers, residuals and driver."""
+        return pd.DataFrame(self.to_dict()["vehicles"])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them and the report holds them."""
+        from xosc_lateral.workflows.recordings.page import facts_of
+
+        return facts_of(self._made) | {"outputs": [str(path) for path in self.outputs]}
+
+    def write(self, folder: PathLike, *, force: bool = False) -> tuple[Path, ...]:
+        """Write NAME.xosc and its road, drivers.csv for `convert`, report.html and report.json, all or none.
+
+        Returns
+        -------
+        tuple of Path
+        """
+        from xosc_lateral.files.atomic import write_atomically
+        from xosc_lateral.files.json_text import canonical_json
+        from xosc_lateral.workflows.recordings.page import facts_of, page_of
+
+        made, where = self._made, output_folder(folder)
+        facts = facts_of(made)
+        files: dict[str, bytes | str] = {
+            made.traffic.road_name: made.traffic.road,
+            f"{made.traffic.name}.xosc": made.scenario,
+            **fitted_profiles(made),
+            "report.html": page_of(made, facts),
+            "report.json": canonical_json(facts),
+        }
+        table = where / "drivers.csv"
+        paths = {where / name: data for name, data in files.items()}
+        kept = {path for path in made.traffic.sources if path.exists() and (where / path.name).exists()}
+        same = {path for path in paths if any(path.resolve() == one.resolve() for one in kept)}
+        claim([*(path for path in paths if path not in same), table], made.traffic.sources, force=force)
+        for path, data in paths.items():
+            if path not in same:  # a road that lies there already stays as it is
+                write_atomically(path, data)
+        drivers_table(made, table)
+        self.outputs = (*paths, table)
+        return self.outputs

@@ -1,0 +1,160 @@
+"""Which rows of a recording are road-following: apart from lane changes, gaps and short rests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.base.lazy import pd
+from xosc_lateral.drivers.drives.cleaning import RUN
+
+RATE_WINDOW = 0.5  # [s]; the lateral speed is a central difference over this
+KEPT = "kept"
+
+
+@dataclass(frozen=True)
+class CutSettings:
+    """How tracks are cut."""
+
+    max_gap: float = 1.0  # longest stretch of rows that the provider made up (between two cameras) that is kept [s]
+    calm_rate: float = 0.1  # a lane change reaches back and forth to where the lateral speed falls below this [m/s]
+    longest_change: float = 8.0  # but not farther than this from the crossing [s]
+    margin: float = 1.0  # cut in addition before and after each lane change [s]
+    # edge: cut at both ends of what is left: vehicles still settle there, or are about to set off, and trackers
+    # have less to go by [s]
+    edge: float = 2.0
+    shortest: float = 5.0  # stretches below this are dropped [s]
+    # open_offset, open_rate: a track that begins or ends farther from the lane centre than this, or faster
+    # sideways, is taken to do so in a lane change whose rest was not seen; and nobody has settled in a lane who
+    # is farther from its centre: a car of 1.8 m touches a marking at 0.95 m [m], [m/s]
+    open_offset: float = 0.7
+    open_rate: float = 0.3
+
+
+DEFAULT_CUTS = CutSettings()
+
+
+def lane_changes(
+    x: FloatArray, offset: FloatArray, lane: IntArray, vehicle: IntArray, step: float, settings: CutSettings
+) -> BoolArray:
+    """Rows from where a vehicle sets off towards another lane to where it has settled there; arrays of shape (n,).
+
+    `x`: lateral position, continuous through lane changes. [m] `offset`: from the centre of its lane. [m] Both NaN
+    where unknown; rows sorted by vehicle and time, `step` apart. [s]
+    """
+    changing = np.zeros(len(x), dtype=np.bool_)
+    reach, margin = round(settings.longest_change / step), round(settings.margin / step)
+    first = np.searchsorted(vehicle, vehicle, side="left")
+    last = np.searchsorted(vehicle, vehicle, side="right") - 1
+    rate = _lateral_speed(x, first, last, step)
+    near = np.abs(offset) < settings.open_offset
+    switches = np.flatnonzero((vehicle[1:] == vehicle[:-1]) & (lane[1:] != lane[:-1]))
+    for k in np.concatenate([switches, _open_ends(offset, rate, vehicle, settings)]):
+        lowest, highest = max(first[k], k - reach), min(last[k], k + reach)
+        towards = np.sign(rate[k]) or 1.0
+        before = np.flatnonzero(near[lowest : k + 1] & (towards * rate[lowest : k + 1] < settings.calm_rate))
+        after = np.flatnonzero(near[k : highest + 1] & (towards * rate[k : highest + 1] < settings.calm_rate))
+        begin = lowest + before[-1] if len(before) else lowest
+        end = k + after[0] if len(after) else highest
+        changing[max(first[k], begin - margin) : min(last[k], end + margin) + 1] = True
+    return changing
+
+
+def _open_ends(offset: FloatArray, rate: FloatArray, vehicle: IntArray, settings: CutSettings) -> IntArray:
+    """First and last rows of tracks that are cut off amid a lane change."""
+    new = np.flatnonzero(vehicle[1:] != vehicle[:-1])
+    ends = np.concatenate([[0], new, new + 1, [len(vehicle) - 1]]).astype(np.int64)
+    far, fast = np.abs(offset[ends]) > settings.open_offset, np.abs(rate[ends]) > settings.open_rate
+    return np.asarray(ends[(far & (np.abs(rate[ends]) > settings.calm_rate)) | fast])
+
+
+def long_gaps(made_up: BoolArray, vehicle: IntArray, step: float, max_gap: float) -> BoolArray:
+    """Rows in made-up stretches longer than `max_gap` [s]."""
+    run = _runs((made_up[1:] != made_up[:-1]) | (vehicle[1:] != vehicle[:-1]))
+    length = np.bincount(run) * step
+    return np.asarray(made_up & (length[run] > max_gap + 1e-9))
+
+
+def name_states(
+    reasons: dict[str, BoolArray],
+    lane: IntArray,
+    vehicle: IntArray,
+    frame: IntArray,
+    step: float,
+    settings: CutSettings,
+) -> NDArray[np.str_]:
+    """Per row `KEPT`, or the first reason that cuts it; "edge" at the ends of what is left, "short" for crumbs."""
+    state = np.select(list(reasons.values()), list(reasons), default=KEPT)
+    run = _kept_runs(state, lane, vehicle, frame)
+    count = np.bincount(run)
+    place = np.arange(len(run)) - (np.cumsum(count) - count)[run]
+    edge = round(settings.edge / step)
+    at_edge = (place < edge) | (place >= count[run] - edge)
+    short = (count[run] - 2 * edge) * step < settings.shortest
+    return np.where(state == KEPT, np.where(short, "short", np.where(at_edge, "edge", KEPT)), state)
+
+
+def number_runs(state: NDArray[np.str_], lane: IntArray, vehicle: IntArray, frame: IntArray) -> IntArray:
+    """Number of the kept stretch of each row, counted from 0 in every vehicle; -1 for rows that are cut."""
+    run = _kept_runs(state, lane, vehicle, frame)
+    kept = state == KEPT
+    begins = kept & np.r_[True, (run[1:] != run[:-1])]
+    counted = np.cumsum(begins)
+    start = np.searchsorted(vehicle, vehicle, side="left")
+    return np.where(kept, counted - 1 - (counted - begins)[start], -1)
+
+
+class Rows(NamedTuple):
+    """Whose rows they are, when and where; sorted by vehicle and frame, shape (n,)."""
+
+    vehicle: IntArray
+    frame: IntArray
+    lane: IntArray  # a number that changes with the lane
+    step: float  # between two frames [s]
+
+
+def cut_table(
+    columns: Mapping[str, Any],
+    rows: Rows,
+    settings: CutSettings,
+    *,
+    sideways: FloatArray,
+    reasons: Mapping[str, BoolArray],
+    kind: NDArray[Any],
+    is_truck: BoolArray,
+) -> pd.DataFrame:
+    """The drive table: these columns, classes of vehicles, numbers of kept stretches, and `state`.
+
+    `sideways`: lateral position, continuous through lane changes. [m] `reasons`: for cuts besides lane changes.
+    """
+    vehicle, frame, lane, step = rows
+    changing = lane_changes(sideways, columns["offset"], lane, vehicle, step, settings)
+    state = name_states({**reasons, "lane change": changing}, lane, vehicle, frame, step, settings)
+    runs = number_runs(state, lane, vehicle, frame)
+    more = {"vehicle_class": kind, "is_truck": is_truck.astype(np.float64), RUN: runs, "state": state}
+    return pd.DataFrame({**columns, **more})
+
+
+def _kept_runs(state: NDArray[np.str_], lane: IntArray, vehicle: IntArray, frame: IntArray) -> IntArray:
+    """Number of each row's stretch of equal fate, in one lane and without a gap."""
+    kept = state == KEPT
+    new = (kept[1:] != kept[:-1]) | (vehicle[1:] != vehicle[:-1]) | (lane[1:] != lane[:-1]) | (np.diff(frame) != 1)
+    return _runs(new)
+
+
+def _lateral_speed(x: FloatArray, first: IntArray, last: IntArray, step: float) -> FloatArray:
+    """Difference over `RATE_WINDOW`, one-sided at a track's ends; 0 where unknown. [m/s]"""
+    half = max(1, round(0.5 * RATE_WINDOW / step))
+    rows = np.arange(len(x))
+    ahead, behind = np.minimum(rows + half, last), np.maximum(rows - half, first)
+    rate = (x[ahead] - x[behind]) / (np.maximum(ahead - behind, 1) * step)
+    return np.where(np.isfinite(rate), rate, 0.0)
+
+
+def _runs(new: BoolArray) -> IntArray:
+    return np.concatenate([[0], np.cumsum(new)]).astype(np.int64)

@@ -1,0 +1,168 @@
+"""What happened between vehicles: who was cut in on, who braked behind whom, how near; and triggers made of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.workflows.recordings.plan import VehiclePlan
+from xosc_lateral.world.road.network import RoadNetwork
+
+REACH = 150.0
+"""Who is farther away has nothing to do with it: 5 s at 30 m/s. [m]"""
+BRAKING = 1.0
+"""Deceleration from which a piece of the speed profile is braking: coasting in gear gives less (about 0.5 at 100 km/h).
+[m/s2]"""
+SURE_RATE = 1.0
+"""A distance that passes its value more slowly is no trigger: 0.1 m of error would be more than 0.1 s. [m/s]"""
+WATCHED = 5.0
+"""So long before, a relative trigger is not armed: the same distance may come about earlier, behind the other. [s]"""
+BORNE_OUT = 0.2
+"""So near to the recorded moment the trigger has to come. [s]"""
+
+
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """Another vehicle at a moment: free space between bumpers [m], and time until it is used up [s], inf: never."""
+
+    name: str
+    gap: float
+    time_to_collision: float
+
+
+@dataclass(frozen=True, slots=True)
+class Encounter:
+    """A lane change or a braking, with who was ahead and behind in the lane that it is in then."""
+
+    kind: str  # "lane change" or "braking"
+    vehicle: str
+    time: float  # when it begins; of a lane change, when the vehicle is half way [s]
+    side: str  # "left", "right"; empty of a braking
+    ahead: Beside | None
+    behind: Beside | None
+
+
+@dataclass(frozen=True, slots=True)
+class RelativeTrigger:
+    """A maneuver begins when the distance to another vehicle passes a value, but not before a time."""
+
+    other: str  # the other entity
+    distance: float  # between the reference points, along the road [m]
+    grows: bool  # it passes the value from below
+    not_before: float  # [s]
+
+
+def brakings(plan: VehiclePlan) -> list[int]:
+    """Numbers of the speed profile's corners at which braking begins."""
+    step = np.diff(plan.speed.time)
+    hard = np.diff(plan.speed.speed) / step <= -BRAKING
+    return [k for k in range(len(hard)) if hard[k] and (k == 0 or not hard[k - 1]) and k > 0]
+
+
+def encounters(plans: Sequence[VehiclePlan], network: RoadNetwork) -> tuple[Encounter, ...]:
+    """All lane changes and brakings, in order of time."""
+    found = list[Encounter]()
+    for plan in plans:
+        for one, lane in zip(plan.lateral.transitions, plan.targets, strict=True):
+            if one.lanes:
+                time, side = one.start + 0.5 * one.duration, "left" if one.lanes > 0 else "right"
+                beside = _beside(plan, plans, time, network, lane)
+                found.append(Encounter("lane change", plan.name, time, side, *beside))
+        for time in plan.speed.time[brakings(plan)].tolist():
+            found.append(Encounter("braking", plan.name, time, "", *_beside(plan, plans, time, network, None)))
+    return tuple(sorted(found, key=lambda one: (one.time, one.vehicle)))
+
+
+def _row(plan: VehiclePlan, time: float) -> int | None:
+    """Recorded row at a moment; None: it is not there."""
+    vehicle = plan.vehicle
+    if not plan.present[0] - 1e-9 <= time <= vehicle.time[-1]:
+        return None
+    return min(int(np.searchsorted(vehicle.time, time)), len(vehicle.time) - 1)
+
+
+def _lane(plan: VehiclePlan, row: int, network: RoadNetwork) -> tuple[int, int, int]:
+    """Road, lane, and direction along s (+1 or -1) of a recorded row."""
+    vehicle = plan.vehicle
+    road, lane = int(vehicle.road[row]), int(vehicle.lane[row])
+    return road, lane, network.travel_direction(road, lane) * int(vehicle.way[row])
+
+
+def _speed(plan: VehiclePlan, time: float) -> float:
+    return float(np.interp(time, plan.speed.time, plan.speed.speed))
+
+
+def _along(plan: VehiclePlan, time: FloatArray) -> FloatArray:
+    """Planned s at some times, shape as the argument. [m]"""
+    recorded = np.interp(plan.speed.way(time), plan.way, plan.vehicle.time)
+    return np.interp(recorded, plan.vehicle.time, plan.vehicle.s)
+
+
+def _beside(
+    plan: VehiclePlan, plans: Sequence[VehiclePlan], time: float, network: RoadNetwork, lane: int | None
+) -> tuple[Beside | None, Beside | None]:
+    """Nearest vehicle ahead and behind in a lane of the same road; None: the lane that it is in."""
+    row = _row(plan, time)
+    if row is None:
+        return None, None
+    road, own, way = _lane(plan, row, network)
+    wanted = road, own if lane is None else lane, way
+    at = np.array([time])
+    here, speed = way * float(_along(plan, at)[0]) + plan.vehicle.centre, _speed(plan, time)
+    best: list[Beside | None] = [None, None]
+    for other in plans:
+        row = None if other is plan else _row(other, time)
+        if row is None or _lane(other, row, network) != wanted:
+            continue
+        middle = way * float(_along(other, at)[0]) + other.vehicle.centre - here
+        gap = max(abs(middle) - 0.5 * (other.vehicle.length + plan.vehicle.length), 0.0)
+        k = 0 if middle > 0.0 else 1
+        closing = (speed - _speed(other, time)) * (1.0 if middle > 0.0 else -1.0)
+        known = best[k]
+        if gap <= REACH and (known is None or gap < known.gap):
+            best[k] = Beside(other.name, gap, gap / closing if closing > 1e-3 else np.inf)
+    return best[0], best[1]
+
+
+def relative_triggers(
+    plan: VehiclePlan, plans: Sequence[VehiclePlan], network: RoadNetwork
+) -> tuple[dict[int, RelativeTrigger], dict[int, RelativeTrigger]]:
+    """Triggers that the plans bear out: of transitions by their number, of brakings by their corner's."""
+    changes, braking = dict[int, RelativeTrigger](), dict[int, RelativeTrigger]()
+    for k, (one, lane) in enumerate(zip(plan.lateral.transitions, plan.targets, strict=True)):
+        if one.lanes:
+            _, behind = _beside(plan, plans, one.start, network, lane)
+            ahead, _ = _beside(plan, plans, one.start, network, None)
+            if trigger := _trigger(plan, behind, plans, one.start) or _trigger(plan, ahead, plans, one.start):
+                changes[k] = trigger
+    for k in brakings(plan):
+        time = float(plan.speed.time[k])
+        ahead, _ = _beside(plan, plans, time, network, None)
+        if trigger := _trigger(plan, ahead, plans, time):
+            braking[k] = trigger
+    return changes, braking
+
+
+def _trigger(
+    plan: VehiclePlan, beside: Beside | None, plans: Sequence[VehiclePlan], time: float
+) -> RelativeTrigger | None:
+    """The distance to another vehicle as a trigger, if it passes its value at that time and not in a while before."""
+    other = next((one for one in plans if beside is not None and one.name == beside.name), None)
+    if other is None:
+        return None
+    first = max(plan.present[0], other.present[0], time - WATCHED)
+    roads = np.unique(np.r_[plan.vehicle.road, other.vehicle.road])
+    if time - first < 1.0 or len(roads) > 1:  # distances over several roads depend on the player's way
+        return None
+    t = np.arange(first, min(time + 1.0, plan.present[1], other.present[1]), 0.02)
+    distance = np.abs(_along(plan, t) - _along(other, t))
+    before, at, ahead = np.interp((time - 0.5, time, time + 0.5), t, distance).tolist()
+    grows = ahead > before
+    passed = distance > at if grows else distance < at
+    moment = float(t[int(np.argmax(passed))]) if passed.any() else np.inf
+    if abs(ahead - before) < SURE_RATE or abs(moment - time) > BORNE_OUT:
+        return None
+    return RelativeTrigger(other.name, at, grows, first)

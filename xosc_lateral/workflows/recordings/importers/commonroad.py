@@ -1,0 +1,146 @@
+"""CommonRoad scenarios [1]_ into the standard drive table, through commonroad-io (extra `commonroad`).
+
+Recorded obstacles are placed between the bounds of their lanelets: the offset counts from the middle of the two bounds,
+the lane width is their distance.
+
+References
+----------
+.. [1] M. Althoff, M. Koschi, S. Manzinger, "CommonRoad: composable benchmarks for motion planning on roads", IV 2017.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.errors import FormatError, NotEnoughDataError
+from xosc_lateral.files.xml import read_xml
+from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
+from xosc_lateral.workflows.recordings.importers.table import Imported, guarded
+from xosc_lateral.workflows.recordings.importers.track_table import Tracks, ground_speed, travel_heading
+from xosc_lateral.workflows.recordings.lane_shapes import LaneShape, curvature_along, place_in_shapes
+from xosc_lateral.workflows.recordings.placed import LaneGraph, import_each, import_placed
+
+LICENCE = "that of the CommonRoad scenario and of the recording that it was made from"
+
+
+@guarded
+def import_commonroad(
+    sources: Path | Sequence[Path], settings: CutSettings = DEFAULT_CUTS, *, keep_cut: bool = False
+) -> Imported:
+    """Read one or several scenarios.
+
+    Raises `FormatError` if commonroad-io is not installed, or a file is no CommonRoad scenario; `NotEnoughDataError` if
+    nothing is left once lane changes are cut.
+    """
+    return import_each(sources, lambda file: _read(file, settings), keep_cut=keep_cut)
+
+
+def _read(path: Path, settings: CutSettings) -> Imported:
+    scenario = _opened(path)
+    graph, shapes = _graph(scenario)
+    tracks = place_in_shapes(_tracks(scenario, path), shapes, graph.left)
+    about = {"format": "commonroad", "version": str(getattr(scenario, "scenario_id", "unknown")), "licence": LICENCE}
+    return import_placed(tracks, graph, settings, keep_cut=True, sources=[path], **about)
+
+
+def _graph(scenario: Any) -> tuple[LaneGraph, list[_Lanelet]]:
+    """How its lanelets hang together, and their shapes."""
+    lanelets = {lanelet.lanelet_id: lanelet for lanelet in scenario.lanelet_network.lanelets}
+    numbers = {name: k for k, name in enumerate(lanelets)}
+    shapes = [_Lanelet(lanelet) for lanelet in lanelets.values()]
+    beside = [one.adj_left if one.adj_left_same_direction else None for one in lanelets.values()]
+    left = np.array([numbers.get(name, -1) for name in beside], dtype=int)
+    following = [[numbers[name] for name in one.successor if name in numbers] for one in lanelets.values()]
+    graph = LaneGraph(np.array([shape.length for shape in shapes]), left, following)
+    return graph, shapes
+
+
+def _opened(path: Path) -> Any:
+    try:
+        from commonroad.common.file_reader import CommonRoadFileReader
+    except ImportError as error:
+        what = "reading CommonRoad needs commonroad-io: pip install 'xosc-lateral[commonroad]'"
+        raise FormatError(what, path=path) from error
+    except TypeError as error:  # what its generated code raises under another protobuf
+        what = "commonroad-io needs protobuf 3.20, the extra `osi` a later one: use an environment for each"
+        raise FormatError(what, path=path) from error
+    read_xml(path)  # no entities, and no larger than ours may be
+    try:
+        scenario, _ = CommonRoadFileReader(str(path)).open()
+    except Exception as error:  # whatever its parser meets in a foreign file
+        reason = " ".join(str(error).split())[:200]
+        raise FormatError(f"not a CommonRoad scenario that commonroad-io can read: {reason}", path=path) from error
+    return scenario
+
+
+def read_obstacles(path: Path) -> Tracks:
+    """All obstacles that move along a recorded trajectory. Raises `FormatError`, `NotEnoughDataError`."""
+    return _tracks(_opened(path), path)
+
+
+def _tracks(scenario: Any, path: Path) -> Tracks:
+    names: list[str] = []
+    rows: list[tuple[float, ...]] = []
+    lengths: list[float] = []
+    kinds: list[str] = []
+    for obstacle in scenario.dynamic_obstacles:
+        trajectory = getattr(obstacle.prediction, "trajectory", None)
+        if trajectory is None:
+            continue
+        for state in [obstacle.initial_state, *trajectory.state_list]:
+            position = np.asarray(getattr(state, "position", np.nan), dtype=object)
+            if position.shape == (2,):
+                speed = getattr(state, "velocity", np.nan)
+                rows.append((len(names), state.time_step, *position, getattr(state, "orientation", np.nan), speed))
+        names.append(f"{path.stem}:{obstacle.obstacle_id}")
+        lengths.append(float(getattr(obstacle.obstacle_shape, "length", 4.6)))
+        kinds.append(str(obstacle.obstacle_type.value).lower())
+    if len(rows) < 2:
+        raise NotEnoughDataError(f"{path}: no obstacle with a recorded trajectory")
+    values = np.array(rows, dtype=np.float64)
+    values = values[np.lexsort((values[:, 1], values[:, 0]))]
+    values = values[np.r_[True, (np.diff(values[:, :2], axis=0) != 0).any(axis=1)]]
+    vehicle, step = values[:, 0].astype(np.int64), float(scenario.dt)
+    x, y = values[:, 2], values[:, 3]
+    heading = np.where(np.isfinite(values[:, 4]), values[:, 4], travel_heading(x, y, vehicle, step))
+    speed = np.where(np.isfinite(values[:, 5]), values[:, 5], ground_speed(x, y, vehicle, step))
+    length, kind = np.array(lengths)[vehicle], np.array(kinds)[vehicle]
+    time = step * values[:, 1]
+    return Tracks(tuple(names), vehicle, time, step, x, y, heading, np.abs(speed), length, kind)
+
+
+class _Lanelet(LaneShape):
+    """A lane whose bounds have as many points each, which face each other."""
+
+    def __init__(self, lanelet: Any) -> None:
+        self.left = np.asarray(lanelet.left_vertices, dtype=np.float64)[:, :2]
+        self.right = np.asarray(lanelet.right_vertices, dtype=np.float64)[:, :2]
+        super().__init__(0.5 * (self.left + self.right), [self.left, self.right])
+
+    def place(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, ...]:
+        """See `LaneShape`."""
+        points = np.stack([x, y], axis=1)
+        about = points[:, None] - self.centre[None, :-1]
+        size2 = np.maximum(self.size**2, 1e-12)
+        share = np.clip((about * self.step).sum(axis=2) / size2, 0.0, 1.0)
+        away = ((about - share[:, :, None] * self.step) ** 2).sum(axis=2)
+        k = away.argmin(axis=1)
+        rows = np.arange(len(x))
+        u = share[rows, k][:, None]
+        left = self.left[k] + u * (self.left[k + 1] - self.left[k])
+        right = self.right[k] + u * (self.right[k + 1] - self.right[k])
+        direction = self.direction[k]
+        normal = np.stack([-np.sin(direction), np.cos(direction)], axis=1)
+        middle = 0.5 * (left + right)
+        offset = ((points - middle) * normal).sum(axis=1)
+        width = ((left - right) * normal).sum(axis=1)
+        way = self.start[k] + u[:, 0] * self.size[k]
+        before = (k == 0) & ((points - self.centre[0]) @ self.step[0] < 0)
+        past = (k == len(self.size) - 1) & ((points - self.centre[-1]) @ self.step[-1] > 0)
+        curvature = curvature_along(self.start, self.direction, way)
+        return np.where(before | past, np.nan, way), offset, width, direction, curvature

@@ -1,0 +1,326 @@
+"""DLR Highway Traffic (A39, Germany) into the standard drive table.
+
+The data set (DLR Institute of Transportation Systems, "DLR Highway Traffic dataset", Zenodo, concept record 14012005)
+holds 20 Hz tracks in UTM coordinates and no lane geometry. The first file of version 1.1.0, five minutes with 445
+vehicles on 6.4 km, lies as a zip inside the PyPI wheel of `tasi`.
+
+What a reader of the table has to know:
+
+- `offset` is counted from the middle of the *traffic* of that lane at that place, not from the middle between painted
+  markings, which nobody measured. The mean offset of a lane is therefore about zero by construction.
+- The lane width is the distance between the traffic's centres of the two lanes of that direction.
+- The provider smoothed the tracks by cubics of one second, whose slopes jump where two of them meet. Above 0.5 Hz, half
+  a jump a period, tracks show hardly anything else: what is faster is taken out here, once, before lanes are found.
+- Between two cameras the provider interpolated. Bridges up to `max_gap` are kept (0.3 Hz content hardly changes in
+  that time), longer ones are cut.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import zipfile
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.base.errors import FormatError, NotEnoughDataError
+from xosc_lateral.base.lazy import pd
+from xosc_lateral.drivers.drives.cleaning import RUN
+from xosc_lateral.drivers.drives.filters import filtered, low_pass_between
+from xosc_lateral.files.source import open_source
+from xosc_lateral.workflows.recordings.cuts import (
+    DEFAULT_CUTS,
+    CutSettings,
+    lane_changes,
+    long_gaps,
+    name_states,
+    number_runs,
+)
+from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
+from xosc_lateral.workflows.recordings.lanes_from_tracks import LaneCentreLine, fit_lane_centre
+from xosc_lateral.workflows.recordings.neighbours import find_neighbours
+from xosc_lateral.world.road.road_from_tracks import ReferenceLine, fit_reference_line
+
+LANES = 2  # through lanes per direction of the A39 there; ramps and their merging lanes are left out
+STEP = 0.05  # [s]
+CLASSES = ("car", "van", "truck", "motorbike")
+COLUMNS = (
+    *("timestamp", "id", "center_easting", "center_northing", "velocity_northing", "velocity_magnitude"),
+    *("acceleration_signed", "dimension_length", "dimension_height", "interpolated"),
+    *(f"classifications_{name}" for name in CLASSES),
+)
+PIECES = (0.5, 0.6)
+"""Frequencies below which movement across the road is kept, and above which none is: half a jump a period. [Hz]"""
+ATTENUATION = 40.0
+"""Of what is faster; a third of a millimetre of its 3 cm is left. [dB]"""
+WIDTH = "dimension_width"
+"""Read where it is there: nothing of an import needs it."""
+LICENCE = (
+    "DLR Highway Traffic dataset (Deutsches Zentrum für Luft- und Raumfahrt, doi:10.5281/zenodo.14012005), said by "
+    "others to be under CC BY-NC-SA 4.0; its first file lies in the wheel of tasi, licensed Apache-2.0. No tracks are "
+    "passed on with a profile, only fitted parameters."
+)
+
+
+@guarded
+def import_dlr_ht(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cut: bool = False) -> Imported:
+    """Read the trajectory CSV, the data set's zip or the wheel of `tasi` that holds it.
+
+    Returns Imported: table with columns drive, time, offset, lane_width, speed, context, vehicle_class, and (with
+    `keep_cut`) `state` naming why a row would have been cut.
+    """
+    tracks = read_tracks(source)
+    found = find_lanes(tracks, settings)
+    forward, reference, s_road = found.forward, found.reference, found.s
+    placed, lanes, gap = found.placed, found.lanes, found.gap
+    s = np.where(forward, s_road, reference.length - s_road)
+    table = _context(tracks, placed, s, forward)
+    table["curvature"] = reference.curvature(s_road) * np.where(forward, 1.0, -1.0)
+    # 0.1 mm, 0.1 per km: below any measurement, above what linear algebra does differently from machine to machine.
+    table = table.round({"curvature": 7, **dict.fromkeys(table.columns.drop(["curvature", "drive", "time"]), 4)})
+    reasons = {"no lane": placed.lane < 0, "lane change": placed.changing, "gap": gap}
+    vehicle, frame = tracks["vehicle"].to_numpy(), np.round(tracks["time"].to_numpy() / STEP).astype(np.int64)
+    table["state"] = name_states(reasons, placed.lane, vehicle, frame, STEP, settings)
+    table[RUN] = number_runs(table["state"].to_numpy(), placed.lane, vehicle, frame)
+    described = [_describe(name, k, lane) for name, both in lanes.items() for k, lane in enumerate(both)]
+    about = {"format": "dlr-ht", "version": _version(source), "licence": LICENCE, "lanes": described}
+    return finished(table, keep_cut=keep_cut, sources=[source], settings=asdict(settings), step=STEP, **about)
+
+
+def read_tracks(source: Path) -> pd.DataFrame:
+    """All rows, sorted by vehicle and time, with `time` [s] from the first instant and `vehicle` counted from 0."""
+    frame = pd.concat([_read_csv(stream, source) for stream in _trajectory_files(source)], ignore_index=True)
+    try:
+        stamps = pd.to_datetime(frame["timestamp"], utc=True)
+    except ValueError as error:
+        raise FormatError(f"no time: {error}", path=source, element="timestamp") from error
+    if frame.empty:
+        raise NotEnoughDataError(f"{source}: no rows")
+    frame["time"] = (stamps - stamps.min()).dt.total_seconds()
+    frame = frame.drop_duplicates(["id", "time"]).sort_values(["id", "time"], ignore_index=True)
+    frame["vehicle"] = np.unique(frame["id"].to_numpy(), return_inverse=True)[1]
+    return frame
+
+
+def _trajectory_files(source: Path) -> list[io.BytesIO]:
+    """The trajectory CSV files in a CSV, a zip, or a zip in a wheel."""
+    with open_source(source) as opened:
+        if not zipfile.is_zipfile(opened.file):
+            opened.file.seek(0)
+            return [io.BytesIO(opened.file.read())]
+        try:
+            archive = zipfile.ZipFile(opened.file)
+            opened.unpacked(sum(item.file_size for item in archive.infolist()))
+            inner = [name for name in archive.namelist() if "DLR-Highway-Traffic" in name and name.endswith(".zip")]
+            if inner:
+                archive = zipfile.ZipFile(io.BytesIO(archive.read(sorted(inner)[-1])))
+                opened.unpacked(sum(item.file_size for item in archive.infolist()))
+            names = sorted(name for name in archive.namelist() if "/trajectories" in name and name.endswith(".csv"))
+            files = [io.BytesIO(archive.read(name)) for name in names]
+        except zipfile.BadZipFile as error:
+            raise FormatError(f"damaged zip: {error}", path=source) from error
+    if not files:
+        raise FormatError("holds no DLR Highway Traffic trajectories (trajectories_*.csv)", path=source)
+    return files
+
+
+def _read_csv(stream: io.BytesIO, source: Path) -> pd.DataFrame:
+    with stream:
+        head = stream.readline().decode("utf-8", "replace").strip().split(",")
+        missing = [name for name in COLUMNS if name not in head]
+        if missing:
+            raise FormatError(f"no column {', '.join(missing)}; is this a DLR HT trajectory file?", path=source, line=1)
+        stream.seek(0)
+        try:
+            frame = pd.read_csv(stream, usecols=[name for name in (*COLUMNS, WIDTH) if name in head], engine="pyarrow")
+        except ValueError as error:  # pandas' and pyarrow's parser errors are both of this kind
+            raise FormatError(f"can't be read as CSV: {error}", path=source) from error
+    for name in frame.columns.drop("timestamp"):
+        numbers = pd.to_numeric(frame[name], errors="coerce").to_numpy(dtype=np.float64)
+        if not np.isfinite(numbers).all():
+            row = int(np.argmin(np.isfinite(numbers)))
+            raise FormatError(f"no number: {frame[name].iloc[row]}", path=source, line=row + 2, element=name)
+    return frame
+
+
+def travels_north(tracks: pd.DataFrame) -> BoolArray:
+    """Carriageway of each row, by its vehicle's mean velocity, shape (n,)."""
+    mean = tracks.groupby("vehicle")["velocity_northing"].transform("mean")
+    return np.asarray(mean.to_numpy() > 0.0)
+
+
+class _Placed(NamedTuple):
+    """Each row's place across the road, shape (n,)."""
+
+    lane: IntArray
+    offset: FloatArray
+    width: FloatArray
+    changing: BoolArray
+
+
+@dataclass(frozen=True, eq=False)
+class Carriageways:
+    """The road's reference line, lane centres of both directions (right to left), and every row's place in them."""
+
+    reference: ReferenceLine
+    forward: BoolArray
+    s: FloatArray
+    gap: BoolArray
+    placed: _Placed
+    lanes: dict[str, list[LaneCentreLine]]
+
+
+def find_lanes(tracks: pd.DataFrame, settings: CutSettings = DEFAULT_CUTS) -> Carriageways:
+    """Lanes out of nothing but the tracks; "northbound" ones along the reference line, "southbound" ones against it."""
+    forward = travels_north(tracks)
+    reference, s_road, d_road = fit_reference_line(tracks[["center_easting", "center_northing"]].to_numpy(), forward)
+    d_road = _slow(d_road, tracks)
+    # From here on every carriageway has its own s and d: s grows with travel, d is positive to the left of it.
+    s = np.where(forward, s_road, reference.length - s_road)
+    d = np.where(forward, d_road, -d_road)
+    vehicle, height = tracks["vehicle"].to_numpy(), tracks["dimension_height"].to_numpy()
+    gap = long_gaps(tracks["interpolated"].to_numpy(), vehicle, STEP, settings.max_gap)
+    n = len(tracks)
+    placed = _Placed(np.full(n, -1), np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=np.bool_))
+    lanes: dict[str, list[LaneCentreLine]] = {}
+    for name, mine in (("northbound", forward), ("southbound", ~forward)):
+        rows = np.flatnonzero(mine)
+        part, lanes[name] = _place_in_lanes(s[rows], d[rows], height[rows], vehicle[rows], gap[rows], settings)
+        placed.lane[rows], placed.offset[rows] = part.lane, part.offset
+        placed.width[rows], placed.changing[rows] = part.width, part.changing
+    return Carriageways(reference, forward, s_road, gap, placed, lanes)
+
+
+def _slow(d: FloatArray, tracks: pd.DataFrame) -> FloatArray:
+    """Lateral positions, shape (n,) [m], without what is faster than `PIECES`; nothing is filtered across a gap."""
+    kernel = low_pass_between(*PIECES, STEP, ATTENUATION)
+    vehicle, time = tracks["vehicle"].to_numpy(), tracks["time"].to_numpy()
+    ends = np.flatnonzero((np.diff(vehicle) != 0) | (np.diff(time) > 1.5 * STEP)) + 1
+    return np.concatenate([filtered(part, kernel) for part in np.split(d, ends)])
+
+
+def _place_in_lanes(
+    s: FloatArray, d: FloatArray, height: FloatArray, vehicle: IntArray, gap: BoolArray, settings: CutSettings
+) -> tuple[_Placed, list[LaneCentreLine]]:
+    """Lane centres of one carriageway, and every row's lane and offset. Rounds, since each needs the other."""
+    levels = _levels(d)
+    centre = np.repeat(levels[:, None], len(s), axis=1)
+    bend, width = np.full(len(d), levels.mean()), float(np.diff(levels).mean())
+    lanes: list[LaneCentreLine] = []
+    for _ in range(3):
+        lane, offset, changing = _place(d, centre, bend, width, vehicle, settings)
+        lanes = []
+        for index in range(LANES):
+            rows = np.flatnonzero((lane == index) & ~changing & ~gap)
+            passage = np.cumsum(np.r_[True, (np.diff(rows) != 1) | (np.diff(vehicle[rows]) != 0)])
+            second = _each(passage, round(1.0 / STEP))
+            lanes.append(fit_lane_centre(s[rows][second], d[rows][second], height[rows][second], passage[second]))
+        centre = np.array([one.at(s, height) for one in lanes])
+        # Past a lane's known part its last value stands in, so that no lane change is lost sight of there.
+        bend = np.mean([one.at(np.clip(s, one.start, one.end), height) for one in lanes], axis=0)
+        width = _lane_width(lanes)
+    lane, offset, changing = _place(d, centre, bend, width, vehicle, settings)
+    return _Placed(lane, offset, np.full(len(s), width), changing), lanes
+
+
+def _place(
+    d: FloatArray, centre: FloatArray, bend: FloatArray, width: float, vehicle: IntArray, settings: CutSettings
+) -> tuple[IntArray, FloatArray, BoolArray]:
+    """Lane, offset (NaN in no lane) and whether a lane change is on."""
+    lane = _nearest_lane(d, centre, width)
+    offset = np.where(lane >= 0, d - centre[np.clip(lane, 0, None), np.arange(len(d))], np.nan)
+    return lane, offset, lane_changes(d - bend, offset, lane, vehicle, STEP, settings)
+
+
+def _lane_width(lanes: list[LaneCentreLine]) -> float:
+    """Median distance of neighbouring lane centres, where both are known."""
+    s = np.arange(max(lane.start for lane in lanes), min(lane.end for lane in lanes), 10.0)
+    return float(np.median(np.diff([lane.at(s, np.full(len(s), lane.height)) for lane in lanes], axis=0)))
+
+
+def _levels(d: FloatArray) -> FloatArray:
+    """Mean lateral position of the lanes, right to left: the innermost `LANES` clusters (two-means)."""
+    low, high = np.quantile(d, [0.2, 0.95])
+    levels = np.linspace(low, high, LANES)
+    for _ in range(50):
+        nearest = np.abs(d[:, None] - levels).argmin(axis=1)
+        close = np.abs(d - levels[nearest]) < 2.0
+        levels = np.array([d[close & (nearest == k)].mean() for k in range(LANES)])
+    return levels
+
+
+def _nearest_lane(d: FloatArray, centre: FloatArray, width: float) -> IntArray:
+    """Index from the right; -1 where the vehicle is more than half a lane width from every centre."""
+    away = np.abs(d - centre)
+    away = np.where(np.isfinite(away), away, np.inf)
+    nearest = away.argmin(axis=0)
+    # Between two lanes the midpoint decides; towards the outside half a width does.
+    return np.where(away.min(axis=0) <= width * 0.55, nearest, -1)
+
+
+def _each(passage: IntArray, every: int) -> BoolArray:
+    """True for every n-th row of each passage, from its first."""
+    start = np.flatnonzero(np.r_[True, passage[1:] != passage[:-1]])
+    position = np.arange(len(passage)) - np.repeat(start, np.diff(np.r_[start, len(passage)]))
+    return np.asarray(position % every == 0)
+
+
+def _context(tracks: pd.DataFrame, placed: _Placed, s: FloatArray, forward: BoolArray) -> pd.DataFrame:
+    """The drive table's columns, for every row of the tracks."""
+    kind = vehicle_classes(tracks)
+    frame = np.round(tracks["time"].to_numpy() / STEP).astype(np.int64) * 2 + forward
+    near = find_neighbours(
+        frame,
+        placed.lane,
+        s,
+        tracks["dimension_length"].to_numpy(),
+        kind == "truck",
+        lane_on_left=placed.lane < LANES - 1,
+        lane_on_right=placed.lane > 0,
+    )
+    return pd.DataFrame(
+        {
+            "drive": "ht-" + tracks["id"].astype(str),
+            "time": np.round(tracks["time"].to_numpy(), 3),
+            "offset": placed.offset,
+            "lane_width": placed.width,
+            "speed": tracks["velocity_magnitude"].to_numpy(),
+            "acceleration": tracks["acceleration_signed"].to_numpy(),
+            "lane_index": placed.lane,
+            "lane_count": LANES,
+            **near,
+            "vehicle_class": kind,
+            "is_truck": (kind == "truck").astype(np.float64),
+        }
+    )
+
+
+def vehicle_classes(tracks: pd.DataFrame) -> NDArray[np.str_]:
+    """The provider's likeliest class of each vehicle."""
+    scores = tracks[[f"classifications_{name}" for name in CLASSES]].to_numpy()
+    return np.asarray(np.array(CLASSES)[scores.argmax(axis=1)])
+
+
+def _describe(carriageway: str, index: int, lane: LaneCentreLine) -> dict[str, object]:
+    error = lane.standard_error(np.arange(lane.start, lane.end, 10.0))
+    return {
+        "carriageway": carriageway,
+        "lane_index": index,
+        "length_m": round(lane.end - lane.start, 1),
+        "stretches": lane.passages,
+        "centre_standard_error_m": {"median": round(float(np.median(error)), 4), "max": round(float(error.max()), 4)},
+    }
+
+
+def _version(source: Path) -> str:
+    """Version of the data set, as the name of the folder or zip gives it."""
+    names = [str(source)]
+    if zipfile.is_zipfile(source):
+        names += zipfile.ZipFile(source).namelist()
+    found = [match for name in names if (match := re.search(r"Highway-Traffic-dataset_v(\d+)-(\d+)-(\d+)", name))]
+    return ".".join(found[0].groups()) if found else "unknown"

@@ -1,0 +1,166 @@
+"""Somebody's tables: read by a saved mapping, and a first version of one for a person to correct."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.lazy import pd
+from xosc_lateral.files.drives import drives_of_table, translated
+from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping, factor, spelled
+from xosc_lateral.files.tables import comma_numbers, read_table, text_encoding
+
+HEADERS = {
+    "time": r"time|timestamp|t|zeit|zeitstempel|sec|seconds",
+    "drive": r"drive|trip|run|session|fahrt|drive_?id|trip_?id",
+    "offset": r"(lane_?)?offset|lat(eral)?(_?(pos(ition)?|offset|dev(iation)?))?|querablage|lane_?pos(ition)?",
+    "lane_width": r"(lane_?)?width|(fahr)?(spur|streifen)_?breite|fahrstreifenbreite",
+    "distance_left": r"(dist(ance)?_?)?(to_?)?left(_?(line|marking|lane))?|abstand_?links|(line|marking)_?left",
+    "distance_right": r"(dist(ance)?_?)?(to_?)?right(_?(line|marking|lane))?|abstand_?rechts|(line|marking)_?right",
+    "speed": r"v(_?(ego|veh(icle)?))?|speed|velocity|geschw(indigkeit)?|tempo|vehicle_?speed",
+    "acceleration": r"a(x|cc(eleration)?)?|a_?long|beschl(eunigung)?",
+    "is_truck": r"(vehicle_?)?(class|type|typ|klasse)|fahrzeug_?(klasse|typ|art)|is_?truck|truck|lkw",
+    "curvature": r"curv(ature)?|kappa|kr(ue|ü)mmung",
+    "lead_distance": r"(lead|front|ahead|headway)_?(dist(ance)?|gap)?|vorder_?abstand|abstand_?vorn(e)?",
+    "left_distance": r"(neighbou?r|car|veh(icle)?|gap)_?left(_?dist(ance)?)?|left_?distance|nachbar_?links",
+    "right_distance": r"(neighbou?r|car|veh(icle)?|gap)_?right(_?dist(ance)?)?|right_?distance|nachbar_?rechts",
+    "lane_index": r"lane(_?(index|no|nr|number|id))?|spur|fahrstreifen",
+}
+"""What the headers of a column look like, without their unit; English and German."""
+
+TRUCKS = re.compile(r"truck|lorry|lkw|bus|semi|trailer|hgv|sattel", re.IGNORECASE)
+
+BY_SIZE = {
+    "speed": ((60.0, 250.0, "km/h"),),
+    "lane_width": ((200.0, 700.0, "cm"), (2000.0, 7000.0, "mm")),
+    "offset": ((4.0, 300.0, "cm"), (300.0, 3000.0, "mm")),
+    "distance_left": ((20.0, 500.0, "cm"),),
+    "distance_right": ((20.0, 500.0, "cm"),),
+}
+"""Median sizes that no value in the standard unit has, and the unit that they speak for."""
+
+LEVELS = 12
+"""So many different texts are written out at most."""
+
+SIGNS = {"offset": "positive to the LEFT of travel, else :-m", "curvature": "positive in LEFT curves, else :-1/m"}
+
+
+def import_table(sources: Path | Sequence[Path], *, mapping: MappingLike | None = None) -> pd.DataFrame:
+    """Tables under standard names, in standard units; a table without `drive` is a drive called after its file.
+
+    `mapping`: without it, headers are taken to be standard names. Raises `FormatError`, `NotEnoughDataError`: as
+    `formats.drives.read_drives`: what is written here can be read.
+    """
+    known = as_mapping(mapping)
+    made = []
+    for path in [sources] if isinstance(sources, Path) else sources:
+        table = translated(read_table(path, known)[0], known, path)
+        drives_of_table(table, TableMapping(), path)
+        if "drive" not in table:
+            table.insert(0, "drive", path.name.partition(".")[0])
+        made.append(table)
+    return pd.concat(made, ignore_index=True)
+
+
+def propose_mapping(files: Sequence[Path]) -> str:
+    """TOML of a mapping of these tables, with what each line was guessed from.
+
+    Raises `FormatError`: if they can't be read, or have no column in common.
+    """
+    tables = [read_table(path)[0].rename(columns=lambda name: str(name).strip()) for path in files]
+    shared = [name for name in tables[0].columns if all(name in table.columns for table in tables)]
+    if not shared:
+        raise FormatError("the tables have no column in common", path=files[-1])
+    values = {name: pd.concat([table[name] for table in tables], ignore_index=True) for name in shared}
+    found: dict[str, str] = {}
+    for header in shared:
+        bare, _ = _parts_of(header)
+        name = next((name for name, words in HEADERS.items() if name not in found and _fits(words, bare)), None)
+        if name is not None:
+            found[name] = header
+    sides = {"distance_left", "distance_right"} <= found.keys()
+    needed = ("time",) if sides else ("time", "offset", "lane_width")
+    codes = sorted({text_encoding(path) for path in files} - {"utf-8"})
+    lines = [
+        f"# Proposed from {', '.join(path.name for path in files)}: read every line, correct it, save it, and give it",
+        '# with --mapping FILE. NAME = "COLUMN" or "COLUMN:UNIT"; a unit with a minus turns the sign.',
+        *(f"encoding = {_quoted(code)}" for code in codes[:1]),
+        "",
+        "[columns]",
+        *(_line(name, header, values[header]) for name, header in found.items()),
+        *(f'# {name} = "?"  # needed, and not found' for name in needed if name not in found),
+    ]
+    for name, header in found.items():
+        if name != "drive" and not len(_numbers(values[header])):
+            lines += _texts(name, values[header])
+    left = [header for header in shared if header not in found.values()]
+    if left:
+        lines += ["", f"# Others keep their names: {', '.join(left[:40])}"]
+    lines += ["", "# [roles]  # where a column comes from, for close-loop", '# curvature = "road"', ""]
+    return "\n".join(lines)
+
+
+def _parts_of(header: str) -> tuple[str, str]:
+    """A header without its unit, in lower case, and the unit; empty where it names none."""
+    match = re.fullmatch(r"(.+?)[ _]*[\[(]([^\])]+)[\])]", header)
+    if match and spelled(match[2]):
+        return _plain(match[1]), str(spelled(match[2]))
+    stem, _, last = header.rpartition("_")
+    unit = spelled(last) if stem else None
+    return (_plain(stem), unit) if unit and unit != "-" else (_plain(header), "")
+
+
+def _plain(text: str) -> str:
+    spaced = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", text)
+    return re.sub(r"[\s.:\-_/]+", "_", spaced).strip("_").lower()
+
+
+def _fits(words: str, bare: str) -> bool:
+    return re.fullmatch(words, bare) is not None or re.fullmatch(words, bare.partition("_")[2] or "-") is not None
+
+
+def _line(name: str, header: str, column: pd.Series) -> str:
+    _, unit = _parts_of(header)
+    why = "by its header"
+    if unit:
+        try:
+            factor(name, unit)
+            why = "unit by its header"
+        except ValueError:
+            unit = ""
+    numbers = _numbers(column)
+    if not unit and len(numbers):
+        size = float(np.median(np.abs(numbers)))
+        unit = next((unit for low, high, unit in BY_SIZE.get(name, ()) if low <= size < high), "")
+        if name == "time" and len(numbers) > 1 and 2.0 <= float(np.median(np.abs(np.diff(numbers)))) <= 1000.0:
+            unit = "ms"
+        why = "unit by the size of its values" if unit else why
+    seen = f"; {numbers.min():.4g} to {numbers.max():.4g}" if len(numbers) else ""
+    sign = f"; CHECK: {SIGNS[name]}" if name in SIGNS else ""
+    given = f"{header}:{unit}" if unit else header
+    entry = f"{{column = {_quoted(header)}}}" if ":" in header and not unit else _quoted(given)
+    return f"{name} = {entry}  # {why}{seen}{sign}"
+
+
+def _numbers(column: pd.Series) -> FloatArray:
+    commas = None if pd.api.types.is_numeric_dtype(column) else comma_numbers(column)
+    values = pd.to_numeric(column if commas is None else commas, errors="coerce").to_numpy(dtype=np.float64)
+    return np.asarray(values[np.isfinite(values)])
+
+
+def _texts(name: str, column: pd.Series) -> list[str]:
+    texts = sorted({str(cell).strip() for cell in column.dropna()})
+    if name == "time" or len(texts) > LEVELS:
+        return []
+    numbers = {text: int(bool(TRUCKS.search(text))) if name == "is_truck" else k for k, text in enumerate(texts)}
+    return ["", f"[values.{name}]", *(f"{_quoted(text)} = {number}" for text, number in numbers.items())]
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)

@@ -1,0 +1,282 @@
+"""HighD and exiD (leveLXData, RWTH Aachen) into the standard drive table, from their published column layouts.
+
+A recording is three files, ``XX_tracks.csv``, ``XX_tracksMeta.csv`` and ``XX_recordingMeta.csv``.
+
+highD [1]_ : image coordinates in metres, y pointing DOWN; `x`, `y` are the upper left corner of the bounding box,
+`width` its extent along the road and `height` across; the straight lane markings stand in the recording's meta file;
+the upper lanes (drivingDirection 1) drive towards -x.
+
+exiD [2]_ : lateral offset and lane width come along with every row (`latLaneCenterOffset`, `laneWidth`; several values
+parted by ``;`` where lanelets overlap: the first one counts). Which side is positive there is found from the data, by
+comparing the offset's rate with the heading, so that `offset` is positive to the left whatever the release says.
+
+References
+----------
+.. [1] R. Krajewski et al., ITSC 2018, doi:10.1109/ITSC.2018.8569552
+.. [2] T. Moers et al., IV 2022, doi:10.1109/IV51971.2022.9827305
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.base.errors import FormatError, NotEnoughDataError
+from xosc_lateral.base.lazy import pd
+from xosc_lateral.files.tables import read_table
+from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings, Rows, cut_table
+from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
+from xosc_lateral.workflows.recordings.neighbours import REACH, find_neighbours
+
+LICENCE = (
+    "highD/exiD: leveLXData, under the licence that you signed (free for non-commercial research); whether fitted "
+    "parameters may be passed on is for that licence to say"
+)
+HIGHD_COLUMNS = ("frame", "id", "x", "y", "width", "height", "xVelocity", "xAcceleration")
+EXID_COLUMNS = (
+    *("trackId", "frame", "xCenter", "yCenter", "heading", "length", "lonVelocity", "lonAcceleration"),
+    *("latLaneCenterOffset", "laneWidth", "laneletId", "laneChange", "leadId", "leadDHW"),
+    *("leftLeadId", "leftRearId", "leftAlongsideId", "rightLeadId", "rightRearId", "rightAlongsideId"),
+)
+TRUCKS = ("truck", "bus")
+VEHICLES = ("car", "van", "truck", "bus", "motorcycle", "trailer")
+
+
+@guarded
+def import_levelx(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cut: bool = False) -> Imported:
+    """Read one recording (its ``XX_tracks.csv``) or a folder of them; highD and exiD are recognised by their columns.
+
+    Raises `FormatError` if a file or a column is missing, or the exiD sign is undecided.
+    """
+    tracks_files = sorted(source.glob("*_tracks.csv")) if source.is_dir() else [source]
+    if not tracks_files:
+        raise FormatError("no XX_tracks.csv in this folder", path=source)
+    parts, layouts, steps = zip(*(_read_recording(path, settings) for path in tracks_files), strict=True)
+    if len(set(layouts)) > 1 or len(set(steps)) > 1:
+        raise FormatError("recordings of different layouts or frame rates: import them one by one", path=source)
+    table, about = pd.concat(parts, ignore_index=True), {"format": f"levelx {layouts[0]}", "licence": LICENCE}
+    return finished(table, keep_cut=keep_cut, sources=tracks_files, settings=asdict(settings), step=steps[0], **about)
+
+
+def _read_recording(path: Path, settings: CutSettings) -> tuple[pd.DataFrame, str, float]:
+    """Table with `state`, layout and step of one recording."""
+    tracks, tracks_meta, recording = read_recording_files(path)
+    number = path.name.split("_")[0]
+    step = 1.0 / frame_rate(recording, path)
+    if "latLaneCenterOffset" in tracks.columns:
+        return _from_exid(tracks, tracks_meta, number, step, path, settings), "exiD", step
+    return _from_highd(tracks, tracks_meta, recording, number, step, path, settings), "highD", step
+
+
+def read_recording_files(path: Path) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
+    """Tracks, their meta table and that of the recording."""
+    tables = []
+    for ending in ("_tracks.csv", "_tracksMeta.csv", "_recordingMeta.csv"):
+        file = path.with_name(path.name.replace("_tracks.csv", ending))
+        if not file.exists():
+            what = "missing; a recording is XX_tracks.csv, XX_tracksMeta.csv and XX_recordingMeta.csv"
+            raise FormatError(what, path=file)
+        tables.append(read_table(file)[0])
+    return tables[0], tables[1], tables[2]
+
+
+def markings(recording: pd.DataFrame, side: str, path: Path) -> FloatArray:
+    """Of highD's "upper" or "lower" lanes, y pointing down. [m]"""
+    return np.array([float(part) for part in cell(recording, f"{side}LaneMarkings", path).split(";")])
+
+
+def cell(frame: pd.DataFrame, column: str, path: Path) -> str:
+    """Of a meta file's only row."""
+    if column not in frame.columns or frame.empty:
+        raise FormatError(f"no value of {column} in the recording's meta file", path=path)
+    return str(frame[column].iloc[0])
+
+
+def frame_rate(recording: pd.DataFrame, path: Path) -> float:
+    """Of a recording. [1/s]"""
+    rate = cell(recording, "frameRate", path)
+    if not (rate.replace(".", "", 1).isdigit() and 1.0 <= float(rate) <= 1000.0):
+        raise FormatError(f"frameRate={rate!r}, expected 1 to 1000 per second", path=path)
+    return float(rate)
+
+
+def require(frame: pd.DataFrame, columns: Sequence[str], path: Path) -> None:
+    """Refuse a table that lacks a column."""
+    missing = [name for name in columns if name not in frame.columns]
+    if missing:
+        raise FormatError(f"no column {', '.join(missing)}; neither highD nor exiD", path=path, line=1)
+
+
+# ---- highD -----------------------------------------------------------------------------------------------------------
+def _from_highd(
+    tracks: pd.DataFrame,
+    tracks_meta: pd.DataFrame,
+    recording: pd.DataFrame,
+    number: str,
+    step: float,
+    path: Path,
+    settings: CutSettings,
+) -> pd.DataFrame:
+    require(tracks, HIGHD_COLUMNS, path)
+    tracks = tracks.sort_values(["id", "frame"], ignore_index=True)
+    meta = tracks_meta.set_index("id").reindex(tracks["id"])
+    rightwards = meta["drivingDirection"].to_numpy() == 2
+    way = np.where(rightwards, 1.0, -1.0)
+    # y points down: for traffic towards +x the left is at smaller y.
+    x = way * (tracks["x"] + 0.5 * tracks["width"]).to_numpy()
+    left = -way * (tracks["y"] + 0.5 * tracks["height"]).to_numpy()
+    lane, offset, width, count = (np.zeros(len(tracks)) for _ in range(4))
+    for mine, side, sign in ((rightwards, "lower", -1.0), (~rightwards, "upper", 1.0)):
+        marks = np.sort(sign * markings(recording, side, path))
+        index = np.searchsorted(marks, left[mine]) - 1
+        inside = np.clip(index, 0, len(marks) - 2)
+        lane[mine] = np.where(index == inside, index, -1)
+        offset[mine] = left[mine] - 0.5 * (marks[inside] + marks[inside + 1])
+        width[mine], count[mine] = np.diff(marks)[inside], len(marks) - 1
+    lane_number = lane.astype(np.int64)
+    vehicle, frame = tracks["id"].to_numpy(), tracks["frame"].to_numpy()
+    kind = meta["class"].astype(str).str.lower().to_numpy()
+    is_truck = np.isin(kind, TRUCKS)
+    near = find_neighbours(
+        frame * 2 + rightwards,
+        lane_number,
+        x,
+        tracks["width"].to_numpy(),
+        is_truck,
+        lane_on_left=lane_number < count - 1,
+        lane_on_right=lane_number > 0,
+    )
+    columns = {
+        "drive": f"highd-{number}-" + tracks["id"].astype(str),
+        "time": np.round(frame * step, 4),
+        "offset": offset,
+        "lane_width": width,
+        "speed": np.abs(tracks["xVelocity"].to_numpy()),
+        "acceleration": way * tracks["xAcceleration"].to_numpy(),
+        "lane_index": lane_number,
+        "lane_count": count.astype(np.int64),
+        **near,
+    }
+    rows, reasons = Rows(vehicle, frame, lane_number, step), {"no lane": lane_number < 0}
+    return cut_table(columns, rows, settings, sideways=left, reasons=reasons, kind=kind, is_truck=is_truck)
+
+
+# ---- exiD ------------------------------------------------------------------------------------------------------------
+def _from_exid(
+    tracks: pd.DataFrame, tracks_meta: pd.DataFrame, number: str, step: float, path: Path, settings: CutSettings
+) -> pd.DataFrame:
+    require(tracks, EXID_COLUMNS, path)
+    tracks = tracks.sort_values(["trackId", "frame"], ignore_index=True)
+    kind = tracks_meta.set_index("trackId").reindex(tracks["trackId"])["class"].astype(str).str.lower().to_numpy()
+    offset, width = _first(tracks["latLaneCenterOffset"]), _first(tracks["laneWidth"])
+    vehicle, frame = tracks["trackId"].to_numpy(), tracks["frame"].to_numpy()
+    known = np.isfinite(offset) & np.isfinite(width) & (width > 0.0)
+    # A new lane shows as a step of the offset; lanelets that follow one another along the road don't.
+    step_of_offset = np.diff(offset, prepend=offset[:1])
+    jump = (np.abs(step_of_offset) > 0.5 * width) | (tracks["laneChange"].to_numpy() == 1)
+    jump &= np.r_[False, vehicle[1:] == vehicle[:-1]]
+    lane = np.cumsum(jump).astype(np.int64)
+    lateral = np.cumsum(np.where(jump | ~np.isfinite(step_of_offset), 0.0, step_of_offset))
+    offset = offset * _left_sign(lateral, tracks, vehicle, step, path)
+    is_truck = np.isin(kind, TRUCKS)
+    columns = {
+        "drive": f"exid-{number}-" + tracks["trackId"].astype(str),
+        "time": np.round(frame * step, 4),
+        "offset": offset,
+        "lane_width": width,
+        "speed": tracks["lonVelocity"].to_numpy(),
+        "acceleration": tracks["lonAcceleration"].to_numpy(),
+        **_exid_neighbours(tracks, is_truck),
+    }
+    rows, reasons = Rows(vehicle, frame, lane, step), {"no vehicle": ~np.isin(kind, VEHICLES), "no lane": ~known}
+    return cut_table(columns, rows, settings, sideways=lateral, reasons=reasons, kind=kind, is_truck=is_truck)
+
+
+def _first(column: pd.Series) -> FloatArray:
+    """First of the values parted by ``;``; NaN where there is none."""
+    if column.dtype.kind == "f":
+        return column.to_numpy(dtype=np.float64)
+    first = column.astype(str).str.split(";").str[0]
+    return np.asarray(pd.to_numeric(first, errors="coerce").to_numpy(dtype=np.float64))
+
+
+def _left_sign(lateral: FloatArray, tracks: pd.DataFrame, vehicle: IntArray, step: float, path: Path) -> float:
+    """+1 if the offset grows when a vehicle heads to the left of its lane's course, -1 if it shrinks.
+
+    By the correlation of the way to the left, from the heading, with the rate of the offset; the heading is taken
+    against its own mean over 4 s, which takes the road's course out of it.
+    """
+    heading = np.unwrap(np.radians(tracks["heading"].to_numpy()))
+    half = max(1, round(2.0 / step))
+    inside = np.arange(half, max(half, len(vehicle) - half))
+    inside = inside[vehicle[inside + half] == vehicle[inside - half]]
+    if len(inside) < 100:
+        raise NotEnoughDataError(f"{path}: no track of 4 s; they are needed to find which side is left")
+    towards_left = tracks["lonVelocity"].to_numpy()[inside] * _about_mean(heading, inside, half)
+    rate = _about_mean(np.gradient(lateral), inside, half)
+    agreement = float(np.corrcoef(towards_left, rate)[0, 1])
+    if not abs(agreement) > 0.1:
+        what = f"the lane's positive side is undecided: correlation of heading and offset rate is {agreement:.2f}"
+        raise FormatError(what, path=path, element="latLaneCenterOffset")
+    return float(np.sign(agreement))
+
+
+def _about_mean(values: FloatArray, rows: IntArray, half: int) -> FloatArray:
+    """Values at `rows`, less their own mean over `half` rows to each side."""
+    summed = np.concatenate([[0.0], np.cumsum(values)])
+    return np.asarray(values[rows] - (summed[rows + half + 1] - summed[rows - half]) / (2 * half + 1))
+
+
+def _exid_neighbours(tracks: pd.DataFrame, is_truck: NDArray[np.bool_]) -> dict[str, FloatArray]:
+    """Leader and neighbours from the ids that come along; distances bumper to bumper. Which lanes there are is not in
+    the tracks, so beside, NaN is no lane as well as nobody."""
+    row_of = _rows_by_frame_and_track(tracks)
+    lead, lead_row = tracks["leadDHW"].to_numpy(dtype=np.float64), row_of(_ids(tracks["leadId"]))
+    there = (lead_row >= 0) & (lead >= 0.0) & (lead <= REACH)
+    near = {
+        "lead_distance": np.where(there, lead, np.inf),
+        "lead_is_truck": np.where(there, is_truck[lead_row], False).astype(np.float64),
+    }
+    for side in ("left", "right"):
+        best, truck = np.full(len(tracks), np.inf), np.zeros(len(tracks))
+        for who in ("Lead", "Rear", "Alongside"):
+            other = row_of(_ids(tracks[f"{side}{who}Id"]))
+            gap = np.where(other >= 0, _free_space(tracks, other), np.inf)
+            closer = (gap < best) & (gap <= REACH)
+            best, truck = np.where(closer, gap, best), np.where(closer, is_truck[other], truck)
+        near |= {f"{side}_distance": np.where(np.isfinite(best), best, np.nan), f"{side}_is_truck": truck}
+    return near
+
+
+def _free_space(tracks: pd.DataFrame, other: IntArray) -> FloatArray:
+    """Free space lengthwise between every row's vehicle and that of row `other`. [m]"""
+    heading = np.radians(tracks["heading"].to_numpy())
+    east, north, length = (tracks[name].to_numpy(dtype=np.float64) for name in ("xCenter", "yCenter", "length"))
+    along = (east[other] - east) * np.cos(heading) + (north[other] - north) * np.sin(heading)
+    return np.asarray(np.maximum(np.abs(along) - 0.5 * (length + length[other]), 0.0))
+
+
+def _ids(column: pd.Series) -> IntArray:
+    """First id of each row, -1 where there is none."""
+    return np.nan_to_num(_first(column), nan=-1.0).astype(np.int64)
+
+
+def _rows_by_frame_and_track(tracks: pd.DataFrame) -> Callable[[IntArray], IntArray]:
+    """Function from track ids, one per row, to the row of that track at the same frame (-1: none)."""
+    frame, track = tracks["frame"].to_numpy(dtype=np.int64), tracks["trackId"].to_numpy(dtype=np.int64)
+    size = int(track.max()) + 2
+    key = frame * size + track
+    order = np.argsort(key, kind="stable")
+
+    def row_of(ids: IntArray) -> IntArray:
+        wanted = frame * size + ids
+        place = np.clip(np.searchsorted(key[order], wanted), 0, len(key) - 1)
+        found = (ids >= 0) & (ids < size) & (key[order][place] == wanted)
+        return np.where(found, order[place], -1)
+
+    return row_of

@@ -1,0 +1,106 @@
+"""ASAM OSI traces [1]_ into the standard drive table (extra `osi`).
+
+Vehicles are placed between the boundaries of their lanes, as the trace has them or, with `road`, as an OpenDRIVE file
+has them. The offset is that of the rear axle where the trace says where it is, else of the vehicle's middle.
+
+References
+----------
+.. [1] ASAM OSI (Open Simulation Interface) 3.8: osi_groundtruth.proto, osi_lane.proto, osi_logicallane.proto.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from xosc_lateral.base.errors import FormatError
+from xosc_lateral.files.opendrive import read_opendrive, read_road
+from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
+from xosc_lateral.workflows.recordings.importers.table import Imported, guarded
+from xosc_lateral.workflows.recordings.importers.tracks import place_on_road
+from xosc_lateral.workflows.recordings.lane_shapes import place_in_shapes
+from xosc_lateral.workflows.recordings.osi.read import Recorded, read_osi
+from xosc_lateral.workflows.recordings.osi.shapes import lanes_of
+from xosc_lateral.workflows.recordings.placed import (
+    LaneGraph,
+    PlacedTracks,
+    import_each,
+    import_placed,
+    require_lanes,
+)
+
+LICENCE = "that of the trace"
+
+HOST = "host"
+"""Stands for the trace's own host vehicle."""
+
+
+@guarded
+def import_osi(
+    sources: Path | Sequence[Path],
+    settings: CutSettings = DEFAULT_CUTS,
+    *,
+    host: str | None = None,
+    road: Path | str | None = None,
+    channel: str | None = None,
+    keep_cut: bool = False,
+) -> Imported:
+    """Read one or several traces of ground truth or sensor views.
+
+    Raises `FormatError`: The extra is missing; no trace; no lanes; no such vehicle; `NotEnoughDataError` if nothing is
+    left once lane changes are cut.
+
+    `host`: keep this vehicle alone: its identifier or name in the trace; "host": the trace's host vehicle. `road`:
+    OpenDRIVE file to take lanes from. `channel`: topic of an MCAP file with several.
+    """
+    several = not isinstance(sources, Path) and len(sources) > 1
+
+    def read(path: Path) -> Imported:
+        recorded = read_osi(path, channel)
+        only = None if host is None else _named(recorded, host, path)
+        if several:
+            names = tuple(f"{path.stem}:{name}" for name in recorded.tracks.names)
+            recorded = replace(recorded, tracks=replace(recorded.tracks, names=names))
+            only = None if only is None else {f"{path.stem}:{name}" for name in only}
+        placed, graph, files = _placed(recorded, path, None if road is None else Path(road))
+        about = {"format": "osi", "sources": files, "licence": LICENCE, "notes": recorded.notes}
+        return import_placed(placed, graph, settings, keep_cut=True, only=only, **about)
+
+    return import_each(sources, read, keep_cut=keep_cut)
+
+
+def _named(recorded: Recorded, host: str, path: Path) -> set[str]:
+    """Tracks of the vehicle that is wanted."""
+    wanted = host
+    if host == HOST:
+        if len(recorded.hosts) != 1:
+            there = ", ".join(recorded.hosts) or "none"
+            raise FormatError(f"host vehicles: {there}; name one with --host", path=path)
+        wanted = recorded.hosts[0]
+    wanted = {number: name for name, number in recorded.numbers.items()}.get(wanted, wanted)
+    found = {name for name in recorded.tracks.names if name.split("#")[0] == wanted}  # NAME#2 after a leap
+    if not found:
+        there = ", ".join(recorded.tracks.names[:20])
+        raise FormatError(f"no vehicle {host!r}; there are {there}", path=path)
+    return found
+
+
+def _placed(recorded: Recorded, path: Path, road: Path | None) -> tuple[PlacedTracks, LaneGraph, list[Path]]:
+    """Every row in its lane; what the lanes are; the files that said so."""
+    tracks, files, network = recorded.tracks, [path], None
+    if road is not None:
+        network, files, where = read_opendrive(road), [path, road], road.name
+    elif recorded.opendrive is not None:
+        network, where = read_road(recorded.opendrive, path.stem), "the road in it"
+    if network is not None:
+        x, y = network.header_offset.undo(tracks.x, tracks.y)
+        heading = tracks.heading - network.header_offset.heading
+        placed, graph = place_on_road(replace(tracks, x=x, y=y, heading=heading), network)
+    elif (lanes := lanes_of(recorded)) is not None:
+        (strips, graph), where = lanes, "the trace"
+        placed = place_in_shapes(tracks, strips, graph.left)
+    else:
+        raise FormatError("has no lanes with boundaries: give the road with --road FILE.xodr", path=path)
+    require_lanes(placed, where, path)
+    return placed, graph, files

@@ -1,0 +1,226 @@
+"""Tables of tracks, whatever their headers: vehicle, time, x, y, and what else there is."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.base.errors import FormatError, NotEnoughDataError
+from xosc_lateral.base.lazy import pd
+from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping, parse_map
+from xosc_lateral.files.source import open_source
+from xosc_lateral.files.states import COLUMNS
+from xosc_lateral.files.tables import foreign_errors, listed, numbers_of, read_table, unpacked_text
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+HEADERS: Mapping[str, tuple[str, ...]] = {
+    "vehicle": ("vehicle", "id", "track_id", "trackid", "vehicle_id", "object_id", "track", "drive"),
+    "time": ("time", "timestamp", "t"),
+    "x": ("x", "x_center", "center_x", "xcenter", "easting", "center_easting", "pos_x"),
+    "y": ("y", "y_center", "center_y", "ycenter", "northing", "center_northing", "pos_y"),
+    "heading": ("heading", "yaw", "psi", "psi_rad", "orientation"),
+    "speed": ("speed", "velocity", "v"),
+    "length": ("length", "vehicle_length", "dimension_length"),
+    "width": ("width", "vehicle_width", "dimension_width"),
+    "rear": ("rear",),
+    "vehicle_class": ("vehicle_class", "class", "type", "agent_type", "object_type"),
+}
+"""Name -> headers that are understood, in lower case, the first that is there; others by the map."""
+
+USUAL_LENGTH = {"truck": 16.5, "bus": 12.0, "trailer": 12.0, "motorcycle": 2.2, "motorbike": 2.2}
+"""Where no length is given; 4.6 m for the rest (EU new cars, 2023: mean 4.4 m). [m]"""
+
+
+@dataclass(frozen=True, eq=False)
+class Tracks:
+    """Rows sorted by vehicle and time; each array of shape (n,), in m, s, rad, m/s."""
+
+    names: tuple[str, ...]
+    vehicle: IntArray
+    time: FloatArray
+    step: float
+    x: FloatArray
+    y: FloatArray
+    heading: FloatArray
+    speed: FloatArray
+    length: FloatArray
+    kind: NDArray[np.str_]
+    width: FloatArray | None = None
+    is_reference: bool = False
+    """Positions are those of the reference point, as in a table of states that `play` writes, not of the middle."""
+    rear: FloatArray | None = None
+    """How far x and y lie behind the vehicle's middle; None: they are the middle. [m]"""
+
+
+SPEED_WINDOW = 0.4
+"""Positions are differenced over this where no speed was recorded. [s]"""
+
+
+def ground_speed(x: FloatArray, y: FloatArray, vehicle: IntArray, step: float) -> FloatArray:
+    """Speed from positions, shape (n,). [m/s]"""
+    return np.hypot(rate(x, vehicle, step, SPEED_WINDOW), rate(y, vehicle, step, SPEED_WINDOW))
+
+
+def travel_heading(x: FloatArray, y: FloatArray, vehicle: IntArray, step: float) -> FloatArray:
+    """Heading from positions, shape (n,). [rad]"""
+    return np.arctan2(rate(y, vehicle, step, SPEED_WINDOW), rate(x, vehicle, step, SPEED_WINDOW))
+
+
+def rate(values: FloatArray, vehicle: IntArray, step: float, window: float) -> FloatArray:
+    """Difference over a window about each row, within a vehicle's rows."""
+    first = np.searchsorted(vehicle, vehicle, side="left")
+    last = np.searchsorted(vehicle, vehicle, side="right") - 1
+    half = max(1, round(0.5 * window / step))
+    rows = np.arange(len(values))
+    low, high = np.maximum(rows - half, first), np.minimum(rows + half, last)
+    return np.asarray((values[high] - values[low]) / (np.maximum(high - low, 1) * step))
+
+
+def read_tracks(path: Path, columns: Sequence[str] = (), mapping: MappingLike | None = None) -> Tracks:
+    """Read a table of tracks.
+
+    `columns`: ``NAME=COLUMN[:UNIT]`` for headers that aren't understood, and for units other than m, s, rad, m/s.
+    Raises `FormatError`: a missing column, no number where one is needed. Raises `NotEnoughDataError`: no vehicle with
+    two rows.
+    """
+    saved = as_mapping(mapping)
+    table = read_esmini_log(path) if is_esmini_log(path) else read_table(path, saved)[0]
+    return tracks_of(table, path, columns, saved)
+
+
+def tracks_of(
+    table: pd.DataFrame, path: Path, columns: Sequence[str] = (), saved: TableMapping | None = None
+) -> Tracks:
+    """Tracks of a table that is read; see `read_tracks`."""
+    is_played = set(COLUMNS) <= set(map(str, table.columns))
+    if is_played:  # a table of states, as `play` writes it
+        table = table.rename(columns={"name": "vehicle", "h": "heading"})
+    found = _columns(table, path, as_mapping(None) if saved is None else saved, columns)
+    order = found.sort_values(["vehicle", "time"], kind="stable", ignore_index=True)
+    order = order.drop_duplicates(["vehicle", "time"], ignore_index=True)
+    codes, names = order["vehicle"].factorize()
+    time = order["time"].to_numpy(dtype=np.float64)
+    same = codes[1:] == codes[:-1]
+    if not same.any():
+        raise NotEnoughDataError(f"{path}: no vehicle has two rows")
+    step = float(np.median(np.diff(time)[same]))
+    vehicle = codes.astype(np.int64)
+    x, y = order["x"].to_numpy(dtype=np.float64), order["y"].to_numpy(dtype=np.float64)
+    kind = order["vehicle_class"].astype(str).str.lower().to_numpy(dtype=str) if "vehicle_class" in order else None
+    kinds = np.full(len(order), "") if kind is None else kind
+    usual = np.array([USUAL_LENGTH.get(one, 4.6) for one in kinds])
+    return Tracks(
+        tuple(f"{name}" for name in names),
+        vehicle,
+        time - float(time.min()),
+        step,
+        x,
+        y,
+        _given(order, "heading", travel_heading(x, y, vehicle, step)),
+        np.abs(_given(order, "speed", ground_speed(x, y, vehicle, step))),
+        _given(order, "length", usual),
+        kinds,
+        order["width"].to_numpy(dtype=np.float64) if "width" in order else None,
+        is_reference=is_played,
+        rear=_given(order, "rear", np.zeros(len(order))) if "rear" in order else None,
+    )
+
+
+def _given(table: pd.DataFrame, name: str, otherwise: FloatArray) -> FloatArray:
+    if name not in table:
+        return otherwise
+    values = table[name].to_numpy(dtype=np.float64)
+    return np.where(np.isfinite(values), values, otherwise)
+
+
+def _columns(table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequence[str]) -> pd.DataFrame:
+    """The columns that are needed, under their own names, in our units."""
+    mapping = {**saved.columns, **parse_map(words)}
+    if unknown := mapping.keys() - HEADERS.keys():
+        raise FormatError(f"--map {min(unknown)}: tracks have {', '.join(HEADERS)}", path=path)
+    by_lower = {str(name).strip().lower(): name for name in reversed(list(table.columns))}
+    found = {}
+    for name, headers in HEADERS.items():
+        source = mapping.get(name)
+        header = next((by_lower[one] for one in headers if one in by_lower), None) if source is None else source.column
+        if header is None or header not in table.columns:
+            if source is not None or name in ("vehicle", "time", "x", "y"):
+                there = f"there are {listed(table.columns)} (translate with --map {name}=COLUMN)"
+                raise FormatError(f"no column {header or name!r}; {there}", path=path, line=1)
+            continue
+        column = table[header]
+        if name in ("vehicle", "vehicle_class"):
+            found[name] = column
+        else:
+            by = 1.0 if source is None else source.factor
+            found[name] = pd.Series(numbers_of(column, path, name) * by, index=column.index)
+    made = pd.DataFrame(found).replace([np.inf, -np.inf], np.nan)
+    return made.dropna(subset=["vehicle", "time", "x", "y"])
+
+
+FIRST = b"esmini "
+"""Begins the lines before the table, which name the player's version."""
+
+HEAD = "Index [-]"
+
+MOST_LINES = 50
+"""Before the table's head; a player writes seven."""
+
+_LOGGED = {
+    "vehicle": "Entity_Name",
+    "x": "World_Position_X",
+    "y": "World_Position_Y",
+    "heading": "World_Heading_Angle",
+    "speed": "Current_Speed",
+    "length": "bb_length",
+    "width": "bb_width",
+    "rear": "bb_x",
+}
+"""Column of a table of tracks -> the log's. Positions are those of the rear axle, `bb_x` behind the box's middle."""
+
+_NAME = re.compile(r"\s*#(\d+)\s+(\w+)")
+
+
+def is_esmini_log(path: Path) -> bool:
+    """Whether a file begins like one."""
+    with open_source(path) as source:
+        return unpacked_text(source).read(len(FIRST)) == FIRST
+
+
+def read_esmini_log(path: Path) -> pd.DataFrame:
+    """Rows of all vehicles, one below the other: the columns of `_LOGGED`, and `time`.
+
+    Raises `FormatError`: a column is missing, or the table is damaged.
+    """
+    with open_source(path) as source, foreign_errors(path, "can't be read as a log of esmini"):
+        text = unpacked_text(source)
+        head = (text.readline().decode("utf-8", "replace") for _ in range(MOST_LINES))
+        names = next((line.rstrip().rstrip(",").split(",") for line in head if line.startswith(HEAD)), None)
+        if names is None:
+            raise FormatError(f"a log of esmini without a line that begins with '{HEAD}'", path=path)
+        table = pd.read_csv(text, header=None, names=range(len(names)), skipinitialspace=True, index_col=False)
+    places: dict[str, dict[str, int]] = {}
+    for column, name in enumerate(names):
+        if found := _NAME.match(name):
+            places.setdefault(found[1], {})[found[2]] = column
+    frames = []
+    for number, mine in places.items():
+        if missing := sorted(set(_LOGGED.values()) - mine.keys()):
+            raise FormatError(f"vehicle #{number}: no column {missing[0]}", path=path)
+        frame = pd.DataFrame({name: table[mine[theirs]] for name, theirs in _LOGGED.items()})
+        frames.append(frame.assign(time=table[1]).dropna(subset=["vehicle"]))  # one that has not come yet is empty
+    if not frames:
+        raise FormatError("no vehicle in the table's head", path=path)
+    rows = pd.concat(frames, ignore_index=True)
+    rows["vehicle"] = rows["vehicle"].astype(str).str.strip()
+    return rows

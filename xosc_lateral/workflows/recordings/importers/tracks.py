@@ -1,0 +1,127 @@
+"""Tracks of any recording on a known road into the standard drive table.
+
+A table of x, y (and heading, speed, length and class where there are any) in the coordinates of an OpenDRIVE road. The
+road says which lane a vehicle is in and how far from its centre, what the lane is like, and who is ahead and beside.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from xosc_lateral.base.errors import FormatError
+from xosc_lateral.files.mapping import MappingLike
+from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
+from xosc_lateral.workflows.recordings.importers.table import Imported, guarded
+from xosc_lateral.workflows.recordings.importers.track_table import Tracks, read_tracks
+from xosc_lateral.workflows.recordings.placed import LaneGraph, PlacedTracks, import_placed, require_lanes
+from xosc_lateral.world.road.lanes import DRIVING, beside
+from xosc_lateral.world.road.network import RoadNetwork
+
+LICENCE = "your own recording"
+
+INTO_NEXT = 1e-3
+"""Step beyond a section's end that brings one into the next. [m]"""
+
+Piece = tuple[int, int, int]
+"""Road, lane section, lane."""
+
+
+@guarded
+def import_tracks(
+    source: Path,
+    *,
+    road: Path | str,
+    columns: Sequence[str] = (),
+    mapping: MappingLike | None = None,
+    settings: CutSettings = DEFAULT_CUTS,
+    keep_cut: bool = False,
+) -> Imported:
+    """Read tracks on a known road.
+
+    Raises `FormatError`: A missing column, or tracks that lie beside the road; `NotEnoughDataError` if nothing is left
+    once lane changes are cut.
+
+    `source`: CSV or Parquet table, one row per vehicle and instant; x and y are the vehicle's middle (or lie `rear`
+    behind it, where there is that column), in the road's coordinates. Or a log that esmini wrote (``--csv_logger``).
+    `road`: OpenDRIVE file. `columns`: ``NAME=COLUMN[:UNIT]`` for `vehicle`, `time`, `x`, `y`, `heading`, `speed`,
+    `length`, `rear`, `vehicle_class`. `mapping`: more of them, saved.
+    """
+    network = read_opendrive(road)
+    placed, graph = place_on_road(read_tracks(source, columns, mapping), network)
+    require_lanes(placed, Path(road).name, source)
+    sources = [source, Path(road)]
+    return import_placed(placed, graph, settings, keep_cut=keep_cut, format="tracks", sources=sources, licence=LICENCE)
+
+
+def place_on_road(tracks: Tracks, network: RoadNetwork) -> tuple[PlacedTracks, LaneGraph]:
+    """Every row's driving lane, and what the road is like there; x and y in the coordinates of the road's file.
+
+    Raises `FormatError`: the road has no driving lane.
+    """
+    pieces, graph = lane_graph(network)
+    if not pieces:
+        raise FormatError("the road has no driving lane that tracks could lie in", path=network.path)
+    found = network.world_to_lane(tracks.x, tracks.y, heading=tracks.heading)
+    piece, along = np.full(len(tracks.x), -1), np.zeros(len(tracks.x))
+    inside = np.flatnonzero((found.distance <= 0.0) & (found.lane != 0))
+    road, lane, s = found.road[inside], found.lane[inside], found.s[inside]
+    number = np.array([network.roads[r].section_number(at) for r, at in zip(road.tolist(), s.tolist(), strict=True)])
+    for index, k, name in sorted(set(zip(road.tolist(), number.tolist(), lane.tolist(), strict=True))):
+        mine = (road == index) & (number == k) & (lane == name)
+        section, forward = network.roads[index].sections[k], network.travel_direction(index, name) > 0
+        piece[inside[mine]] = pieces.get((index, k, name), -1)
+        along[inside[mine]] = s[mine] - section.start if forward else section.end - s[mine]
+    there = np.flatnonzero(piece >= 0)
+    where = found.road[there], found.lane[there], found.s[there]
+    lane_index, lane_count = network.lane_index(*where)
+    values = {
+        "lane_width": network.lane_width(*where),
+        "curvature": network.lane_curvature(*where),
+        "lane_index": lane_index,
+        "lane_count": lane_count,
+        "crossfall": network.crossfall(*where),
+        "grade": network.grade(*where),
+    }
+    columns = {name: np.full(len(piece), np.nan) for name in values}
+    for name, known in values.items():
+        columns[name][there] = known
+    offset, width = np.where(piece >= 0, found.offset, np.nan), columns.pop("lane_width")
+    return PlacedTracks(tracks, piece, along, offset, width, columns), graph
+
+
+def lane_graph(network: RoadNetwork) -> tuple[dict[Piece, int], LaneGraph]:
+    """Driving lanes of all sections, and how they hang together."""
+    pieces: dict[Piece, int] = {}
+    length = []
+    for index, road in enumerate(network.roads):
+        for k, section in enumerate(road.sections):
+            for lane in section.lanes:
+                if lane.type in DRIVING:
+                    pieces[index, k, lane.id] = len(pieces)
+                    length.append(section.end - section.start)
+    left = np.full(len(pieces), -1)
+    following = []
+    for (index, k, name), number in pieces.items():
+        forward = network.travel_direction(index, name) > 0
+        other = beside(name, 1 if forward else -1)
+        if network.travel_direction(index, other) == network.travel_direction(index, name):
+            left[number] = pieces.get((index, k, other), -1)
+        following.append(_following(network, pieces, index, k, name, forward))
+    return pieces, LaneGraph(np.array(length), left, following)
+
+
+def _following(
+    network: RoadNetwork, pieces: dict[Piece, int], index: int, k: int, name: int, forward: bool
+) -> list[int]:
+    """Piece straight ahead of this one, in the direction of travel."""
+    section = network.roads[index].sections[k]
+    end = section.end - INTO_NEXT if forward else section.start + INTO_NEXT
+    step = network.advance(index, name, end, 2 * INTO_NEXT)
+    if step.remaining > 0.0:
+        return []
+    found = pieces.get((step.road, network.roads[step.road].section_number(step.s), step.lane))
+    return [] if found is None or found == pieces[index, k, name] else [found]

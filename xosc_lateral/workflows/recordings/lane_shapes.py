@@ -1,0 +1,196 @@
+"""Which lane a row of a recording lies in, where lanes are given as shapes between two lines each."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.workflows.recordings.importers.track_table import Tracks
+from xosc_lateral.workflows.recordings.placed import PlacedTracks
+
+LEAST_AGREEMENT = 0.7
+"""Cosine between a vehicle's heading and the lane's that is taken to be driven along. [-]"""
+
+SMOOTHED = 20.0
+"""Way over which a lane's turning is averaged into a curvature: bounds are polygons. [m]"""
+
+
+class LaneShape(ABC):
+    """A lane between two boundaries, in coordinates along and across its centre line.
+
+    `centre`: in the direction of travel, shape (n, 2) or (n, 3). [m] `boundaries`: lines about it. [m] `beyond`: so far
+    out of their box a point may lie in the lane. [m]
+    """
+
+    def __init__(self, centre: FloatArray, boundaries: Sequence[FloatArray], beyond: float = 0.0) -> None:
+        self.centre = centre
+        self.step = np.diff(centre[:, :2], axis=0)
+        self.size = np.hypot(*self.step.T)
+        self.start = np.concatenate([[0.0], np.cumsum(self.size)])
+        self.length = float(self.start[-1])
+        self.direction = np.unwrap(np.arctan2(self.step[:, 1], self.step[:, 0]))
+        both = np.concatenate(boundaries)[:, :2]
+        self.low, self.high = both.min(axis=0) - beyond, both.max(axis=0) + beyond
+
+    def may_hold(self, x: FloatArray, y: FloatArray) -> NDArray[np.bool_]:
+        """Points in the box about it, shape as the arguments."""
+        return np.asarray((x >= self.low[0]) & (x <= self.high[0]) & (y >= self.low[1]) & (y <= self.high[1]))
+
+    @abstractmethod
+    def place(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, ...]:
+        """Way along the centre line (NaN beyond its ends), offset from the middle of the boundaries, width, direction
+        and curvature there; shape as the arguments. [m], [m], [m], [rad], [1/m]
+        """
+
+
+def place_in_shapes(tracks: Tracks, shapes: Sequence[LaneShape], left: IntArray) -> PlacedTracks:
+    """Every row in the lane that it drives along; `left`: on the left of each lane, driven the same way, or -1."""
+    piece, along, offset, width, curvature = find_lanes(shapes, tracks.x, tracks.y, tracks.heading)
+    index, count = lanes_beside(left)
+    inside = piece >= 0
+    road = {
+        "curvature": curvature,
+        "lane_index": np.where(inside, index[piece], np.nan),
+        "lane_count": np.where(inside, count[piece], np.nan),
+    }
+    return PlacedTracks(tracks, piece, along, offset, width, road)
+
+
+def find_lanes(
+    shapes: Sequence[LaneShape], x: FloatArray, y: FloatArray, heading: FloatArray
+) -> tuple[IntArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Lanelet that every row drives along (-1: none), way in it, offset, width and curvature: the one it is amid."""
+    n = len(x)
+    piece = np.full(n, -1)
+    along, offset, width, curvature = (np.full(n, np.nan) for _ in range(4))
+    nearest = np.full(n, np.inf)
+    for number, shape in enumerate(shapes):
+        near = np.flatnonzero(shape.may_hold(x, y))
+        if not len(near):
+            continue
+        way, aside, wide, ahead, bend = shape.place(x[near], y[near])
+        inside = (np.abs(aside) <= 0.5 * wide) & np.isfinite(way) & (np.cos(heading[near] - ahead) > LEAST_AGREEMENT)
+        better = inside & (np.abs(aside) < nearest[near])
+        rows = near[better]
+        piece[rows], nearest[rows] = number, np.abs(aside[better])
+        along[rows], offset[rows], width[rows], curvature[rows] = way[better], aside[better], wide[better], bend[better]
+    return piece, np.nan_to_num(along), offset, width, curvature
+
+
+def lanes_beside(left: IntArray) -> tuple[IntArray, IntArray]:
+    """Lanes to the right of each lanelet that are driven the same way, and all of them, itself included."""
+    right = np.full(len(left), -1)
+    right[left[left >= 0]] = np.flatnonzero(left >= 0)
+    counts = []
+    for beside in (right, left):
+        steps = np.zeros(len(left), dtype=np.int64)
+        for start in range(len(left)):
+            here = start
+            while beside[here] >= 0 and steps[start] < len(left):
+                here = int(beside[here])
+                steps[start] += 1
+        counts.append(steps)
+    return counts[0], counts[0] + counts[1] + 1
+
+
+def curvature_along(start: FloatArray, direction: FloatArray, way: FloatArray) -> FloatArray:
+    """Curvature of a polyline, smoothed, at some ways along it, shape as `way`. [1/m]
+
+    `start`: way to each of its points, shape (n + 1,). [m] `direction`: of its pieces, unwrapped, shape (n,). [rad]
+    """
+    middles = 0.5 * (start[1:] + start[:-1])
+    bend = np.interp(way + 0.5 * SMOOTHED, middles, direction) - np.interp(way - 0.5 * SMOOTHED, middles, direction)
+    span = np.minimum(way + 0.5 * SMOOTHED, middles[-1]) - np.maximum(way - 0.5 * SMOOTHED, middles[0])
+    return np.asarray(np.where(span > 1.0, bend / np.maximum(span, 1.0), 0.0))
+
+
+# ---- lanes between lines whose points don't face each other
+STEP = 1.0
+"""Points of a centre line are at most this far apart, so that the nearest one is next to a point's foot. [m]"""
+
+BEYOND = 1e-3
+"""A foot that lies farther than this before the start or past the end is outside. [m]"""
+
+
+class Strip(LaneShape):
+    """A lane between lines in the direction of travel, shape (n, 3); the centre may lie anywhere between. [m]"""
+
+    def __init__(self, centre: FloatArray, left: FloatArray, right: FloatArray) -> None:
+        from scipy.spatial import cKDTree
+
+        super().__init__(_dense(centre), [left, right], BEYOND)
+        self._tree = cKDTree(self.centre[:, :2])
+        self._left, self._right = self._edge(left), self._edge(right)
+
+    def _edge(self, line: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """A boundary as way along, offset from the centre line and height, in order of the way."""
+        dense = _dense(line)
+        way, aside, _, _ = self._foot(dense[:, 0], dense[:, 1])
+        order = np.argsort(way, kind="stable")
+        return way[order], aside[order], dense[order, 2]
+
+    def place(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, ...]:
+        """See `LaneShape`."""
+        way, aside, k, beyond = self._foot(x, y)
+        left, right = (np.interp(way, edge[0], edge[1]) for edge in (self._left, self._right))
+        high, low = (np.interp(way, edge[0], edge[2]) for edge in (self._left, self._right))
+        lean = np.hypot(left - right, high - low) / np.maximum(left - right, 1e-6)  # across the surface, as roads count
+        outside = np.abs(beyond) > BEYOND
+        curvature = curvature_along(self.start, self.direction, way)
+        offset, width = lean * (aside - 0.5 * (left + right)), lean * (left - right)
+        return np.where(outside, np.nan, way), offset, width, self.direction[k], curvature
+
+    def _foot(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.intp], FloatArray]:
+        """Way along, distance to the left, number of the piece, and how far past its ends; shape as the arguments."""
+        points = np.stack([x, y], axis=1)
+        nearest = np.asarray(self._tree.query(points)[1], dtype=np.intp)
+        found = [self._on(points, np.clip(nearest + side, 0, len(self.size) - 1)) for side in (-1, 0)]
+        first = found[0][4] <= found[1][4]
+        way, aside, beyond = (np.where(first, found[0][n], found[1][n]) for n in (0, 1, 3))
+        k = np.where(first, found[0][2], found[1][2])
+        return way, aside, k, beyond
+
+    def _on(self, points: FloatArray, k: NDArray[np.intp]) -> tuple[Any, ...]:
+        """The same on one piece each, and the distance from it squared."""
+        along = self.step[k] / self.size[k][:, None]
+        about = points - self.centre[k, :2]
+        ahead = (about * along).sum(axis=1)
+        aside = along[:, 0] * about[:, 1] - along[:, 1] * about[:, 0]
+        held = np.clip(ahead, 0.0, self.size[k])
+        past = np.where((k == 0) & (ahead < 0.0), ahead, 0.0)
+        past = np.where((k == len(self.size) - 1) & (ahead > self.size[k]), ahead - self.size[k], past)
+        return self.start[k] + held, aside, k, past, (ahead - held) ** 2 + aside**2
+
+
+def middle(left: FloatArray, right: FloatArray) -> FloatArray:
+    """A line between two others that are driven the same way, shape (n, 3). [m]"""
+    ways = [np.concatenate([[0.0], np.cumsum(_sizes(line))]) for line in (left, right)]
+    share = np.union1d(*(way / way[-1] for way in ways))
+    ends = [
+        np.stack([np.interp(share, way / way[-1], line[:, axis]) for axis in (0, 1, 2)], axis=1)
+        for way, line in zip(ways, (left, right), strict=True)
+    ]
+    return np.asarray(0.5 * (ends[0] + ends[1]))
+
+
+def _sizes(line: FloatArray) -> FloatArray:
+    """Of the pieces of a line, seen from above, shape (n - 1,). [m]"""
+    return np.asarray(np.hypot(*np.diff(line[:, :2], axis=0).T))
+
+
+def _dense(line: FloatArray) -> FloatArray:
+    """Without points that are there twice, and none farther from the next than `STEP`."""
+    size = _sizes(line)
+    line = line[np.r_[True, size > 1e-9]]
+    size = _sizes(line)
+    way = np.concatenate([[0.0], np.cumsum(size)])
+    count = np.maximum(np.ceil(size / STEP).astype(np.int64), 1)
+    piece = np.repeat(np.arange(len(size)), count)
+    within = np.concatenate([np.arange(n) / n for n in count]) if len(count) else np.zeros(0)
+    at = np.append(way[piece] + within * size[piece], way[-1])
+    return np.stack([np.interp(at, way, line[:, axis]) for axis in (0, 1, 2)], axis=1)

@@ -1,0 +1,245 @@
+"""Lateral maneuvers of a recorded vehicle: lane changes, aborted ones, lane offsets; when, how long, of what shape."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.base.rows import true_slices
+from xosc_lateral.workflows.recordings.recorded import RecordedVehicle
+from xosc_lateral.workflows.recordings.transitions import SHAPES, Rough, Transition, fit_transition
+
+SETTLED = 0.7
+"""Nobody has settled in a lane who is farther from its centre, see `formats.importers.cuts`. [m]"""
+CALM = 0.1
+"""A lane change reaches to where the lateral speed falls below this, see there. [m/s]"""
+LONGEST = 8.0
+"""From the crossing to either end, see there. [s]"""
+STILL, STEADY = 1e-3, 0.5
+"""Lateral speed below which a vehicle stands still sideways [m/s], for at least so long [s]."""
+LEVEL = 0.02
+"""Movement between two still stretches that is worth a maneuver. [m]"""
+RATE_WINDOW = 0.5
+"""The lateral speed is a difference over this. [s]"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class LateralPlan:
+    """Lateral maneuvers of a vehicle."""
+
+    start: float  # level at the first row [m]
+    transitions: tuple[Transition, ...]  # in order; none begins before the one before it is over
+    is_played: bool  # the track stands still sideways for most of the time: no person drove it
+
+    def at(self, time: FloatArray) -> FloatArray:
+        """Level at some times, shape as the argument. [m]"""
+        value = np.full(len(time), self.start)
+        before = self.start
+        for one in self.transitions:
+            share = SHAPES[one.shape](np.clip((time - one.start) / one.duration, 0.0, 1.0))
+            value = np.where(time >= one.start, before + (one.level - before) * share, value)
+            before = one.level
+        return value
+
+
+def lateral_plan(vehicle: RecordedVehicle, begin: float) -> LateralPlan:
+    """Find and fit all lateral maneuvers; none starts before `begin` [s]."""
+    course = _Course.of(vehicle)
+    y = course.y
+    still = _still(course.time, course.rate)
+    is_played = bool(still.mean() > 0.5)
+    if is_played:
+        rough = _between_levels(course, still)
+        start = float(np.median(y[true_slices(still)[0]])) if still[0] else float(y[0])
+    else:
+        rough = course.maneuvers()
+        first = rough[0].first if rough else len(y)
+        is_off = abs(y[0]) > SETTLED and first < int(np.argmax(np.append(np.abs(y) < SETTLED, True)))
+        start = float(y[0]) if is_off or first == 0 else 0.0
+    transitions = list[Transition]()
+    free, before = begin, start
+    for one in rough:
+        found = fit_transition(course.time, y, one, free)
+        transitions.append(replace(found, change=found.level - before))
+        before = found.level
+        free = found.end
+    return LateralPlan(start, tuple(transitions), is_played)
+
+
+def lateral_speed(time: FloatArray, y: FloatArray) -> FloatArray:
+    """Difference over `RATE_WINDOW`, one-sided at the ends, shape (n,). [m/s]"""
+    half = max(1, round(0.5 * RATE_WINDOW / float(np.median(np.diff(time)))))
+    rows = np.arange(len(y))
+    low, high = np.maximum(rows - half, 0), np.minimum(rows + half, len(y) - 1)
+    return np.asarray((y[high] - y[low]) / (time[high] - time[low]))
+
+
+def _still(time: FloatArray, rate: FloatArray) -> NDArray[np.bool_]:
+    still = np.abs(rate) < STILL
+    for part in true_slices(still):
+        if time[part.stop - 1] - time[part.start] < STEADY:
+            still[part] = False
+    return still
+
+
+# ---- who stands still between maneuvers ------------------------------------------------------------------------------
+def _between_levels(course: _Course, still: NDArray[np.bool_]) -> list[Rough]:
+    y, base, lanes = course.y, course.base, course.lanes
+    rough = []
+    parts = true_slices(still)
+    for one, other in pairwise([slice(0, 1), *parts] if not still[0] else parts):
+        before, after = float(np.median(y[one])), float(np.median(y[other]))
+        for first, last, low, high in _turned(y, one.stop - 1, other.start, before, after):
+            if abs(high - low) > LEVEL:
+                change = int(lanes[last] - lanes[first])
+                rows = _reach(y, first, last, low, high)
+                rough.append(Rough(*rows, low, high, change, float(high - base[last]), held=True))
+    if not still[-1] and parts:
+        first, before = parts[-1].stop - 1, float(np.median(y[parts[-1]]))
+        if abs(y[-1] - before) > LEVEL:
+            change = int(lanes[-1] - lanes[first])
+            after = float(y[-1])
+            rough.append(Rough(first, len(y) - 1, before, after, change, float(after - base[-1]), held=True, cut=True))
+    return rough
+
+
+def _turned(y: FloatArray, first: int, last: int, before: float, after: float) -> list[tuple[int, int, float, float]]:
+    """Movements to one side between two rows: where it turns back beyond both levels, there are two of them."""
+    part = y[first : last + 1]
+    beyond = np.maximum(part - max(before, after), min(before, after) - part)
+    if beyond.max() <= LEVEL:
+        return [(first, last, before, after)]
+    top = float(part[int(beyond.argmax())])
+    rest = first + np.flatnonzero(np.abs(part - top) < LEVEL)
+    return [(first, int(rest[0]), before, top), (int(rest[-1]), last, top, after)]
+
+
+def _reach(y: FloatArray, first: int, last: int, before: float, after: float) -> tuple[int, int]:
+    """Rows between which it is at neither level, to a thousandth of the way; one row of each level along."""
+    near = 1e-3 * abs(after - before)
+    away = np.flatnonzero((np.abs(y[first : last + 1] - before) > near) & (np.abs(y[first : last + 1] - after) > near))
+    return (first, last) if not len(away) else (first + max(int(away[0]) - 1, 0), first + int(away[-1]) + 1)
+
+
+# ---- drivers ---------------------------------------------------------------------------------------------------------
+@dataclass(frozen=True, eq=False, slots=True)
+class _Course:
+    """How a vehicle moves across its lanes, at the recorded rows; arrays of shape (n,)."""
+
+    time: FloatArray  # [s]
+    y: FloatArray  # from the centre of the first row's lane, positive left [m]
+    base: FloatArray  # the same of the centre of its lane [m]
+    lanes: IntArray  # of its lane, from the first row's
+    rate: FloatArray  # lateral speed [m/s]
+    room: FloatArray  # offset at which a side comes to a marking; `SETTLED` for who is as wide as the lane [m]
+
+    @classmethod
+    def of(cls, vehicle: RecordedVehicle) -> _Course:
+        """Of a recorded vehicle."""
+        base, lanes = vehicle.levels
+        y = vehicle.offset + base
+        room = np.maximum(0.5 * (vehicle.lane_width - vehicle.width), SETTLED)
+        return cls(vehicle.time, y, base, lanes, lateral_speed(vehicle.time, y), np.asarray(room))
+
+    def maneuvers(self) -> list[Rough]:
+        """Changes between lanes that the vehicle settled in, and excursions from one of them."""
+        lanes = self.lanes
+        edges = np.r_[0, np.flatnonzero(np.diff(lanes)) + 1, len(lanes)]
+        episodes = [slice(int(a), int(b)) for a, b in pairwise(edges)]
+        inner = episodes[1:-1]
+        settled = [part for part in episodes if self._is_settled(part, is_passing=part in inner)]
+        settled = settled or [max(episodes, key=lambda part: part.stop - part.start)]
+        rough = list[Rough]()
+        if settled[0].start > 0:  # it comes from a lane that was not seen
+            rough.append(self._change(0, settled[0].start, settled[0].start, cut=True))
+        else:
+            rough += self._open_start(settled[0])
+        for one, other in pairwise(settled):
+            if lanes[one.start] == lanes[other.start]:
+                rough += self._excursion(float(self.base[one.start]), one.stop, other.start)
+            else:
+                rough.append(self._change(one.stop - 1, (one.stop + other.start) // 2, other.start))
+        last = settled[-1].stop
+        if last < len(lanes) and lanes[-1] != lanes[last - 1]:
+            rough.append(self._change(last - 1, last, len(lanes) - 1, cut=True))
+        else:
+            rough += self._open_end(slice(settled[-1].start, len(lanes)))
+        return _apart(sorted(rough, key=lambda one: one.first))
+
+    def _is_settled(self, part: slice, *, is_passing: bool) -> bool:
+        """Near the lane's centre, and not just crossing it: between two crossings to one side, speed falls by half."""
+        near = np.abs(self.y[part] - self.base[part]) < self.room[part]
+        into, out = self.rate[part.start], self.rate[part.stop - 1]
+        if not near.any() or not is_passing or into * out <= 0.0:
+            return bool(near.any())
+        return bool((np.abs(self.rate[part])[near] < 0.5 * min(abs(into), abs(out))).any())
+
+    def _change(self, before: int, crossing: int, after: int, *, cut: bool = False) -> Rough:
+        """A change from the lane of row `before` to that of row `after`, as far as it moves towards it."""
+        low, high = float(self.base[before]), float(self.base[after])
+        first = self._begin(before, crossing, low, np.sign(high - low) or 1.0)
+        last = self._end(crossing, after, high, np.sign(high - low) or 1.0)
+        begin = float(self.y[0]) if cut and first == 0 else low
+        return Rough(first, last, begin, high, int(self.lanes[after] - self.lanes[before]), cut=cut)
+
+    def _begin(self, before: int, crossing: int, level: float, side: float) -> int:
+        """Row at which movement to a side begins: the last calm one near the level, else the nearest to it."""
+        low = int(np.searchsorted(self.time, self.time[crossing] - LONGEST))
+        away = self.y[low : before + 1] - level
+        calm = np.flatnonzero((side * self.rate[low : before + 1] < CALM) & (np.abs(away) < SETTLED))
+        return low + (int(calm[-1]) if len(calm) else _nearest(away))
+
+    def _end(self, crossing: int, after: int, level: float, side: float) -> int:
+        """Row at which movement to a side is over: the first calm one near the level, else the nearest to it."""
+        high = min(int(np.searchsorted(self.time, self.time[crossing] + LONGEST)), len(self.time) - 1)
+        away = self.y[after : high + 1] - level
+        calm = np.flatnonzero((side * self.rate[after : high + 1] < CALM) & (np.abs(away) < SETTLED))
+        return after + (int(calm[0]) if len(calm) else _nearest(away))
+
+    def _open_start(self, part: slice) -> list[Rough]:
+        """A track that begins far from its lane's centre, moving towards it: within a lane change."""
+        begin, level = float(self.y[0]), float(self.base[0])
+        towards = -np.sign(begin - level) * self.rate
+        near = np.abs(self.y[part] - level) < SETTLED
+        if abs(begin - level) <= SETTLED or towards[0] < CALM or not near.any():
+            return []
+        done = np.flatnonzero(near & (towards[part] < CALM))
+        last = int(done[0]) if len(done) else _nearest(self.y[part] - level)
+        return [Rough(0, last, begin, level, 0, cut=True)]
+
+    def _open_end(self, part: slice) -> list[Rough]:
+        """A track that ends far from its lane's centre, moving away: within a lane change, or towards a ramp."""
+        level, end = float(self.base[-1]), float(self.y[-1])
+        away = np.sign(end - level) * self.rate
+        near = np.abs(self.y[part] - level) < SETTLED
+        if abs(end - level) <= SETTLED or away[-1] < CALM or not near.any():
+            return []
+        calm = np.flatnonzero(near & (away[part] < CALM))
+        first = part.start + (int(calm[-1]) if len(calm) else _nearest(self.y[part] - level))
+        return [Rough(first, len(self.y) - 1, level, end, 0, end - level, cut=True)]
+
+    def _excursion(self, level: float, first: int, last: int) -> list[Rough]:
+        """Out of a lane and back into it: two lane offsets."""
+        peak = first + int(np.abs(self.y[first : last + 1] - level).argmax())
+        side, height = np.sign(self.y[peak] - level), float(self.y[peak])
+        begin, end = self._begin(first, peak, level, side), self._end(peak, last, level, -side)
+        return [
+            Rough(begin, peak, level, height, 0, height - level, aborted=True),
+            Rough(peak, end, height, level, 0, aborted=True),
+        ]
+
+
+def _nearest(away: FloatArray) -> int:
+    return int(np.abs(away).argmin()) if len(away) else 0
+
+
+def _apart(rough: list[Rough]) -> list[Rough]:
+    """Without movement within a lane that is part of a lane change."""
+    changes = [(one.first, one.last) for one in rough if one.lanes]
+    return [
+        one for one in rough if one.lanes or not any(first < one.last and one.first < last for first, last in changes)
+    ]

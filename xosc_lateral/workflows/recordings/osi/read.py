@@ -1,0 +1,176 @@
+"""What vehicles did and where lanes are, from the ground truth of an OSI trace."""
+
+from __future__ import annotations
+
+from array import array
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.base.errors import FormatError, NotEnoughDataError
+from xosc_lateral.files.osi.extra import osi
+from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH, Tracks, ground_speed, travel_heading
+from xosc_lateral.workflows.recordings.osi.trace import Trace
+from xosc_lateral.world.motion.nominal import axes
+
+KINDS = {
+    **dict.fromkeys(("SMALL_CAR", "COMPACT_CAR", "CAR", "MEDIUM_CAR", "LUXURY_CAR"), "car"),
+    **{"DELIVERY_VAN": "van", "VAN": "van", "HEAVY_TRUCK": "truck", "SEMITRACTOR": "truck", "MOTORBIKE": "motorcycle"},
+}
+"""`VehicleClassification.Type` -> vehicle class; others by their own names."""
+
+THINGS = ("lane", "lane_boundary", "logical_lane", "logical_lane_boundary")
+"""Fields of a `GroundTruth` that are kept besides moving objects: lanes in both encodings."""
+
+LEAP = 3.0
+"""Farther than twice what it drives in a step, and by this much: not the same vehicle any more. [m]"""
+
+COLUMNS = 12
+"""Number, time, x, y, yaw, speed, length, pitch, roll; the rear axle, on the ground, from the middle."""
+
+
+@dataclass
+class Recorded:
+    """A trace's vehicles, lanes and what a reader has to know."""
+
+    # tracks: x and y are those of the ground below the rear axle where the trace says where that is, else below
+    # the middle
+    tracks: Tracks
+    things: Mapping[str, Mapping[int, Any]]  # of `THINGS`: messages by identifier, as first said
+    hosts: tuple[str, ...]  # names of all host vehicles
+    numbers: dict[str, str]  # name -> identifier
+    notes: list[str]
+    opendrive: bytes | None = None
+
+
+def read_osi(path: Path, channel: str | None = None) -> Recorded:
+    """Read a trace, message by message.
+
+    Raises `FormatError`: No trace; a vehicle without a position; times that are none; `NotEnoughDataError`: No vehicle
+    in two messages.
+    """
+    with Trace(path, channel) as trace:
+        collected = _Collected(path)
+        for number, message in enumerate(trace, 1):
+            collected.take(message, number)
+        return replace(collected.recorded(trace.notes), opendrive=trace.opendrive)
+
+
+@dataclass
+class _Collected:
+    path: Path
+    values: array[float] = field(default_factory=lambda: array("d"))
+    names: dict[int, str] = field(default_factory=dict)
+    kinds: dict[int, str] = field(default_factory=dict)
+    things: dict[str, dict[int, Any]] = field(default_factory=lambda: {name: {} for name in THINGS})
+    hosts: dict[int, None] = field(default_factory=dict)
+    left_out: Counter[str] = field(default_factory=Counter)
+    messages: int = 0
+    zero: int = 0
+
+    def take(self, message: Any, number: int) -> None:
+        """One `GroundTruth`."""
+        self.messages = number
+        if not message.HasField("timestamp"):
+            raise FormatError("has no timestamp", path=self.path, element=f"message {number}")
+        nanoseconds = message.timestamp.seconds * 1_000_000_000 + message.timestamp.nanos
+        if number == 1:
+            self.zero = nanoseconds
+        if message.HasField("host_vehicle_id"):
+            self.hosts[message.host_vehicle_id.value] = None
+        for one in message.moving_object:
+            self._vehicle(one, 1e-9 * (nanoseconds - self.zero), number)
+        for name, known in self.things.items():
+            for thing in getattr(message, name):
+                if thing.id.value not in known:
+                    kept = known[thing.id.value] = type(thing)()
+                    kept.CopyFrom(thing)  # a part would keep the whole message
+
+    def _vehicle(self, one: Any, time: float, number: int) -> None:
+        name = one.id.value
+        if name not in self.names:
+            self._meet(one)
+        if name not in self.kinds:
+            return
+        base = one.base
+        where = f"message {number}: moving object {name}"
+        if not base.HasField("position"):
+            raise FormatError("has no position", path=self.path, element=where)
+        yaw = base.orientation.yaw if base.HasField("orientation") else np.nan
+        speed = np.hypot(base.velocity.x, base.velocity.y) if base.HasField("velocity") else np.nan
+        length = base.dimension.length if base.HasField("dimension") else 0.0
+        rear = one.vehicle_attributes.bbcenter_to_rear
+        turned = base.orientation.pitch, base.orientation.roll
+        x, y = base.position.x, base.position.y
+        row = (name, time, x, y, yaw, speed, length or np.nan, *turned, rear.x, rear.y, -0.5 * base.dimension.height)
+        if not np.isfinite(row[2:4]).all():
+            raise FormatError(f"x {row[2]:g}, y {row[3]:g}: not a position", path=self.path, element=where)
+        self.values.extend(map(float, row))
+
+    def _meet(self, one: Any) -> None:
+        kinds = osi("osi3.osi_object_pb2").MovingObject
+        name = one.id.value
+        said = [r.identifier[-1] for r in one.source_reference if "openscenario" in r.type and r.identifier]
+        self.names[name] = said[0] if said and said[0] not in self.names.values() else str(name)
+        has_class = one.HasField("vehicle_classification")
+        if one.type == kinds.TYPE_VEHICLE or (one.type == kinds.TYPE_UNKNOWN and has_class):
+            kind = kinds.VehicleClassification.Type.Name(one.vehicle_classification.type).removeprefix("TYPE_")
+            self.kinds[name] = KINDS.get(kind, "" if kind in ("UNKNOWN", "OTHER") else kind.lower())
+        else:
+            self.left_out[kinds.Type.Name(one.type).removeprefix("TYPE_").lower()] += 1
+
+    def recorded(self, notes: list[str]) -> Recorded:
+        """All of it, in order."""
+        rows = np.frombuffer(self.values, dtype=np.float64).reshape(-1, COLUMNS)
+        notes = [*notes, *(f"{count} moving objects of type {kind} left out" for kind, count in self.left_out.items())]
+        rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
+        new = np.r_[True, (np.diff(rows[:, :2], axis=0) != 0).any(axis=1)] if len(rows) else np.zeros(0, dtype=bool)
+        if not new.all():
+            notes.append(f"{int((~new).sum())} rows have the time stamp of the row before: left out")
+            rows = rows[new]
+        same = rows[1:, 0] == rows[:-1, 0]
+        if not same.any():
+            raise NotEnoughDataError(f"{self.path}: no vehicle in two of {self.messages} messages")
+        step = float(np.median(np.diff(rows[:, 1])[same]))
+        vehicle, names = self._split(rows, same, step, notes)
+        tracks = self._tracks(rows, vehicle, names, step)
+        hosts = tuple(self.names.get(host, str(host)) for host in self.hosts)
+        if len(hosts) > 1:
+            notes.append(f"several host vehicles: {', '.join(hosts)}")
+        numbers = {name: str(number) for number, name in self.names.items()}
+        return Recorded(tracks, self.things, hosts, numbers, notes)
+
+    def _split(
+        self, rows: FloatArray, same: NDArray[np.bool_], step: float, notes: list[str]
+    ) -> tuple[IntArray, list[str]]:
+        """Track of every row: an identifier that leaps is another vehicle from there on."""
+        moved, passed = np.hypot(*np.diff(rows[:, 2:4], axis=0).T), np.diff(rows[:, 1])
+        recent = np.fmax(rows[1:, 5], rows[:-1, 5])
+        leaps = same & np.isfinite(recent) & (moved > 2.0 * recent * passed + LEAP)
+        vehicle = np.concatenate([[0], np.cumsum(~same | leaps)]).astype(np.int64)
+        first = np.flatnonzero(np.r_[True, ~same | leaps])
+        names, count = list[str](), Counter[int]()
+        for row in first.tolist():
+            number = int(rows[row, 0])
+            count[number] += 1
+            names.append(self.names[number] + (f"#{count[number]}" if count[number] > 1 else ""))
+        if leaps.any():
+            notes.append(f"{int(leaps.sum())} leaps of a vehicle: another one from there on (NAME#2 ...)")
+        return vehicle, names
+
+    def _tracks(self, rows: FloatArray, vehicle: IntArray, names: list[str], step: float) -> Tracks:
+        _, time, x, y, yaw, speed, length, pitch, roll, *rear = rows.T
+        kinds = np.array([self.kinds[int(number)] for number in rows[:, 0]])
+        usual = np.array([USUAL_LENGTH.get(kind, 4.6) for kind in kinds])
+        heading = np.where(np.isfinite(yaw), yaw, travel_heading(x, y, vehicle, step))
+        speed = np.where(np.isfinite(speed), speed, ground_speed(x, y, vehicle, step))
+        arm = sum(part[:, None] * axis for part, axis in zip(rear, axes(heading, pitch, roll), strict=True))
+        length, behind = np.where(np.isfinite(length), length, usual), -rear[0] if rear[0].any() else None
+        when, place = (time - float(time.min()), step), (x + arm[:, 0], y + arm[:, 1], heading)
+        return Tracks(tuple(names), vehicle, *when, *place, speed, length, kinds, rear=behind)

@@ -1,0 +1,118 @@
+"""Messages of an OSI trace, one after the other: the ground truth of `.mcap`, `.osi` and `.parquet` files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from xosc_lateral.base.errors import FormatError
+from xosc_lateral.files.osi.extra import SUFFIXES, osi
+from xosc_lateral.files.source import check_regular
+from xosc_lateral.workflows.recordings.osi.omega_prime import OmegaPrimeReader
+
+TRUTHS = ("GROUND_TRUTH", "SENSOR_VIEW")
+"""Kinds of messages that hold the true world; a sensor view as its global ground truth."""
+
+
+class Trace:
+    """An open trace; use it as a context.
+
+    Raises `FormatError`: No trace, or none of ground truth; `XoscLateralError`: The extra `osi` is not installed.
+
+    `channel`: topic of an MCAP file; without it the one that holds ground truth, else a sensor view. `notes`: channels
+    that are not read. `opendrive`: the road, where the file has it as OpenDRIVE.
+    """
+
+    def __init__(self, path: Path, channel: str | None = None) -> None:
+        if path.suffix.lower() not in READ:
+            what = f"an OSI trace ends in {', '.join(SUFFIXES)}, one of omega-prime in .parquet too"
+            raise FormatError(what, path=path)
+        check_regular(path)
+        if path.stat().st_size == 0:
+            raise FormatError("is empty", path=path)
+        self.path = path
+        self.notes: list[str] = []
+        self.opendrive: bytes | None = None
+        self._reader = READ[path.suffix.lower()](self, channel)
+
+    def __enter__(self) -> Trace:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._reader.close()
+
+    def __iter__(self) -> Iterator[Any]:
+        """Every `GroundTruth`, in the order of the file."""
+        number = 0
+        while (result := self._reader.read_message()) is not None:
+            number += 1
+            if result.message is None:
+                why = " ".join(str(result.error_message).split())
+                raise FormatError(f"damaged: {why}", path=self.path, element=f"message {number}")
+            is_view = type(result.message).__name__ == "SensorView"
+            yield result.message.global_ground_truth if is_view else result.message
+
+    def _of_mcap(self, channel: str | None) -> Any:
+        reader = osi("osi_utilities").MultiTraceReader()
+        if not reader.open(self.path):
+            raise FormatError("not an MCAP file, or one that was not closed", path=self.path)
+        names = {kind: name for name, kind in osi("osi_utilities").MessageType.__members__.items()}
+        found = {one.topic: names[one.message_type] for one in reader.list_channel_specifications()}
+        others = [topic for topic in reader.get_available_topics() if topic not in found]
+        said = ", ".join([f"{topic} ({kind})" for topic, kind in found.items()] + others) or "none"
+        chosen = _chosen(found, channel)
+        if chosen is None:
+            reader.close()
+            what = "ground truth or a sensor view" + ("" if channel is None else f" named {channel!r}")
+            raise FormatError(f"no channel with {what}; there are: {said}", path=self.path)
+        if len(found) + len(others) > 1:
+            self.notes.append(f"{self.path.name}: read channel {chosen} of {said}")
+        reader.set_topics([chosen])
+        return reader
+
+    def _of_rows(self, channel: str | None) -> Any:
+        _refuse_channel(self.path, channel)
+        reader = OmegaPrimeReader(self.path)
+        self.opendrive = reader.opendrive
+        return reader
+
+    def _of_messages(self, channel: str | None) -> Any:
+        _refuse_channel(self.path, channel)
+        utilities = osi("osi_utilities")
+        kinds = utilities.MessageType
+        named = utilities.infer_message_type_from_filename(self.path.name)
+        if named not in (kinds.UNKNOWN, kinds.GROUND_TRUTH, kinds.SENSOR_VIEW):
+            raise FormatError(f"its name says {named.name}: neither ground truth nor a sensor view", path=self.path)
+        if named is not kinds.UNKNOWN:
+            return self._opened(named)
+        # nothing in the file says what its messages are: a sensor view is one that shows moving objects
+        reader = self._opened(kinds.SENSOR_VIEW)
+        first = reader.read_message()
+        reader.close()
+        is_view = first.message is not None and first.message.global_ground_truth.moving_object
+        return self._opened(kinds.SENSOR_VIEW if is_view else kinds.GROUND_TRUTH)
+
+    def _opened(self, kind: Any) -> Any:
+        reader = osi("osi_utilities").SingleTraceReader()
+        reader.set_message_type(kind)
+        if not reader.open(self.path):
+            raise FormatError("not an OSI trace", path=self.path)
+        return reader
+
+
+READ = {".mcap": Trace._of_mcap, ".osi": Trace._of_messages, ".parquet": Trace._of_rows}
+"""By suffix: how a trace is opened."""
+
+
+def _refuse_channel(path: Path, channel: str | None) -> None:
+    if channel is not None:
+        raise FormatError(f"has no channels, so no channel {channel!r}", path=path)
+
+
+def _chosen(kinds: dict[str, str], channel: str | None) -> str | None:
+    """Topic to read among those of each kind."""
+    truths = [topic for wanted in TRUTHS for topic, kind in kinds.items() if kind == wanted]
+    if channel is None:
+        return truths[0] if truths else None
+    return channel if channel in truths else None

@@ -1,0 +1,206 @@
+"""A recorded vehicle in the lanes of a road, row by row."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.base.rows import true_slices
+from xosc_lateral.world.road.network import RoadNetwork
+from xosc_lateral.world.road.positions import Poses
+
+BESIDE = 1.0
+"""So far beside every driving lane a vehicle still keeps to one: it drives on its marking. [m]"""
+LONGEST_GAP = 1.0
+"""Rows farther apart than this are not of one passage, as in `formats.importers.cuts`. [s]"""
+FARTHEST = 1e8
+"""No map projection gives such a position: the Earth's circumference is 4e7 m. [m]"""
+SHORTEST_STEP = 1e-4
+"""Rows that follow sooner are of the same moment: no sensor has 10 kHz. [s]"""
+SHORTEST = 2.0
+"""Passages below this are left out: a speed and its change can't be told in less. [s]"""
+LEAP = 1.5
+"""Farther than it can have driven by this much (half a narrow lane): an identifier that has gone to another vehicle.
+[m]"""
+BACKWARDS = 0.5
+"""Who falls back so far drives backwards; less is an error of standing vehicles' positions. [m]"""
+SLOW = 0.5
+"""Below this speed the direction of movement is none: that of the row before holds. [m/s]"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class RecordedVehicle:
+    """One passage of one vehicle; arrays of shape (n,), rows in order of time."""
+
+    name: str  # name, kind: as recorded; the class in lower case, empty where not known
+    kind: str
+    length: float  # length, width, height: [m]
+    width: float
+    height: float
+    centre: float  # middle of the vehicle ahead of its reference point, the rear axle [m]
+    time: FloatArray  # [s]
+    x: FloatArray  # x, y: of the reference point, in the coordinates of the road [m]
+    y: FloatArray
+    road: IntArray  # road, lane: index of the road in the network, OpenDRIVE lane
+    lane: IntArray
+    # s, offset, lane_width: offset from the lane's centre, positive to the LEFT of the vehicle's travel [m]
+    s: FloatArray
+    offset: FloatArray
+    lane_width: FloatArray
+    # way: +1: it drives as its lane is driven, -1: against it, as who overtakes on a road with one lane each way
+    way: IntArray
+
+    def poses(self, network: RoadNetwork, offset: FloatArray) -> Poses:
+        """World poses at each row's place along the road, `offset` [m] to the left of its lane's centre; shape (n,)."""
+        poses = network.lane_to_world(self.road, self.lane, self.s, self.way * offset)
+        return poses._replace(heading=poses.heading + np.where(self.way < 0, np.pi, 0.0))
+
+    @property
+    def levels(self) -> tuple[FloatArray, IntArray]:
+        """Lateral position of each row's lane centre from the first row's [m], and how many lanes to its left it is.
+
+        A step of the offset by more than half a lane is a new lane; one lane that goes over into another one ahead
+        has none. Shape (n,) each.
+        """
+        step = np.diff(self.offset)
+        width = 0.5 * (self.lane_width[1:] + self.lane_width[:-1])
+        lanes = np.where(np.abs(step) > 0.5 * width, -np.round(step / width), 0.0)
+        return np.r_[0.0, np.cumsum(lanes * width)], np.r_[0, np.cumsum(lanes)].astype(np.int64)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Recording:
+    """Vehicles on a road, and what was left out, a line each."""
+
+    vehicles: tuple[RecordedVehicle, ...]
+    left_out: tuple[str, ...]
+    start: float  # start, end: of the window [s]
+    end: float
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Track:
+    """One vehicle as recorded, in the coordinates of the road; arrays of shape (n,)."""
+
+    name: str
+    kind: str
+    length: float  # length, width, height: [m]
+    width: float
+    height: float
+    ahead: float  # the recorded point ahead of the reference point [m]
+    middle: float  # the vehicle's middle ahead of it [m]
+    time: FloatArray  # time, x, y, heading: of the recorded point [s], [m], [rad]
+    x: FloatArray
+    y: FloatArray
+    heading: FloatArray
+
+
+def place_tracks(tracks: Sequence[Track], network: RoadNetwork, start: float, end: float) -> Recording:
+    """Each vehicle's longest passage in driving lanes within a window of time.
+
+    Raises `NotEnoughDataError`: if no vehicle is left.
+    """
+    vehicles, left_out = list[RecordedVehicle](), list[str]()
+    for track in tracks:
+        inside = (np.hypot(track.x, track.y) < FARTHEST) & np.isfinite(track.heading)
+        rows = np.flatnonzero(inside & (track.time >= start - 1e-9) & (track.time <= end + 1e-9))
+        if len(rows):
+            rows = rows[np.r_[True, np.diff(track.time[rows]) > SHORTEST_STEP]]
+            found = _place(track, rows, network, left_out)
+            if found is not None:
+                vehicles.append(replace(found, time=found.time - start))
+    if not vehicles:
+        why = f": {left_out[0]}" if left_out else ""
+        raise NotEnoughDataError(f"no vehicle can be reconstructed between {start:g} and {end:g} s{why}")
+    return Recording(tuple(vehicles), tuple(left_out), start, end)
+
+
+def _place(track: Track, rows: NDArray[np.intp], network: RoadNetwork, left_out: list[str]) -> RecordedVehicle | None:
+    time, x, y = track.time[rows], track.x[rows], track.y[rows]
+    heading = _held(time, x, y, track.heading[rows])
+    x, y = x - track.ahead * np.cos(heading), y - track.ahead * np.sin(heading)
+    found = network.world_to_lane(x, y, heading=heading)
+    on_lane = (found.distance <= BESIDE) & (found.lane != 0)
+    if not on_lane.any():
+        left_out.append(f"{track.name}: on no driving lane")
+        return None
+    lane_heading = np.zeros(len(x))
+    there = np.flatnonzero(on_lane)
+    place = found.road[there], found.lane[there], found.s[there]
+    lane_heading[there] = network.lane_to_world(*place).heading
+    width = np.full(len(x), np.nan)
+    width[there] = network.lane_width(*place)
+    way = np.where(np.cos(heading - lane_heading) < 0.0, -1, 1)
+    elsewhere = on_lane & _elsewhere(time, x, y, heading, lane_heading)
+    passages = _passages(time, x, y, on_lane & ~elsewhere)
+    reasons = {"off the lanes": int((~on_lane).sum()), "across a lane or backwards": int(elsewhere.sum())}
+    if not passages:
+        said = "".join(f", {rows} of {len(time)} rows {why}" for why, rows in reasons.items() if rows)
+        left_out.append(f"{track.name}: no {SHORTEST:g} s along a driving lane without a gap{said}")
+        return None
+    best = max(passages, key=lambda part: time[part.stop - 1] - time[part.start])
+    lost = len(time) - (best.stop - best.start)
+    if lost:
+        reasons["beyond them, a gap or a leap"] = lost - sum(reasons.values())
+        said = ", ".join(f"{rows} {why}" for why, rows in reasons.items() if rows > 0)
+        left_out.append(f"{track.name}: {lost} of {len(time)} rows: {said}")
+    size = track.length, track.width, track.height, track.middle
+    road, lane = (each.astype(np.int64)[best] for each in (found.road, found.lane))
+    where = road, lane, found.s[best], (way * found.offset)[best]
+    return RecordedVehicle(
+        track.name, track.kind, *size, time[best], x[best], y[best], *where, width[best], way[best].astype(np.int64)
+    )
+
+
+def _held(time: FloatArray, x: FloatArray, y: FloatArray, heading: FloatArray) -> FloatArray:
+    """Headings where it moves; else that of the last row that does."""
+    if len(time) < 2:
+        return heading
+    moving = np.hypot(np.gradient(x, time), np.gradient(y, time)) >= SLOW
+    if not moving.any():
+        return heading
+    last = np.maximum.accumulate(np.where(moving, np.arange(len(time)), -1))
+    return np.asarray(heading[np.where(last >= 0, last, int(np.argmax(moving)))])
+
+
+def _elsewhere(
+    time: FloatArray, x: FloatArray, y: FloatArray, heading: FloatArray, lane_heading: FloatArray
+) -> NDArray[np.bool_]:
+    """Rows that do not follow a lane: it moves across it, as a person on foot, or drives backwards."""
+    if len(time) < 2:
+        return np.zeros(len(time), dtype=np.bool_)
+    dx, dy = np.gradient(x), np.gradient(y)
+    along, across = (
+        np.abs(dx * np.cos(lane_heading + turn) + dy * np.sin(lane_heading + turn)) for turn in (0, np.pi / 2)
+    )
+    driven = np.cumsum(np.r_[0.0, np.diff(x) * np.cos(heading[1:]) + np.diff(y) * np.sin(heading[1:])])
+    moves = np.hypot(dx, dy) >= SLOW * np.gradient(time)
+    return np.asarray((moves & (across > along)) | (driven < np.maximum.accumulate(driven) - BACKWARDS))
+
+
+def _passages(time: FloatArray, x: FloatArray, y: FloatArray, on_lane: NDArray[np.bool_]) -> list[slice]:
+    """Stretches of rows on a lane without a gap or a leap, `SHORTEST` at least."""
+    from scipy.ndimage import median_filter
+
+    step = np.maximum(np.diff(time), 1e-9)
+    broken = step > LONGEST_GAP
+    if len(step):
+        moved = np.diff(x), np.diff(y)
+        vx, vy = (median_filter(each / step, 5, mode="nearest") for each in moved)
+        about = np.maximum(np.hypot(vx, vy), 1.0)
+        across = (moved[1] * vx - moved[0] * vy) / about
+        # twice as far as about that time, or turned by more than 30 degrees
+        broken |= np.hypot(*moved) > 2.0 * about * step + LEAP
+        broken |= np.abs(across) > 0.5 * about * step + LEAP
+    parts = []
+    for part in true_slices(on_lane):
+        cuts = part.start + 1 + np.flatnonzero(broken[part.start : part.stop - 1])
+        edges = [part.start, *cuts.tolist(), part.stop]
+        parts += [slice(a, b) for a, b in pairwise(edges)]
+    return [part for part in parts if time[part.stop - 1] - time[part.start] >= SHORTEST and part.stop - part.start > 3]

@@ -1,0 +1,261 @@
+"""Recordings with positions of several vehicles, with the road that they were driven on: given, or made from them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.errors import FormatError
+from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping
+from xosc_lateral.files.opendrive import read_opendrive, read_road
+from xosc_lateral.files.opendrive.write import SHOULDER, WIDTH_PIECE, WrittenLane, WrittenRoad, curved_plan
+from xosc_lateral.files.tables import foreign_errors
+from xosc_lateral.workflows.recordings.importers import dlr_ht, levelx
+from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH, Tracks, read_tracks, tracks_of
+from xosc_lateral.workflows.recordings.recorded import Track
+from xosc_lateral.world.road.network import RoadNetwork
+
+STEP = 0.1
+"""Rows are thinned to this: lane changes and braking last seconds. [s]"""
+REAR_AXLE = 0.3
+"""Middle of a vehicle ahead of its rear axle, as a share of its length: 1.4 m of a car of 4.6 m. [-]"""
+LONGEST = 60.0
+"""Of vehicles with all that they pull: road trains have 53.5 m. [m]"""
+WIDEST = 6.0
+"""Of what drives on roads, heavy transports included. [m]"""
+AROUND = 50.0
+"""A made road goes on so far beyond its traffic. [m]"""
+USUAL_WIDTH = {"truck": 2.5, "bus": 2.5, "trailer": 2.5, "van": 2.0, "motorcycle": 0.8, "motorbike": 0.8}
+"""Where no width is given; 1.8 m for the rest (2.55 m is the EU's limit, directive 96/53/EC). [m]"""
+USUAL_HEIGHT = {"truck": 3.6, "bus": 3.2, "trailer": 3.6, "van": 2.3}
+"""Where no height is given; 1.5 m for the rest. [m]"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class RecordedTraffic:
+    """Tracks in the coordinates of a road."""
+
+    name: str  # of what is made from it
+    tracks: tuple[Track, ...]
+    network: RoadNetwork
+    road: bytes  # the road's file
+    road_name: str  # of the file
+    sources: tuple[Path, ...]  # what was read
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last time. [s]"""
+        return min(float(t.time[0]) for t in self.tracks), max(float(t.time[-1]) for t in self.tracks)
+
+
+def read_recording(
+    source: Path, *, kind: str | None = None, road: Path | None = None, columns: MappingLike | None = None
+) -> RecordedTraffic:
+    """Read a recording.
+
+    `kind`: its format, one of `READERS`; without it, told from the name. `road`: OpenDRIVE file, for formats that come
+    without one. `columns`: name -> ``COLUMN[:UNIT]``, of tables. Raises `FormatError`, `NotEnoughDataError`.
+    """
+    kind = kind or format_of(source)
+    if kind not in READERS:
+        raise FormatError(f"no recording format {kind!r}; there are {', '.join(READERS)}", path=source)
+    if not source.exists():
+        raise FormatError("no such file or folder", path=source)
+    with foreign_errors(source, "can't be read as a recording"), np.errstate(all="ignore"):
+        return READERS[kind](source, road, as_mapping(columns))
+
+
+def format_of(source: Path) -> str:
+    """A recording's format by its name; a table, where nothing else fits."""
+    name = source.name.lower()
+    if name.endswith((".whl", ".zip")) or name.startswith("trajectories_"):
+        return "dlr-ht"
+    if source.is_dir() or name.endswith("_tracks.csv"):
+        return "levelx"
+    if name.endswith((".osi", ".mcap", ".osi.gz")):
+        return "osi"
+    return "commonroad" if name.endswith((".xml", ".pb")) else "tracks"
+
+
+# ---- tracks on a known road ------------------------------------------------------------------------------------------
+def _tracks(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
+    return _on_road(read_tracks(source, mapping=columns), source, road)
+
+
+def _osi(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
+    from xosc_lateral.workflows.recordings.osi.read import read_osi
+
+    recorded = read_osi(source)
+    traffic = _on_road(recorded.tracks, source, road)
+    return replace(traffic, notes=(*recorded.notes, *traffic.notes))
+
+
+def _commonroad(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
+    from xosc_lateral.workflows.recordings.importers.commonroad import read_obstacles
+
+    tracks = read_obstacles(source)
+    own = tuple(name.removeprefix(f"{source.stem}:") for name in tracks.names)
+    return _on_road(replace(tracks, names=own), source, road)
+
+
+def _on_road(tracks: Tracks, source: Path, road: Path | None) -> RecordedTraffic:
+    if road is None:
+        raise FormatError("comes without a road: give it with --road FILE.xodr", path=source)
+    network = read_opendrive(road)
+    x, y = network.header_offset.undo(tracks.x, tracks.y)
+    heading = tracks.heading - network.header_offset.heading
+    found, notes = [], []
+    for k, rows in enumerate(_rows_of(tracks.vehicle)):
+        rows = rows[_thinned(tracks.time[rows])]
+        name, kind = tracks.names[k], str(tracks.kind[rows[0]])
+        length, width = float(tracks.length[rows[0]]), USUAL_WIDTH.get(kind, 1.8)
+        given = width if tracks.width is None else float(tracks.width[rows[0]])
+        if 0.0 < length <= LONGEST and 0.0 < given <= WIDEST:
+            width = given
+        else:
+            usual = USUAL_LENGTH.get(kind, 4.6)
+            notes.append(f"{name}: no vehicle has {length:g} m x {given:g} m, {usual:g} m x {width:g} m are taken")
+            length = usual
+        middle = REAR_AXLE * length if tracks.rear is None else float(tracks.rear[rows[0]])
+        ahead = 0.0 if tracks.is_reference or tracks.rear is not None else middle
+        at = tracks.time[rows], x[rows], y[rows], heading[rows]
+        found.append(Track(name, kind, length, width, USUAL_HEIGHT.get(kind, 1.5), ahead, middle, *at))
+    files = road.read_bytes(), road.name, (source, road), tuple(notes)
+    return RecordedTraffic(source.name.split(".")[0], tuple(found), network, *files)
+
+
+def _rows_of(vehicle: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """Rows of each vehicle; they are sorted by it."""
+    return np.split(np.arange(len(vehicle)), np.flatnonzero(np.diff(vehicle)) + 1)
+
+
+def _thinned(time: FloatArray) -> NDArray[np.bool_]:
+    """Rows `STEP` apart, or as recorded where that is slower; always the first and the last."""
+    number = np.floor((time - time[0]) / STEP + 1e-6)
+    kept = np.r_[True, np.diff(number) > 0]
+    kept[-1] = True
+    return np.asarray(kept, dtype=np.bool_)
+
+
+# ---- recordings whose road is made -----------------------------------------------------------------------------------
+def _made(road: WrittenRoad, tracks: Sequence[Track], sources: Sequence[Path], notes: Sequence[str]) -> RecordedTraffic:
+    data = road.to_xml().encode()
+    about = data, f"{road.name}.xodr", tuple(sources), tuple(notes)
+    return RecordedTraffic(road.name, tuple(tracks), read_road(data, road.name), *about)
+
+
+def _dlr(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
+    table = dlr_ht.read_tracks(source)
+    lanes = dlr_ht.find_lanes(table)
+    made = dlr_road(lanes)
+    kinds = dlr_ht.vehicle_classes(table)
+    x = table["center_easting"].to_numpy() - made.origin[0]
+    y = table["center_northing"].to_numpy() - made.origin[1]
+    time, vehicle = table["time"].to_numpy(), table["vehicle"].to_numpy()
+    usual = np.array([USUAL_WIDTH.get(str(kind), 1.8) for kind in kinds])
+    width = table[dlr_ht.WIDTH].to_numpy() if dlr_ht.WIDTH in table else usual
+    sizes = table["dimension_length"].to_numpy(), width, table["dimension_height"].to_numpy()
+    names = table["id"].astype(str).to_numpy(dtype=str)
+    short = _short(names)
+    tracks = []
+    for rows in _rows_of(vehicle):
+        rows = rows[_thinned(time[rows])]
+        first = rows[0]
+        length, wide, high = (float(size[first]) for size in sizes)
+        heading = np.arctan2(np.gradient(y[rows]), np.gradient(x[rows])) if len(rows) > 1 else np.zeros(1)
+        box = length, wide, high, REAR_AXLE * length, REAR_AXLE * length
+        tracks.append(Track(short[names[first]], str(kinds[first]), *box, time[rows], x[rows], y[rows], heading))
+    note = "the road is that of the traffic: lane centres are those of its vehicles, nobody measured markings"
+    return _made(made, tracks, [source], [note])
+
+
+def _levelx(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
+    """One recording of highD, whose road is straight and has its markings in the meta file; exiD comes with a road."""
+    files = sorted(source.glob("*_tracks.csv")) if source.is_dir() else [source]
+    if len(files) != 1:
+        raise FormatError(f"{len(files)} recordings (XX_tracks.csv); name one", path=source)
+    table, meta, about = levelx.read_recording_files(files[0])
+    rate = levelx.frame_rate(about, files[0])
+    if "latLaneCenterOffset" in table.columns:
+        kinds = meta.set_index("trackId").reindex(table["trackId"])["class"].astype(str).to_numpy()
+        named = table.assign(time=table["frame"] / rate, heading=np.radians(table["heading"]), vehicle_class=kinds)
+        return _on_road(tracks_of(named, files[0], saved=columns), files[0], road)
+    levelx.require(table, levelx.HIGHD_COLUMNS, files[0])
+    lower, upper = (np.sort(levelx.markings(about, side, files[0])) for side in ("lower", "upper"))
+    middle = 0.5 * (upper[-1] + lower[0])
+    ways = meta.set_index("id")["drivingDirection"]
+    classes = meta.set_index("id")["class"].astype(str).str.lower()
+    x0 = float(np.floor(table["x"].min() - AROUND))
+    length = float(np.ceil(table["x"].max() + table["width"].max() + AROUND)) - x0
+    tracks = []
+    for name, rows in table.sort_values(["id", "frame"]).groupby("id"):
+        time = rows["frame"].to_numpy(dtype=np.float64) / rate
+        rows, time = rows[_thinned(time)], time[_thinned(time)]
+        size, wide, kind = float(rows["width"].iloc[0]), float(rows["height"].iloc[0]), str(classes[name])
+        x, y = (rows["x"] + 0.5 * rows["width"]).to_numpy(), -(rows["y"] + 0.5 * rows["height"]).to_numpy()
+        heading = np.full(len(time), 0.0 if ways[name] == 2 else np.pi)
+        box = size, wide, USUAL_HEIGHT.get(kind, 1.5), REAR_AXLE * size, REAR_AXLE * size
+        tracks.append(Track(str(name), kind, *box, time, x, y, heading))
+    left, right = (
+        [WrittenLane.even("median", inner), *(WrittenLane.even("driving", float(one)) for one in widths)]
+        for inner, widths in (
+            (middle - float(upper[-1]), np.diff(upper)[::-1]),
+            (float(lower[0]) - middle, np.diff(lower)),
+        )
+    )
+    plan = np.array([[0.0, x0, -middle, 0.0, length]])  # y points down in the recording
+    return _made(WrittenRoad(f"highd-{files[0].name.split('_')[0]}", plan, left, right), tracks, [files[0]], [])
+
+
+def _short(names: NDArray[np.str_]) -> dict[str, str]:
+    """Names without the beginning that all have in common, as long as a digit is left."""
+    every = sorted(set(names.tolist()))
+    common = 0
+    while len(every) > 1 and common < len(every[0]) - 1 and len({name[: common + 1] for name in every}) == 1:
+        common += 1
+    return {name: name[common:] for name in every}
+
+
+def dlr_road(found: dlr_ht.Carriageways) -> WrittenRoad:
+    """Both carriageways along one reference line; lanes where their traffic drives.
+
+    A lane's width is the distance of the two centres of its direction; what is left to the reference line is the
+    median's.
+    """
+    line = found.reference
+    middle = line.place(np.array([0.5 * line.length]), 0)[0]
+    origin = float(np.round(middle[0])), float(np.round(middle[1]))
+    s = np.linspace(0.0, line.length, max(2, round(line.length / WIDTH_PIECE)) + 1)
+    sides = []
+    for name in ("southbound", "northbound"):
+        outer, inner = found.lanes[name]
+        along = s if name == "northbound" else line.length - s
+        distance = [-one.at(np.clip(along, one.start, one.end), np.full(len(s), one.height)) for one in (inner, outer)]
+        width = distance[1] - distance[0]
+        median = distance[0] - 0.5 * width
+        sides.append(
+            [
+                WrittenLane.through("median", s, median),
+                WrittenLane.through("driving", s, width),
+                WrittenLane.through("driving", s, width),
+                WrittenLane.even("shoulder", SHOULDER),
+            ]
+        )
+    return WrittenRoad("dlr-ht", curved_plan(line, origin), sides[0], sides[1], origin)
+
+
+Reader = Callable[[Path, "Path | None", TableMapping], RecordedTraffic]
+READERS: dict[str, Reader] = {
+    "dlr-ht": _dlr,
+    "levelx": _levelx,
+    "tracks": _tracks,
+    "osi": _osi,
+    "commonroad": _commonroad,
+}
+"""Format -> its reader."""

@@ -1,0 +1,169 @@
+"""What all results have in common, and what calls accept as their inputs."""
+
+from __future__ import annotations
+
+import hashlib
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.files.hashes import parsed_hashes
+from xosc_lateral.workflows.conversion.options import PathLike, Paths, ProfileLike
+from xosc_lateral.workflows.conversion.options import paths as as_paths
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from xosc_lateral.files.mapping import MappingLike
+
+
+class Result(ABC):
+    """A result: a line as its `repr`, the command line's text as its `str`, a table, and JSON values."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def headline(self) -> str:
+        """One line."""
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.headline()}>"
+
+    @abstractmethod
+    def __str__(self) -> str: ...
+
+    @abstractmethod
+    def to_frame(self) -> pd.DataFrame:
+        """As a table."""
+
+    @abstractmethod
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them."""
+
+
+PAGE_SUFFIXES = (".html", ".htm")
+
+
+def write_page(
+    path: PathLike, usual_name: str, html: Callable[[], str], *, inputs: Iterable[Path] = (), force: bool = False
+) -> Path:
+    """Write an HTML page, if need be into a folder; made only if it may be written there."""
+    from xosc_lateral.files.atomic import write_atomically
+    from xosc_lateral.files.output_paths import claim, output_file
+
+    output = output_file(path, usual_name, PAGE_SUFFIXES)
+    claim([output], inputs, force=force)
+    return write_atomically(output, html())
+
+
+__all__ = ["DrivesLike", "PathLike", "Paths", "ProfileLike", "as_paths", "given_drives", "given_profile"]
+
+DrivesLike: TypeAlias = "PathLike | pd.DataFrame | Drive | Sequence[PathLike | pd.DataFrame | Drive]"
+"""A table's path, a frame, a `Drive`, or several of them."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class GivenDrives:
+    """Drives, and what they came from.
+
+    Parameters
+    ----------
+    drives : list of Drive
+    inputs : mapping of str to str
+        Name of each table -> SHA-256 of its bytes (of a frame: of its columns' values).
+    files : tuple of Path
+        Those of them that are files.
+    """
+
+    drives: list[Drive]
+    inputs: Mapping[str, str]
+    files: tuple[Path, ...]
+
+
+@contextmanager
+def naming(given: GivenDrives) -> Iterator[None]:
+    """What finds too little in the drives does not know their files: they are named here.
+
+    Raises
+    ------
+    NotEnoughDataError
+        With the files before it.
+    """
+    try:
+        yield
+    except NotEnoughDataError as error:
+        names = [str(path) for path in given.files] or list(given.inputs)
+        if not names or any(name in str(error) for name in names):
+            raise
+        more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+        raise NotEnoughDataError(f"{', '.join(names[:3])}{more}: {error}") from error
+
+
+def given_drives(drives: DrivesLike, columns: MappingLike | None = None) -> GivenDrives:
+    """Read whatever stands for measured drives.
+
+    Parameters
+    ----------
+    drives : path, DataFrame, Drive, or sequence of them
+    columns : mapping of str to str, TableMapping, or path, optional
+        Standard name -> foreign header, with a unit if need be: ``{"speed": "v_kmh:km/h"}``; or a saved mapping.
+
+    Raises
+    ------
+    FormatError, NotEnoughDataError
+        See `formats.drives.read_drives`.
+    """
+    from xosc_lateral.files.drives import drives_of_table, read_drives, with_distinct_names
+    from xosc_lateral.files.mapping import as_mapping
+
+    items = _listed(drives)
+    mapping = as_mapping(columns)
+    files = [Path(item) for item in items if isinstance(item, str | Path)]
+    if len(files) == len(items):
+        return GivenDrives(read_drives(files, mapping), parsed_hashes(files), tuple(files))
+    found: list[Drive] = []
+    inputs: dict[str, str] = {}
+    for number, item in enumerate(items, start=1):
+        if isinstance(item, Drive):
+            found.append(item)
+        elif isinstance(item, str | Path):
+            found += read_drives(item, mapping)
+        else:
+            name = "DataFrame" if len(items) == 1 else f"DataFrame {number}"
+            found += drives_of_table(item, mapping, name)
+            inputs[name] = frame_hash(item)
+    return GivenDrives(with_distinct_names(found), parsed_hashes(files) | inputs, tuple(files))
+
+
+def frame_hash(frame: pd.DataFrame) -> str:
+    """SHA-256 over the names, kinds and values of a frame's columns, in hexadecimal."""
+    digest = hashlib.sha256()
+    for name in frame.columns:
+        values = frame[name]
+        digest.update(f"\0{name}\0{values.dtype}\0".encode())
+        if isinstance(values.dtype, np.dtype) and values.dtype.kind in "biuf":
+            digest.update(values.to_numpy().astype(values.dtype.newbyteorder("<")).tobytes())
+        else:  # texts, times, categories
+            digest.update(values.to_csv(index=False, header=False).encode())
+    return digest.hexdigest()
+
+
+def given_profile(profile: ProfileLike, library: Paths = ()) -> DriverProfile:
+    """A profile as it is, or read by its path or name; see `read_profile`."""
+    from xosc_lateral.files.profiles import read_profile
+
+    return profile if isinstance(profile, DriverProfile) else read_profile(profile, as_paths(library))
+
+
+def _listed(drives: DrivesLike) -> list[PathLike | pd.DataFrame | Drive]:
+    if isinstance(drives, str | Path | Drive) or not isinstance(drives, Sequence):
+        return [drives]
+    return list(drives)

@@ -1,0 +1,1 @@
+"""What happens in a scenario: storyboard, road, player, motion, surroundings."""

@@ -1,0 +1,149 @@
+"""Free space between vehicles: the exact distance between their bounding boxes, seen from above.
+
+References
+----------
+.. [1] C. Ericson, "Real-Time Collision Detection", 2005, sections 5.1.2 (point and line segment) and 5.2.1
+       (separating axes).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from msgspec import Struct
+from numpy.typing import NDArray
+
+from xosc_lateral.base.arrays import BoolArray, FloatArray
+from xosc_lateral.base.rows import BLOCK, give_back
+from xosc_lateral.world.surroundings.nearby import stretches_within
+
+REACH = 30.0
+"""Boxes farther apart than this at all times are no pair worth naming. [m]"""
+
+
+LEAST_SIZE = 1e-9
+"""A box is at least this long and wide: sides without a length have no direction. [m]"""
+
+TOGETHER = 256
+"""Pairs whose boxes are compared at once: a numpy call costs as much as some hundred boxes. [-]"""
+
+
+class BoxPath(Struct, frozen=True, eq=False):
+    """A vehicle's bounding box along its path."""
+
+    name: str
+    x: FloatArray
+    y: FloatArray
+    heading: FloatArray
+    """Shape (n,). Pose of the reference point; NaN where the vehicle is absent. [m], [rad]"""
+    length: float
+    width: float
+    """Of the box. [m]"""
+    centre: float
+    """Box centre ahead of the reference point. [m]"""
+
+
+class Gap(Struct, frozen=True):
+    """Smallest free space between two vehicles over a run; 0: they touch."""
+
+    names: tuple[str, str]
+    distance: float
+    """[m]"""
+    time: float
+    """When it is reached first. [s]"""
+
+    @property
+    def touches(self) -> bool:
+        """Whether the boxes overlap or meet."""
+        return self.distance <= 0.0
+
+
+def smallest_gaps(time: FloatArray, paths: Sequence[BoxPath], *, reach: float = REACH) -> tuple[Gap, ...]:
+    """Smallest gap of each pair of vehicles that come within `reach` [m] of each other, on one time grid [s]."""
+    smallest: dict[tuple[int, int], Gap] = {}
+    for part in _together(_near_pairs(paths, reach)):
+        a, b = ([(paths[pair[side]], near) for pair, near in part] for side in (0, 1))
+        distances = box_distance(corners(a), corners(b))
+        ends = np.cumsum([len(near) for _, near in part])
+        for (pair, near), distance in zip(part, np.split(distances, ends[:-1]), strict=True):
+            best = int(np.argmin(distance))
+            if distance[best] <= reach and not (pair in smallest and smallest[pair].distance <= distance[best]):
+                names = paths[pair[0]].name, paths[pair[1]].name
+                smallest[pair] = Gap(names, float(distance[best]), float(time[near[best]]))
+    return tuple(smallest[pair] for pair in sorted(smallest))
+
+
+_NearPair = tuple[tuple[int, int], NDArray[np.intp]]
+
+
+def _near_pairs(paths: Sequence[BoxPath], reach: float) -> Iterator[_NearPair]:
+    """Pairs that come near each other, and rows of a stretch on which their gap may be the smallest."""
+    extent = max((np.hypot(path.length, path.width) / 2 + abs(path.centre) for path in paths), default=0.0)
+    x, y = [path.x for path in paths], [path.y for path in paths]
+    for rows, pairs in stretches_within(x, y, reach + 2 * extent):
+        for first, second in pairs:
+            a, b = paths[first], paths[second]
+            half_diagonals = 0.5 * (np.hypot(a.length, a.width) + np.hypot(b.length, b.width))
+            between = np.hypot(a.x[rows] - b.x[rows], a.y[rows] - b.y[rows])
+            apart = between - half_diagonals - abs(a.centre) - abs(b.centre)
+            near = np.flatnonzero(apart <= reach)
+            if len(near):
+                # the exact distance is only needed where a lower bound of it undercuts the best upper bound
+                upper = np.min(between[near]) + abs(a.centre) + abs(b.centre)
+                yield (first, second), rows.start + near[apart[near] <= upper]
+        give_back()
+
+
+def _together(pairs: Iterator[_NearPair]) -> Iterator[list[_NearPair]]:
+    """As many as are looked at at once."""
+    part: list[_NearPair] = []
+    rows = 0
+    for pair in pairs:
+        part.append(pair)
+        rows += len(pair[1])
+        if len(part) == TOGETHER or rows >= BLOCK:
+            yield part
+            part, rows = [], 0
+    if part:
+        yield part
+
+
+def corners(boxes: Sequence[tuple[BoxPath, NDArray[np.intp]]]) -> FloatArray:
+    """Corners of boxes on some rows each, counter-clockwise, one box after the other, shape (n, 4, 2). [m]"""
+    x, y, heading = (np.concatenate([getattr(box, name)[rows] for box, rows in boxes])[:, None] for name in _POSE)
+    counts = [len(rows) for _, rows in boxes]
+    length, width, centre = (np.repeat([getattr(box, name) for box, _ in boxes], counts)[:, None] for name in _SIZE)
+    ahead = centre + 0.5 * length * np.array([1.0, -1.0, -1.0, 1.0])
+    left = 0.5 * width * np.array([1.0, 1.0, -1.0, -1.0])
+    cos, sin = np.cos(heading), np.sin(heading)
+    return np.stack([x + ahead * cos - left * sin, y + ahead * sin + left * cos], axis=-1)
+
+
+_POSE, _SIZE = ("x", "y", "heading"), ("length", "width", "centre")
+
+
+def box_distance(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Distance between rectangles, row by row, shape (n,); 0 where they overlap. [m]
+
+    From their corners in order, shape (n, 4, 2). [m]
+    """
+    from_a, apart_of_a = _beyond(a, b)
+    from_b, apart_of_b = _beyond(b, a)
+    return np.where(apart_of_a | apart_of_b, np.minimum(from_a, from_b), 0.0)
+
+
+def _beyond(box: FloatArray, corners: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """Distance of the nearest corner from a box that they are not in [m], and whether a side of it parts them from it.
+
+    Convex shapes are nearest to each other at a corner of one of them, and apart if a side of one parts them.
+    """
+    x, y = (np.ascontiguousarray(corners[..., k].T) - 0.5 * (box[:, 0, k] + box[:, 2, k]) for k in (0, 1))
+    outside, parted = [], np.zeros(len(box), dtype=bool)
+    for neighbour in (1, 3):
+        east, north = (0.5 * (box[:, 0, k] - box[:, neighbour, k]) for k in (0, 1))
+        half = np.maximum(np.hypot(east, north), LEAST_SIZE)
+        along = (x * east + y * north) / half
+        parted |= (along.min(axis=0) > half) | (along.max(axis=0) < -half)
+        outside.append(np.maximum(np.abs(along) - half, 0.0))
+    return np.hypot(*outside).min(axis=0), parted

@@ -1,0 +1,124 @@
+"""Which segments of an entity's motion are road-following, and why the rest is none."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+import numpy as np
+from msgspec import Struct
+
+from xosc_lateral.base.arrays import BoolArray, IntArray
+from xosc_lateral.base.rows import blocks
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion
+from xosc_lateral.world.road.network import RoadNetwork
+
+MINIMUM_SPEED = 40.0 / 3.6
+"""Below this the model says nothing [m/s] (Neis & Beyerer cut their data at 40 km/h)."""
+
+_ACROSS_LANE = np.pi / 4
+"""Heading relative to the lane, whichever way it is driven, beyond which the vehicle does not follow it. [rad]"""
+
+_SPEED_SLACK = 1e-6
+"""40 km/h written as 11.1111 in a scenario is meant as 40 km/h. [m/s, relative]"""
+
+
+class SegmentKind(Enum):
+    """What a segment is; every value but the first is a reason why no offsets are sampled there."""
+
+    ROAD_FOLLOWING = "road-following"
+    ABSENT = "not in the scenario at that time"
+    NOT_A_VEHICLE = "not a vehicle"
+    TRAILER = "trailer"
+    OFF_ROAD = "off the road"
+    TRAJECTORY = "follows a trajectory"
+    LATERAL_ACTION = "lateral action"
+    NOT_DRIVING_LANE = "not in a driving lane"
+    ACROSS_LANE = "not heading along its lane"
+    SLOW = "below 40 km/h"
+    ROAD_END = "at the end of the road"
+
+
+_KINDS = tuple(SegmentKind)
+
+
+class SegmentSpan(Struct, frozen=True):
+    """A segment as the rows ``first`` to ``last`` (both included) of one entity, of one kind throughout."""
+
+    kind: SegmentKind
+    first: int
+    last: int
+    """Rows of the entity's motion."""
+    start: float
+    end: float
+    """Time of those rows. [s]"""
+
+    @property
+    def is_road_following(self) -> bool:
+        """Whether offsets are sampled here."""
+        return self.kind is SegmentKind.ROAD_FOLLOWING
+
+
+class SegmentRow(Struct, frozen=True):
+    """One segment of one entity."""
+
+    entity: str
+    start: float
+    end: float
+    """[s]"""
+    road_following: bool
+    why: str
+    """Why it is no road-following segment; empty if it is one."""
+    road: str
+    lane: int
+    """Where it begins; empty and 0 off the road."""
+
+
+def cut_segments(motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool = False) -> tuple[SegmentSpan, ...]:
+    """Cut an entity's whole motion into segments, each row into exactly one; teleports always cut.
+
+    `is_trailer`: the entity is pulled by another, and has no driver.
+    """
+    firsts: list[tuple[int, int]] = []  # rows at which segments begin, and their kinds
+    before = -1
+    for rows in blocks(len(motion.time)):
+        kinds = _row_kinds(motion, network, rows, is_trailer)
+        placed_anew = (motion.activity[rows] & Activity.TELEPORTED) != 0
+        cut = np.flatnonzero((np.diff(kinds, prepend=before) != 0) | placed_anew)
+        firsts += zip((rows.start + cut).tolist(), kinds[cut].tolist(), strict=True)
+        before = kinds[-1]
+    lasts = [*(first - 1 for first, _ in firsts[1:]), len(motion.time) - 1]
+    return tuple(
+        SegmentSpan(_KINDS[kind], a, b, float(motion.time[a]), float(motion.time[b]))
+        for (a, kind), b in zip(firsts, lasts, strict=True)
+    )
+
+
+def _row_kinds(motion: EntityMotion, network: RoadNetwork, rows: slice, is_trailer: bool) -> IntArray:
+    """Kind of each of these rows, as its index in `SegmentKind`; the first reason that applies, in the enum's order."""
+    kinds = np.zeros(rows.stop - rows.start, dtype=np.int64)
+    for kind, applies in reversed(_reasons(motion, network, rows, is_trailer).items()):
+        kinds[applies] = _KINDS.index(kind)
+    return kinds
+
+
+def _reasons(
+    motion: EntityMotion, network: RoadNetwork, rows: slice, is_trailer: bool
+) -> dict[SegmentKind, BoolArray | bool]:
+    """Where in these rows each kind applies, by the enum's order."""
+    activity, road, lane, s = motion.activity[rows], motion.road[rows], motion.lane[rows], motion.s[rows]
+    on_road = (road >= 0) & ((activity & Activity.OFF_ROAD) == 0)
+    in_driving_lane = np.zeros(len(road), dtype=bool)
+    in_driving_lane[on_road] = network.lane_index(road[on_road], lane[on_road], s[on_road])[0] >= 0
+    return {
+        SegmentKind.ABSENT: (activity & Activity.ACTIVE) == 0,
+        SegmentKind.NOT_A_VEHICLE: not motion.entity.is_vehicle,
+        SegmentKind.TRAILER: is_trailer,
+        SegmentKind.OFF_ROAD: ~on_road,
+        SegmentKind.TRAJECTORY: (activity & Activity.TRAJECTORY) != 0,
+        SegmentKind.LATERAL_ACTION: (activity & Activity.LATERAL) != 0,
+        SegmentKind.NOT_DRIVING_LANE: on_road & ~in_driving_lane,
+        # Who overtakes on the lane of those who come towards him follows that lane.
+        SegmentKind.ACROSS_LANE: np.abs(np.sin(motion.heading_relative[rows])) > np.sin(_ACROSS_LANE),
+        SegmentKind.SLOW: motion.speed[rows] < MINIMUM_SPEED * (1.0 - _SPEED_SLACK),
+        SegmentKind.ROAD_END: (activity & Activity.ROAD_END) != 0,
+    }

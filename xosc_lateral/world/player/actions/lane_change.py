@@ -1,0 +1,142 @@
+"""LaneChangeAction."""
+
+from __future__ import annotations
+
+from math import atan, atan2, copysign, inf, pi, sqrt
+
+from xosc_lateral.world.motion.nominal import Activity
+from xosc_lateral.world.player.actions.base import Domain, Maker, RunningPrivateAction
+from xosc_lateral.world.player.drive import move_along_lane
+from xosc_lateral.world.player.positions.resolve import beside
+from xosc_lateral.world.player.state import NOWHERE, EntityState
+from xosc_lateral.world.player.transition import EPSILON, Transition
+from xosc_lateral.world.scenario.enums import DynamicsDimension, DynamicsShape
+from xosc_lateral.world.scenario.private_actions import AbsoluteTargetLane, LaneChangeAction
+
+
+class RunningLaneChange(RunningPrivateAction):
+    """From the present lateral position to the target lane, while moving on.
+
+    The lateral position is measured from the centre of the target lane: its width and course are thereby followed. The
+    way of one frame on the entity's track is `speed * step`; what goes sideways is missing ahead. The heading follows
+    the movement of the frame and is 0 again at the end.
+    """
+
+    domains = Domain.LATERAL
+    content: LaneChangeAction
+
+    def _prepare(self) -> None:
+        self._reference = self._referred(self.content.target)
+
+    def _begin(self) -> None:
+        state = self.actor
+        state.locate()
+        if state.road == NOWHERE:
+            self._refuse(f"'{state.name}' is on no road: the lane change is not played")
+            return
+        lane, network = self._target_lane(), state.network
+        if not network.has_lane_at(state.road, lane, state.s):
+            there = ", ".join(str(info.id) for info in network.lanes_at(state.road, state.s))
+            what = f"road '{network.road_ids[state.road]}' has no lane {lane} at s = {state.s:.1f} m (lanes: {there})"
+            self._refuse(f"{what}: lane change not played")
+            return
+        state.turn(0.0 if state.is_forward else pi)
+        self._guide = EntityState(state.entity, network, route=state.route)
+        """Follows the target lane beside the entity, at its own place across the road."""
+        across = state.t - network.lane_state_at(state.road, lane, state.s).centre_t
+        self._guide.put(state.place._replace(lane=lane, offset_t=across, pose=None))
+        self._transition = Transition.of(self.content.dynamics)
+        self._transition.begin(across, self.content.target_lane_offset)
+
+    def _act(self, time: float, step: float) -> None:
+        state, guide, transition = self.actor, self._guide, self._transition
+        state.take_control(Activity.LATERAL)
+        way = abs(state.speed) * step
+        if abs(state.speed) < EPSILON:
+            return
+        side = copysign(1.0, transition.target - transition.start)
+        flipped = guide.road, guide.lane
+        ahead, offset, turn = self._move_of_frame(way, step)
+        guide.offset_t = offset
+        if transition.is_step:
+            ahead = way
+        move_along_lane(guide, copysign(ahead, state.speed))
+        self._follow_flip(flipped, offset)
+        self._place(guide, turn)
+        if transition.is_step:
+            self._jumped(transition.target - transition.start)
+        state.speed_taken = True
+        if transition.is_done or self._is_there(offset, side):
+            state.turn(0.0 if guide.is_forward else pi)
+            self.end()
+        elif guide.at_road_end:
+            self.end()
+
+    # ---- in detail ---------------------------------------------------------------------------------------------------
+    def _target_lane(self) -> int:
+        target = self.content.target
+        if isinstance(target, AbsoluteTargetLane):
+            return target.lane_id
+        assert self._reference is not None
+        self._reference.locate()
+        if self._reference.lane == 0 and target.value == 0:
+            return 1  # nobody drives on lane 0: the lane to its left, as in the reference player
+        return beside(self._reference.lane, target.value if self._reference.is_forward else -target.value)
+
+    def _move_of_frame(self, way: float, step: float) -> tuple[float, float, float]:
+        """Way ahead [m], new offset [m], and heading relative to the direction of driving, positive to +t [rad]."""
+        transition = self._transition
+        rate = transition.slope() / transition.scale
+        if transition.dimension is DynamicsDimension.DISTANCE:
+            if transition.is_step:
+                return way, transition.value(), 0.0
+            ahead = way / sqrt(1.0 + rate * rate)
+            transition.advance(ahead)
+            return ahead, transition.value(), atan(rate)
+        sideways = step * abs(rate)
+        ahead = sqrt(max(way * way - min(sideways, way) ** 2, 0.0))
+        if sideways < way + EPSILON:
+            transition.advance(step)
+            return ahead, transition.value(), atan2(copysign(sideways, rate), ahead)
+        if transition.is_step:
+            transition.advance(inf)
+            return ahead, transition.target, 0.0
+        return self._aside(way, rate)
+
+    def _aside(self, way: float, rate: float) -> tuple[float, float, float]:
+        """Slower than the change asks for: all movement goes sideways, evenly."""
+        transition = self._transition
+        change = max(abs(transition.target - transition.start), EPSILON)
+        transition.advance(way * transition.range / change)
+        return 0.0, transition.value(DynamicsShape.LINEAR), copysign(0.5 * pi - EPSILON, rate)
+
+    def _follow_flip(self, before: tuple[int, int], offset: float) -> None:
+        """On a road whose s runs the other way, +t is the other side: the rest of the transition is mirrored."""
+        guide, transition = self._guide, self._transition
+        if guide.offset_t != offset and (guide.road, guide.lane) != before and guide.offset_t == -offset:
+            transition.start, transition.target = -transition.start, -transition.target
+
+    def _place(self, guide: EntityState, turn: float) -> None:
+        """Put the actor where its guide is, on the lane that is under it."""
+        network, state = self.simulation.network, self.actor
+        t = guide.t
+        found = network.lane_at(guide.road, guide.s, t)
+        lane = found.lane or guide.lane
+        under = network.lane_state_at(guide.road, lane, guide.s)
+        state.move_to(guide.road, lane, guide.s, t - under.centre_t)
+        # The course is relative to the target lane; lanes side by side are not parallel where one widens.
+        aside = atan(network.lane_state_at(guide.road, guide.lane, guide.s).slope) - atan(under.slope)
+        state.section = (0.0, -1.0)
+        state.at_road_end = guide.at_road_end
+        if guide.is_forward:
+            state.turn(copysign(1.0, state.speed) * turn + aside)
+        else:
+            state.turn(pi - copysign(1.0, state.speed) * turn + aside)
+
+    def _is_there(self, offset: float, side: float) -> bool:
+        transition = self._transition
+        rest = (transition.target - offset) * side
+        return abs(rest) < EPSILON or (transition.parameter > 0.0 and rest < 0.0)
+
+
+RUNNING: dict[type, Maker] = {LaneChangeAction: RunningLaneChange}

@@ -1,0 +1,162 @@
+"""Conditions on distances: to a position, to an entity, headway and time to collision, and contact.
+
+References
+----------
+.. [1] J. C. Hayward, "Near-miss determination through use of a scale of danger", Highway Research Record 384, 1972:
+       time to collision.
+"""
+
+from __future__ import annotations
+
+from math import copysign, hypot
+
+from xosc_lateral.world.player.angles import difference
+from xosc_lateral.world.player.boxes import overlap
+from xosc_lateral.world.player.conditions.base import EntityCheck, EntityChecks
+from xosc_lateral.world.player.distances import Measure, Spot, apart
+from xosc_lateral.world.player.positions.resolve import pose_of, spot_at
+from xosc_lateral.world.player.simulation import Simulation
+from xosc_lateral.world.player.state import EntityState
+from xosc_lateral.world.player.transition import EPSILON
+from xosc_lateral.world.player.values import holds
+from xosc_lateral.world.scenario.conditions import (
+    CollisionCondition,
+    DistanceCondition,
+    Measured,
+    ReachPositionCondition,
+    RelativeDistanceCondition,
+    TimeHeadwayCondition,
+    TimeToCollisionCondition,
+)
+from xosc_lateral.world.scenario.enums import CoordinateSystem, RelativeDistanceType, RoutingAlgorithm
+
+_SHORTEST = (None, RoutingAlgorithm.UNDEFINED, RoutingAlgorithm.SHORTEST)
+
+
+def measure_of(content: Measured | RelativeDistanceCondition, simulation: Simulation) -> Measure:
+    """Defaults of the standard: entity frame, euclidian. `alongRoute` of version 1.0 names the road, but not which
+    component of the distance; a euclidian one is the same in every frame (so the reference player has it, too).
+
+    What is measured otherwise than asked for is noted.
+    """
+    along_route = getattr(content, "along_route", None)
+    system = content.coordinate_system or (CoordinateSystem.ROAD if along_route else CoordinateSystem.ENTITY)
+    measure = Measure(system, content.distance_type or RelativeDistanceType.EUCLIDIAN, content.freespace)
+    if measure.is_along_roads and content.routing_algorithm not in _SHORTEST:
+        simulation.note(
+            f"routingAlgorithm '{content.routing_algorithm}': measured along the shortest way instead", content.place
+        )
+    if (
+        content.freespace
+        and system is CoordinateSystem.TRAJECTORY
+        and measure.kind is not RelativeDistanceType.EUCLIDIAN
+    ):
+        simulation.note("free space along a trajectory: measured along the entity's own axes instead", content.place)
+    return measure
+
+
+def _amount(measure: Measure, state: EntityState, target: Spot | EntityState) -> float:
+    """Never negative. [m]"""
+    if measure.kind is RelativeDistanceType.EUCLIDIAN and not measure.freespace:
+        place = target.plane if isinstance(target, EntityState) else target
+        return apart(state, place.x, place.y)
+    return abs(measure.between(state, target))
+
+
+def prepare_distance(content: DistanceCondition, simulation: Simulation) -> EntityCheck:
+    """Its amount counts. [m]"""
+    measure = measure_of(content, simulation)
+    spot = spot_at(content.position, simulation)
+    return lambda state: holds(_amount(measure, state, spot()), content.rule, content.value)
+
+
+def prepare_relative_distance(content: RelativeDistanceCondition, simulation: Simulation) -> EntityCheck:
+    """Its amount counts. [m]"""
+    other = simulation.entity(content.entity_ref, content.place)
+    measure = measure_of(content, simulation)
+    return lambda state: other.active and holds(_amount(measure, state, other), content.rule, content.value)
+
+
+ANGULAR_TOLERANCE = 0.05
+"""How far heading, pitch and roll may be from an orientation that is given; the reference player's value. [rad]"""
+
+
+def prepare_reach_position(content: ReachPositionCondition, simulation: Simulation) -> EntityCheck:
+    """Straight distance in the plane [m]; an orientation that the position gives has to be met, too."""
+    spot = spot_at(content.position, simulation)
+    oriented = getattr(content.position, "orientation", None) is not None
+
+    def check(state: EntityState) -> bool:
+        target = spot()
+        if not apart(state, target.x, target.y) < content.tolerance:
+            return False
+        if not oriented:
+            return True
+        wanted, pose = pose_of(content.position, simulation), state.pose
+        return all(
+            abs(difference(getattr(pose, angle), getattr(wanted, angle))) < ANGULAR_TOLERANCE
+            for angle in ("heading", "pitch", "roll")
+        )
+
+    return check
+
+
+def prepare_time_headway(content: TimeHeadwayCondition, simulation: Simulation) -> EntityCheck:
+    """Not defined, hence false, when the other is behind or the entity does not move forward. [s]"""
+    other = simulation.entity(content.entity_ref, content.place)
+    measure = measure_of(content, simulation)
+
+    def check(state: EntityState) -> bool:
+        if not other.active or state.speed < EPSILON:
+            return False
+        distance = measure.between(state, other)
+        return distance >= 0.0 and holds(distance / state.speed, content.rule, content.value)
+
+    return check
+
+
+def prepare_time_to_collision(content: TimeToCollisionCondition, simulation: Simulation) -> EntityCheck:
+    """Not defined, hence false, when they don't come closer. [s]"""
+    measure, target = measure_of(content, simulation), content.target
+    if isinstance(target, str):
+        other = simulation.entity(target, content.place)
+        simulation.derives_motion = True
+        return lambda state: (
+            other.active and _collides(measure.between(state, other), _closing_speed(state, other), content)
+        )
+    spot = spot_at(target, simulation)
+    return lambda state: _collides(measure.between(state, spot()), state.speed, content)
+
+
+def _collides(distance: float, closing: float, content: TimeToCollisionCondition) -> bool:
+    if abs(distance) < EPSILON or abs(closing) < EPSILON or distance / closing < 0.0:
+        return False
+    return holds(distance / closing, content.rule, content.value)
+
+
+def _closing_speed(state: EntityState, other: EntityState) -> float:
+    """Own velocity along the other's velocity, minus the other's speed; own speed when the other stands. [m/s]"""
+    vx, vy, _ = other.velocity
+    if abs(vx) < EPSILON and abs(vy) < EPSILON:
+        return state.speed
+    along = (state.velocity[0] * vx + state.velocity[1] * vy) / hypot(vx, vy)
+    return copysign(1.0, state.speed) * copysign(1.0, along) * (along - abs(other.speed))
+
+
+def prepare_collision(content: CollisionCondition, simulation: Simulation) -> EntityCheck:
+    """With one entity, or with any other of a category. Who is named touches itself, as in the reference player."""
+    if content.entity_ref is not None:
+        named = simulation.entity(content.entity_ref, content.place)
+        return lambda state: named.active and overlap(state, named)
+    others = [o for o in simulation.everybody() if content.by_type in (None, o.entity.category)]
+    return lambda state: any(o is not state and o.active and overlap(state, o) for o in others)
+
+
+CHECKS: EntityChecks = {
+    DistanceCondition: prepare_distance,
+    RelativeDistanceCondition: prepare_relative_distance,
+    ReachPositionCondition: prepare_reach_position,
+    TimeHeadwayCondition: prepare_time_headway,
+    TimeToCollisionCondition: prepare_time_to_collision,
+    CollisionCondition: prepare_collision,
+}

@@ -1,0 +1,255 @@
+"""Distances between an entity and something else, in the ways that conditions and actions ask for.
+
+All signed: positive ahead, or to the left. The reference direction is that of the road at the entity, turned the way
+that the entity points; without a road, the entity's own heading (as in the reference player).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import copysign, cos, hypot, inf, sin
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from xosc_lateral.world.player import boxes
+from xosc_lateral.world.player.paths.base import nearest_s
+from xosc_lateral.world.player.state import NOWHERE, EntityState
+from xosc_lateral.world.player.trailers import drawn_by
+from xosc_lateral.world.road.network import RoadNetwork
+from xosc_lateral.world.road.positions import RoadPath
+from xosc_lateral.world.scenario.enums import CoordinateSystem, RelativeDistanceType
+
+_ALONG_ROADS = (CoordinateSystem.ROAD, CoordinateSystem.LANE)
+
+FAR = 1e10
+"""Distance where there is no way from one to the other. [m]"""
+
+
+class Spot(Struct, frozen=True):
+    """A place that distances are measured to; without road coordinates where it has none, or nobody needs them. [m]"""
+
+    x: float
+    y: float
+    road: int = NOWHERE
+    lane: int = 0
+    s: float = 0.0
+    t: float = 0.0
+
+
+class RoadGap(Struct, frozen=True):
+    """From one place to another along the roads, seen there.
+
+    [m], lanes (positive to +t, lane 0 not counted), whether on the other side of lane 0, whether s runs the other way.
+    """
+
+    ds: float
+    dt: float
+    lanes: int
+    opposite: bool
+    is_turned: bool = False
+
+
+def ahead_and_left(state: EntityState, x: float, y: float) -> tuple[float, float]:
+    """Components of the way to a point in the entity's own frame: along its heading, and to its left. [m]"""
+    pose = state.plane
+    c, s = cos(pose.heading), sin(pose.heading)
+    dx, dy = x - pose.x, y - pose.y
+    return dx * c + dy * s, dy * c - dx * s
+
+
+def apart(state: EntityState, x: float, y: float) -> float:
+    """Euclidian distance in the plane, never negative. [m]"""
+    pose = state.plane
+    return hypot(pose.x - x, pose.y - y)
+
+
+def straight_distance(state: EntityState, x: float, y: float) -> float:
+    """Euclidian distance, negative when the point is behind."""
+    ahead, left = ahead_and_left(state, x, y)
+    length = hypot(ahead, left)
+    return length if ahead > 0.0 else -length
+
+
+def spot_of(state: EntityState) -> Spot:
+    """Where an entity is."""
+    state.locate()
+    pose = state.pose
+    if state.road == NOWHERE:
+        return Spot(pose.x, pose.y)
+    return Spot(pose.x, pose.y, state.road, state.lane, state.s, state.t)
+
+
+def road_gap(state: EntityState, spot: Spot, *, limit: float = FAR) -> RoadGap | None:
+    """Way from an entity to a spot along the roads; None: there is none."""
+    return _gap_between(state, spot_of(state), spot, limit)
+
+
+def free_road_gap(state: EntityState, other: EntityState, *, limit: float = FAR) -> RoadGap | None:
+    """Free space along the roads to another entity, and the lanes between their front right corners; None: no way.
+
+    A box may lie in two lanes, and the standard does not say which counts: the corner as in the reference player,
+    where boxes that touch are in the same lane.
+    """
+    if boxes.overlap(state, other):
+        return RoadGap(0.0, 0.0, 0, opposite=False)
+    ds = Measure(CoordinateSystem.ROAD, RelativeDistanceType.LONGITUDINAL, freespace=True).to_entity(state, other)
+    if ds is None:
+        return None
+    own, theirs = (_project(state, *boxes.corners(one)[-1]) for one in (state, other))
+    gap = _gap_between(state, own, theirs, limit)
+    return gap and replace(gap, ds=ds)
+
+
+def _gap_between(state: EntityState, own: Spot, spot: Spot, limit: float) -> RoadGap | None:
+    path = _path_between(state, own, spot, limit)
+    if path is None:
+        return None
+    lane = _lane_there(state.network, own, path)
+    opposite = lane * spot.lane < 0
+    lanes = spot.lane - lane
+    if opposite:
+        lanes -= 1 if lanes > 0 else -1
+    return RoadGap(path.ds, _across(own, spot, path), lanes, opposite, path.is_turned)
+
+
+def _path_between(state: EntityState, own: Spot, spot: Spot, limit: float = FAR) -> RoadPath | None:
+    """The way that an entity would drive from one place to another; None: there is none."""
+    if own.road == NOWHERE or spot.road == NOWHERE:
+        return None
+    direction = 1 if state.is_forward else -1
+    return state.network.path_between((own.road, own.s), (spot.road, spot.s), direction=direction, limit=limit)
+
+
+def _across(own: Spot, spot: Spot, path: RoadPath) -> float:
+    """Change of t on the way, as it is counted there. [m]"""
+    return spot.t - (-own.t if path.is_turned else own.t)
+
+
+class Measure(Struct, frozen=True):
+    """How a distance is measured: in which coordinate system, which part of it, between boxes or reference points.
+
+    A distance is None where no way leads along the roads.
+    """
+
+    system: CoordinateSystem
+    kind: RelativeDistanceType
+    freespace: bool = False
+
+    @property
+    def is_along_roads(self) -> bool:
+        """Whether it needs road coordinates."""
+        return self.kind is not RelativeDistanceType.EUCLIDIAN and self.system in _ALONG_ROADS
+
+    def between(self, state: EntityState, target: Spot | EntityState) -> float:
+        """From an entity to a spot, or to another entity with all trailers that both draw; `FAR` without a way. [m]"""
+        found = self.to_spot(state, target) if isinstance(target, Spot) else self._to_train(state, target)
+        return FAR if found is None else found
+
+    def _to_train(self, state: EntityState, target: EntityState) -> float | None:
+        """Free space is that of the nearest two."""
+        pairs = [(own, theirs) for own in _train(state) for theirs in _train(target)]
+        if not self.freespace or len(pairs) == 1:
+            return self.to_entity(state, target)
+        nearness = self if self.is_along_roads else replace(self, kind=RelativeDistanceType.EUCLIDIAN)
+        found = [nearness.to_entity(*pair) for pair in pairs]
+        gap, nearest = min(zip(found, pairs, strict=True), key=lambda one: inf if one[0] is None else abs(one[0]))
+        return gap if nearness is self else self.to_entity(*nearest)
+
+    def to_entity(self, state: EntityState, other: EntityState) -> float | None:
+        """From one entity to another. [m]"""
+        if not self.freespace:
+            if self.is_along_roads:
+                return self.to_spot(state, spot_of(other))
+            pose = other.plane
+            return self.to_spot(state, Spot(pose.x, pose.y))
+        if not self.is_along_roads:
+            return self._between_boxes(state, boxes.corners(other), lambda: boxes.overlap(state, other))
+        if boxes.overlap(state, other):
+            return 0.0
+        return self._between_corners(state, [_project(state, x, y) for x, y in boxes.corners(other)])
+
+    def to_spot(self, state: EntityState, spot: Spot) -> float | None:
+        """From an entity to a spot. [m]"""
+        if self.freespace:
+            if self.is_along_roads:
+                return self._between_corners(state, [spot])
+            point = spot.x, spot.y
+            return self._between_boxes(state, (point,), lambda: boxes.holds_point(boxes.corners(state), point))
+        if self.kind is RelativeDistanceType.EUCLIDIAN:
+            return straight_distance(state, spot.x, spot.y)
+        lateral = self.kind is RelativeDistanceType.LATERAL
+        if self.system is CoordinateSystem.WORLD:
+            pose, turn = state.plane, state.network.header_offset.heading
+            dx, dy = spot.x - pose.x, spot.y - pose.y
+            return dx * sin(turn) + dy * cos(turn) if lateral else dx * cos(turn) - dy * sin(turn)
+        if self.system is CoordinateSystem.TRAJECTORY:
+            return _along_trajectory(state, spot, lateral=lateral)
+        if self.system is CoordinateSystem.ENTITY:
+            ahead, left = ahead_and_left(state, spot.x, spot.y)
+            return left if lateral else ahead
+        gap = road_gap(state, spot)
+        if gap is None:
+            return None
+        return gap.dt if lateral else gap.ds
+
+    def _between_boxes(self, state: EntityState, shape: tuple[boxes.Point, ...], touches: Callable[[], bool]) -> float:
+        """Gap from an entity's box to a shape, straight or along the axes of the world or of the entity. [m]"""
+        own, along_own = boxes.corners(state), -state.plane.heading
+        if self.kind is RelativeDistanceType.EUCLIDIAN:
+            ahead, _ = boxes.gaps(own, shape, along_own)
+            return 0.0 if touches() else copysign(boxes.distance_between(own, shape), ahead or 1.0)
+        in_world = self.system is CoordinateSystem.WORLD
+        along, across = boxes.gaps(own, shape, state.network.header_offset.heading if in_world else along_own)
+        return across if self.kind is RelativeDistanceType.LATERAL else along
+
+    def _between_corners(self, state: EntityState, spots: list[Spot]) -> float | None:
+        """Smallest gap along (or across) the road between the projected corners; 0 where they overlap. [m]"""
+        state.locate()
+        values = []
+        for own in (_project(state, x, y) for x, y in boxes.corners(state)):
+            for spot in spots:
+                path = _path_between(state, own, spot)
+                if path is None:
+                    return None
+                values.append(_across(own, spot, path) if self.kind is RelativeDistanceType.LATERAL else path.ds)
+        return 0.0 if min(values) < 0.0 <= max(values) else min(values, key=abs)
+
+
+def _train(state: EntityState) -> list[EntityState]:
+    """The vehicle in front and what it draws."""
+    while state.tow is not None:
+        state = state.tow
+    return [state, *(trailer for _, trailer in drawn_by(state))]
+
+
+def _along_trajectory(state: EntityState, spot: Spot, *, lateral: bool) -> float:
+    """From where an entity is on its trajectory to the nearest point there; without one, straight."""
+    if state.path is None:
+        return straight_distance(state, spot.x, spot.y)
+    path = state.path.path
+    s = nearest_s(path, spot.x, spot.y)
+    if not lateral:
+        return s - state.path.s
+    point = path.at(s)
+    return (spot.y - point.y) * cos(point.tangent) - (spot.x - point.x) * sin(point.tangent)
+
+
+def _project(state: EntityState, x: float, y: float) -> Spot:
+    """Road coordinates of a point near an entity."""
+    if state.road == NOWHERE:
+        return Spot(x, y)
+    found = state.network.world_to_lane_at(x, y, near=(state.road, state.s), lane_types=None)
+    return Spot(x, y, found.road, found.lane, found.s, found.t)
+
+
+def _lane_there(network: RoadNetwork, own: Spot, path: RoadPath) -> int:
+    """Lane that a place's lane leads to at the end of a way; where none does, its own, counted from there."""
+    road, lane, way = own.road, own.lane, path.way
+    for entered, entry in path.entered:
+        onward = network.next_lanes(road, lane, way)
+        there = [link.lane for link in onward if (link.road, link.direction) == (entered, entry)]
+        if not there:
+            return -own.lane if path.is_turned else own.lane
+        road, lane, way = entered, there[0], entry
+    return lane

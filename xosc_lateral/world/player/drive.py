@@ -1,0 +1,199 @@
+"""Moving along lanes: the default driver, and what lane changes and lane offsets need of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import inf, pi
+
+from xosc_lateral.world.player.state import NOWHERE, EntityState
+from xosc_lateral.world.player.transition import EPSILON
+from xosc_lateral.world.road import LaneLink
+from xosc_lateral.world.road.moving import most_turning
+from xosc_lateral.world.road.network import DRIVING
+
+_TIGHT = 1e-3
+"""Beyond this share of the radius, the centre of a curve is so near that lengths beside the line say nothing. [-]"""
+
+
+def drive(state: EntityState, distance: float) -> None:
+    """Let the default driver move an entity, `distance` [m] on its own track; negative: backwards.
+
+    Without a road there is no lane to follow: the entity stops.
+    """
+    state.follow_lane()
+    if state.road == NOWHERE:
+        state.set_speed(0.0)
+        return
+    move_along_lane(state, distance)
+    state.speed_taken = True
+
+
+def move_along_lane(state: EntityState, distance: float) -> None:
+    """Move an entity along its lane as far as it goes, lateral offset and relative heading kept.
+
+    The way along the reference line follows from the curvature at the START of the step (explicit Euler, as the
+    reference player does it).
+
+    `distance`: way on the entity's own track; negative: backwards. [m]
+    """
+    travel(state, 1 if state.is_forward else -1, along_reference(state, state.s, distance))
+
+
+def halt_at_road_end(state: EntityState, step: float) -> None:
+    """Who has not moved at a road's end in the frame before stops, whoever drives it.
+
+    `state`: after it was moved in this frame; `step`: [s]
+    """
+    if state.free_pose is not None:
+        state.last_place, state.stuck = None, False
+        return
+    before, here = state.last_place, (state.road, state.s, state.offset_t)
+    state.last_place = here
+    if not state.at_road_end:
+        state.stuck = False
+        return
+    if state.stuck:
+        state.set_speed(0.0)
+    moved = inf if before is None or before[0] != here[0] else abs(here[1] - before[1]) + abs(here[2] - before[2])
+    state.stuck = moved < EPSILON * step
+
+
+def along_reference(state: EntityState, s: float, distance: float) -> float:
+    """Length along the reference line of an entity's way beside it, from `s` on. [m]"""
+    curvature = state.network.curvature_at(state.road, s)
+    if abs(curvature) < EPSILON:
+        return distance
+    t = state.network.lane_state_at(state.road, state.lane, s).centre_t + state.offset_t
+    return beside_line(curvature, t, distance)
+
+
+def beside_line(curvature: float, t: float, distance: float) -> float:
+    """Length along a line of a way beside it, where that line has a curvature [1/m]. [m]"""
+    if abs(curvature) < EPSILON:
+        return distance
+    shrink = 1.0 - curvature * t
+    return distance / shrink if shrink > _TIGHT else distance
+
+
+def travel(state: EntityState, way: int, distance: float) -> None:
+    """Move along s: `way` +1 or -1 tells the direction of a positive distance. [m]"""
+    if distance < 0.0:
+        way, distance = -way, -distance
+    s = state.s + way * distance
+    start, end = state.section
+    if start < s < end:
+        state.s = s
+        state._pose = None
+        state.at_road_end = False
+        return
+    _travel_far(state, way, distance)
+
+
+def _travel_far(state: EntityState, way: int, distance: float) -> None:
+    network = state.network
+    links_passed = 0
+    while True:
+        moved = network.advance(
+            state.road, state.lane, state.s, distance, direction=way, choose=lambda options: _choose(state, options)
+        )
+        if moved.direction != way:
+            _turn_round(state)
+        state.move_to(moved.road, moved.lane, moved.s, state.offset_t)
+        way, distance = moved.direction, moved.remaining
+        links_passed += 1
+        if distance <= 0.0 or links_passed > _MOST_GAPS:
+            break
+        onward = _bridge_gap(state, way)
+        if onward is None:
+            break
+        way = onward
+    _leave_narrow_lane(state)
+    _note_surroundings(state, way, blocked=distance > 0.0)
+
+
+_MOST_GAPS = 8
+"""Lanes without a link that are bridged in one step, at most."""
+
+
+def _choose(state: EntityState, options: Sequence[LaneLink]) -> LaneLink:
+    """At a junction: along the route; where that says nothing, the first way on, as in the reference player.
+
+    Without a route straight on, seen from the direction in which the lane is driven: who drives against it takes the
+    way that turns most. The standard does not say; the reference player does it so.
+    """
+    network, first = state.network, options[0]
+    if state.route is not None:
+        return state.route.choose(state.road, options) or first
+    if first.direction != network.travel_direction(first.road, first.lane):
+        return most_turning(network.roads, options)
+    return network.straightest(options)
+
+
+def _turn_round(state: EntityState) -> None:
+    """Onto a road whose s runs the other way."""
+    state.offset_t = -state.offset_t
+    state.turn(state.relative_heading + pi)
+
+
+def _bridge_gap(state: EntityState, way: int) -> int | None:
+    """A lane ends without a link: go on in the nearest lane beyond; the new way along s, or None at a true end.
+
+    Between sections of a road that is the one nearest to the middle of the old lane, and the offset is kept; between
+    roads it is the one nearest to the entity, which goes to its middle (both as the reference player does it).
+    """
+    network = state.network
+    road = network.roads[state.road]
+    at_end = state.s >= road.length - EPSILON if way > 0 else state.s <= EPSILON
+    t = state.t
+    if not at_end:
+        beyond = state.s + way * EPSILON
+        found = network.lane_at(state.road, beyond, t - state.offset_t)
+        if not found.lane or found.lane == state.lane:
+            return None
+        state.move_to(state.road, found.lane, beyond, state.offset_t)
+        return way
+    link = road.successor if way > 0 else road.predecessor
+    if link is None or link.element_type != "road" or link.element_id not in network.road_ids:
+        return None
+    index = network.index_of(link.element_id)
+    entry = 1 if link.contact != "end" else -1
+    if entry != way:
+        t = -t
+        _turn_round(state)
+    s = 0.0 if entry > 0 else network.roads[index].length
+    found = network.lane_at(index, s, t)
+    if not found.lane:
+        return None
+    state.move_to(index, found.lane, s, 0.0)
+    return entry
+
+
+def _leave_narrow_lane(state: EntityState) -> None:
+    """A lane that has closed is left for the middle of the nearest open one on the same side of the road."""
+    network = state.network
+    if state.lane == 0 or network.lane_state_at(state.road, state.lane, state.s).width >= EPSILON:
+        return
+    t = state.t
+    nearest, found = inf, 0
+    for lane in network.lanes_at(state.road, state.s):
+        away = abs(lane.centre_t - t) - 0.5 * lane.width
+        if lane.width >= EPSILON and lane.type in DRIVING and lane.id * state.lane > 0 and away < nearest:
+            nearest, found = away, lane.id
+    if found:
+        state.move_to(state.road, found, state.s, 0.0)
+
+
+def _note_surroundings(state: EntityState, way: int, *, blocked: bool) -> None:
+    """Remember how far the lane id holds (not at all while the lane may close), and whether the road ends here."""
+    network = state.network
+    road = network.roads[state.road]
+    start, end = network.section_at(state.road, state.s)
+    lane = road.section_at(state.s).by_id.get(state.lane)
+    closes = (
+        state.lane == 0 or lane is None or any(lane.state_at(s).width < EPSILON for s in (*lane.starts, start, end))
+    )
+    state.section = (0.0, -1.0) if closes else (start, end)
+    dead_end = (state.s <= EPSILON and road.predecessor is None) or (
+        state.s >= road.length - EPSILON and road.successor is None
+    )
+    state.at_road_end = blocked or dead_end

@@ -1,0 +1,217 @@
+"""All trajectory shapes that can be played: what the file says -> a path laid out in the world."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import inf, nan
+from typing import Any
+
+from msgspec import Struct
+
+from xosc_lateral.base.errors import FormatError, PlaybackError, UnsupportedElementError
+from xosc_lateral.world.player.paths.base import Path
+from xosc_lateral.world.player.paths.clothoid import ClothoidPath, TimedClothoid
+from xosc_lateral.world.player.paths.nurbs import Control, NurbsPath, clamped_knots
+from xosc_lateral.world.player.paths.polyline import Corner, PolylinePath, fill_times, has_gaps_in_time, merge_close
+from xosc_lateral.world.player.positions.on_road import reference_of
+from xosc_lateral.world.player.simulation import Simulation
+from xosc_lateral.world.player.state import EntityState
+from xosc_lateral.world.road import Pose
+from xosc_lateral.world.scenario import Place, Unsupported
+from xosc_lateral.world.scenario.position import (
+    Clothoid,
+    ClothoidSpline,
+    ClothoidSplineSegment,
+    Nurbs,
+    Polyline,
+    Position,
+    Shape,
+    Trajectory,
+    Vertex,
+    WorldPosition,
+)
+
+MOST_TURNING = 1e4
+"""Clothoids that turn by more are refused. [rad]"""
+
+VERTEX_RADIUS = 0.1
+"""Vertices of a polyline nearer than this count as one. [m]"""
+
+
+class Layout(Struct, frozen=True):
+    """What laying out a path may depend on, besides the world: who follows it, how, and how fast it comes. [m/s]"""
+
+    simulation: Simulation
+    locate: Callable[[Position, Simulation], Pose]
+    place: Place
+    follower: EntityState | None
+    follow: bool
+    speed: float
+
+    def pose_of(self, position: Position) -> Pose:
+        """World pose of a position now. [m], [rad]"""
+        return self.locate(position, self.simulation)
+
+    def note(self, what: str) -> None:
+        """Say that the trajectory is not followed as written."""
+        self.simulation.note(what, self.place)
+
+    def error(self, what: str) -> FormatError:
+        """That it can't be followed."""
+        return self.place.error(what, PlaybackError)
+
+
+def _polyline(shape: Polyline, layout: Layout) -> Path:
+    if not shape.vertices:
+        raise layout.error("the polyline has no vertices")
+    corners = [_corner(vertex, layout) for vertex in shape.vertices]
+    _check_times([corner.time for corner in corners], "vertex", layout)
+    if has_gaps_in_time(corners):
+        layout.note("vertices without a time get it by their distance from those that have one")
+        corners = fill_times(corners)
+    merged = merge_close(corners, VERTEX_RADIUS)
+    if len(merged) < len(corners):
+        left_out = len(corners) - len(merged)
+        layout.note(f"{left_out} vertices nearer than {VERTEX_RADIUS:g} m to the one before are left out")
+    return PolylinePath(merged, follow=layout.follow, initial_speed=layout.speed)
+
+
+def _corner(vertex: Vertex, layout: Layout) -> Corner:
+    """A vertex where it is now; its height counts where the file gives one, and then its pitch and roll do."""
+    position = vertex.position
+    pose = layout.pose_of(position)
+    heading, pitch, roll = (
+        own if given is not None else nan
+        for own, given in zip((pose.heading, pose.pitch, pose.roll), _given_angles(position), strict=True)
+    )
+    if not _gives_height(position):
+        pitch, roll = nan, nan
+    elif roll != roll:
+        roll = pose.roll
+    z, is_fixed = (pose.z if _gives_height(position) else nan), reference_of(position) is None
+    return Corner(pose.x, pose.y, z, heading, pitch, roll, _or_nan(vertex.time), pose.z, is_fixed)
+
+
+def _clothoid(shape: Clothoid, layout: Layout) -> Path:
+    end = shape.curvature + shape.curvature_prime * shape.length
+    start = shape.start_time
+    piece = ClothoidSplineSegment(shape.curvature, end, shape.length, position_start=shape.position, time_start=start)
+    return _clothoid_spline(ClothoidSpline((piece,), shape.stop_time), layout)
+
+
+def _clothoid_spline(shape: ClothoidSpline, layout: Layout) -> Path:
+    if not shape.segments:
+        raise layout.error("the clothoid spline has no segments")
+    pieces: list[TimedClothoid] = []
+    for segment in shape.segments:
+        x, y, heading = _start_of(segment, pieces, layout)
+        begin, end, length = segment.curvature_start, segment.curvature_end, segment.length
+        _check_turning(begin, end, length, layout)
+        pieces.append(TimedClothoid(x, y, heading, begin, end, length, _or_nan(segment.time_start)))
+    return ClothoidPath(pieces, _or_nan(shape.time_end))
+
+
+def _start_of(
+    segment: ClothoidSplineSegment, pieces: Sequence[TimedClothoid], layout: Layout
+) -> tuple[float, float, float]:
+    """Its own position, the end of the piece before, or where the follower is. [m], [m], [rad]"""
+    if segment.position_start is not None:
+        pose = layout.pose_of(segment.position_start)
+        x, y, heading = pose.x, pose.y, pose.heading
+    elif pieces:
+        x, y, heading = pieces[-1].at(pieces[-1].length)
+    elif layout.follower is not None:
+        pose = layout.follower.plane
+        x, y, heading = pose.x, pose.y, pose.heading
+    else:
+        raise layout.error("the clothoid spline has no start")
+    return x, y, heading + segment.h_offset
+
+
+def _check_turning(start: float, end: float, length: float, layout: Layout) -> None:
+    """A curvature that makes an entity spin is a mistake in the file (and would take for ever to integrate)."""
+    if not (length >= 0.0 and max(abs(start), abs(end)) * length <= MOST_TURNING):
+        raise layout.error(
+            f"a clothoid of {length:g} m with curvatures {start:g} to {end:g} 1/m: needs a length of at least 0 m and "
+            f"less than {MOST_TURNING:g} rad of turning"
+        )
+
+
+def _check_times(times: Sequence[float], what: str, layout: Layout) -> None:
+    """Times never run backwards."""
+    last = -inf
+    for k, time in enumerate(times):
+        if time < last:
+            raise layout.error(f"time {time:g} s of {what} {k + 1} is before that of an earlier one, {last:g} s")
+        last = time if time == time else last
+
+
+def _nurbs(shape: Nurbs, layout: Layout) -> Path:
+    count = len(shape.control_points)
+    knots = shape.knots or clamped_knots(count, shape.order)
+    if count < max(shape.order, 2) or len(knots) != count + shape.order:
+        raise layout.error(
+            f"a NURBS curve of order {shape.order} with {count} control points and {len(shape.knots)} knots: "
+            "needs at least as many control points as its order, and knots = control points + order"
+        )
+    controls = []
+    for point in shape.control_points:
+        pose = layout.pose_of(point.position)
+        controls.append(Control(pose.x, pose.y, point.weight, _or_nan(point.time)))
+    _check_times([control.time for control in controls], "control point", layout)
+    return NurbsPath(controls, knots, shape.order)
+
+
+SHAPES: dict[type, Callable[[Any, Layout], Path]] = {
+    Clothoid: _clothoid,
+    ClothoidSpline: _clothoid_spline,
+    Nurbs: _nurbs,
+    Polyline: _polyline,
+}
+
+
+def path_of(
+    trajectory: Trajectory,
+    simulation: Simulation,
+    pose_of: Callable[[Position, Simulation], Pose],
+    *,
+    follower: EntityState | None = None,
+    follow: bool = False,
+    speed: float = 0.0,
+) -> Path:
+    """A trajectory laid out in the world as it is now; `pose_of` tells where a position is."""
+    shape = trajectory.shape
+    if isinstance(shape, Unsupported):
+        raise shape.place.error(shape.reason or f"a {shape.kind} can't be followed", UnsupportedElementError)
+    return SHAPES[type(shape)](shape, Layout(simulation, pose_of, trajectory.place, follower, follow, speed))
+
+
+def duration(shape: Shape) -> float:
+    """Time from the first to the last time stamp; 0 where there are none. [s]"""
+    times: list[float | None] = []
+    if isinstance(shape, Polyline):
+        times = [vertex.time for vertex in shape.vertices]
+    elif isinstance(shape, Clothoid):
+        times = [shape.start_time, shape.stop_time]
+    elif isinstance(shape, ClothoidSpline):
+        times = [*(segment.time_start for segment in shape.segments), shape.time_end]
+    elif isinstance(shape, Nurbs) and all(point.time is not None for point in shape.control_points):
+        times = [point.time for point in shape.control_points]
+    start, end = (times[0], times[-1]) if times else (None, None)
+    return 0.0 if start is None or end is None else end - start
+
+
+def _given_angles(position: Position) -> tuple[float | None, float | None, float | None]:
+    """Heading, pitch and roll as written, absolute or relative; None: the path's own."""
+    given = position if isinstance(position, WorldPosition) else getattr(position, "orientation", None)
+    return (None, None, None) if given is None else (given.h, given.p, given.r)
+
+
+def _gives_height(position: Position) -> bool:
+    if isinstance(position, WorldPosition):
+        return position.z is not None
+    return getattr(position, "dz", None) is not None
+
+
+def _or_nan(value: float | None) -> float:
+    return nan if value is None else value

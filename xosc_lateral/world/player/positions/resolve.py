@@ -1,0 +1,251 @@
+"""All positions that can be played: what the file says -> a place in the world."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import cos, nan, pi, sin
+
+from xosc_lateral.base.errors import PlaybackError, UnsupportedElementError
+from xosc_lateral.world.player.distances import Spot
+from xosc_lateral.world.player.paths.registry import path_of
+from xosc_lateral.world.player.positions.geo import geo_position
+from xosc_lateral.world.player.positions.on_road import (
+    headed,
+    lane_placement,
+    moved_along,
+    on_road,
+    road_index,
+    road_placement,
+    tilted_or_road,
+)
+from xosc_lateral.world.player.simulation import Simulation
+from xosc_lateral.world.player.state import NOWHERE, Placement, RouteGuide, free, guide, locate, world_pose
+from xosc_lateral.world.road import Pose
+from xosc_lateral.world.scenario import Unsupported
+from xosc_lateral.world.scenario.position import (
+    FromCurrentEntity,
+    FromLaneCoordinates,
+    GeoPosition,
+    LanePosition,
+    Position,
+    RelativeLanePosition,
+    RelativeObjectPosition,
+    RelativeRoadPosition,
+    RelativeWorldPosition,
+    RoadPosition,
+    Route,
+    RoutePosition,
+    TrajectoryPosition,
+    WorldPosition,
+)
+
+_FIXED = (GeoPosition, LanePosition, RoadPosition, WorldPosition)
+"""Positions that no entity has an influence on."""
+
+
+def resolve(position: Position, simulation: Simulation, *, route: RouteGuide | None = None) -> Placement:
+    """The place that a position means now; raises `PlaybackError` where there is no such place.
+
+    `route` is that of the entity which is to go there: a way along the road from another entity follows it, or else the
+    route of that other one.
+    """
+    if isinstance(position, Unsupported):
+        raise position.place.error(position.reason or f"{position.kind} can't be played", UnsupportedElementError)
+    if isinstance(position, RelativeLanePosition | RelativeRoadPosition):
+        return POSITIONS[type(position)](position, simulation, route)
+    return POSITIONS[type(position)](position, simulation)
+
+
+def spot_at(position: Position, simulation: Simulation) -> Callable[[], Spot]:
+    """A position to measure distances to, found anew each time only if it may move."""
+    if isinstance(position, _FIXED):
+        fixed = _spot(resolve(position, simulation), simulation)
+        return lambda: fixed
+    return lambda: _spot(resolve(position, simulation), simulation)
+
+
+def pose_of(position: Position, simulation: Simulation) -> Pose:
+    """World pose of a position now. z, pitch and roll are the road's where none are given. [m], [rad]"""
+    if isinstance(position, WorldPosition) and None not in (position.z, position.p, position.r):
+        return _world_pose(position)  # nothing of it is the road's, which need not be looked for
+    return world_pose(simulation.network, resolve(position, simulation))
+
+
+def route_guide(route_: Route, simulation: Simulation) -> RouteGuide | None:
+    """The way over a route's waypoints; None: no way leads along it."""
+    return guide(simulation.network, [resolve(waypoint.position, simulation) for waypoint in route_.waypoints])
+
+
+def _spot(place: Placement, simulation: Simulation) -> Spot:
+    network = simulation.network
+    pose = world_pose(network, place)
+    if place.road == NOWHERE:
+        return Spot(pose.x, pose.y)
+    t = network.lane_state_at(place.road, place.lane, place.s).centre_t + place.offset_t
+    return Spot(pose.x, pose.y, place.road, place.lane, place.s, t)
+
+
+def lane_position(position: LanePosition, simulation: Simulation) -> Placement:
+    """Without an orientation, in the lane's direction of travel."""
+    road = road_index(position, simulation)
+    return lane_placement(position, simulation, road, position.lane_id, position.s, position.offset)
+
+
+def road_position(position: RoadPosition, simulation: Simulation) -> Placement:
+    """Without an orientation, along s."""
+    return road_placement(position, simulation, road_index(position, simulation), position.s, position.t)
+
+
+def _world_pose(position: WorldPosition) -> Pose:
+    """Heading 0 where none is given; z, pitch and roll, where none are given, are NaN: the road's."""
+    return free(
+        position.x,
+        position.y,
+        position.h or 0.0,
+        nan if position.z is None else position.z,
+        nan if position.p is None else position.p,
+        nan if position.r is None else position.r,
+    )
+
+
+def world_position(position: WorldPosition, simulation: Simulation) -> Placement:
+    """Under the pose."""
+    return locate(simulation.network, _world_pose(position))
+
+
+def relative_lane_position(
+    position: RelativeLanePosition, simulation: Simulation, route: RouteGuide | None = None
+) -> Placement:
+    """`ds` goes along the road's s and counts lanes and offset along +t; `dsLane` goes along the lane's direction of
+    travel and counts them to the left of it.
+    """
+    state = on_road(position, simulation)
+    network = simulation.network
+    if position.ds_lane is None:
+        there = moved_along(state, position.ds or 0.0, 1, route)
+        side = 1
+    else:
+        there = moved_along(state, position.ds_lane, network.travel_direction(state.road, state.lane), route)
+        side = network.travel_direction(there.road, there.lane)
+    lane = beside(there.lane, side * position.d_lane)
+    if simulation.scenario.header.is_left_handed:  # the offset counts from the lane's direction, with `ds` too
+        offset = position.offset * network.travel_direction(there.road, lane)
+    else:
+        offset = position.offset * side
+    along_lane = position.ds_lane is not None
+    return lane_placement(position, simulation, there.road, lane, there.s, offset, along_lane=along_lane)
+
+
+def beside(lane: int, lanes: int) -> int:
+    """The lane `lanes` further along +t; there is no lane 0 to drive on."""
+    target = lane + lanes
+    if lane != 0 and (target == 0 or (target > 0) != (lane > 0)):
+        target += 1 if lanes > 0 else -1
+    return target
+
+
+def relative_road_position(
+    position: RelativeRoadPosition, simulation: Simulation, route: RouteGuide | None = None
+) -> Placement:
+    """`ds` and `dt` along the road's axes; the way goes on over linked roads."""
+    there = moved_along(on_road(position, simulation), position.ds, 1, route)
+    t = simulation.network.lane_state_at(there.road, there.lane, there.s).centre_t + there.offset_t
+    return road_placement(position, simulation, there.road, there.s, t + position.dt)
+
+
+def relative_object_position(position: RelativeObjectPosition, simulation: Simulation) -> Placement:
+    """Along the entity's own axes; its pitch and roll tilt the way there."""
+    pose = simulation.entity(position.entity_ref, position.place).pose
+    c, s = cos(pose.heading), sin(pose.heading)
+    ahead, left, up = position.dx, position.dy, position.dz or 0.0
+    flat_ahead = ahead * cos(pose.pitch) + (left * sin(pose.roll) + up * cos(pose.roll)) * sin(pose.pitch)
+    flat_left = left * cos(pose.roll) - up * sin(pose.roll)
+    rise = (left * sin(pose.roll) + up * cos(pose.roll)) * cos(pose.pitch) - ahead * sin(pose.pitch)
+    x = pose.x + flat_ahead * c - flat_left * s
+    y = pose.y + flat_ahead * s + flat_left * c
+    return _near(position, simulation, pose, x, y, pose.z + rise)
+
+
+def relative_world_position(position: RelativeWorldPosition, simulation: Simulation) -> Placement:
+    """Along the world's axes."""
+    pose = simulation.entity(position.entity_ref, position.place).pose
+    dx, dy = simulation.network.header_offset.turned_back(position.dx, position.dy)
+    return _near(position, simulation, pose, pose.x + dx, pose.y + dy, pose.z + (position.dz or 0.0))
+
+
+def _near(
+    position: RelativeObjectPosition | RelativeWorldPosition,
+    simulation: Simulation,
+    pose: Pose,
+    x: float,
+    y: float,
+    z: float,
+) -> Placement:
+    """There, at that height if the file gives one; relative angles count from the entity's pose."""
+    heading = headed(position.orientation, pose.heading, simulation)
+    tilt = tilted_or_road(position.orientation, pose, simulation)
+    return locate(simulation.network, free(x, y, heading, nan if position.dz is None else z, *tilt))
+
+
+def trajectory_position(position: TrajectoryPosition, simulation: Simulation) -> Placement:
+    """Relative headings count from the trajectory's."""
+    point = path_of(position.trajectory, simulation, pose_of).at(position.s)
+    heading = headed(position.orientation, point.heading, simulation)
+    x = point.x - position.t * sin(point.heading)
+    y = point.y + position.t * cos(point.heading)
+    return locate(simulation.network, free(x, y, heading, point.z))
+
+
+def route_position(position: RoutePosition, simulation: Simulation) -> Placement:
+    """The way along the route counts from its first waypoint; an entity on it is where it is."""
+    network, where = simulation.network, position.in_route
+    if position.route is None or where is None:
+        raise position.place.error("names no route or no place on it", PlaybackError)
+    if isinstance(where, FromCurrentEntity):
+        state = simulation.entity(where.entity_ref, position.place)
+        state.locate()
+        return state.place._replace(pose=state.pose if state.road == NOWHERE else None)
+    route = route_guide(position.route, simulation)
+    if route is None:
+        raise position.place.error(f"no way leads along route '{position.route.name}'", PlaybackError)
+    road, s, direction = route.at(where.path_s)
+    if direction < 0:
+        simulation.note(
+            "the route runs against s here: lanes, offset and heading count along it "
+            "(in esmini only with --align_routepositions)",
+            position.place,
+        )
+    if isinstance(where, FromLaneCoordinates):
+        turned = _is_turned(simulation, road, where.lane_id, direction)
+        lane, offset = (-where.lane_id, -where.lane_offset) if turned else (where.lane_id, where.lane_offset)
+        return lane_placement(position, simulation, road, lane, s, offset)
+    t = -where.t if _is_turned(simulation, road, network.lane_at(road, s, where.t).lane, direction) else where.t
+    place = road_placement(position, simulation, road, s, t)
+    if position.orientation is not None or direction > 0:
+        return place
+    return place._replace(relative_heading=place.relative_heading + pi)  # along the route
+
+
+def _is_turned(simulation: Simulation, road: int, lane: int, direction: int) -> bool:
+    """Where the route runs against s, a lane that is driven against the route was counted from it: its twin is meant.
+
+    Files do both: ids as the road has them, and ids as if each road ran along the route. Along s these are the same.
+    """
+    network = simulation.network
+    if direction > 0 or lane == 0 or network.travel_direction(road, lane) == direction:
+        return False
+    return any(-lane in section.by_id for section in network.roads[road].sections)
+
+
+POSITIONS: dict[type, Callable[..., Placement]] = {
+    GeoPosition: geo_position,
+    LanePosition: lane_position,
+    RelativeLanePosition: relative_lane_position,
+    RelativeObjectPosition: relative_object_position,
+    RelativeRoadPosition: relative_road_position,
+    RelativeWorldPosition: relative_world_position,
+    RoadPosition: road_position,
+    RoutePosition: route_position,
+    TrajectoryPosition: trajectory_position,
+    WorldPosition: world_position,
+}

@@ -1,0 +1,269 @@
+"""Rows of a run: written down cheaply in every frame, worked out into poses all at once in the end."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterator
+from math import pi
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.base.arrays import BoolArray, FloatArray, Int32Array, IntArray
+from xosc_lateral.base.errors import PlaybackError
+from xosc_lateral.base.rows import BLOCK, columns, kept
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion
+from xosc_lateral.world.player.state import NOWHERE, EntityState
+from xosc_lateral.world.road import RoadNetwork
+from xosc_lateral.world.road.tables import turned_in_surface
+
+NO_LANE = "none"
+"""Lane type of what is beside the road, though the road describes it."""
+
+_UNKNOWN = -2
+"""Road of a row whose world pose is known, but whose road coordinates nobody has asked for yet."""
+
+
+FARTHEST = 1e8
+"""No entity is further from the origin: UTM coordinates stay below 1e7. [m]"""
+
+FASTEST = 1000.0
+"""No entity is faster. [m/s]"""
+
+FARTHEST_IN_A_FRAME = 1000.0
+"""No entity gets further within a frame, unless it is placed anew. [m]"""
+
+
+_TELEPORTED, _ROAD_END = int(Activity.TELEPORTED), int(Activity.ROAD_END)  # plain: flags take ten times as long
+
+
+class Rows:
+    """Rows of one entity: in arrays as they come, and put away as bytes, column after column, every so many frames."""
+
+    def __init__(self, state: EntityState) -> None:
+        self.state = state
+        self._s = array("d")
+        self._offset_t = array("d")
+        self._relative_heading = array("d")
+        self._speed = array("d")
+        self._road = array("i")
+        self._lane = array("i")
+        self._activity = array("B")
+        self._columns = (
+            self._s, self._offset_t, self._relative_heading, self._speed, self._road, self._lane, self._activity
+        )  # fmt: skip
+        self._put_away: list[NDArray[np.uint8]] = []
+        self._rows_put_away = 0
+        self._free_rows = array("q")
+        self._free = array("d")
+        self._free_put_away: list[tuple[IntArray, FloatArray]] = []
+        self._knows_height = True
+        """Of all rows whose road nobody has asked for."""
+
+    def write(self, time: float) -> None:
+        """Write down where the entity is now; raises `PlaybackError` where no entity can be. [s]"""
+        state = self.state
+        free = state.free_pose
+        x, y = (state.s, state.offset_t) if free is None else (free.x, free.y)
+        speed = 0.0 if state.activity & _TELEPORTED else state.speed  # that of a leap is none
+        if state.active and not (abs(x) <= FARTHEST and abs(y) <= FARTHEST and abs(speed) <= FASTEST):
+            words = ("s", "offset") if free is None else ("x", "y")
+            raise self._implausible(time, f"{words[0]} = {x:g} m, {words[1]} = {y:g} m, speed = {state.speed:g} m/s")
+        if free is not None:
+            self._free_rows.append(self._rows_put_away + len(self._road))
+            self._free.extend(free)
+        self._road.append(state.road if state._located else _UNKNOWN)
+        self._lane.append(state.lane)
+        self._s.append(state.s)
+        self._offset_t.append(state.offset_t)
+        self._relative_heading.append(state.relative_heading)
+        self._speed.append(state.speed)
+        self._activity.append(state.activity | _ROAD_END if state.at_road_end else state.activity)
+
+    def follow(self, s: FloatArray) -> None:
+        """Write down rows along a lane that differ in s alone, shape (n,). [m]"""
+        state, n = self.state, len(s)
+        self._s.frombytes(s.tobytes())
+        for column, value in (
+            (self._road, state.road),
+            (self._lane, state.lane),
+            (self._offset_t, state.offset_t),
+            (self._relative_heading, state.relative_heading),
+            (self._speed, state.speed),
+            (self._activity, state.activity),
+        ):
+            column.frombytes(np.full(n, value, dtype=column.typecode).tobytes())
+
+    def _implausible(self, time: float, what: str) -> PlaybackError:
+        place = self.state.entity.place
+        return PlaybackError(
+            f"'{self.state.name}' leaves every plausible bound at {time:.2f} s ({what}; limits {FARTHEST:g} m and "
+            f"{FASTEST:g} m/s): the scenario can't be played",
+            path=place.path,
+            line=place.line,
+            element=place.element,
+        )
+
+    def put_away(self) -> None:
+        """Make place for rows to come."""
+        if not self._road:
+            return
+        if self._free_rows:
+            rows, free = np.array(self._free_rows), np.array(self._free).reshape(-1, 6)
+            unknown = np.array(self._road)[rows - self._rows_put_away] == _UNKNOWN
+            self._knows_height &= not np.isnan(free[unknown, 2]).any()
+            self._free_put_away.append((kept(rows), kept(free.ravel()).reshape(-1, 6)))
+        self._rows_put_away += len(self._road)
+        self._put_away.append(kept(np.frombuffer(b"".join(self._columns), dtype=np.uint8)))
+        for column in (*self._columns, self._free_rows, self._free):
+            del column[:]
+
+    def motion(self, network: RoadNetwork, time: FloatArray) -> EntityMotion:
+        """All rows, with world poses and directions of travel; what was written down is gone."""
+        self.put_away()
+        names = (
+            "x", "y", "z", "heading", "pitch", "roll",
+            "speed", "road", "lane", "s", "offset", "heading_relative", "activity",
+        )  # fmt: skip
+        found = columns(len(time), self._worked_out(network, time))
+        return EntityMotion(entity=self.state.entity, time=time, **dict(zip(names, found, strict=True)))
+
+    def _worked_out(self, network: RoadNetwork, time: FloatArray) -> Iterator[tuple[NDArray[Any], ...]]:
+        """Columns of `motion`, in blocks of rows."""
+        begin, before = 0, tuple[NDArray[Any], ...]()
+        for s, offset, along, speed, road, lane, activity in self._blocks():
+            n, where = len(s), _Where(road, lane, s, offset)
+            free_rows, free = self._free_within(begin, begin + n)
+            direction = np.ones(n)
+            unknown = road[free_rows] == _UNKNOWN
+            looked_up = free_rows[unknown]
+            known = road >= 0
+            if known.any():
+                direction[known] = network.travel_directions(road[known], lane[known])
+            offset *= direction
+            if len(looked_up):
+                height = free[unknown, 2] if self._knows_height else None
+                _look_up(network, looked_up, free[unknown], height, where, direction)
+            to_lane = along - np.where(direction > 0, 0.0, pi)
+            on_road = road >= 0
+            pose = _poses(network, where, to_lane)
+            pose[free_rows] = np.where(np.isnan(free), pose[free_rows], free)  # what was left to the road stays
+            to_lane[looked_up] = pose[looked_up, 3]
+            if len(looked_up) and network.road_ids:
+                to_lane[looked_up] -= network.lane_to_world(*where.at(looked_up)).heading
+            checked = (time[begin : begin + n], pose[:, 0], pose[:, 1], activity)
+            self._check_jumps(*(np.concatenate(two) for two in zip(before, checked, strict=True)) if begin else checked)
+            before = tuple(values[-1:].copy() for values in checked)
+            beside = _beside_road(network, where, pose)
+            activity[beside & (activity & np.uint8(Activity.ACTIVE) > 0)] |= np.uint8(Activity.OFF_ROAD)
+            road[~on_road], lane[~on_road], s[~on_road], offset[~on_road] = NOWHERE, 0, 0.0, 0.0
+            heading = np.mod(pose[:, 3], 2.0 * pi, out=pose[:, 3])
+            relative = (to_lane + pi) % (2.0 * pi) - pi
+            yield (*pose[:, :3].T, heading, *pose[:, 4:].T, speed, road, lane, s, offset, relative, activity)
+            begin += n
+        self._put_away.clear()
+        self._free_put_away.clear()
+
+    def _blocks(self) -> Iterator[list[NDArray[Any]]]:
+        """What was put away, as arrays of its columns, shape (rows,) each."""
+        together: list[list[NDArray[Any]]] = []
+        kinds = [np.dtype(column.typecode) for column in self._columns]
+        size = sum(kind.itemsize for kind in kinds)
+        for number, data in enumerate(self._put_away, start=1):
+            rows = len(data) // size
+            ends = np.cumsum([rows * kind.itemsize for kind in kinds])
+            parts = np.split(data, ends[:-1])
+            together.append([part.view(kind) for part, kind in zip(parts, kinds, strict=True)])
+            if number == len(self._put_away) or sum(len(part[0]) for part in together) >= BLOCK:
+                yield [np.concatenate(column) for column in zip(*together, strict=True)]
+                together = []
+
+    def _free_within(self, begin: int, end: int) -> tuple[IntArray, FloatArray]:
+        """World poses that were given, shape (n, 6), and their rows, counted from `begin`, before `end`."""
+        parts = [(rows, free) for rows, free in self._free_put_away if rows[0] < end and rows[-1] >= begin]
+        if not parts:
+            return np.empty(0, dtype=np.int64), np.empty((0, 6))
+        rows, free = (np.concatenate(column) for column in zip(*parts, strict=True))
+        inside = (rows >= begin) & (rows < end)
+        return rows[inside] - begin, free[inside]
+
+    def _check_jumps(self, time: FloatArray, x: FloatArray, y: FloatArray, activity: NDArray[np.uint8]) -> None:
+        """Nobody moves this far in a frame without being placed anew."""
+        moved = np.hypot(np.diff(x), np.diff(y))
+        there = (activity[1:] & activity[:-1] & np.uint8(Activity.ACTIVE)) != 0
+        far = there & ((activity[1:] & np.uint8(Activity.TELEPORTED)) == 0) & (moved > FARTHEST_IN_A_FRAME)
+        if far.any():
+            k = int(np.flatnonzero(far)[0]) + 1
+            raise self._implausible(float(time[k]), f"{moved[k - 1]:g} m in one frame")
+
+
+class _Where(NamedTuple):
+    """Road coordinates of rows."""
+
+    road: Int32Array
+    lane: Int32Array
+    s: FloatArray
+    offset: FloatArray
+
+    def at(self, rows: IntArray) -> tuple[Int32Array, Int32Array, FloatArray, FloatArray]:
+        """Those of some rows."""
+        return self.road[rows], self.lane[rows], self.s[rows], self.offset[rows]
+
+
+def _poses(network: RoadNetwork, where: _Where, to_lane: FloatArray) -> FloatArray:
+    """World poses of the rows that are on a road, shape (n, 6), turned by `to_lane` [rad] against their lanes."""
+    on_road = where.road >= 0
+    pose = np.zeros((len(on_road), 6), order="F")  # each column is then an array of its own
+    rows = np.flatnonzero(on_road)
+    if len(rows):
+        pose[rows] = np.column_stack(network.lane_to_world(*where.at(rows)))
+    turned = on_road & (to_lane != 0.0)
+    sloped = turned & ((pose[:, 4] != 0.0) | (pose[:, 5] != 0.0))
+    flat = turned & ~sloped
+    pose[flat, 3] += to_lane[flat]
+    if sloped.any():
+        turn, pose[sloped, 4], pose[sloped, 5] = turned_in_surface(to_lane[sloped], pose[sloped, 4], pose[sloped, 5])
+        pose[sloped, 3] += turn
+    return pose
+
+
+def _look_up(
+    network: RoadNetwork,
+    rows: IntArray,
+    free: FloatArray,
+    height: FloatArray | None,
+    where: _Where,
+    direction: FloatArray,
+) -> None:
+    """Road coordinates of rows that only have a world pose."""
+    if not network.road_ids:
+        where.road[rows] = NOWHERE
+        return
+    found = network.world_to_lane(free[:, 0], free[:, 1], height)
+    where.road[rows], where.lane[rows], where.s[rows], where.offset[rows] = (
+        found.road,
+        found.lane,
+        found.s,
+        found.offset,
+    )
+    direction[rows] = network.travel_directions(found.road, found.lane)
+
+
+def _beside_road(network: RoadNetwork, where: _Where, pose: FloatArray) -> BoolArray:
+    """Rows whose reference point is on no lane of any kind."""
+    beside = where.road < 0
+    rows = np.flatnonzero(~beside)
+    if not len(rows):
+        return beside
+    road, lane, s, offset = where.at(rows)
+    suspects = rows[np.abs(offset) > 0.5 * network.lane_width(road, lane, s) + _TOUCH]  # beyond their own lane
+    if len(suspects):
+        types = {lane.type for r in network.roads for section in r.sections for lane in section.lanes} - {NO_LANE}
+        found = network.world_to_lane(pose[suspects, 0], pose[suspects, 1], lane_types=types)
+        beside[suspects] = ~(found.distance <= _TOUCH)
+    return beside
+
+
+_TOUCH = 1e-3
+"""So near to a lane, a point counts as on it. [m]"""

@@ -1,0 +1,124 @@
+"""From the storyboard as read to the storyboard as it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from xosc_lateral.world.player.actions.base import RunningAction
+from xosc_lateral.world.player.actions.registry import prepare_action
+from xosc_lateral.world.player.conditions.registry import prepare_trigger
+from xosc_lateral.world.player.positions.on_road import reference_of
+from xosc_lateral.world.player.simulation import Simulation
+from xosc_lateral.world.player.storyboard import EventElement, StoryboardElement
+from xosc_lateral.world.player.trigger import RunningTrigger
+from xosc_lateral.world.scenario import Act, Action, Event, Init, ManeuverGroup, Private, Storyboard, Trigger
+from xosc_lateral.world.scenario.enums import StoryboardElementType
+from xosc_lateral.world.scenario.private_actions import TeleportAction
+
+
+def build_storyboard(storyboard: Storyboard, simulation: Simulation) -> StoryboardElement:
+    """The tree of the storyboard; conditions that watch an element have found it."""
+    stories = [
+        StoryboardElement(story.name, StoryboardElementType.STORY, [_act(act, simulation) for act in story.acts])
+        for story in storyboard.stories
+    ]
+    root = StoryboardElement("", None, stories, stop_trigger=_stop(storyboard.stop_trigger, simulation))
+    root.settle()
+    for look in simulation.when_built:
+        look(root)
+    if storyboard.stop_trigger is None:
+        simulation.note("has no stop trigger: the run ends at the time limit", storyboard.place)
+    return root
+
+
+def init_actions(init: Init, simulation: Simulation) -> list[RunningAction]:
+    """Init actions in the order in which they start: an entity that is placed relative to another comes after it."""
+    actions = [
+        prepare_action(action, None, simulation) for action in (*init.global_actions, *init.user_defined_actions)
+    ]
+    for private in _in_order(init.privates):
+        state = simulation.actor(private.entity_ref, private.place)
+        actions += [prepare_action(action, state, simulation) for action in private.actions]
+    return actions
+
+
+def _in_order(privates: tuple[Private, ...]) -> Iterator[Private]:
+    waiting = list(privates)
+    placed: set[str] = set()
+    names = {private.entity_ref for private in privates}
+    while waiting:
+        for private in waiting:
+            needs = _references(private) & names - {private.entity_ref}
+            if needs <= placed or private is waiting[-1]:
+                break
+        # The last one waiting goes on even so: a ring of references has no good order.
+        chosen = private if needs <= placed else waiting[0]
+        waiting.remove(chosen)
+        if chosen.entity_ref not in {other.entity_ref for other in waiting}:
+            placed.add(chosen.entity_ref)
+        yield chosen
+
+
+def _references(private: Private) -> set[str]:
+    names = (
+        reference_of(action.content.position)
+        for action in private.actions
+        if isinstance(action.content, TeleportAction)
+    )
+    return {name for name in names if name is not None}
+
+
+def _start(trigger: Trigger | None, simulation: Simulation) -> RunningTrigger | None:
+    return None if trigger is None else prepare_trigger(trigger, simulation, when_empty=True)
+
+
+def _stop(trigger: Trigger | None, simulation: Simulation) -> RunningTrigger | None:
+    return None if trigger is None else prepare_trigger(trigger, simulation, when_empty=False)
+
+
+def _act(act: Act, simulation: Simulation) -> StoryboardElement:
+    return StoryboardElement(
+        act.name,
+        StoryboardElementType.ACT,
+        [_group(group, simulation) for group in act.maneuver_groups],
+        _start(act.start_trigger, simulation),
+        _stop(act.stop_trigger, simulation),
+    )
+
+
+def _group(group: ManeuverGroup, simulation: Simulation) -> StoryboardElement:
+    if group.actors.select_triggering_entities:
+        simulation.note("the triggering entities do not join the actors", group.actors.place)
+    maneuvers = [
+        StoryboardElement(
+            maneuver.name,
+            StoryboardElementType.MANEUVER,
+            [_event(event, group, simulation) for event in maneuver.events],
+        )
+        for maneuver in group.maneuvers
+    ]
+    kind, count = StoryboardElementType.MANEUVER_GROUP, group.maximum_execution_count
+    return StoryboardElement(group.name, kind, maneuvers, maximum_count=count)
+
+
+def _event(event: Event, group: ManeuverGroup, simulation: Simulation) -> EventElement:
+    return EventElement(
+        event.name,
+        StoryboardElementType.EVENT,
+        [one for action in event.actions for one in _actions(action, group, simulation)],
+        _start(event.start_trigger, simulation) or RunningTrigger((), when_empty=True),
+        maximum_count=event.maximum_execution_count,
+        priority=event.priority,
+    )
+
+
+def _actions(action: Action, group: ManeuverGroup, simulation: Simulation) -> Iterator[RunningAction]:
+    """One action for each actor, or one for all when it is not private."""
+    if not action.is_private:
+        yield prepare_action(action, None, simulation)
+        return
+    if not group.actors.entity_refs:
+        place = group.actors.place
+        simulation.note(f"maneuver group '{group.name}' has no actors: its private actions are not played", place)
+    for name in group.actors.entity_refs:
+        yield prepare_action(action, simulation.actor(name, group.actors.place), simulation)

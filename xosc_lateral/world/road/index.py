@@ -1,0 +1,200 @@
+"""World to lane: which roads are near a point, and which of their lanes it is in."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from xosc_lateral.base.arrays import FloatArray, Int32Array
+from xosc_lateral.world.road.places import lane_at
+from xosc_lateral.world.road.positions import LaneCoordinates, LanePositions
+from xosc_lateral.world.road.projection import Feet, project, project_at
+from xosc_lateral.world.road.samples import Candidates, Samples
+from xosc_lateral.world.road.tables import NetworkTables
+
+WRONG_WAY = 2.0
+"""A lane driven the opposite way counts as this much further off when the heading is known. [m]"""
+
+SAME_LEVEL = 1.0
+"""Height differences below this mean nothing when z is known. [m]"""
+
+TOUCHING = 1e-6
+"""A point no further off than this is on the lane that it was expected on. [m]"""
+
+
+class SurfaceIndex:
+    """World to lane over a whole network."""
+
+    def __init__(self, tables: NetworkTables) -> None:
+        """Samples are laid when they are first asked for, once per choice of lane types."""
+        self._tables = tables
+        self._samples: dict[frozenset[str] | None, Samples] = {}
+        self._wanted: dict[frozenset[str] | None, NDArray[np.bool_]] = {}
+
+    def world_to_lane(
+        self,
+        x: ArrayLike,
+        y: ArrayLike,
+        z: ArrayLike | None,
+        heading: ArrayLike | None,
+        *,
+        lane_types: Collection[str] | None,
+    ) -> LanePositions:
+        """Nearest lanes (see `RoadNetwork.world_to_lane`)."""
+        given = [x, y, *(a for a in (z, heading) if a is not None)]
+        arrays = np.broadcast_arrays(*(np.asarray(a, dtype=np.float64) for a in given))
+        flat = [a.ravel() for a in arrays]
+        _refuse_nan(flat)
+        height = flat[2] if z is not None else None
+        direction = flat[-1] if heading is not None else None
+        types = None if lane_types is None else frozenset(lane_types)
+        best = _Best(len(flat[0]))
+        for begin in range(0, len(flat[0]), 16384):
+            part = slice(begin, begin + 16384)
+            found = self._candidates(flat[0][part], flat[1][part], types)
+            self._score(best, found._replace(point=found.point + begin), flat[0], flat[1], height, direction, types)
+        return best.positions(arrays[0].shape)
+
+    def _candidates(self, x: FloatArray, y: FloatArray, types: frozenset[str] | None) -> Candidates:
+        if types not in self._samples:
+            self._samples[types] = Samples(self._tables, types)
+        return self._samples[types].near(x, y)
+
+    def path_to_lane(
+        self, x: ArrayLike, y: ArrayLike, road: ArrayLike, s: ArrayLike, *, lane_types: Collection[str] | None
+    ) -> LanePositions:
+        """Nearest lanes on known roads (see `RoadNetwork.path_to_lane`)."""
+        arrays = np.broadcast_arrays(*(np.asarray(a, dtype=np.float64) for a in (x, y, s)), np.asarray(road, np.int32))
+        flat = [a.ravel() for a in arrays]
+        _refuse_nan(flat[:3])
+        types = None if lane_types is None else frozenset(lane_types)
+        best = _Best(len(flat[0]))
+        roads = flat[3].astype(np.int32)
+        known = np.flatnonzero(roads >= 0)
+        self._score(best, Candidates(known, roads[known], flat[2][known]), flat[0], flat[1], None, None, types)
+        # Driven off the road that it was on, onto the next one: look again, without prejudice.
+        lost = np.flatnonzero(best.distance > TOUCHING)
+        if len(lost):
+            found = self._candidates(flat[0][lost], flat[1][lost], types)
+            self._score(best, found._replace(point=lost[found.point]), flat[0], flat[1], None, None, types)
+        return best.positions(arrays[0].shape)
+
+    def world_to_lane_at(
+        self,
+        x: float,
+        y: float,
+        z: float | None,
+        heading: float | None,
+        *,
+        near: tuple[int, float] | None,
+        lane_types: Collection[str] | None,
+    ) -> LaneCoordinates:
+        """Nearest lane of one point (see `RoadNetwork.world_to_lane_at`). [m], [rad]"""
+        if near is not None and near[0] >= 0:
+            road = self._tables.roads[near[0]]
+            s, t, ahead = project_at(road, x, y, near[1])
+            here = lane_at(road, near[0], s, t, lane_types)
+            if abs(ahead) <= TOUCHING and here.distance <= TOUCHING and here.lane != 0:
+                return here
+        best = self.world_to_lane(x, y, z, heading, lane_types=lane_types)
+        return LaneCoordinates(int(best.road), int(best.lane), *(float(values) for values in best[2:]))
+
+    # ---- choosing ----------------------------------------------------------------------------------------------------
+    def _score(
+        self,
+        best: _Best,
+        found: Candidates,
+        x: FloatArray,
+        y: FloatArray,
+        z: FloatArray | None,
+        heading: FloatArray | None,
+        types: frozenset[str] | None,
+    ) -> None:
+        """Project each point onto its candidate road, find the lane there, keep what beats the best so far."""
+        point, road, guess = found
+        feet = project(self._tables, road, x[point], y[point], guess)
+        row, centre, width = self._lanes(road, feet, types)
+        away = np.abs(feet.t - centre)
+        outside = np.hypot(np.maximum(away - 0.5 * width, 0.0), feet.ahead)
+        outside[row < 0] = np.inf
+        direction = self._tables.directions[row]
+        score = outside
+        if z is not None:
+            above = np.abs(z[point] - self._tables.height(road, feet.s, feet.t))
+            score = score + np.maximum(above - SAME_LEVEL, 0.0)
+        if heading is not None:
+            lane_heading = feet.heading + np.where(direction < 0, np.pi, 0.0)
+            score = score + 0.5 * WRONG_WAY * (1.0 - np.cos(heading[point] - lane_heading))
+        lane = np.where(row < 0, 0, self._tables.ids[row])
+        offset = direction * (feet.t - centre)
+        best.offer(point, score, away, LanePositions(road, lane, feet.s, offset, feet.t, outside))
+
+    def _lanes(
+        self, road: Int32Array, feet: Feet, types: frozenset[str] | None
+    ) -> tuple[Int32Array, FloatArray, FloatArray]:
+        """Row, centre and width of the lane of these types that holds t, else of the nearest; row -1: there is none."""
+        tables = self._tables
+        if types not in self._wanted:
+            self._wanted[types] = np.array(
+                [lane.id != 0 and (types is None or lane.type in types) for lane in tables.lanes]
+            )
+        wanted = self._wanted[types]
+        section = np.broadcast_to(np.asarray(tables.section_of(road, feet.s)), feet.s.shape)
+        first, count = tables.section_first[section], tables.section_count[section]
+        row = np.full(len(feet.s), -1, dtype=np.int32)
+        centre, width = np.zeros(len(feet.s)), np.zeros(len(feet.s))
+        lowest, closest = np.full(len(feet.s), np.inf), np.full(len(feet.s), np.inf)
+        for rank in range(int(count.max(initial=0))):
+            here = np.flatnonzero(rank < count)
+            here = here[wanted[first[here] + rank]]
+            profile = tables.profile_of(first[here] + rank, feet.s[here])
+            away = np.abs(feet.t[here] - profile.centre)
+            # lanes of no width only where there is nothing else, as in `places.lane_at`
+            score = np.maximum(away - 0.5 * profile.width, 0.0) + np.where(profile.width <= 1e-6, 1e3, 0.0)
+            better = (score < lowest[here]) | ((score == lowest[here]) & (away < closest[here]))
+            to = here[better]
+            row[to] = first[to] + rank
+            centre[to], width[to] = profile.centre[better], profile.width[better]
+            lowest[to], closest[to] = score[better], away[better]
+        return row, centre, width
+
+
+class _Best:
+    """The best candidate so far for each of n points."""
+
+    def __init__(self, n: int) -> None:
+        self._score, self._away = np.full(n, np.inf), np.full(n, np.inf)
+        whole = np.full(n, -1, dtype=np.int32), np.zeros(n, dtype=np.int32)
+        self._found = LanePositions(*whole, np.zeros(n), np.zeros(n), np.zeros(n), np.full(n, np.inf))
+        self.distance = self._found.distance
+
+    def offer(self, point: NDArray[np.int64], score: FloatArray, away: FloatArray, found: LanePositions) -> None:
+        """Take what has a smaller score; of equals (lanes on top of each other) the one whose centre is nearer."""
+        score = np.round(score, 9)  # rounding noise must not decide between roads that touch
+        order = np.lexsort((found.road, np.round(away, 9), score, point))
+        order = order[np.append(True, np.diff(point[order]) > 0)] if len(order) else order
+        target = point[order]
+        better = (score[order] < self._score[target]) | (
+            (score[order] == self._score[target]) & (away[order] < self._away[target])
+        )
+        order, target = order[better], target[better]
+        self._score[target], self._away[target] = score[order], away[order]
+        kept: tuple[NDArray[Any], ...] = self._found
+        offered: tuple[NDArray[Any], ...] = found
+        for whole, part in zip(kept, offered, strict=True):
+            whole[target] = part[order]
+
+    def positions(self, shape: tuple[int, ...]) -> LanePositions:
+        """The result, in the shape of the question."""
+        road, lane, *others = self._found
+        return LanePositions(road.reshape(shape), lane.reshape(shape), *(values.reshape(shape) for values in others))
+
+
+def _refuse_nan(arrays: Sequence[FloatArray]) -> None:
+    for array in arrays:
+        if not np.isfinite(array).all():
+            i = int(np.flatnonzero(~np.isfinite(array))[0])
+            raise ValueError(f"point {i}: {array[i]} is not a coordinate")

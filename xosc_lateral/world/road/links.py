@@ -1,0 +1,162 @@
+"""Where lanes and roads lead: road links, lane links, junctions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from xosc_lateral.world.road.lanes import Lane, LaneSection
+from xosc_lateral.world.road.positions import LaneLink
+from xosc_lateral.world.road.road import Connection, Junction, Road, RoadLink
+
+End = tuple[int, int]
+"""A road as entered: its index, and +1 (at its start, to go along s) or -1 (at its end)."""
+
+
+class Links:
+    """Links between lanes and roads; look-ups are kept, since a player asks the same ones again and again."""
+
+    def __init__(self, roads: Sequence[Road], junctions: Sequence[Junction]) -> None:
+        self.roads = roads
+        self._index = {road.id: i for i, road in enumerate(roads)}
+        self._junctions = {junction.id: junction for junction in junctions}
+        self._links: dict[tuple[int, int, int], tuple[LaneLink, ...]] = {}
+        self._ends: dict[End, tuple[End, ...]] = {}
+
+    def next_lanes(self, road: int, lane: int, direction: int) -> tuple[LaneLink, ...]:
+        """Lanes that follow when leaving the road at its end (+1) or start (-1)."""
+        key = (road, lane, direction)
+        if key not in self._links:
+            self._links[key] = tuple(dict.fromkeys(self._find_links(*key)))
+        return self._links[key]
+
+    def _find_links(self, road: int, lane: int, direction: int) -> Iterator[LaneLink]:
+        here = self.roads[road]
+        link = here.successor if direction > 0 else here.predecessor
+        found = here.sections[-1 if direction > 0 else 0].by_id.get(lane)
+        if link is None or found is None or lane == 0:
+            return
+        if link.element_type == "junction":
+            onward = [
+                *self._through_junction(here, found, link),
+                *self._back_through_direct_junction(here, found, link, direction),
+            ]
+            yield from onward or self._against_traffic(here, found, link, direction)
+            return
+        other = self._index.get(link.element_id)
+        if other is None:
+            return
+        contact = link.contact or self._contact_of(road, direction, other)
+        for target in self._linked_ids(found, direction, self.roads[other], contact):
+            yield self._enter(other, target, contact)
+
+    def _through_junction(self, here: Road, lane: Lane, link: RoadLink) -> Iterator[LaneLink]:
+        junction = self._junctions.get(link.element_id)
+        for connection in junction.connections if junction else ():
+            other = self._index.get(connection.connecting_road)
+            if connection.incoming_road != here.id or other is None:
+                continue
+            contact = connection.contact or "start"
+            for target in self._connected_ids(connection, lane, self.roads[other], contact):
+                if target in _end_section(self.roads[other], contact).by_id:
+                    yield self._enter(other, target, contact)
+
+    def _against_traffic(self, here: Road, lane: Lane, link: RoadLink, direction: int) -> Iterator[LaneLink]:
+        """Into a junction on a lane that leads out of it: connections hold the other way, lanes name their links."""
+        for other, contact in self._roads_back(here, link.element_id, direction):
+            for candidate in _lanes_linked_to(lane, self.roads[other], contact):
+                yield self._enter(other, candidate, contact)
+
+    def _back_through_direct_junction(
+        self, here: Road, lane: Lane, link: RoadLink, direction: int
+    ) -> Iterator[LaneLink]:
+        """Direct junctions have no connecting roads whose own links lead back: their connections hold both ways."""
+        for connection, other, contact in self._direct_connections(here, link, direction):
+            section = _end_section(self.roads[other], contact)
+            for source, target in connection.lanes:
+                if target == lane.id and source in section.by_id:
+                    yield self._enter(other, source, contact)
+
+    def _direct_connections(self, here: Road, link: RoadLink, direction: int) -> Iterator[tuple[Connection, int, str]]:
+        """Connections of a direct junction that end where this road is left; incoming road, and its end there."""
+        junction = self._junctions.get(link.element_id)
+        for connection in junction.connections if junction and here.junction != link.element_id else ():
+            other = self._index.get(connection.incoming_road)
+            touches = "end" if direction > 0 else "start"
+            if connection.connecting_road != here.id or (connection.contact or "start") != touches or other is None:
+                continue
+            incoming = self.roads[other]
+            for back, contact in ((incoming.successor, "end"), (incoming.predecessor, "start")):
+                if back and back.element_type == "junction" and back.element_id == link.element_id:
+                    yield connection, other, contact
+
+    def _connected_ids(self, connection: Connection, lane: Lane, other: Road, contact: str) -> list[int]:
+        """Lanes of the connecting road; without any laneLink, those that name the lane as their own link."""
+        if connection.lanes:
+            return [to for source, to in connection.lanes if source == lane.id]
+        return _lanes_linked_to(lane, other, contact)
+
+    def _linked_ids(self, lane: Lane, direction: int, other: Road, contact: str) -> list[int]:
+        """Lanes of the linked road: as the lane says, else as the other side says."""
+        ids = lane.successors if direction > 0 else lane.predecessors
+        if ids:
+            return [i for i in ids if i in _end_section(other, contact).by_id and i != 0]
+        return _lanes_linked_to(lane, other, contact)
+
+    def _contact_of(self, road: int, direction: int, other: int) -> str:
+        """Contact point that a file leaves out: the end of the other road that is nearer."""
+        here, there = self.roads[road], self.roads[other]
+        x, y, _ = here.reference_at(here.length if direction > 0 else 0.0)
+        gaps = []
+        for s in (0.0, there.length):
+            u, v, _ = there.reference_at(s)
+            gaps.append((u - x) ** 2 + (v - y) ** 2)
+        return "start" if gaps[0] <= gaps[1] else "end"
+
+    def _enter(self, road: int, lane: int, contact: str) -> LaneLink:
+        return LaneLink(road, lane, *((0.0, 1) if contact == "start" else (self.roads[road].length, -1)))
+
+    def next_roads(self, road: int, direction: int) -> tuple[End, ...]:
+        """Roads that can be entered when leaving this one at its end (+1) or start (-1), driven there either way."""
+        key = (road, direction)
+        if key not in self._ends:
+            self._ends[key] = tuple(dict.fromkeys(self._find_roads(road, direction)))
+        return self._ends[key]
+
+    def _find_roads(self, road: int, direction: int) -> Iterator[End]:
+        here = self.roads[road]
+        link = here.successor if direction > 0 else here.predecessor
+        if link is None:
+            return
+        if link.element_type != "junction":
+            other = self._index.get(link.element_id)
+            if other is not None:
+                yield other, 1 if (link.contact or self._contact_of(road, direction, other)) == "start" else -1
+            return
+        junction = self._junctions.get(link.element_id)
+        for connection in junction.connections if junction else ():
+            other = self._index.get(connection.connecting_road)
+            if connection.incoming_road == here.id and other is not None:
+                yield other, 1 if connection.contact != "end" else -1
+        for _, other, contact in self._direct_connections(here, link, direction):
+            yield other, 1 if contact == "start" else -1
+        # Files list a connection from the road that drives into it only; on the way back it is found by its own links.
+        for other, contact in self._roads_back(here, link.element_id, direction):
+            yield other, 1 if contact == "start" else -1
+
+    def _roads_back(self, here: Road, junction: str, direction: int) -> Iterator[tuple[int, str]]:
+        """Roads of a junction that lead to this one's end (+1) or start (-1) by their own links, and by which end."""
+        touches = RoadLink("road", here.id, "end" if direction > 0 else "start")
+        for index, other in enumerate(self.roads):
+            if other.junction == junction:
+                ends = (other.predecessor, "start"), (other.successor, "end")
+                yield from ((index, contact) for back, contact in ends if back == touches)
+
+
+def _lanes_linked_to(lane: Lane, other: Road, contact: str) -> list[int]:
+    """Lanes at an end of another road that name this lane as their own link."""
+    lanes = _end_section(other, contact).lanes
+    return [one.id for one in lanes if lane.id in (one.predecessors if contact == "start" else one.successors)]
+
+
+def _end_section(road: Road, contact: str) -> LaneSection:
+    return road.sections[0 if contact == "start" else -1]

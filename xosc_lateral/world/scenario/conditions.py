@@ -1,0 +1,237 @@
+"""Conditions as a file says them: on values, and on entities."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated
+
+from msgspec import Struct
+
+from xosc_lateral.world.scenario.enums import (
+    AngleType,
+    ConditionEdge,
+    CoordinateSystem,
+    DirectionalDimension,
+    EntityCategory,
+    RelativeDistanceType,
+    RoutingAlgorithm,
+    Rule,
+    StoryboardElementState,
+    StoryboardElementType,
+)
+from xosc_lateral.world.scenario.place import (
+    AnyNumber,
+    Content,
+    EntityRef,
+    EntityRefs,
+    No,
+    ParameterRef,
+    Place,
+    Zero,
+    called,
+)
+from xosc_lateral.world.scenario.position import Position
+from xosc_lateral.world.scenario.storyboard import Condition, ConditionGroup, Trigger
+
+DistanceType = called("relativeDistanceType")
+
+
+class ParameterCondition(Content, frozen=True):
+    """`value` is text: numbers are compared as numbers where both are."""
+
+    parameter_ref: ParameterRef
+    value: str
+    rule: Rule
+
+
+class VariableCondition(Content, frozen=True):
+    """`value` is text: numbers are compared as numbers where both are."""
+
+    variable_ref: ParameterRef
+    value: str
+    rule: Rule
+
+
+class SimulationTimeCondition(Content, frozen=True):
+    """[s]"""
+
+    value: AnyNumber
+    rule: Rule
+
+
+def at_time(moment: float, name: str, place: Place) -> Trigger:
+    """Trigger of our own that holds from a moment on. [s]"""
+    content = SimulationTimeCondition(moment, Rule.GREATER_THAN, place=place)
+    return Trigger((ConditionGroup((Condition(name, 0.0, ConditionEdge.NONE, content, None, place),)),), place)
+
+
+class TimeOfDayCondition(Content, frozen=True):
+    """Against the environment's clock."""
+
+    date_time: datetime
+    rule: Rule
+
+
+class StoryboardElementStateCondition(Content, frozen=True):
+    """State or transition of a storyboard element; `element_ref` is the trailing part of ``story::act::...::name``."""
+
+    element_type: Annotated[StoryboardElementType, called("storyboardElementType")]
+    element_ref: Annotated[str, called("storyboardElementRef")]
+    state: StoryboardElementState
+
+
+class TrafficSignalCondition(Content, frozen=True):
+    """A signal shows a state."""
+
+    name: str
+    state: str
+
+
+class TrafficSignalControllerCondition(Content, frozen=True):
+    """A signal controller is in a phase."""
+
+    controller_ref: Annotated[str, called("trafficSignalControllerRef")]
+    phase: str
+
+
+class UserDefinedValueCondition(Content, frozen=True):
+    """A value from outside: never known while playing."""
+
+    name: str
+    value: str
+    rule: Rule
+
+
+class EndOfRoadCondition(Content, frozen=True):
+    """At the end of its road for this long. [s]"""
+
+    duration: float
+
+
+class CollisionCondition(Content, frozen=True):
+    """Touches that entity, or any of that category."""
+
+    entity_ref: str | None = None
+    by_type: EntityCategory | None = None
+
+
+class OffroadCondition(Content, frozen=True):
+    """Off the road for this long. [s]"""
+
+    duration: float
+
+
+class Measured(Content, frozen=True, kw_only=True):
+    """A distance, or what is made of one, against a value. `along_route` (1.0) None: not said."""
+
+    value: AnyNumber
+    rule: Rule
+    freespace: No
+    coordinate_system: CoordinateSystem | None = None
+    distance_type: Annotated[RelativeDistanceType | None, DistanceType] = None
+    along_route: bool | None = None
+    routing_algorithm: RoutingAlgorithm | None = None
+
+
+class TimeHeadwayCondition(Measured, frozen=True):
+    """Distance to an entity over own speed. [s]"""
+
+    entity_ref: EntityRef
+
+
+class TimeToCollisionCondition(Measured, frozen=True):
+    """Distance to an entity or position over closing speed. [s]"""
+
+    target: str | Position
+
+
+class AccelerationCondition(Content, frozen=True):
+    """[m/s2]; `direction` None: the magnitude."""
+
+    value: AnyNumber
+    rule: Rule
+    direction: DirectionalDimension | None = None
+
+
+class StandStillCondition(Content, frozen=True):
+    """Stands for this long. [s]"""
+
+    duration: float
+
+
+class SpeedCondition(Content, frozen=True):
+    """[m/s]; `direction` None: the scalar speed."""
+
+    value: AnyNumber
+    rule: Rule
+    direction: DirectionalDimension | None = None
+
+
+class RelativeSpeedCondition(SpeedCondition, frozen=True, kw_only=True):
+    """Own speed minus that of an entity. [m/s]"""
+
+    entity_ref: EntityRef
+
+
+class TraveledDistanceCondition(Content, frozen=True):
+    """Since the scenario's start. [m]"""
+
+    value: AnyNumber
+
+
+class ReachPositionCondition(Content, frozen=True):
+    """Within `tolerance` of a position. [m]"""
+
+    position: Position
+    tolerance: float
+
+
+class DistanceCondition(Measured, frozen=True):
+    """Distance to a position. [m]"""
+
+    position: Position
+
+
+class RelativeDistanceCondition(Content, frozen=True):
+    """Distance to an entity. [m]"""
+
+    entity_ref: EntityRef
+    value: AnyNumber
+    rule: Rule
+    freespace: No
+    distance_type: Annotated[RelativeDistanceType, DistanceType] = RelativeDistanceType.EUCLIDIAN
+    coordinate_system: CoordinateSystem | None = None
+    routing_algorithm: RoutingAlgorithm | None = None
+
+
+class RelativeLaneRange(Struct, frozen=True):
+    """Lanes `from_lane` to `to_lane`, relative to the own one; None: open."""
+
+    from_lane: Annotated[int | None, called("from")]
+    to_lane: Annotated[int | None, called("to")]
+
+
+class RelativeClearanceCondition(Content, frozen=True):
+    """Nobody (of `entity_refs`, or at all when empty) in these lanes within these distances. [m]"""
+
+    opposite_lanes: No
+    freespace: Annotated[bool, called("freeSpace", "freespace", default=False)]
+    distance_forward: Zero
+    distance_backward: Zero
+    lane_ranges: tuple[RelativeLaneRange, ...] = ()
+    entity_refs: EntityRefs = ()
+
+
+class AngleCondition(Content, frozen=True):
+    """Own angle within a tolerance. [rad]"""
+
+    angle_type: AngleType
+    angle: float
+    tolerance: Annotated[float, called("angleTolerance")]
+    coordinate_system: CoordinateSystem | None = None
+
+
+class RelativeAngleCondition(AngleCondition, frozen=True, kw_only=True):
+    """Angle relative to an entity's within a tolerance. [rad]"""
+
+    entity_ref: EntityRef

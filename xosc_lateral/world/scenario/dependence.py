@@ -1,0 +1,212 @@
+"""What in a storyboard depends, directly or through others, on vehicles that somebody else drives.
+
+A condition depends on them if it looks at such a vehicle, at somebody who depends on one, at a storyboard element whose
+start or end does, or at a value that is set by such an event; an event through its condition; a vehicle through an
+event that moves it or an action that refers to somebody. In doubt a thing depends: it is then left to react.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from msgspec import Struct
+
+from xosc_lateral.world.scenario.conditions import (
+    CollisionCondition,
+    ParameterCondition,
+    RelativeClearanceCondition,
+    StoryboardElementStateCondition,
+    TrafficSignalCondition,
+    TrafficSignalControllerCondition,
+    UserDefinedValueCondition,
+    VariableCondition,
+)
+from xosc_lateral.world.scenario.enums import StoryboardElementState, StoryboardElementType
+from xosc_lateral.world.scenario.global_actions import TrafficSignalControllerAction, TrafficSignalStateAction
+from xosc_lateral.world.scenario.private_actions import APPEARANCE, TeleportAction
+from xosc_lateral.world.scenario.scenario import Scenario
+from xosc_lateral.world.scenario.storyboard import Act, Condition, Event, ManeuverGroup, Trigger
+from xosc_lateral.world.scenario.under_test import controlled_entities
+
+Path = tuple[str, ...]
+
+_DEPTH = {
+    StoryboardElementType.STORY: 1,
+    StoryboardElementType.ACT: 2,
+    StoryboardElementType.MANEUVER_GROUP: 3,
+    StoryboardElementType.MANEUVER: 4,
+    StoryboardElementType.EVENT: 5,
+    StoryboardElementType.ACTION: 6,
+}
+"""Names from the story down to an element."""
+
+_REFERENCES = frozenset({"entity_ref", "entity_refs", "master_entity_ref", "trailer_ref"})
+
+
+@dataclass(eq=False, slots=True)
+class Dependence:
+    """What depends on the vehicles under test; see `dependence`.
+
+    Parameters
+    ----------
+    entities : set of str
+        Whose motion does, the vehicles under test included.
+    begins, ends : set of tuple of str
+        Storyboard elements, by their names from the story down, whose start or end does.
+    values : set of str
+        Parameters, variables, signals and signal controllers that are set by such an event.
+    """
+
+    entities: set[str]
+    begins: set[Path] = field(default_factory=set)
+    ends: set[Path] = field(default_factory=set)
+    values: set[str] = field(default_factory=set)
+
+    def of_trigger(self, trigger: Trigger | None) -> bool:
+        """Whether a trigger depends on them."""
+        return any(self.of_condition(condition) for condition in conditions_of(trigger))
+
+    def of_condition(self, condition: Condition) -> bool:
+        """Whether a condition depends on them."""
+        content = condition.content
+        looked_at = set(entity_references(content))
+        if condition.triggering_entities is not None:
+            looked_at |= set(condition.triggering_entities.entity_refs)
+        if looked_at & self.entities:
+            return True
+        match content:
+            case CollisionCondition(entity_ref=None) | RelativeClearanceCondition(entity_refs=()):
+                return bool(self.entities)  # anybody
+            case StoryboardElementStateCondition():
+                paths = self.begins if content.state is StoryboardElementState.START_TRANSITION else self.ends
+                return any(refers_to(content, path) for path in paths)
+            case ParameterCondition() | VariableCondition() | TrafficSignalCondition():
+                return _value(content) in self.values
+            case TrafficSignalControllerCondition():
+                return content.controller_ref in self.values
+        return isinstance(content, UserDefinedValueCondition)  # comes from whoever drives
+
+    def size(self) -> int:
+        """Of what was found."""
+        return len(self.entities) + len(self.begins) + len(self.ends) + len(self.values)
+
+
+def dependence(scenario: Scenario, under_test: Collection[str]) -> Dependence:
+    """What depends on vehicles under test; nothing if there are none.
+
+    A vehicle with a controller of its own depends on them: what it drives by can't be known.
+    """
+    found = Dependence(set(under_test))
+    if not under_test:
+        return found
+    found.entities |= controlled_entities(scenario)
+    size = -1
+    while found.size() != size:
+        size = found.size()
+        _follow_init(scenario, found)
+        for story in scenario.storyboard.stories:
+            for act in story.acts:
+                _follow_act(found, (story.name,), act)
+        found.entities |= {e.trailer for e in scenario.entities if e.trailer is not None and e.name in found.entities}
+    return found
+
+
+def entity_references(content: object) -> Iterator[str]:
+    """Entities that an action or a condition refers to, positions inside it included."""
+    if isinstance(content, tuple):
+        for item in content:
+            yield from entity_references(item)
+    elif isinstance(content, Struct):
+        for name in content.__struct_fields__:
+            value: Any = getattr(content, name)
+            # A time to collision has an entity's name or a position.
+            if isinstance(value, str) and (name in _REFERENCES or name == "target"):
+                yield value
+            elif name in _REFERENCES and isinstance(value, tuple):
+                yield from value
+            elif name != "properties":
+                yield from entity_references(value)
+
+
+def conditions_of(trigger: Trigger | None) -> Iterator[Condition]:
+    """Every condition of a trigger, if there is one."""
+    if trigger is not None:
+        for group in trigger.groups:
+            yield from group.conditions
+
+
+def refers_to(content: StoryboardElementStateCondition, path: Path) -> bool:
+    """Whether a state condition is about the element with these names from the story down."""
+    wanted = tuple(content.element_ref.split("::"))
+    return _DEPTH.get(content.element_type) == len(path) and path[len(path) - len(wanted) :] == wanted
+
+
+def _follow_init(scenario: Scenario, found: Dependence) -> None:
+    for private in scenario.storyboard.init.privates:
+        for action in private.actions:
+            # Where others are at the start is known.
+            if not isinstance(action.content, TeleportAction) and found.entities & set(
+                entity_references(action.content)
+            ):
+                found.entities.add(private.entity_ref)
+
+
+def _follow_act(found: Dependence, above: Path, act: Act) -> None:
+    path = (*above, act.name)
+    begins = found.of_trigger(act.start_trigger)
+    stops = found.of_trigger(act.stop_trigger)
+    if begins:
+        found.begins.add(path)
+    if begins or stops:
+        found.ends |= {path, above}
+    for group in act.maneuver_groups:
+        again = group.maximum_execution_count > 1 and (*path, group.name) in found.ends
+        for maneuver, event in group.events():
+            here = (*path, group.name, maneuver.name, event.name)
+            _follow_event(found, here, act, group, event, cut=begins or stops or again)
+
+
+def _follow_event(found: Dependence, path: Path, act: Act, group: ManeuverGroup, event: Event, *, cut: bool) -> None:
+    depends = cut or found.of_trigger(event.start_trigger)
+    actors = set(actors_of(act, group, event))
+    refers = False
+    for action in event.actions:
+        references = set(entity_references(action.content))
+        moves = action.is_private and not isinstance(action.content, APPEARANCE)
+        steered = bool(references & found.entities)
+        refers |= steered
+        if moves and (depends or steered):
+            found.entities |= actors
+        if not action.is_private and depends:
+            found.entities |= references  # appears or is gone then
+            found.values |= {_value(action.content)} - {""}
+    if depends:
+        found.begins |= {path, *((*path, action.name) for action in event.actions)}
+    if depends or refers or actors & found.entities:
+        found.ends |= {path[:depth] for depth in range(1, len(path) + 1)}
+        found.ends |= {(*path, action.name) for action in event.actions}
+
+
+def actors_of(act: Act, group: ManeuverGroup, event: Event) -> tuple[str, ...]:
+    """Who may act in an event: the group's actors, and whoever triggers it where it is about them."""
+    if not group.actors.select_triggering_entities:
+        return group.actors.entity_refs
+    triggering = [
+        name
+        for trigger in (act.start_trigger, event.start_trigger)
+        for condition in conditions_of(trigger)
+        if condition.triggering_entities is not None
+        for name in condition.triggering_entities.entity_refs
+    ]
+    return tuple(dict.fromkeys([*group.actors.entity_refs, *triggering]))
+
+
+def _value(content: object) -> str:
+    """Name of the parameter, variable or signal that an action sets or a condition looks at; empty: none."""
+    if isinstance(content, TrafficSignalStateAction | TrafficSignalCondition):
+        return content.name
+    if isinstance(content, TrafficSignalControllerAction):
+        return content.controller_ref
+    return str(getattr(content, "parameter_ref", "") or getattr(content, "variable_ref", ""))

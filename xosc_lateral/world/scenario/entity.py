@@ -1,0 +1,124 @@
+"""Scenario objects: vehicles, pedestrians, things, and the controllers assigned to them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated
+
+from msgspec import Struct, field
+
+from xosc_lateral.world.scenario.enums import EntityCategory, VehicleCategory
+from xosc_lateral.world.scenario.place import Name, Place, Xml, Zero, called
+
+
+class BoundingBox(Struct, frozen=True):
+    """Box around the entity; its centre in the entity's frame (x ahead of the reference point, y left, z up). [m]"""
+
+    center_x: Annotated[float, called("Center/x")]
+    center_y: Annotated[float, called("Center/y")]
+    center_z: Annotated[float, called("Center/z", default=0.0)]
+    length: Annotated[float, called("Dimensions/length")]
+    width: Annotated[float, called("Dimensions/width")]
+    height: Annotated[float, called("Dimensions/height")]
+
+
+USUAL_BOX = BoundingBox(1.5, 0.0, 0.9, 5.0, 2.0, 1.8)
+"""Where a file gives none: the middle of the field's passenger cars."""
+
+
+class Performance(Struct, frozen=True):
+    """Limits of a vehicle; infinite where the file has none. [m/s], [m/s2], [m/s3]"""
+
+    max_speed: float = float("inf")
+    max_acceleration: float = float("inf")
+    max_deceleration: float = float("inf")
+    max_acceleration_rate: float = float("inf")
+    max_deceleration_rate: float = float("inf")
+
+
+class Axle(Struct, frozen=True):
+    """An axle; `position_x` ahead of the reference point. [m], [rad]"""
+
+    max_steering: Zero
+    position_x: Zero
+    position_z: Zero
+    track_width: Zero
+    wheel_diameter: Zero
+
+
+class Axles(Struct, frozen=True):
+    """Front (a trailer may have none), rear and further axles."""
+
+    front: Annotated[Axle | None, called("FrontAxle")]
+    rear: Annotated[Axle | None, called("RearAxle")]
+    additional: Annotated[tuple[Axle, ...], called("AdditionalAxle")] = ()
+
+
+class Controller(Struct, frozen=True):
+    """A controller by name. It is named and reported; playback uses the default driver instead."""
+
+    name: Name
+    place: Place
+    properties: Mapping[str, str] = field(default_factory=dict)
+    object_name: str | None = None
+    """Name of the ObjectController (1.3), which ActivateControllerAction may refer to."""
+
+
+class Entity(Struct, frozen=True):
+    """One scenario object.
+
+    Parameters
+    ----------
+    name : str
+        Name of the ScenarioObject.
+    category : EntityCategory
+        Vehicle, pedestrian, miscellaneous or external.
+    place : Place
+        Of the ScenarioObject.
+    bounding_box : BoundingBox
+        `USUAL_BOX` where the file has none.
+    vehicle_category : VehicleCategory or None
+        Vehicles only.
+    performance : Performance
+        Vehicles only; else without limits.
+    axles : Axles or None
+        Vehicles only.
+    controllers : tuple of Controller
+        Assigned at the start.
+    object_name : str
+        Name of the Vehicle, Pedestrian or MiscObject (often its catalog entry).
+    kind : str
+        The file's own category code (``car``, ``wheelchair``, ``pole`` ...); empty for external objects.
+    trailer : str or None
+        Name of the entity that it pulls from the start.
+    hitch_x, coupler_x : float or None
+        Of the trailer coupling, ahead of the reference point. [m]
+    mass : float or None
+        [kg]
+    model3d : str or None
+        3D model file, as written.
+    properties : mapping of str to str
+        Vendor properties.
+    """
+
+    name: str
+    category: EntityCategory
+    place: Place
+    bounding_box: Annotated[BoundingBox, Xml(default=USUAL_BOX)]
+    vehicle_category: VehicleCategory | None = None
+    performance: Performance = Performance()
+    axles: Axles | None = None
+    controllers: tuple[Controller, ...] = ()
+    object_name: str = ""
+    kind: str = ""
+    trailer: str | None = None
+    hitch_x: float | None = None
+    coupler_x: float | None = None
+    mass: float | None = None
+    model3d: Annotated[str | None, called("model3d", "model")] = None
+    properties: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def is_vehicle(self) -> bool:
+        """Vehicles are what lateral movement is added to; all else plays along."""
+        return self.category is EntityCategory.VEHICLE

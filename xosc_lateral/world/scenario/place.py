@@ -1,0 +1,105 @@
+"""What all elements of a file have in common: where they stand, and how their fields are written."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Annotated
+
+from msgspec import UNSET, Struct
+
+from xosc_lateral.base.errors import FormatError
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """File, line and element of something read.
+
+    Parameters
+    ----------
+    path : str
+        The file (a scenario or a catalog).
+    line : int or None
+        Line, from 1.
+    element : str
+        The element as errors name it, as in ``Event 'brake'``.
+    node : tuple of int
+        Child indices from the root element down: finds the same XML element again in a new parse of the same bytes.
+    """
+
+    path: str
+    line: int | None
+    element: str
+    node: tuple[int, ...] = field(default=(), repr=False, compare=False)
+
+    def error(self, what: str, kind: type[FormatError] = FormatError) -> FormatError:
+        """An error that names the place."""
+        return kind(what, path=self.path, line=self.line, element=self.element)
+
+
+class Content(Struct, frozen=True, kw_only=True):
+    """What an action, a condition or a position says; knows where it stands."""
+
+    place: Place
+
+
+class Unsupported(Struct, frozen=True):
+    """Something that was understood to be there, but that the model holds no more of: the player names it.
+
+    Parameters
+    ----------
+    kind : str
+        The standard's element name, as in ``RandomRouteAction``.
+    place : Place
+        Where it stands.
+    reason : str
+        Why, if there is more to say than that it is unknown.
+    """
+
+    kind: str
+    place: Place
+    reason: str = ""
+
+
+class Xml(Struct, frozen=True):
+    """How a field is written in a file, where its name and type don't say so.
+
+    Without it an attribute is called like its field (``entityRef`` for `entity_ref`), an element like its type.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Attributes, or child elements, of which the first that is there counts; ``Sun/azimuth`` is in a child element.
+        An empty tuple where the name is the usual one, ``("",)`` for the element itself.
+    default : object
+        What is read where it is missing, if the field itself has no default: lenient reading, not the standard.
+    finite : bool
+        Infinity is refused.
+    is_entity : bool
+        The name of an entity that has to be there; of a tuple, those that EntityRef elements stand for.
+    is_parameter : bool
+        The name of a parameter, which files also write with a ``$``.
+    """
+
+    names: tuple[str, ...] = ()
+    default: object = UNSET
+    finite: bool = True
+    is_entity: bool = False
+    is_parameter: bool = False
+
+
+def called(*names: str, default: object = UNSET) -> Xml:
+    """A field under other names."""
+    return Xml(names, default)
+
+
+EntityRef = Annotated[str, Xml(is_entity=True)]
+EntityRefs = Annotated[tuple[str, ...], Xml(is_entity=True)]
+ParameterRef = Annotated[str, Xml(is_parameter=True)]
+AnyNumber = Annotated[float, Xml(finite=False)]
+"""May be infinite."""
+Zero = Annotated[float, Xml(default=0.0)]
+"""0 where a file has none."""
+No = Annotated[bool, Xml(default=False)]
+"""False where a file has none."""
+Name = Annotated[str, Xml(default="")]
+"""Empty where a file has none."""

@@ -1,0 +1,231 @@
+"""Where other vehicles are, seen along the lane that one drives on, and what of them counts as being there.
+
+Others belong to a lane as far as their bodies lie in it, seen from where the vehicle itself is, so that they come and
+go as a lane change does, anybody's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.base.segment import FADES
+from xosc_lateral.world.road.network import RoadNetwork
+from xosc_lateral.world.scenario import BoundingBox
+
+REACH = 200.0
+"""How far a driver looks for others [m]; beyond it there is none (about what a series radar sees)."""
+
+IN_SIGHT = 2.0 * REACH + 100.0
+"""Vehicles never nearer than this in a straight line are not searched along the lane. Free space is counted along the
+reference line, which on the tightest ramp is half as long as its outer lane; the rest is for two road trains. [m]"""
+
+ALONGSIDE = 10.0
+"""A vehicle in the next lane counts half as alongside at this free space lengthwise, wholly at half of it. [m]"""
+
+NEAR = 40.0
+"""Free space over which the influence of others fades to 37 %, as in `driver.neighbours`: with so much more free space
+for each factor e that less of a body lies in the lane, its influence is the product of both. [m]"""
+
+
+class Reach(NamedTuple):
+    """A lane section within reach along the own lane: u(s) = at + sign * (s - s_entry) counts along travel. [m]"""
+
+    road: int
+    s_low: float
+    s_high: float
+    lane: int
+    at: float
+    s_entry: float
+    sign: int
+
+
+def lane_path(network: RoadNetwork, road: int, lane: int, s: float, forward: int) -> list[Reach]:
+    """Sections along a lane within `REACH` both ways, in a coordinate u that is 0 at `s` and grows along travel."""
+    low, high = network.section_at(road, s)
+    path = [Reach(road, low, high, lane, 0.0, s, forward)]
+    for way in (1, -1):
+        here, direction, done = (road, lane, s), way * forward, 0.0
+        while done < REACH + (high - low):
+            section = network.section_at(here[0], here[2])
+            left = (section[1] - here[2]) if direction > 0 else (here[2] - section[0])
+            step = network.advance(*here, left + _INTO_NEXT, direction=direction)
+            if step.remaining > 0.0:
+                break
+            done += left
+            here, direction = (step.road, step.lane, step.s), step.direction
+            start, end = network.section_at(step.road, step.s)
+            s_entry = step.s - direction * _INTO_NEXT
+            path.append(Reach(step.road, start, end, step.lane, way * done, s_entry, way * direction))
+    return path
+
+
+_INTO_NEXT = 1e-6
+"""Step beyond a section's end that brings one into the next. [m]"""
+
+
+class Others(NamedTuple):
+    """Where another vehicle is, seen along the own lane: u ahead [m], from the own path to the left [m], which way."""
+
+    ahead: FloatArray
+    left: FloatArray
+    oncoming: BoolArray
+
+
+ZONES = {"lead": 0.0, "left": 1.0, "right": -1.0}
+"""Middle of the lane on each side, from the own path to the left. [own lane widths]"""
+
+
+def see_along(
+    path: Sequence[Reach],
+    own_u: FloatArray,
+    own_offset: FloatArray,
+    road: NDArray[np.integer],
+    s: FloatArray,
+    t: FloatArray,
+    direction: NDArray[np.integer],
+    centre_t: Callable[[int, int, FloatArray], FloatArray],
+) -> Others:
+    """Where others are along one's lane path, row by row: other moments, or other vehicles. Shape (n,) each.
+
+    From where one is on the path (`lane_path`) and from its lane's centre, positive left [m]; where the other is, road,
+    s and t [m], and which way it drives along s, +1 or -1, 0 on no lane; and t of a lane's centre, by road, lane and s.
+    Others elsewhere are not seen (NaN).
+    """
+    n = len(own_u)
+    seen = Others(np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool))
+    for part in path:
+        on = (direction != 0) & (road == part.road) & (s >= part.s_low - 1e-9) & (s <= part.s_high + 1e-9)
+        k = np.flatnonzero(on)
+        if not len(k):
+            continue
+        ahead = part.at + part.sign * (s[k] - part.s_entry) - own_u[k]
+        # the own lane path may pass a place twice (a ring road): the nearer view counts
+        nearer = ~(np.abs(seen.ahead[k]) <= np.abs(ahead))
+        k, ahead = k[nearer], ahead[nearer]
+        seen.ahead[k] = ahead
+        seen.left[k] = part.sign * (t[k] - centre_t(part.road, part.lane, s[k])) - own_offset[k]
+        seen.oncoming[k] = direction[k] != part.sign
+    return seen
+
+
+class Extent(NamedTuple):
+    """How long vehicles are, and how far their middles are ahead of their reference points, shape (n,) each. [m]"""
+
+    length: FloatArray
+    center_x: FloatArray
+
+
+def free_space(seen: Others, own: BoundingBox | Extent, other: BoundingBox | Extent) -> FloatArray:
+    """Bumper to bumper, 0 while overlapping lengthwise. [m]"""
+    turned = np.where(seen.oncoming, -1.0, 1.0)
+    between_centres = seen.ahead + turned * other.center_x - own.center_x
+    return np.maximum(np.abs(between_centres) - 0.5 * (own.length + other.length), 0.0)
+
+
+@dataclass(eq=False, slots=True)
+class Around:
+    """Who is around: on each side of `ZONES`; free space to who comes towards one [m], and how far he is there [-].
+
+    Shape (n,).
+    """
+
+    sides: Mapping[str, _Side]
+    oncoming: FloatArray
+    oncoming_there: FloatArray
+
+    @classmethod
+    def nobody(cls, n: int) -> Around:
+        """Nobody around anybody."""
+        return cls({side: _Side.nobody(n) for side in ZONES}, np.full(n, np.nan), np.zeros(n))
+
+    def add(
+        self,
+        rows: IntArray,
+        seen: Others,
+        gap: FloatArray,
+        width: FloatArray,
+        other_width: float | FloatArray,
+        is_truck: BoolArray,
+    ) -> None:
+        """Others, seen from the rows, which may come again; free space to them, own lane and their bodies wide. [m]
+
+        Shape (m,) each.
+        """
+        with np.errstate(invalid="ignore"):
+            there = (gap <= REACH) & ~np.isnan(seen.left)
+            # he comes into sight in the last quarter of the reach, and is gone within `NEAR` once he has passed
+            share = 1.0 - smooth_step(np.where(seen.ahead > 0, 4.0 * gap / REACH - 3.0, gap / NEAR))
+            k = np.flatnonzero(there & seen.oncoming & (share > 0))
+            there &= ~seen.oncoming
+        np.fmin.at(self.oncoming, rows[k], gap[k] - NEAR * np.log(share[k]))
+        np.maximum.at(self.oncoming_there, rows[k], share[k])
+        for side, middle in ZONES.items():
+            share = _share_inside(seen.left / width - middle, other_width / width)
+            share = np.where(there & ((side != "lead") | (seen.ahead > 0)), share, 0.0)
+            k = np.flatnonzero(share)
+            if len(k):
+                self.sides[side].add(rows[k], gap[k], share[k], is_truck[k])
+
+    def columns(self, lanes: Mapping[str, FloatArray], *, always_fade: bool = False) -> dict[str, FloatArray]:
+        """Context columns, shape (n,) each; `lanes`: how far there is one on each side. [-]"""
+        columns = {"oncoming_distance": self.oncoming}
+        if always_fade or (self.oncoming_there.max(initial=0.0) > 0.0 and self.oncoming_there.min(initial=1.0) < 1.0):
+            columns[f"oncoming_distance{FADES}"] = self.oncoming_there
+        for side, found in self.sides.items():
+            columns |= {f"{side}_is_truck": found.is_truck}
+            lane = np.maximum(lanes[side], np.minimum(found.influence, 1.0))
+            columns[f"{side}_distance"] = np.where((lane > 0) & np.isnan(found.distance), np.inf, found.distance)
+            if always_fade or (lane.max(initial=0.0) > 0.0 and lane.min(initial=1.0) < 1.0):
+                columns[f"{side}_distance{FADES}"] = lane
+            if side != "lead":  # the same as measured drives often have it: a flag for what drives beside
+                columns |= {f"truck_{side}": found.truck_alongside, f"car_{side}": found.car_alongside}
+        return columns
+
+
+@dataclass(eq=False, slots=True)
+class _Side:
+    """What is on one side, shape (n,) each: distance [m]; influence of all and of trucks, kinds alongside. [-]"""
+
+    distance: FloatArray
+    influence: FloatArray
+    of_trucks: FloatArray
+    truck_alongside: FloatArray
+    car_alongside: FloatArray
+
+    @classmethod
+    def nobody(cls, n: int) -> _Side:
+        return cls(np.full(n, np.nan), *np.zeros((4, n)))
+
+    def add(self, rows: IntArray, gap: FloatArray, share: FloatArray, is_truck: BoolArray) -> None:
+        """More vehicles, each seen from a row, with free space `gap` [m], of which so much lies in the lane [-]."""
+        np.fmin.at(self.distance, rows, gap - NEAR * np.log(share))
+        influence = share * np.exp(-gap / NEAR)
+        np.add.at(self.influence, rows, influence)
+        alongside = share * (1.0 - smooth_step(gap / ALONGSIDE - 0.5))
+        # a truck comes into sight in the last quarter of the reach
+        np.add.at(self.of_trucks, rows, is_truck * influence * (1.0 - smooth_step(4.0 * gap / REACH - 3.0)))
+        np.maximum.at(self.truck_alongside, rows, is_truck * alongside)
+        np.maximum.at(self.car_alongside, rows, ~is_truck * alongside)
+
+    @property
+    def is_truck(self) -> FloatArray:
+        """How far who is there is a truck, others weighed by their influence."""
+        return self.of_trucks / np.where(self.influence > 0, self.influence, 1.0)
+
+
+def _share_inside(middle: FloatArray, width: FloatArray) -> FloatArray:
+    """Share of a body that lies in a lane one wide, of what fits in; `middle` from the lane's, all in lane widths."""
+    inside = np.minimum(middle + 0.5 * width, 0.5) - np.maximum(middle - 0.5 * width, -0.5)
+    return np.clip(inside / np.minimum(width, 1.0), 0.0, 1.0)
+
+
+def smooth_step(u: FloatArray) -> FloatArray:
+    """0 at 0 and below, 1 at 1 and above, smooth between."""
+    u = np.clip(u, 0.0, 1.0)
+    return np.asarray(u**2 * (3.0 - 2.0 * u))
