@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 DEV_STAMP := $(VENV)/.installed-dev
 DOCS_STAMP := $(VENV)/.installed-docs
 
-.PHONY: fuzz lock install-locked sbom reproducible licences test-matrix demo test fast style lint format docs schema profiles refined templates loop-dlr picture map clean
+.PHONY: laboratory fuzz lock install-locked sbom reproducible licences test-matrix demo test fast style lint format docs schema profiles refined templates loop-dlr picture map clean
 
 # Python compiles what it imports when it does: a fifth of what is installed.
 QUICK := --disable-pip-version-check --progress-bar on --no-compile
@@ -55,6 +55,11 @@ FAST := $(addprefix tests/,world/road world/scenario world/motion world/surround
 fast: $(DEV_STAMP)
 	$(BIN)/python -m pytest -q $(FAST) -m 'not slow' -k 'not importers and not fuzz and not corpus'
 
+# What proves the documentation's claims: its scripts start, their parts are right. Not part of `make test`.
+laboratory: $(DEV_STAMP)
+	$(BIN)/python -m pip install $(QUICK) -e '.[board]'
+	$(BIN)/python -m pytest -n 2 --dist worksteal laboratory/tests
+
 # Mutants of every input format against its reader: bytes damaged, then well-formed files that say something else;
 # twenty minutes or so. What hurts lands in out/faults.
 fuzz: $(DEV_STAMP)
@@ -77,10 +82,10 @@ schema: $(STAMP)
 # the closed loop made stays as it is; `make refined` makes it anew.
 WHEEL := out/data/tasi-0.15.4-py3-none-any.whl
 profiles: $(STAMP) $(WHEEL)
-	$(BIN)/python -m benchmarks.build_library $(WHEEL) -o driver_profiles --keep-refined
+	$(BIN)/python -m laboratory.build_library $(WHEEL) -o driver_profiles --keep-refined
 
 refined: $(STAMP) $(WHEEL)
-	$(BIN)/python -m benchmarks.build_library $(WHEEL) -o driver_profiles
+	$(BIN)/python -m laboratory.build_library $(WHEEL) -o driver_profiles
 
 # The README's picture, and CONTRIBUTING's map of the imports.
 picture: $(STAMP)

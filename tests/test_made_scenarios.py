@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 from lxml import etree
 
-from benchmarks.findings import schema_findings
-from benchmarks.in_player import shifts
-from benchmarks.made.actions import ACTIONS
-from benchmarks.made.conditions import CONDITIONS
-from benchmarks.made.roads import ROADS
-from benchmarks.made.scenario import LAST, made
+from laboratory.findings import schema_findings
+from laboratory.in_player import shifts
+from tests.kit.made.actions import ACTIONS
+from tests.kit.made.conditions import CONDITIONS
+from tests.kit.made.roads import ROADS
+from tests.kit.made.scenario import LAST, made
 from xosc_lateral.workflows.conversion.load import play_scenario
 
 SCHEMA = Path(__file__).parent / "data" / "xsd" / "OpenSCENARIO-1.3.0.xsd"

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from tests.world.player.stage import Stage, after, event, lane_change, maneuvers, to_lane
+from tests.kit.stage import Stage, after, event, lane_change, maneuvers, to_lane
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import app
 from xosc_lateral.workflows.batch.manifest import read_manifest

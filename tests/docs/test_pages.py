@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 PAGES = sorted(
     path.relative_to(ROOT).as_posix()
-    for path in [*DOCS.rglob("*.md"), *ROOT.glob("*.md"), *ROOT.glob("benchmarks/**/README.md")]
+    for path in [*DOCS.rglob("*.md"), *ROOT.glob("*.md"), *ROOT.glob("laboratory/**/README.md")]
 )
 RUN = (
     "quickstart.md",
@@ -116,7 +116,7 @@ def test_a_command_that_takes_long_is_accepted(page, line, tmp_path, monkeypatch
 
 def begin_script(words: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     """Run a benchmark or an example until its arguments are parsed; of others, look whether they are there."""
-    if words[0] == "-m" and not words[1].startswith("benchmarks."):
+    if words[0] == "-m" and not words[1].startswith("laboratory."):
         assert words[1] == "build" or find_spec(words[1])
         assert all((ROOT / word).exists() for word in words if word.startswith("tests/"))
         return

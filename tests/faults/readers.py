@@ -18,8 +18,8 @@ import pandas as pd
 from examples.driver_simulator import simulate_drive
 from tests.faults.reader import NonsenseError, Reader, sane
 from tests.faults.recordings import RECORDINGS
-from tests.files.made_scenario import ROAD, declarations, entity, parameter, scenario_text, vehicle
-from tests.profiles import simulated_profile
+from tests.kit.profiles import simulated_profile
+from tests.kit.scenario_files import ROAD, declarations, entity, parameter, scenario_text, vehicle
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.limits import context_range
 from xosc_lateral.drivers.drives.cuts import all_runs

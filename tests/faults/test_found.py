@@ -13,8 +13,8 @@ import pytest
 
 from examples.driver_simulator import simulate_drive
 from tests.faults.readers import manifest_row
-from tests.files.made_scenario import scenario_text, write_scenario
-from tests.profiles import simulated_profile
+from tests.kit.profiles import simulated_profile
+from tests.kit.scenario_files import scenario_text, write_scenario
 from xosc_lateral import write_template
 from xosc_lateral.base.shipped import shipped_folder
 from xosc_lateral.cli import main

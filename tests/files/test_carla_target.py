@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from tests.files import scenario_runner
-from tests.files.made_scenario import (
+from tests.files.test_openscenario_write import CUSTOM, LIGHT, STOP_AND_GO, VISIBLE, nominal, played
+from tests.files.test_versions import ENVIRONMENT, RICH, tree, written
+from tests.kit import scenario_runner
+from tests.kit.scenario_files import (
     action,
     declarations,
     entity,
@@ -21,8 +23,6 @@ from tests.files.made_scenario import (
     teleport,
     time_condition,
 )
-from tests.files.test_openscenario_write import CUSTOM, LIGHT, STOP_AND_GO, VISIBLE, nominal, played
-from tests.files.test_versions import ENVIRONMENT, RICH, tree, written
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.openscenario.write.target import target

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.files.made_scenario import action, event, speed_action, story
 from tests.files.test_openscenario_write import played
 from tests.files.test_versions import tree, written
+from tests.kit.scenario_files import action, event, speed_action, story
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.openscenario.write.lane_offset_scenario import write_lane_offset_scenario

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.files.made_scenario import (
+from tests.kit.scenario_files import (
     action,
     declarations,
     entity,

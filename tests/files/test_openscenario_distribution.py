@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.files.made_scenario import declarations, parameter, scenario_text, write_scenario
+from tests.kit.scenario_files import declarations, parameter, scenario_text, write_scenario
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.openscenario.distribution import LogicalScenario, read_distribution
 from xosc_lateral.files.openscenario.read import read_scenario

@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from lxml import etree
 
-from tests.files.made_scenario import (
+from tests.kit.scenario_files import (
     action,
     declarations,
     entity,

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from tests.files.made_scenario import (
+from tests.kit.scenario_files import (
     action,
     declarations,
     entity,

@@ -10,9 +10,9 @@ import pytest
 from lxml import etree
 from msgspec import structs
 
-from tests.files.made_scenario import action, event, made, time_condition
 from tests.files.test_openscenario_write import LANE_CHANGE, STEP, nominal, played, provenance
-from tests.world.motion.made_motion import drive, entity, together, two_roads
+from tests.kit.motion import drive, entity, together, two_roads
+from tests.kit.scenario_files import action, event, made, time_condition
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.openscenario.write.lane_offset_scenario import write_lane_offset_scenario
 from xosc_lateral.files.openscenario.write.moving import Moving, _heading_times

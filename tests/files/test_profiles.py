@@ -10,7 +10,7 @@ import jsonschema
 import pytest
 from msgspec.structs import replace
 
-from tests.profiles import simulated_profile
+from tests.kit.profiles import simulated_profile
 from xosc_lateral.base.errors import DriverProfileError, FormatError
 from xosc_lateral.drivers.model.effects import Acts, Drift, Linear
 from xosc_lateral.drivers.model.profile import DriverProfile, profile_schema

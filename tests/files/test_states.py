@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from tests.world.player.stage import Stage, after, event, lane_change, maneuvers, on_lane, speed, teleport, to_lane
+from tests.kit.stage import Stage, after, event, lane_change, maneuvers, on_lane, speed, teleport, to_lane
 from xosc_lateral.files.states import COLUMNS, states_csv, states_frame
 from xosc_lateral.world.motion.nominal import Activity, NominalMotion
 from xosc_lateral.world.road import RoadNetwork

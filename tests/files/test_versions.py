@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from tests.files.made_scenario import (
+from tests.files.test_openscenario_write import CUSTOM, LIGHT, STOP_AND_GO, VISIBLE, nominal, played
+from tests.kit.scenario_files import (
     action,
     declarations,
     entity,
@@ -26,7 +27,6 @@ from tests.files.made_scenario import (
     vehicle,
     write_scenario,
 )
-from tests.files.test_openscenario_write import CUSTOM, LIGHT, STOP_AND_GO, VISIBLE, nominal, played
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.openscenario.write.draft import WrittenScenario

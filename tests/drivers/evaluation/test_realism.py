@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from tests.benchmarks.models.made_runs import smooth_runs
+from tests.kit.runs import smooth_runs
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.evaluation.parts import SnippetCondition

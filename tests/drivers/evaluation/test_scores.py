@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import wasserstein_distance
 
-from benchmarks.comparison import compare_profiles, driver_distances
+from laboratory.comparison import compare_profiles, driver_distances
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.resampling import STEP

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.profiles import simulated_profile
-from tests.world.motion.made_motion import LANE_WIDTH, drive, entity, together, two_roads
+from tests.kit.motion import LANE_WIDTH, drive, entity, together, two_roads
+from tests.kit.profiles import simulated_profile
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.fitting.answers import LAG, ORDER, RESPONSE, SCALE, basis_of, measure_beside
 from xosc_lateral.drivers.fitting.fitting import fit_population

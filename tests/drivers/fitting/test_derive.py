@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.profiles import simulated_profile
+from tests.kit.profiles import simulated_profile
 from xosc_lateral import read_profile
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.segment import Segment

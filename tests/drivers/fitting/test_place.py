@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.benchmarks.models.made_runs import made_run, smooth_runs
+from tests.kit.runs import made_run, smooth_runs
 from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
 from xosc_lateral.drivers.drives.cuts import CutRules
 from xosc_lateral.drivers.drives.drive import Drive, Run

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.simulated.assist import FLAG, OPENLKA_MAP, LaneKeepingAssist, openlka_layout
 from examples.driver_simulator.simulator import simulate_drive
+from tests.kit.simulated.assist import FLAG, OPENLKA_MAP, LaneKeepingAssist, openlka_layout
 from xosc_lateral.cli import main
 from xosc_lateral.drivers.drives.cuts import all_runs
 from xosc_lateral.drivers.evaluation.snippets import sample_runs

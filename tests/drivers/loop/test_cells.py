@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.drivers.loop.made_coarse import timeline_of
+from tests.kit.coarse import timeline_of
 from xosc_lateral.drivers.loop.residual import statistics_of
 from xosc_lateral.drivers.loop.timeline import Coarse
 from xosc_lateral.drivers.model.effects import Acts, Linear, Proximity

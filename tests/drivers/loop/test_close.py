@@ -10,11 +10,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks import simulated as plants
-from benchmarks.simulated.movements import ornstein_uhlenbeck, record_movement
 from examples.driver_simulator.simulator import Driver, simulate_drive
-from tests.drivers.loop import truth
 from tests.drivers.loop.conftest import driver_in
+from tests.kit import simulated as plants
+from tests.kit import truth
+from tests.kit.simulated.movements import ornstein_uhlenbeck, record_movement
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.cli import main
 from xosc_lateral.drivers.drives.drive import Drive

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.drivers.loop.made_coarse import coarse_of, movement, wander
+from tests.kit.coarse import coarse_of, movement, wander
 from xosc_lateral.drivers.loop.column_search import ColumnSearch
 from xosc_lateral.drivers.loop.columns import Column, Values
 from xosc_lateral.drivers.loop.model import Outcome

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.drivers.loop.made_coarse import timeline_of
+from tests.kit.coarse import timeline_of
 from xosc_lateral.drivers.loop.columns import MAX_LEVELS, MIN_SHARE, Column, Values, known_columns
 
 N = 6000

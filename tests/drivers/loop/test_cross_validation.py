@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.drivers.loop.made_coarse import coarse_of, movement, wander
+from tests.kit.coarse import coarse_of, movement, wander
 from xosc_lateral.drivers.loop.cross_validation import held_out_gain
 from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm

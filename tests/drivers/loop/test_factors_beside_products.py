@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.drivers.loop.planted import planted_drive
+from tests.kit.planted import planted_drive
 from xosc_lateral.drivers.loop.column_search import ColumnSearch
 from xosc_lateral.drivers.loop.identify import usable_columns
 from xosc_lateral.drivers.loop.regression import fit_model

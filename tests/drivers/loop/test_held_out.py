@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.drivers.loop.made_coarse import SPREAD, coarse_of, movement, wander
+from tests.kit.coarse import SPREAD, coarse_of, movement, wander
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.loop.columns import Column, Values
 from xosc_lateral.drivers.loop.cross_validation import Nested, gain_over

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.drivers.loop.made_coarse import movement, timeline_of, wander
-from tests.drivers.model.core.made_models import POPULATION
-from tests.drivers.model.effects.made_effects import made
+from tests.kit.coarse import movement, timeline_of, wander
+from tests.kit.core_models import POPULATION
+from tests.kit.effects import made
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.loop.identify import CLOCK, initial_terms, usable_columns
 from xosc_lateral.drivers.loop.regression import fit_model

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
-from tests.drivers.loop.made_coarse import wander
+from tests.kit.coarse import wander
 from xosc_lateral.drivers.loop.innovations import innovations, smoothed_as_seen
 
 N = 3000

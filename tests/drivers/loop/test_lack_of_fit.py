@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.drivers.loop.made_coarse import movement, timeline_of
+from tests.kit.coarse import movement, timeline_of
 from xosc_lateral.drivers.loop.residual import (
     LEVEL,
     STANDS_OUT,

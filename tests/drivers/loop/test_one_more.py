@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.drivers.loop.made_coarse import coarse_of, movement
 from tests.drivers.model.test_stream import make_profile
+from tests.kit.coarse import coarse_of, movement
 from xosc_lateral.base.plugins import defined_in
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.loop import selection, terms

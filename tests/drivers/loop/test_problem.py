@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from tests.drivers.loop.made_coarse import coarse_of, movement
+from tests.kit.coarse import coarse_of, movement
 from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.squares import Squares, of_squares
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.drivers.loop.made_coarse import coarse_of
-from tests.drivers.model.effects.made_effects import made
+from tests.kit.coarse import coarse_of
+from tests.kit.effects import made
 from xosc_lateral.drivers.loop.terms.column import driving_range, span
 from xosc_lateral.drivers.loop.timeline import Coarse
 from xosc_lateral.drivers.model.effects import (

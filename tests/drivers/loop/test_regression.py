@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.drivers.loop.made_coarse import SPREAD, coarse_of, movement, wander
+from tests.kit.coarse import SPREAD, coarse_of, movement, wander
 from xosc_lateral.drivers.loop import regression
 from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm

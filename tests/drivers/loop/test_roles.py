@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.drivers.loop.made_coarse import movement, timeline_of, wander
+from tests.kit.coarse import movement, timeline_of, wander
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.drivers.loop.columns import Role, is_clock, proposed_role, roles_of
 from xosc_lateral.drivers.loop.timeline import Timeline

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.drivers.loop.made_coarse import movement, timeline_of
+from tests.kit.coarse import movement, timeline_of
 from xosc_lateral.drivers.evaluation.metrics import METRICS, snippet_metrics
 from xosc_lateral.drivers.loop.cross_validation import hold_out_blocks
 from xosc_lateral.drivers.loop.held_out import SNIPPET_ROWS, Scorecard, _starts, score_runs

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tests.drivers.loop.made_coarse import coarse_of, movement, wander
+from tests.kit.coarse import coarse_of, movement, wander
 from xosc_lateral.drivers.loop.columns import Column, Values
 from xosc_lateral.drivers.loop.search import KEPT, Search
 from xosc_lateral.drivers.loop.selection import ERROR_BUDGET

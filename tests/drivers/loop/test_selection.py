@@ -1,7 +1,7 @@
 """Effects planted in simulated drives: the loop names that one, with its size, and none where none was planted.
 
 Every drive comes from a simulated human who shares nothing with the model. How often it is right over many drives and
-sizes is the business of benchmarks/identification_study.py; these are single drives that a few tests can afford.
+sizes is the business of laboratory/identification_study.py; these are single drives that a few tests can afford.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import simulated as plants
-from benchmarks.simulated.movements import held, in_regimes, record_movement
 from examples.driver_simulator.simulator import Driver, simulate_drive
-from tests.drivers.loop.selected import named, selected
+from tests.kit import simulated as plants
+from tests.kit.selected import named, selected
+from tests.kit.simulated.movements import held, in_regimes, record_movement
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.loop.identify import usable_columns
 from xosc_lateral.drivers.loop.selection import Selection

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.simulated import movements
-from tests.drivers.loop.selected import selected
+from tests.kit.selected import selected
+from tests.kit.simulated import movements
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.files.drives import read_drives
 

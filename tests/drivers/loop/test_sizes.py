@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from benchmarks.simulated.movements import ornstein_uhlenbeck, record_movement
+from tests.kit.simulated.movements import ornstein_uhlenbeck, record_movement
 from xosc_lateral.drivers.loop.candidates import FINE_SCALES, Family, candidates_of, shapes_of
 from xosc_lateral.drivers.loop.columns import Column, Values
 from xosc_lateral.drivers.loop.model import Fitted

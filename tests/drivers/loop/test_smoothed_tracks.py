@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.drivers.loop.planted import planted_drive
+from tests.kit.planted import planted_drive
 from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
 from xosc_lateral.drivers.model.effects import Acts, Linear

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from tests.drivers.loop.made_coarse import movement, timeline_of
-from tests.drivers.model.core.made_models import STEADY
+from tests.kit.coarse import movement, timeline_of
+from tests.kit.core_models import STEADY
 from xosc_lateral.drivers.loop import core_model
 from xosc_lateral.drivers.loop.core_model import BLOCK, TIMES_S, WORTH_ADDING, SpectrumShape, _shapes
 from xosc_lateral.drivers.loop.timeline import Timeline

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.drivers.model.certified import (
+from tests.kit.certified import (
     FOLDER,
     KINDS,
     MODELS,

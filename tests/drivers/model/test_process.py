@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from tests.drivers.model.certified import FOLDER, MODELS, SEED
+from tests.kit.certified import FOLDER, MODELS, SEED
 from xosc_lateral.drivers.model.effects import Acts, Cycle, Drift, EffectTerms, Linear, Population, Regimes
 from xosc_lateral.drivers.model.process import DriveProcess, combine
 from xosc_lateral.drivers.model.profile import DriverProfile

@@ -9,7 +9,7 @@ import jsonschema
 import pytest
 from msgspec.structs import replace
 
-from tests.drivers.model.core.made_models import POPULATION
+from tests.kit.core_models import POPULATION
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.model.effects import Acts, Drift, Linear
 from xosc_lateral.drivers.model.profile import (

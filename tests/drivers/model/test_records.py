@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tests.profiles import effect_from_dict
+from tests.kit.profiles import effect_from_dict
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.model.effects import Product
 from xosc_lateral.drivers.model.records import Record, kebab, plain, read_as

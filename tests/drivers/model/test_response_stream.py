@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from tests.drivers.model.effects.made_effects import STEP, made
-from tests.profiles import whole_terms
+from tests.kit.effects import STEP, made
+from tests.kit.profiles import whole_terms
 from xosc_lateral.drivers.model.effects import ColumnEffect, Linear, Product
 from xosc_lateral.drivers.model.effects.product import Factor
 from xosc_lateral.drivers.model.process import ResponseStream, ResponseStreamState

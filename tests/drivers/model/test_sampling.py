@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from tests.profiles import simulated_profile
+from tests.kit.profiles import simulated_profile
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.model.core.base import Start
 from xosc_lateral.drivers.model.effects import Acts, Cycle, Drift, EffectTerms, Linear, Regimes

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from examples.driver_simulator import simulate_drive
-from tests.profiles import as_drive, simulated_profile
+from tests.kit.profiles import as_drive, simulated_profile
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.drives.cuts import all_runs
 from xosc_lateral.drivers.drives.drive import Drive

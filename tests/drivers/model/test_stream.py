@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from tests.drivers.model.upsampled import upsample
+from tests.kit.upsampled import upsample
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.fitting.models.two_level.fit import fit_two_level

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from tests.drivers.model.core.made_models import POPULATION
+from tests.kit.core_models import POPULATION
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.model.effects import Drift
 from xosc_lateral.drivers.model.profile import DriverProfile

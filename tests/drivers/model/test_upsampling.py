@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from tests.drivers.model.upsampled import upsample
+from tests.kit.upsampled import upsample
 from xosc_lateral.drivers.model.upsampling import extrapolate, piece
 
 SAMPLES = np.random.default_rng(1).normal(size=12)

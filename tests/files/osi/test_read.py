@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from tests.files.osi.test_write import messages
-from tests.world.motion.made_motion import RADIUS, drive, entity, together, two_roads
+from tests.kit.motion import RADIUS, drive, entity, together, two_roads
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main
 from xosc_lateral.files.osi.write import write_osi

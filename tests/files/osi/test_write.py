@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.world.motion.made_motion import STEP, drive, entity, together, two_roads
+from tests.kit.motion import STEP, drive, entity, together, two_roads
 from xosc_lateral.cli import main
 from xosc_lateral.files.osi.write import write_osi
 from xosc_lateral.world.motion.nominal import Activity, NominalMotion, PlayedAction

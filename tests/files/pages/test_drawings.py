@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from tests.workflows.conversion.made_enriched import converted, made_enriched
-from tests.world.road.places import hand_written
+from tests.kit.enriched import converted, made_enriched
+from tests.kit.places import hand_written
 from xosc_lateral.files.pages.chart import BLUE
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.workflows.conversion.frames import conversion_frame

@@ -10,8 +10,8 @@ from time import monotonic, sleep
 import numpy as np
 import pytest
 
-from tests.files.pages.browser import open_browser
-from tests.workflows.conversion.made_enriched import converted, made_enriched
+from tests.kit.browser import open_browser
+from tests.kit.enriched import converted, made_enriched
 from xosc_lateral.files.pages.chart import BLUE, GREEN, VERMILLION
 from xosc_lateral.workflows.conversion.page import conversion_page
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.workflows.batch.fake_converter import convert, convert_and_log
+from tests.kit.fake_converter import convert, convert_and_log
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.hashes import file_hash
 from xosc_lateral.workflows.batch.batch import STATE, BatchStoppedError, JobOutcome, JobState, convert_many
@@ -246,7 +246,7 @@ def test_a_worker_killed_from_outside_costs_nothing(tmp_path: Path) -> None:
 
 KILLED_RUN = """
 import sys
-from tests.workflows.batch.fake_converter import convert
+from tests.kit.fake_converter import convert
 from xosc_lateral.workflows.batch.batch import convert_many
 from xosc_lateral.workflows.batch.jobs import plan_batch
 for outcome in convert_many(plan_batch([sys.argv[1]], sys.argv[2]), workers=int(sys.argv[3]), converter=convert):

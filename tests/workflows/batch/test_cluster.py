@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.workflows.batch.fake_converter import convert, convert_and_log
+from tests.kit.fake_converter import convert, convert_and_log
 from tests.workflows.batch.test_batch import make_inputs, run, states, tree
 from xosc_lateral.workflows.batch import workers as dask_cluster
 from xosc_lateral.workflows.batch.batch import JobState, convert_many

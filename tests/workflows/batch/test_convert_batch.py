@@ -11,7 +11,7 @@ import pytest
 from lxml import etree
 
 import xosc_lateral as xl
-from tests.profiles import simulated_profile
+from tests.kit.profiles import simulated_profile
 from tests.workflows.batch.test_batch import tree
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.profiles import simulated_profile
-from tests.world.player.stage import line, map_of, road
+from tests.kit.profiles import simulated_profile
+from tests.kit.stage import line, map_of, road
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.openscenario.read import RoadSearch
 from xosc_lateral.workflows.conversion.convert import convert_scenario

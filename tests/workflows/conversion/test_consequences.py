@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from tests.world.motion.made_motion import LANE_WIDTH, drive, entity, together, two_roads
+from tests.kit.motion import LANE_WIDTH, drive, entity, together, two_roads
 from xosc_lateral.workflows.conversion.consequences import gaps_of, lane_departures
 from xosc_lateral.workflows.conversion.result import EntityResult, SampledSegment
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion

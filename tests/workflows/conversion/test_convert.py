@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.profiles import simulated_profile
+from tests.kit.profiles import simulated_profile
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main
 from xosc_lateral.files.profiles import write_profile

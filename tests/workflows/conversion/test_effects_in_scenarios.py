@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from msgspec.structs import replace
 
-from tests.profiles import simulated_profile
-from tests.world.motion.made_motion import RADIUS, drive, entity, together, two_roads
+from tests.kit.motion import RADIUS, drive, entity, together, two_roads
+from tests.kit.profiles import simulated_profile
 from xosc_lateral.drivers.model.effects import Acts, Effect, Factor, Form, Linear, Product
 from xosc_lateral.workflows.conversion.enrich import enrich
 from xosc_lateral.workflows.conversion.result import Neighbours

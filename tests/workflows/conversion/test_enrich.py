@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from tests.profiles import simulated_profile
-from tests.world.motion.made_motion import drive, entity, together, two_roads
+from tests.kit.motion import drive, entity, together, two_roads
+from tests.kit.profiles import simulated_profile
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.workflows.conversion.enrich import enrich

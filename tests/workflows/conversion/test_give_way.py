@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.profiles import simulated_profile
-from tests.world.motion.made_motion import LANE_WIDTH, drive, entity, together, two_roads
+from tests.kit.motion import LANE_WIDTH, drive, entity, together, two_roads
+from tests.kit.profiles import simulated_profile
 from xosc_lateral.workflows.conversion.enrich import enrich
 from xosc_lateral.workflows.conversion.give_way import GAPS, OVERTAKING_SHARE, RESPONDING, SampledVehicle, give_way
 

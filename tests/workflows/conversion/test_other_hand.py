@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from tests.profiles import simulated_profile
-from tests.world.motion.made_motion import drive, entity, together, two_roads
+from tests.kit.motion import drive, entity, together, two_roads
+from tests.kit.profiles import simulated_profile
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.profiles import read_profile

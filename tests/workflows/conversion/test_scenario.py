@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.workflows.conversion.made_enriched import converted, made_enriched
+from tests.kit.enriched import converted, made_enriched
 from xosc_lateral.workflows.conversion.page import conversion_page
 from xosc_lateral.workflows.playing import figures as figures
 from xosc_lateral.world.motion.gaps import Gap

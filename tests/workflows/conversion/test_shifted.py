@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tests.world.player.stage import Stage, after, event, lane_change, maneuvers, speed, state_of, to_lane, when
+from tests.kit.stage import Stage, after, event, lane_change, maneuvers, speed, state_of, to_lane, when
 from xosc_lateral.workflows.conversion.meaning import shifts
 
 

@@ -12,7 +12,7 @@ from lxml import etree
 from msgspec import structs
 
 import xosc_lateral as xl
-from tests.files.made_scenario import (
+from tests.kit.scenario_files import (
     entity,
     private,
     scenario_text,

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 import xosc_lateral as xl
-from tests.workflows.live.esmini_stand_in import StandIn
+from tests.kit.esmini_stand_in import StandIn
 from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.cli import main
 from xosc_lateral.files.openscenario.read import read_scenario

@@ -11,7 +11,7 @@ import jsonschema
 import numpy as np
 import pytest
 
-from tests.world.motion.made_motion import two_roads
+from tests.kit.motion import two_roads
 from xosc_lateral.workflows.live.stdio import Pipe
 from xosc_lateral.workflows.live.traffic import Traffic
 from xosc_lateral.workflows.profiles.profiles import read_profile

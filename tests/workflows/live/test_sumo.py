@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import xosc_lateral as xl
-from tests.workflows.live.sumo_run import write_run
+from tests.kit.sumo_run import write_run
 from xosc_lateral.base.errors import FormatError, SimulationError
 from xosc_lateral.cli import main
 from xosc_lateral.cli.live import FCD

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.world.motion.made_motion import drive, entity, together, two_roads
+from tests.kit.motion import drive, entity, together, two_roads
 from xosc_lateral.workflows.conversion.give_way import SampledVehicle, give_way
 from xosc_lateral.workflows.live.surroundings import OpenDriveRoads, Places, give_way_now, look_around
 from xosc_lateral.world.motion.nominal import NominalMotion

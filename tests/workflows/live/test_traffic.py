@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tests.drivers.model.upsampled import upsample
+from tests.kit.upsampled import upsample
 from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.model.profile import DriverProfile

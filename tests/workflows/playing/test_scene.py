@@ -9,8 +9,8 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
-from tests.workflows.conversion.made_enriched import converted, made_enriched
-from tests.world.motion.made_motion import drive, entity, together, two_roads
+from tests.kit.enriched import converted, made_enriched
+from tests.kit.motion import drive, entity, together, two_roads
 from xosc_lateral.workflows.conversion.page import conversion_page
 from xosc_lateral.workflows.conversion.result import Enriched
 from xosc_lateral.workflows.playing.scene import packed, scene_of

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.library import POPULATION, SINGLE_VEHICLES, most_different
+from laboratory.library import POPULATION, SINGLE_VEHICLES, most_different
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.cli import main
 from xosc_lateral.drivers.evaluation.metrics import free_runs, summary_of

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.drivers.loop.made_coarse import coarse_of, movement, wander
+from tests.kit.coarse import coarse_of, movement, wander
 from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
 from xosc_lateral.drivers.loop.terms.spread import SpreadTerm

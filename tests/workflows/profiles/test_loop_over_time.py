@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.drivers.loop.made_coarse import coarse_of, movement
+from tests.kit.coarse import coarse_of, movement
 from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.terms.regimes import RegimeFit, RegimesTerm
 from xosc_lateral.drivers.loop.terms.time import StepTerm

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.drivers.model.effects.made_effects import made
+from tests.kit.effects import made
 from xosc_lateral.drivers.model.effects import Acts, Linear, Proximity, Saturating, Threshold
 from xosc_lateral.workflows.profiles.loop_words import beside_words
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.workflows.conversion.made_enriched import made_enriched
+from tests.kit.enriched import made_enriched
 from xosc_lateral.files.pages.chart import Panel, color_of
 from xosc_lateral.workflows.conversion.result import Enriched
 from xosc_lateral.workflows.playing.figures import (

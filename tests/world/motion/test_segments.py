@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.world.motion.made_motion import drive, entity, two_roads
+from tests.kit.motion import drive, entity, two_roads
 from xosc_lateral.world.motion.nominal import Activity
 from xosc_lateral.world.motion.segments import SegmentKind, cut_segments
 

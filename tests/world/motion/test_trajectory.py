@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.world.motion.made_motion import RADIUS, drive, entity, two_roads
+from tests.kit.motion import RADIUS, drive, entity, two_roads
 from xosc_lateral.world.motion.nominal import Activity
 from xosc_lateral.world.motion.trajectory import displace, distance_driven, leaps
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.world.player.stage import (
+from tests.kit.stage import (
     STRAIGHT,
     WIDTH,
     Stage,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.world.player.stage import Stage, arc, car, line, map_of, road
+from tests.kit.stage import Stage, arc, car, line, map_of, road
 from xosc_lateral.world.player.distances import (
     Measure,
     RoadGap,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.world.player.stage import (
+from tests.kit.stage import (
     Stage,
     after,
     entity,

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.world.player.stage import (
+from tests.kit.stage import (
     WIDTH,
     Stage,
     after,

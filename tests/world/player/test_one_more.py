@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from tests.world.player.stage import Stage, by_entity, entity, event, maneuvers, private_action, row, start_of, when
+from tests.kit.stage import Stage, by_entity, entity, event, maneuvers, private_action, row, start_of, when
 from xosc_lateral.files.openscenario import conditions as condition_readers
 from xosc_lateral.files.openscenario import private_actions
 from xosc_lateral.files.openscenario.context import Context

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.world.player.stage import (
+from tests.kit.stage import (
     STRAIGHT,
     WIDTH,
     Stage,

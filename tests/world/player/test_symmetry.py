@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from tests.world.player import stage
-from tests.world.road.places import VALID, wrapped
-from tests.world.road.retold import mirrored, moved, turned_round
+from tests.kit import stage
+from tests.kit.places import VALID, wrapped
+from tests.kit.retold_roads import mirrored, moved, turned_round
 from xosc_lateral.files.opendrive import read_opendrive
 from xosc_lateral.workflows.conversion.load import Played, play_scenario
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-from tests.world.player.stage import (
+from tests.kit.stage import (
     TIMING,
     WIDTH,
     Stage,

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.world.player.stage import CURVES
+from tests.kit.stage import CURVES
 from xosc_lateral.world.player.transition import Transition
 from xosc_lateral.world.scenario.enums import DynamicsDimension, DynamicsShape
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import xosc_lateral as xl
-from benchmarks.many_cars import write
+from laboratory.many_cars import write
 from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.player import unwatched

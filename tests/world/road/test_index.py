@@ -7,7 +7,7 @@ from math import pi
 import numpy as np
 import pytest
 
-from tests.world.road.places import VALID, hand_written, random_places
+from tests.kit.places import VALID, hand_written, random_places
 from xosc_lateral.base.errors import PlaybackError
 from xosc_lateral.files.opendrive import read_opendrive
 from xosc_lateral.world.road.network import RoadNetwork

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tests.world.road.places import hand_written
+from tests.kit.places import hand_written
 from xosc_lateral.files.opendrive import read_opendrive
 from xosc_lateral.world.road import DRIVING
 

@@ -7,7 +7,7 @@ from math import pi
 import numpy as np
 import pytest
 
-from tests.world.road.places import hand_written
+from tests.kit.places import hand_written
 from xosc_lateral.world.road import LaneLink
 from xosc_lateral.world.road.moving import most_turning
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.world.road.places import hand_written
+from tests.kit.places import hand_written
 from xosc_lateral.world.road import DRIVING, RoadNetwork
 
 SPACING = 0.5

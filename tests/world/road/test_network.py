@@ -11,7 +11,7 @@ from math import atan, cos, pi, sin, sqrt, tan
 import numpy as np
 import pytest
 
-from tests.world.road.places import VALID, hand_written, random_places, wrapped
+from tests.kit.places import VALID, hand_written, random_places, wrapped
 from xosc_lateral.base.errors import PlaybackError
 from xosc_lateral.files.opendrive import read_opendrive
 from xosc_lateral.world.road.piecewise import PiecewiseCubic

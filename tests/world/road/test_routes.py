@@ -6,7 +6,7 @@ from math import pi
 
 import pytest
 
-from tests.world.road.places import hand_written
+from tests.kit.places import hand_written
 
 
 def test_the_distance_along_roads_is_signed_by_the_way_that_is_shorter():

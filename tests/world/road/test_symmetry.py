@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.world.road.places import VALID, hand_written, random_places, wrapped
-from tests.world.road.retold import mirrored, moved, retold, turned_round
+from tests.kit.places import VALID, hand_written, random_places, wrapped
+from tests.kit.retold_roads import mirrored, moved, retold, turned_round
 from xosc_lateral.world.road import RoadNetwork
 
 NAMES = sorted({path.stem for path in VALID.glob("*.xodr")} - {"odd"})

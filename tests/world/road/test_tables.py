@@ -8,7 +8,7 @@ from math import inf
 import numpy as np
 import pytest
 
-from tests.world.road.places import hand_written, random_places
+from tests.kit.places import hand_written, random_places
 
 
 def test_lanes_are_counted_from_the_right_in_travel_direction():

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.files.made_scenario import action, entity, made, private, speed_action, teleport, vehicle
+from tests.kit.scenario_files import action, entity, made, private, speed_action, teleport, vehicle
 from xosc_lateral.world.scenario import Scenario
 from xosc_lateral.world.scenario.dependence import dependence
 from xosc_lateral.world.scenario.under_test import vehicles_under_test

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.profiles import effect_from_dict
-from tests.world.motion.made_motion import LANE_WIDTH, RADIUS, drive, entity, together, two_roads
+from tests.kit.motion import LANE_WIDTH, RADIUS, drive, entity, together, two_roads
+from tests.kit.profiles import effect_from_dict
 from xosc_lateral.drivers.model.effects import ColumnEffect
 from xosc_lateral.world.motion.nominal import EntityMotion, PlayedAction
 from xosc_lateral.world.road.network import RoadNetwork

@@ -4,7 +4,7 @@ Measured means that enough driving beside somebody was seen to say how far he mo
 is unknown is a population's to lend.
 
 The effect fades exponentially with the free space lengthwise, and is none where there is nobody. Its form was found in
-DLR Highway Traffic v1.1.0 (benchmarks/neighbour_response.py): of those within 0.5 % of the variance of the best, one
+DLR Highway Traffic v1.1.0 (laboratory/neighbour_response.py): of those within 0.5 % of the variance of the best, one
 that is not too quick, and without a corner.
 """
 

@@ -9,7 +9,7 @@ space lengthwise. Of what profiles leave, all is the overtaking one's: the other
 itself. All displacements follow from the paths as first sampled, so nobody's depends on the order of entities, and a
 vehicle far away changes nobody's.
 
-Our own rule: quantile mapping to gaps that were measured in DLR Highway Traffic v1.1.0 (benchmarks/give_way.py).
+Our own rule: quantile mapping to gaps that were measured in DLR Highway Traffic v1.1.0 (laboratory/give_way.py).
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ GAPS = (
     np.array([0.41, 0.75, 0.99, 1.27, 1.59, 1.86, 3.0]),
 )
 """Lateral gap between any vehicles of neighbouring lanes, and between those side by side, at the same quantiles (the
-least, 0.1, 1, 5, 25 and 50 %): DLR Highway Traffic, 744 encounters (`benchmarks/give_way.py`). From 3 m on nobody
+least, 0.1, 1, 5, 25 and 50 %): DLR Highway Traffic, 744 encounters (`laboratory/give_way.py`). From 3 m on nobody
 gives way, which is assumed. [m]"""
 
 RESPONDING = np.array([0.04, 0.26, 0.56, 0.95, 1.43, 1.75, 3.0])
 """Lateral gap that vehicles leave by themselves whose profiles know what neighbours do, at the quantiles of `GAPS`:
 those side by side in the same recording, sampled from `motorway` under its context, 12 seeds
-(`benchmarks/give_way.py`; `motorway-refined` is within 0.03 m of it). [m]"""
+(`laboratory/give_way.py`; `motorway-refined` is within 0.03 m of it). [m]"""
 
 OVERTAKING_SHARE = 0.84
 """Part of the one in the overtaking lane, by the law alone: it moves 0.239 m, the other 0.045 m (same recording,
-alongside; `benchmarks/clearance.py`). [-]"""
+alongside; `laboratory/clearance.py`). [-]"""
 
 FADES, RESPONDING_FADES = 60.0, 20.0
 """Free space lengthwise within which neighbours matter less and less, to profiles that do not respond to them, and

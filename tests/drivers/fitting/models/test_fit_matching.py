@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from tests.drivers.model.core.made_models import POPULATION, STEADY
+from tests.kit.core_models import POPULATION, STEADY
 from xosc_lateral.drivers.fitting.models.autoregressive.fit_coarse import scaled_spectrum
 from xosc_lateral.drivers.fitting.models.autoregressive.fit_matching import (
     LARGEST_STEP,

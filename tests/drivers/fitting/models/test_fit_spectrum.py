@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 from scipy.signal import welch
 
-from tests.drivers.model.core.made_models import STEADY
+from tests.kit.core_models import STEADY
 from xosc_lateral.drivers.fitting.models.autoregressive.fit_coarse import (
     _shaped,
     _typical_power,

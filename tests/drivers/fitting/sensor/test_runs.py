@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.benchmarks.models.made_runs import made_run
-from tests.drivers.model.core.made_models import POPULATION
+from tests.kit.core_models import POPULATION
+from tests.kit.runs import made_run
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.drives.cuts import cut_runs
 from xosc_lateral.drivers.drives.drive import Drive

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import butter, lfilter, sosfilt
 
-from tests.benchmarks.models.made_runs import made_run
+from tests.kit.runs import made_run
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.drives.drive import Drive, MarkingShares, Run
 from xosc_lateral.drivers.fitting.sensor.runs import driver_runs, half_widths_of

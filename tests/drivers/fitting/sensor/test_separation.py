@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from examples.driver_simulator.simulator import simulate_drive
-from tests.benchmarks.models.made_runs import made_run
+from tests.kit.runs import made_run
 from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
 from xosc_lateral.drivers.drives.resampling import resample
 from xosc_lateral.drivers.fitting.fitting import fit_runs

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.drivers.loop.made_coarse import coarse_of, movement, wander
+from tests.kit.coarse import coarse_of, movement, wander
 from xosc_lateral.drivers.loop.held_out import removal_of
 from xosc_lateral.drivers.loop.model import Removal
 from xosc_lateral.drivers.loop.regression import fit_model

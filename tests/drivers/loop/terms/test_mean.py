@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from tests.drivers.loop.made_coarse import coarse_of, movement, wander
+from tests.kit.coarse import coarse_of, movement, wander
 from xosc_lateral.drivers.loop.dictionary import beside, respond_by_second
 from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.terms.mean import NEAR_SCALES, MeanTerm, _profile, _shapes, widening

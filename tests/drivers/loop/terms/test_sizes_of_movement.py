@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from tests.drivers.loop.made_coarse import SPREAD, coarse_of, movement, wander
+from tests.kit.coarse import SPREAD, coarse_of, movement, wander
 from xosc_lateral.drivers.loop import regression
 from xosc_lateral.drivers.loop.model import Fitted
 from xosc_lateral.drivers.loop.regression import fit_model

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tests.drivers.loop.made_coarse import coarse_of, movement
-from tests.profiles import whole_terms
+from tests.kit.coarse import coarse_of, movement
+from tests.kit.profiles import whole_terms
 from xosc_lateral.drivers.loop.low_frequencies import (
     SHORTEST_S,
     SPREAD_ORDERS,

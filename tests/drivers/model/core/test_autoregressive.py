@@ -10,8 +10,8 @@ import pytest
 from msgspec.structs import replace
 
 from examples.driver_simulator import simulate_drive
-from tests.drivers.model.core.made_models import POPULATION, STEADY
-from tests.profiles import as_drive
+from tests.kit.core_models import POPULATION, STEADY
+from tests.kit.profiles import as_drive
 from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
 from xosc_lateral.drivers.drives.cuts import PAPER_RULES, all_runs
 from xosc_lateral.drivers.fitting.models.autoregressive.fit import fit_autoregressive

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from tests.drivers.model.core.made_models import POPULATION, STEADY
+from tests.kit.core_models import POPULATION, STEADY
 from xosc_lateral.drivers.model.core.autoregressive.coarse import Autoregression
 from xosc_lateral.drivers.model.core.autoregressive.model import HEADROOM, KNEE, AutoregressiveState, _bends
 from xosc_lateral.drivers.model.core.base import Start

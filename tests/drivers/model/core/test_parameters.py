@@ -10,7 +10,7 @@ import pytest
 from msgspec.structs import replace
 from scipy.linalg import toeplitz
 
-from tests.drivers.model.core.made_models import POPULATION, STEADY
+from tests.kit.core_models import POPULATION, STEADY
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.model.core.autoregressive.coarse import COARSE_EVERY, interpolate
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel

@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 from scipy.signal import lfilter
 
-from tests.drivers.model.core.made_models import POPULATION, STEADY
+from tests.kit.core_models import POPULATION, STEADY
 from xosc_lateral.drivers.model.core.autoregressive.coarse import COARSE_EVERY, TICKS, interpolate
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
 from xosc_lateral.drivers.model.core.autoregressive.parameters import DriverState

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.drivers.model.effects.made_effects import made, quantity, strength
+from tests.kit.effects import made, quantity, strength
 from xosc_lateral.drivers.model.effects import Angular
 
 

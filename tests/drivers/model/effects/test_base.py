@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from tests.profiles import effect_from_dict
+from tests.kit.profiles import effect_from_dict
 from xosc_lateral.drivers.model.effects import EFFECTS, Drift, Effect, EffectTerms, Step
 from xosc_lateral.drivers.model.effects.base import step_of
 

@@ -8,9 +8,9 @@ from typing import cast
 import numpy as np
 import pytest
 
-from tests.drivers.model.certified import FOLDER, contexts
-from tests.drivers.model.effects.made_effects import EXAMPLES
-from tests.profiles import whole_terms
+from tests.kit.certified import FOLDER, contexts
+from tests.kit.effects import EXAMPLES
+from tests.kit.profiles import whole_terms
 from xosc_lateral.drivers.model.effects import (
     EFFECTS,
     ColumnEffect,

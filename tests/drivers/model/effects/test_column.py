@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.drivers.model.effects.made_effects import STEP, made, strength
-from tests.profiles import whole_terms
+from tests.kit.effects import STEP, made, strength
+from tests.kit.profiles import whole_terms
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.model.effects import Acts, Angular, ColumnEffect, Linear, Saturating, Threshold
 

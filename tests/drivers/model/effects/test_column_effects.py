@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from tests.drivers.model.effects.made_effects import EXAMPLES, ONE
-from tests.profiles import effect_from_dict, whole_terms
+from tests.kit.effects import EXAMPLES, ONE
+from tests.kit.profiles import effect_from_dict, whole_terms
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.model.effects import (
     EFFECTS,

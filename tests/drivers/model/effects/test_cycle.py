@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tests.profiles import whole_terms
+from tests.kit.profiles import whole_terms
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.model.effects import Cycle
 

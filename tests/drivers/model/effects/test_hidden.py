@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from tests.profiles import whole_terms
+from tests.kit.profiles import whole_terms
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.model.effects import EffectTerms, HiddenEffect
 from xosc_lateral.drivers.model.effects.hidden import NoState

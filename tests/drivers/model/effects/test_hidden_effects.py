@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.profiles import whole_terms
+from tests.kit.profiles import whole_terms
 from xosc_lateral.drivers.model.effects import Cycle, Drift, Population, Regimes, Step, VarianceTrend
 
 STEP = 0.2

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tests.drivers.model.effects.made_effects import made, quantity
+from tests.kit.effects import made, quantity
 from xosc_lateral.drivers.model.effects import Nearness
 
 

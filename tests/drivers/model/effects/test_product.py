@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.drivers.model.effects.made_effects import made, quantity, strength
+from tests.kit.effects import made, quantity, strength
 from xosc_lateral.drivers.model.effects import Factor, Form, Linear, Product
 
 X = np.array([-30.0, -10.0, 0.0, 1.0, 10.0, 45.0])

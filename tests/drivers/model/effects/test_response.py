@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from tests.profiles import whole_terms
+from tests.kit.profiles import whole_terms
 from xosc_lateral.drivers.model.effects import Drift
 from xosc_lateral.drivers.model.effects.response import Response, respond, split_shift
 from xosc_lateral.drivers.model.jit_kernel import WORTH_IMPORTING

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.profiles import whole_terms
+from tests.kit.profiles import whole_terms
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.model.effects import Step
 

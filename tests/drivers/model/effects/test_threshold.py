@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.drivers.model.effects.made_effects import made, quantity
+from tests.kit.effects import made, quantity
 from xosc_lateral.drivers.model.effects import Threshold
 
 X = np.linspace(-10.0, 10.0, 41)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.profiles import effect_from_dict, whole_terms
+from tests.kit.profiles import effect_from_dict, whole_terms
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.model.effects import TimeSmooth
 

@@ -1,7 +1,7 @@
 """What CARLA's ScenarioRunner wants of a scenario; the one place of its quirks.
 
 From its published sources (0.9.16: `openscenario_configuration`, `openscenario_parser`, `open_scenario`,
-`actorcontrols`); `tests/files/scenario_runner.py` holds them as assertions. CARLA itself is not run by any test.
+`actorcontrols`); `tests/kit/scenario_runner.py` holds them as assertions. CARLA itself is not run by any test.
 
 - Version 1.0 alone, and valid; no expressions, and parameters not everywhere: values are written.
 - Catalogs are looked for as ``FOLDER/VehicleCatalog.xosc``, of version 1.0: entries are written in place.

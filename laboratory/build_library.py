@@ -1,0 +1,32 @@
+"""Build the shipped driver profiles from the public recording: what `make profiles` runs.
+
+python -m laboratory.build_library tasi-0.15.4-py3-none-any.whl -o FOLDER [--keep-refined]
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from laboratory.library import build_library
+from xosc_lateral.files.profiles import write_profile
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Build the library and write it."""
+    parser = argparse.ArgumentParser(description="Build the shipped driver profiles from the public recording.")
+    parser.add_argument("source", type=Path)
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="FOLDER")
+    parser.add_argument("--model", default="best")
+    parser.add_argument(
+        "--keep-refined", action="store_true", help="leave what the closed loop made as it is in FOLDER"
+    )
+    args = parser.parse_args(argv)
+    profiles = build_library(args.source, model=args.model, refine=not args.keep_refined)
+    for profile in profiles:
+        write_profile(profile, args.output / f"{profile.name}.json")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,271 @@
+"""The shipped profile library, built from the public recording.
+
+    python -m laboratory.build_library tasi-0.15.4-py3-none-any.whl -o FOLDER
+
+The same wheel gives the same bytes on the same kind of processor. Every profile is scored before it is written: for
+the population a fit to half of the vehicles (for the refined profile, a closed loop over them) is scored on the other
+half; for single vehicles a fit to the first part of the drive is held against the last part of its own drive and
+those of the others. What is written is fitted to all.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from msgspec.structs import replace
+from numpy.typing import NDArray
+
+from laboratory.comparison import driver_distances
+from laboratory.refined import NOTES, refine_population, refined_profile
+from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.drivers.drives.cuts import all_runs
+from xosc_lateral.drivers.drives.drive import Drive, Run
+from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.evaluation.metrics import snippet_metrics, summary_of
+from xosc_lateral.drivers.evaluation.record import scores_to_dict
+from xosc_lateral.drivers.evaluation.scores import SNIPPET, score_profile
+from xosc_lateral.drivers.evaluation.snippets import snippets_of
+from xosc_lateral.drivers.fitting.fitting import fit_population, fit_runs
+from xosc_lateral.drivers.fitting.sensor.runs import driver_runs
+from xosc_lateral.drivers.model.profile import POPULATION as ANSWERS
+from xosc_lateral.drivers.model.profile import DriverProfile, Metadata, Provenance
+from xosc_lateral.drivers.model.sensor.model import SensorModel
+from xosc_lateral.files.drives import read_drives
+from xosc_lateral.files.hashes import parsed_hash
+from xosc_lateral.workflows.recordings.importers.dlr_ht import LICENCE, import_dlr_ht
+from xosc_lateral.workflows.recordings.importers.table import write_imported
+
+FloatArray = NDArray[np.float64]
+
+SOURCE = "DLR Highway Traffic v1.1.0 (A39 near Braunschweig, 7 October 2024, 5 min, 6.4 km), DLR"
+SEED = 20241007  # the day of the recording
+SINGLE_VEHICLES = 6
+LONG_DRIVE = 140.0  # [s]; of road-following, for a profile of one vehicle
+SPREAD_FACTOR = 1.35  # a single vehicle's profile whose spread is off by more than this is not shipped
+FITTED_SHARE = 0.6  # of a single vehicle's drive; the rest is held out
+
+
+POPULATION = "motorway"
+POPULATION_NOTES = "All vehicles on a two-lane German motorway in the morning: the population."
+
+
+def build_library(source: Path, *, model: str = "best", refine: bool = True) -> list[DriverProfile]:
+    """All shipped profiles, from the wheel of `tasi` (or the data set's zip or CSV).
+
+    All vehicles were seen by the same cameras: driver and sensor are told apart once, every profile knows the sensor.
+
+    Parameters
+    ----------
+    refine : bool
+        Whether to close the loop for `motorway-refined` as well: most of the time.
+
+    Raises
+    ------
+    FormatError, NotEnoughDataError
+        If the source is no such recording or too little is left of it.
+    """
+    imported = import_dlr_ht(source)
+    kind = dict(zip(imported.table["drive"], imported.table["vehicle_class"], strict=True))
+    with tempfile.TemporaryDirectory() as folder:
+        table = Path(folder) / "dlr-ht.parquet"
+        write_imported(imported, table)
+        drives = read_drives(table)
+    runs = all_runs(drives)
+    seen = Seen(runs, *driver_runs(runs, drives))
+    known = Provenance(source=SOURCE, licence=LICENCE, inputs={source.name: parsed_hash(source)})
+    population = _population_profile(seen, known, model)
+    refined = [_refined_profile(drives, runs, known)] if refine else []
+    of_all = [replace(profile, beside=ANSWERS) for profile in (population, *refined)]
+    profiles = [*of_all, *_single_profiles(seen, kind, known, model)]
+    return [replace(profile, metadata=shipped_metadata(profile)) for profile in profiles]
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """Runs as recorded, the driver's part of each, and what the cameras added to all.
+
+    Parameters
+    ----------
+    recorded, driven : list of Run
+    sensor : SensorModel or None
+    """
+
+    recorded: list[Run]
+    driven: list[Run]
+    sensor: SensorModel | None
+
+    def of(self, holds: Callable[[Run], bool]) -> Seen:
+        """Some of the runs."""
+        chosen = [k for k, run in enumerate(self.recorded) if holds(run)]
+        return Seen([self.recorded[k] for k in chosen], [self.driven[k] for k in chosen], self.sensor)
+
+
+def shipped_metadata(profile: DriverProfile) -> Metadata:
+    """What all shipped profiles have in common, and whose they are."""
+    single = "-vehicle-" in profile.name
+    words = f"{profile.name} {profile.provenance.notes}".lower() if single else profile.name
+    vehicle = next((kind for kind in ("truck", "car", "van") if kind in words), "")
+    tags = ("single-vehicle" if single else "population", *([vehicle] if vehicle else []))
+    return Metadata(version="1", vehicle=vehicle, road="motorway", country="DE", date="2024-10-07", tags=tags)
+
+
+def _population_profile(seen: Seen, known: Provenance, model: str) -> DriverProfile:
+    """Score on held-out vehicles, then fit to all."""
+    chosen = _fitted_half(seen.recorded)
+    fitted = seen.of(lambda run: run.drive in chosen)
+    half = fit_population(fitted.driven, name=POPULATION, model=model, sensor=seen.sensor)
+    evaluation = _evaluation(half, seen.of(lambda run: run.drive not in chosen).recorded)
+    provenance = replace(known, notes=POPULATION_NOTES, evaluation=evaluation)
+    return fit_population(seen.driven, name=POPULATION, model=model, provenance=provenance, sensor=seen.sensor)
+
+
+def _refined_profile(drives: Sequence[Drive], runs: Sequence[Run], known: Provenance) -> DriverProfile:
+    """The same for what the closed loop makes of all vehicles, on the same halves."""
+    chosen = _fitted_half(runs)
+    half = refine_population([drive for drive in drives if drive.name in chosen], SEED).refined
+    evaluation = _evaluation(half, [run for run in runs if run.drive not in chosen])
+    known = replace(known, notes=NOTES, evaluation=evaluation)
+    return refined_profile(refine_population(drives, SEED, known))
+
+
+def _fitted_half(runs: Sequence[Run]) -> set[str]:
+    """Names of half of the vehicles, at random."""
+    vehicles = np.unique([run.drive for run in runs])
+    return set(np.random.default_rng(SEED).permutation(vehicles)[: len(vehicles) // 2].tolist())
+
+
+def _evaluation(half: DriverProfile, others: Sequence[Run]) -> dict[str, Any]:
+    """Scores of a profile of half of the vehicles on the others."""
+    scores = scores_to_dict(score_profile(half, others, seed=SEED, classify=False))
+    return {
+        "held_out": "half of the vehicles, not fitted",
+        "seed": SEED,
+        "snippets": scores["snippets"],
+        "long_snippets": scores["long_snippets"],
+        "spectrum_error_db": scores["spectrum"]["error_db"],
+        "margins": scores["margins"],
+    }
+
+
+# ---- single vehicles -------------------------------------------------------------------------------------------------
+def _single_profiles(seen: Seen, kind: Mapping[str, str], known: Provenance, model: str) -> list[DriverProfile]:
+    """Vehicles with long drives whose movement differs most from one another."""
+    long = _long_drives(seen)
+    whole = {name: fit_runs(mine, name=name, model=model) for name, mine in long.items()}
+    long = {name: mine for name, mine in long.items() if _describes(whole[name], mine)}
+    chosen = most_different({name: snippets_of(mine, SNIPPET, STEP).offset for name, mine in long.items()})
+    parts = {name: split_in_time(long[name]) for name in chosen}
+    early = [fit_runs(parts[name][0], name=name, model=model) for name in chosen]
+    distance = driver_distances(early, [sliding_snippets(parts[name][1]) for name in chosen], SEED)
+    profiles = []
+    for k, name in enumerate(chosen):
+        evaluation = _own_distance(distance[k], k)
+        label = f"motorway-vehicle-{k + 1}"
+        notes = f"One {kind[name]}, {_place_and_spread(long[name])}."
+        provenance = replace(
+            known, notes=notes, evaluation=evaluation, fit={"vehicle": name, "vehicle_class": kind[name]}
+        )
+        fitted = fit_runs(long[name], name=label, model=model, provenance=provenance)
+        profiles.append(replace(fitted, sensor=seen.sensor))
+    return profiles
+
+
+def _long_drives(seen: Seen) -> dict[str, list[Run]]:
+    """Runs of each vehicle that was seen for long."""
+    by_vehicle: dict[str, list[Run]] = {}
+    for run in seen.driven:
+        by_vehicle.setdefault(run.drive, []).append(run)
+    long = {name: mine for name, mine in by_vehicle.items() if sum(map(len, mine)) * STEP >= LONG_DRIVE}
+    return long
+
+
+def _own_distance(distance: NDArray[np.float64], k: int) -> dict[str, Any]:
+    """How near a profile, fitted to the early part, is to its own late part, and to the others'."""
+    others = np.delete(distance, k)
+    nearer = int((distance[k] < others).sum())
+    return {
+        "held_out": f"last {100 * (1 - FITTED_SHARE):.0f} % of the drive, not fitted",
+        "own_distance": round(float(distance[k]), 4),
+        "distances_to_others": [round(float(value), 4) for value in others],
+        "told_apart": f"nearer to its own held-out part than to those of {nearer} of {len(others)} others",
+    }
+
+
+def _describes(profile: DriverProfile, runs: Sequence[Run]) -> bool:
+    """Whether free runs of the profile spread about as widely as the drive did: two minutes don't always suffice."""
+    measured = float(np.concatenate([run.offset for run in runs]).std())
+    return 1.0 / SPREAD_FACTOR <= summary_of(profile).spread / measured <= SPREAD_FACTOR
+
+
+def most_different(snippets: Mapping[str, FloatArray], count: int = SINGLE_VEHICLES) -> list[str]:
+    """Names of drivers that differ visibly and stay themselves: each next one is farthest from all before it.
+
+    Drivers are compared by the mean of their ten metrics, in units of what one driver's mean changes by from the first
+    half of the drive to the second. The half of the drivers that changes most is left out: a profile of somebody who
+    drives differently every minute is a profile of nobody.
+
+    Parameters
+    ----------
+    snippets : mapping of str to array, shape (n, m)
+        Driver -> snippets in the order of time, at least two. [m]
+
+    Raises
+    ------
+    NotEnoughDataError
+        If there are fewer than twice as many drivers as asked for.
+    """
+    names = sorted(snippets)
+    if len(names) < 2 * count:
+        raise NotEnoughDataError(
+            f"{len(names)} vehicles with {LONG_DRIVE:g} s of road-following; {2 * count} are needed to choose {count}"
+        )
+    metrics = [snippet_metrics(snippets[name]) for name in names]
+    change = np.array([one[: len(one) // 2].mean(axis=0) - one[len(one) // 2 :].mean(axis=0) for one in metrics])
+    unit = np.sqrt((change**2).mean(axis=0))
+    steady = np.argsort(((change / unit) ** 2).sum(axis=1), kind="stable")[: max(count, len(names) // 2)]
+    points = np.array([metrics[k].mean(axis=0) for k in steady]) / unit
+    chosen = [int(np.argmin(((points - points.mean(axis=0)) ** 2).sum(axis=1)))]  # the most ordinary one first
+    while len(chosen) < count:
+        nearest = np.min([((points - points[k]) ** 2).sum(axis=1) for k in chosen], axis=0)
+        chosen.append(int(np.argmax(nearest)))
+    return [names[steady[k]] for k in chosen]
+
+
+def split_in_time(runs: Sequence[Run]) -> tuple[list[Run], list[Run]]:
+    """Runs before and after the moment by which `FITTED_SHARE` of the driving is done."""
+    left = round(FITTED_SHARE * sum(map(len, runs)))
+    before, after = [], []
+    for run in runs:
+        cut = min(max(left, 0), len(run))
+        left -= len(run)
+        before += [run.part(slice(0, cut))] if cut > 1 else []
+        after += [run.part(slice(cut, len(run)))] if len(run) - cut > 1 else []
+    return before, after
+
+
+def sliding_snippets(runs: Sequence[Run]) -> FloatArray:
+    """Snippets of 10 s every second: a short drive has few that don't overlap."""
+    length = round(SNIPPET / STEP) + 1
+    windows = [
+        np.lib.stride_tricks.sliding_window_view(run.offset, length)[:: round(1 / STEP)]
+        for run in runs
+        if len(run) >= length
+    ]
+    if not windows:
+        raise NotEnoughDataError(f"no {SNIPPET:g} s without a cut in the last part of {runs[0].drive if runs else '?'}")
+    return np.concatenate(windows)
+
+
+def _place_and_spread(runs: Sequence[Run]) -> str:
+    """What strikes the eye, in words."""
+    offset = np.concatenate([run.offset for run in runs])
+    mean, spread = float(offset.mean()), float(np.mean([run.offset.std() for run in runs]))
+    side = "left" if mean > 0 else "right"
+    place = "to the lane centre" if abs(mean) < 0.08 else f"{abs(mean):.2f} m to the {side} of the lane centre"
+    calm = "steady" if spread < 0.13 else "restless" if spread > 0.22 else "ordinary"
+    return f"keeps {place}, {calm} (std {spread:.2f} m)"

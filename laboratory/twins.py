@@ -1,0 +1,261 @@
+"""Twins of a recorded window beside the recording: in-lane movement, gaps, and the verdicts of UN R157's models.
+
+    python -m laboratory.twins WHEEL [--begin 0] [--variants 20] [--cut-ins 8] [--write PAGE.md]
+
+WHEEL is `tasi-0.15.4-py3-none-any.whl`; 6 minutes of processor time. The window is reconstructed and played once, and
+enriched with each variant as `convert` does it (which also plays its output again, to see that the same happens).
+A classifier is shown snippets of 10 s, below 0.5 Hz as in the fair measure, of the recorded road-following and of the
+twin's at the same times. The null is the same test of a twin against the next twin: a model that is the truth. The
+verdicts are those of `laboratory.r157` on recorded cut-ins, with the follower as the vehicle under test, put nearer and
+farther.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laboratory.fair_null import slow_test
+from laboratory.markers import show
+from laboratory.r157.study.encounters import Target
+from laboratory.r157.study.verdicts import GAPS, MODELS, limits, verdicts_of
+from laboratory.reconstruction import WINDOW, write
+from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.evaluation.filters import below_half_hertz
+from xosc_lateral.drivers.evaluation.snippets import Snippets, snippets_of
+from xosc_lateral.files.profiles import read_profile
+from xosc_lateral.workflows.conversion.consequences import Gap, gaps_of
+from xosc_lateral.workflows.conversion.enrich import enrich
+from xosc_lateral.workflows.conversion.load import Played, play_scenario
+from xosc_lateral.workflows.conversion.result import Enriched
+from xosc_lateral.workflows.recordings.drivers import STEP, in_lane_offsets
+from xosc_lateral.workflows.recordings.encounters import Encounter
+from xosc_lateral.workflows.recordings.page import recorded_path
+from xosc_lateral.workflows.recordings.plan import VehiclePlan
+from xosc_lateral.workflows.recordings.reconstruct import Reconstructed, ReconstructSettings, reconstruct_recording
+from xosc_lateral.workflows.recordings.recordings import read_recording
+from xosc_lateral.world.motion.nominal import Activity
+from xosc_lateral.world.road.network import RoadNetwork
+
+FloatArray = NDArray[np.float64]
+
+SECONDS = 10.0
+AROUND = 5.0  # before and after a cut-in [s]
+EVERY = 0.1  # [s], the step of the published models
+
+
+@dataclass(frozen=True)
+class Twins:
+    """A window, its maneuvers as played, and every variant of them."""
+
+    made: Reconstructed
+    played: Played
+    variants: list[Enriched]
+
+
+def twins_of(source: Path, begin: float, variants: int) -> Twins:
+    made = reconstruct_recording(read_recording(source), ReconstructSettings(begin=begin, end=begin + WINDOW))
+    with tempfile.TemporaryDirectory() as folder:
+        played = play_scenario(write(made, Path(folder)))
+    chosen = {plan.name: one.profile for plan, one in zip(made.plans, made.drivers, strict=True) if one.profile}
+    profiles = {name: read_profile(name) for name in set(chosen.values())}
+    drivers = {name: profiles[profile] for name, profile in chosen.items()}
+    made_up = [enrich(played.motion, played.network, drivers, seed=1, variant=k) for k in range(variants)]
+    return Twins(made, played, made_up)
+
+
+# ---- in-lane movement ------------------------------------------------------------------------------------------------
+def in_lane_runs(twins: Twins) -> tuple[list[Run], list[list[FloatArray]]]:
+    """Recorded road-following of those that a profile drives, and each variant's offsets at the same times. [m]"""
+    runs = []
+    for plan, residuals in zip(twins.made.plans, twins.made.residuals, strict=True):
+        if twins.variants[0].entity(plan.name).is_enriched:
+            stretches = enumerate(in_lane_offsets(plan, residuals))
+            runs += [Run(plan.name, number, *stretch) for number, stretch in stretches]
+    time = twins.played.motion.entities[0].time
+    paths = [
+        [np.interp(run.time, time, variant.entity(run.drive).deviation) for run in runs] for variant in twins.variants
+    ]
+    return runs, paths
+
+
+def told_apart(cut: Snippets, one: Sequence[FloatArray], other: Sequence[FloatArray], seed: int) -> float:
+    return slow_test(cut, one, other, STEP, seed=seed).auc
+
+
+def movement_lines(twins: Twins) -> list[str]:
+    runs, paths = in_lane_runs(twins)
+    cut = snippets_of(runs, SECONDS, STEP)
+    real = [below_half_hertz(run.offset, STEP) for run in runs]
+    made_up = [[below_half_hertz(path, STEP) for path in variant] for variant in paths]
+    areas = [told_apart(cut, real, one, seed) for seed, one in enumerate(made_up)]
+    null = [told_apart(cut, one, made_up[seed - 1], seed) for seed, one in enumerate(made_up)]
+    spreads = [float(np.std(np.concatenate(one))) for one in (real, *made_up)]
+    count = f"{len(cut.items)} snippets of {len({run.drive for run in runs})} vehicles"
+    return [
+        "| in-lane movement | AUC, mean | 5 to 95 % of the variants | spread [m] |",
+        "|---|---|---|---|",
+        f"| twin against recorded ({count}) | {_mean_and_range(areas)} | {np.mean(spreads[1:]):.3f}, recorded "
+        f"{spreads[0]:.3f} |",
+        f"| null: twin against another twin | {_mean_and_range(null)} | |",
+    ]
+
+
+def _mean_and_range(values: Sequence[float]) -> str:
+    low, high = np.quantile(values, [0.05, 0.95])
+    return f"{np.mean(values):.3f} | {low:.3f} to {high:.3f}"
+
+
+# ---- gaps ------------------------------------------------------------------------------------------------------------
+def gap_lines(twins: Twins) -> list[str]:
+    motion, by_name = twins.played.motion, {plan.name: plan for plan in twins.made.plans}
+    paths = [recorded_path(by_name[one.name], one.time, one) for one in motion.entities]
+    recorded, nominal = gaps_of(motion, paths), twins.variants[0].gaps_before
+    pairs = {gap.names for gap in recorded} & {gap.names for gap in nominal}
+    lines = ["| smallest gap of a pair [m] | least | 5 % | half | pairs below 0.5 m |", "|---|---|---|---|---|"]
+    for name, several in (
+        ("recorded", [recorded]),
+        ("maneuvers alone", [nominal]),
+        (f"{len(twins.variants)} twins, mean", [one.gaps_after for one in twins.variants]),
+    ):
+        numbers = np.array([_gap_numbers(gaps, pairs) for gaps in several]).mean(axis=0)
+        lines.append(f"| {name} | " + " | ".join(f"{value:.2f}" for value in numbers[:3]) + f" | {numbers[3]:.1f} |")
+    return lines
+
+
+def _gap_numbers(gaps: Sequence[Gap], pairs: set[tuple[str, str]]) -> list[float]:
+    values = np.array([gap.distance for gap in gaps if gap.names in pairs])
+    return [*np.quantile(values, [0.0, 0.05, 0.5]), float((values < 0.5).sum())]
+
+
+# ---- verdicts --------------------------------------------------------------------------------------------------------
+def cut_ins(made: Reconstructed, most: int) -> list[Encounter]:
+    """Lane changes before followers who close in, the shortest time to collision first."""
+    met = [one for one in made.encounters if one.kind == "lane change" and one.behind is not None]
+    closing = [one for one in met if one.behind is not None and 0.0 < one.behind.time_to_collision < np.inf]
+    return sorted(closing, key=lambda one: one.behind.time_to_collision if one.behind else np.inf)[:most]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a vehicle is: centre along its travel [m], speed [m/s], to the left of the reference line [m]."""
+
+    along: FloatArray
+    speed: FloatArray
+    left: FloatArray
+
+
+def recorded_place(plan: VehiclePlan, time: FloatArray, network: RoadNetwork) -> Place:
+    one = plan.vehicle
+    travel = network.travel_direction(int(one.road[0]), int(one.lane[0]))
+    left = travel * network.lane_centre_t(one.road, one.lane, one.s) + one.offset
+    along = travel * one.s + one.centre
+    speed = np.gradient(along, one.time)
+    return Place(*(np.interp(time, one.time, values) for values in (along, speed, left)))
+
+
+def played_place(twins: Twins, name: str, time: FloatArray, deviation: FloatArray) -> Place:
+    one, network = twins.variants[0].entity(name).motion, twins.played.network
+    there = (one.activity & Activity.ACTIVE) != 0
+    road, lane, s = one.road[there], one.lane[there], one.s[there]
+    travel = network.travel_direction(int(road[0]), int(lane[0]))
+    left = travel * network.lane_centre_t(road, lane, s) + (one.offset + deviation)[there]
+    along = travel * s + one.entity.bounding_box.center_x
+    return Place(*(np.interp(time, one.time[there], values) for values in (along, one.speed[there], left)))
+
+
+def targets(twins: Twins, met: Encounter) -> Iterator[Target]:
+    """One recorded run; then the maneuvers alone and every twin, as runs of one target."""
+    assert met.behind is not None
+    plans = {plan.name: plan for plan in twins.made.plans}
+    cutter, ego, network = plans[met.vehicle], plans[met.behind.name], twins.played.network
+    number = next(k for k, one in enumerate(cutter.lateral.transitions) if one.start <= met.time <= one.end)
+    change, lane = cutter.lateral.transitions[number], cutter.targets[number]
+    first = max(change.start - AROUND, cutter.present[0], ego.present[0])
+    last = min(change.end + AROUND, cutter.present[1], ego.present[1])
+    time = np.arange(first, last, EVERY)
+    row = int(np.searchsorted(cutter.vehicle.time, change.start))
+    where = np.array([cutter.vehicle.road[row]]), np.array([lane]), cutter.vehicle.s[row : row + 1]
+    travel = network.travel_direction(int(where[0][0]), lane)
+    centre = travel * float(network.lane_centre_t(*where)[0])
+    side = float(np.sign(change.change))
+    width = float(network.lane_width(*where)[0])
+    still = np.zeros(len(twins.played.motion.entities[0].time))
+    deviations = [still, *(one.entity(met.vehicle).deviation for one in twins.variants)]
+    played = [played_place(twins, met.vehicle, time, deviation) for deviation in deviations]
+    for several, behind in (
+        ([recorded_place(cutter, time, network)], recorded_place(ego, time, network)),
+        (played, played_place(twins, ego.name, time, still)),
+    ):
+        away = np.array([side * (centre - one.left) for one in several])  # from the lane that it comes to
+        boxes = cutter.vehicle.width, cutter.vehicle.length, ego.vehicle.length, ego.vehicle.width
+        yield Target(
+            twins.made.traffic.name,
+            met.vehicle,
+            EVERY,
+            several[0].along,
+            several[0].speed,
+            behind.along,
+            behind.speed,
+            width - away,
+            away,
+            np.zeros(len(time), dtype=np.bool_),
+            change.start - first,
+            width,
+            *boxes,
+        )
+
+
+def verdict_lines(twins: Twins, most: int) -> list[str]:
+    head = " | ".join(f"{name} [m]" for name in MODELS)
+    lines = [
+        f"Gap from which on the models prevent it, of {GAPS[0]:g} to {GAPS[-1]:g} m: recorded, maneuvers alone, twins "
+        "5 to 95 %.",
+        "",
+        f"| cut-in: gap, time to collision half way | {head} |",
+        "|---" * (1 + len(MODELS)) + "|",
+    ]
+    inside: Mapping[str, list[bool]] = {name: [] for name in MODELS}
+    for met in cut_ins(twins.made, most):
+        recorded, played = (verdicts_of(one) for one in targets(twins, met))
+        cells = []
+        for name in MODELS:
+            own, others = float(limits(recorded.prevented[name])[0]), limits(played.prevented[name])
+            low, high = np.quantile(others[1:], [0.05, 0.95], method="nearest")
+            inside[name].append(bool(others[1:].min() <= own <= others[1:].max()))
+            cells.append(f"{_limit(own)}, {_limit(others[0])}, {_limit(low)} to {_limit(high)}")
+        assert met.behind is not None
+        lines.append(
+            f"| {met.vehicle} before {met.behind.name}, {met.behind.gap:.0f} m, {met.behind.time_to_collision:.0f} s | "
+            f"{' | '.join(cells)} |"
+        )
+    counts = " | ".join(f"{sum(inside[name])} of {len(inside[name])}" for name in MODELS)
+    return [*lines, f"| recorded one within the twins' | {counts} |"]
+
+
+def _limit(gap: float) -> str:
+    """Prevented from this gap on; "all", or "none" of those that were tried."""
+    return "all" if gap < GAPS[0] else "none" if gap > GAPS[-1] else f"{gap:.1f}"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("source", type=Path)
+    parser.add_argument("--begin", type=float, default=0.0)
+    parser.add_argument("--variants", type=int, default=20)
+    parser.add_argument("--cut-ins", type=int, default=8)
+    parser.add_argument("--write", type=Path, help="page with the markers")
+    args = parser.parse_args()
+    twins = twins_of(args.source, args.begin, args.variants)
+    parts = movement_lines(twins), gap_lines(twins), verdict_lines(twins, args.cut_ins)
+    show("\n\n".join("\n".join(part) for part in parts), args.write, "twins")
+
+
+if __name__ == "__main__":
+    main()
