@@ -36,7 +36,7 @@ import xosc_lateral as xl
 from laboratory.in_player import STEP, Span, sharpest, within
 from laboratory.player_outputs import LATERAL, OURS, actions
 from tests.kit.made.reactive import reactive_scenarios
-from xosc_lateral.world.motion.segments import MINIMUM_SPEED
+from xosc_lateral.base.segment import MINIMUM_SPEED
 
 FACTORS = (0.8, 1.0, 1.2)
 WINDOW = 1.0

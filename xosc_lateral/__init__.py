@@ -51,12 +51,12 @@ _HOME = {
     "Evaluation": "workflows.profiles.evaluate",
     "ClosedLoop": "workflows.profiles.loop",
     "ImportedDrives": "workflows.recordings.importing",
-    "XoscLateralError": "errors",
-    "FormatError": "errors",
-    "PlaybackError": "errors",
-    "DriverProfileError": "errors",
-    "NotEnoughDataError": "errors",
-    "SimulationError": "errors",
+    "XoscLateralError": "base.errors",
+    "FormatError": "base.errors",
+    "PlaybackError": "base.errors",
+    "DriverProfileError": "base.errors",
+    "NotEnoughDataError": "base.errors",
+    "SimulationError": "base.errors",
 }
 """Public name -> module that has it."""
 

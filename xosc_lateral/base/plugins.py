@@ -10,7 +10,7 @@ from pathlib import Path
 from pkgutil import iter_modules
 from typing import Any, TypeVar
 
-GROUPS = ("xosc_lateral.effects", "xosc_lateral.importers", "xosc_lateral.files.templates", "xosc_lateral.profiles")
+GROUPS = ("xosc_lateral.effects", "xosc_lateral.importers", "xosc_lateral.templates", "xosc_lateral.profiles")
 """Entry point groups that are looked at."""
 
 

@@ -10,6 +10,9 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 
+MINIMUM_SPEED = 40.0 / 3.6
+"""Below this the model says nothing [m/s] (Neis & Beyerer cut their data at 40 km/h)."""
+
 # Contexts that a scenario can supply by itself (DESIGN, section 4): name -> (unit, what is neutral).
 # `None` as the neutral value: "there is none", written as NaN in the arrays (no vehicle ahead, say).
 CONTEXT_UNITS: Mapping[str, str] = MappingProxyType(

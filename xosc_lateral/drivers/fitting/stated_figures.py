@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from xosc_lateral.base.errors import DriverProfileError
-from xosc_lateral.world.motion.segments import MINIMUM_SPEED
+from xosc_lateral.base.segment import MINIMUM_SPEED
 
 
 @dataclass(frozen=True, slots=True)

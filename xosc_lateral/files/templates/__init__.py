@@ -17,7 +17,7 @@ from xosc_lateral.files.templates.template import Template
 
 __all__ = ["TEMPLATES", "AnyTemplate", "PlainTemplate", "Template", "all_templates", "find_template"]
 
-GROUP = "xosc_lateral.files.templates"
+GROUP = "xosc_lateral.templates"
 """Entry points of further templates."""
 
 AnyTemplate = Template | PlainTemplate

@@ -17,6 +17,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import IntArray
 from xosc_lateral.base.errors import FormatError, SimulationError
+from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.opendrive import read_opendrive
 from xosc_lateral.files.openscenario.read import read_scenario
@@ -26,7 +27,6 @@ from xosc_lateral.workflows.live.paths import LEADING_OVER, TURN, Moves
 from xosc_lateral.workflows.live.surroundings import OpenDriveRoads, Places
 from xosc_lateral.workflows.live.traffic import Moment, Traffic
 from xosc_lateral.world.motion.deviation import SETTLING_TIME, settle
-from xosc_lateral.world.motion.segments import MINIMUM_SPEED
 from xosc_lateral.world.scenario import Scenario
 from xosc_lateral.world.scenario.private_actions import (
     FollowTrajectoryAction,

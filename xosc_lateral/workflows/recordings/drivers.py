@@ -17,11 +17,11 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.rows import true_slices
+from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.evaluation.metrics import free_runs
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.workflows.recordings.plan import Residuals, VehiclePlan
-from xosc_lateral.world.motion.segments import MINIMUM_SPEED
 
 WINDOW, STEP = 10.0, 0.2
 """Of movement that is summed up, as long as the evaluation's snippets; between rows, as profiles have it. [s]"""

@@ -21,9 +21,10 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
 from xosc_lateral.world.motion.ramp_targets import Ramp, acceleration, fitted, largest_change, slowing
-from xosc_lateral.world.motion.segments import MINIMUM_SPEED, SegmentSpan
+from xosc_lateral.world.motion.segments import SegmentSpan
 from xosc_lateral.world.road import RoadNetwork
 
 SETTLING_TIME = 2.0

@@ -9,11 +9,9 @@ from msgspec import Struct
 
 from xosc_lateral.base.arrays import BoolArray, IntArray
 from xosc_lateral.base.rows import blocks
+from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
 from xosc_lateral.world.road.network import RoadNetwork
-
-MINIMUM_SPEED = 40.0 / 3.6
-"""Below this the model says nothing [m/s] (Neis & Beyerer cut their data at 40 km/h)."""
 
 _ACROSS_LANE = np.pi / 4
 """Heading relative to the lane, whichever way it is driven, beyond which the vehicle does not follow it. [rad]"""

@@ -21,6 +21,7 @@ import numpy as np
 from lxml import etree
 from msgspec.structs import replace
 
+from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.files.openscenario.element import parent_of
 from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.draft import Draft, WrittenScenario
@@ -33,7 +34,6 @@ from xosc_lateral.files.openscenario.write.target import STANDARD, TargetPlayer
 from xosc_lateral.world.motion.nominal import NominalMotion, PlayedAction
 from xosc_lateral.world.motion.offset_chain import LEAST_CHANGE, SLACK, OffsetChain, leading, ramps
 from xosc_lateral.world.motion.ramp_targets import Ramp, acceleration
-from xosc_lateral.world.motion.segments import MINIMUM_SPEED
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.scenario import Scenario
 from xosc_lateral.world.scenario.dependence import Dependence
