@@ -24,7 +24,7 @@ DRIVING: frozenset[str] = frozenset(
 )
 """Lane types that vehicles follow, and that world positions snap to."""
 
-NARROW = 0.1
+MINIMUM_LANE_WIDTH = 0.1
 """A lane narrower than this at some s does not count as one there (it opens or closes). [m]"""
 
 
