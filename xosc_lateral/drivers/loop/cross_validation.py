@@ -171,4 +171,4 @@ def nest(
 
 
 def _any_matches(term: Term, others: Sequence[Term]) -> bool:
-    return any(type(term) is type(other) and term.matches(other) for other in others)
+    return any(term.kind == other.kind and term.matches(other) for other in others)
