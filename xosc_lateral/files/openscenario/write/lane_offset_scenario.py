@@ -38,7 +38,6 @@ from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.scenario import Scenario
 from xosc_lateral.world.scenario.dependence import Dependence
 from xosc_lateral.world.scenario.enums import Priority
-from xosc_lateral.world.scenario.private_actions import LATERAL
 
 CHAIN = "xosc-lateral offsets"
 AT_ONCE = 0.1
@@ -143,8 +142,8 @@ class _Acts:
 
     def __init__(self, story: etree._Element, entity: str, draft: Draft, items: Sequence[LateralAction]) -> None:
         self._story, self._entity, self._items, self._version = story, entity, items, draft.version
-        self._played = [one for one in draft.motion.actions if one.actor == entity and _is_lateral(one)]
         self._by_path = {item.path: item for item in items}
+        self._played = [one for one in draft.motion.actions if one.actor == entity and one.path in self._by_path]
         self._last = dict[tuple[str, ...] | None, str]()  # act after each lateral action, and the last one of all
 
     def add(self, chains: Sequence[OffsetChain], depends: Dependence | None) -> None:
@@ -232,7 +231,8 @@ class _Acts:
         # One that runs again may do so with the end: a condition with a delay is looked at all the time, and knows.
         for states in product(("standbyState", "completeState"), repeat=len(again)):
             group = build.sub(trigger, "ConditionGroup")
-            build.state_condition(group, item.kind, item.reference, "endTransition", FIRST if again else 0.0)
+            state = "completeState" if item.at_once else "endTransition"
+            build.state_condition(group, item.kind, item.reference, state, FIRST if again else 0.0)
             for one, state in zip(again, states, strict=True):
                 build.state_condition(group, "event", "::".join(one.path[:-1]), state, SLACK / 3.0)
             if item.path in self._last:
@@ -256,7 +256,8 @@ class _Acts:
         """
         trigger = build.sub(act, "StopTrigger")
         for item in self._items:
-            state, edge = ("startTransition", "rising") if item.path in ran else ("runningState", "none")
+            running = "completeState" if item.at_once else "runningState"  # over in the frame that it begins in
+            state, edge = ("startTransition", "rising") if item.path in ran else (running, "none")
             if item.repeats or item.path not in ran:
                 group = build.sub(trigger, "ConditionGroup")
                 build.state_condition(group, item.kind, item.reference, state, 0.0, edge)
@@ -299,10 +300,6 @@ def _lane_offset(owner: etree._Element, dynamics: Mapping[str, str], offset_t: f
     action = build.sub(owner, "LateralAction/LaneOffsetAction", continuous="false")
     build.sub(action, "LaneOffsetActionDynamics", **dynamics)
     build.sub(action, "LaneOffsetTarget/AbsoluteTargetLaneOffset", value=build.decimal(offset_t, 4))
-
-
-def _is_lateral(played: PlayedAction) -> bool:
-    return isinstance(played.action.content, LATERAL) and played.path != ("Init",)
 
 
 def _cause(before: Sequence[PlayedAction], begin: float) -> PlayedAction | None:

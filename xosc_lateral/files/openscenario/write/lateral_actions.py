@@ -10,34 +10,40 @@ from msgspec import Struct
 
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.scenario import Scenario
+from xosc_lateral.world.scenario.controllers import Domains, switches_lateral
 from xosc_lateral.world.scenario.dependence import Dependence
 from xosc_lateral.world.scenario.private_actions import LATERAL
+from xosc_lateral.world.scenario.under_test import controlled_entities
 
 
 class LateralAction(Struct, frozen=True):
     """A lateral action: its names from the story down, and the type and name that a condition refers to it by.
 
-    `repeats`: it may run more than once.
+    `repeats`: it may run more than once; `at_once`: it gives the lateral domain to a controller, or takes it back.
     """
 
     path: tuple[str, ...]
     kind: str
     reference: str
     repeats: bool = False
+    at_once: bool = False
 
 
 def lateral_actions(scenario: Scenario) -> dict[str, tuple[LateralAction, ...]]:
     """Lateral actions of events, by entity, in file order."""
     names = Counter(_names(scenario))
+    steered = {name for name, one in controlled_entities(scenario).items() if Domains.LATERAL in one.domains}
     by_entity: dict[str, dict[LateralAction, None]] = {}
     for story, act, group in scenario.storyboard.groups():
         for maneuver, event in group.events():
             repeats = group.maximum_execution_count > 1 or event.maximum_execution_count > 1
             for action in event.actions:
-                if isinstance(action.content, LATERAL):
+                at_once = switches_lateral(action.content)
+                actors = [one for one in group.actors.entity_refs if one in steered or not at_once]
+                if at_once or isinstance(action.content, LATERAL):
                     path = (story.name, act.name, group.name, maneuver.name, event.name, action.name)
-                    found = LateralAction(path, *_reference(path, len(event.actions) == 1, names), repeats)
-                    for actor in group.actors.entity_refs:
+                    found = LateralAction(path, *_reference(path, len(event.actions) == 1, names), repeats, at_once)
+                    for actor in actors:
                         by_entity.setdefault(actor, {})[found] = None
     return {entity: tuple(actions) for entity, actions in by_entity.items()}
 
