@@ -189,7 +189,7 @@ def test_a_damaged_state_is_refused_though_sealed_anew_and_the_drive_goes_on(
 def test_a_leap_in_time_and_a_vehicle_named_twice_are_refused(profile: DriverProfile) -> None:
     traffic = Traffic(profile, seed=6)
     drive(traffic, 1.0)
-    with pytest.raises(SimulationError, match="steps of a running simulation: 9999"):
+    with pytest.raises(SimulationError, match=r"simulation: 1e\+09 s, at most 600 s"):
         traffic.step(1e9, moment())
     with pytest.raises(ValueError, match="named twice"):
         traffic.step(1.0, moment(("a", "a")))
