@@ -37,7 +37,7 @@ def test_an_argument_comes_before_the_configuration_and_both_are_said(tmp_path: 
     used, said = neighbours()
     assert used == "profile" and "not known, does not move" in said and "population" not in said
     used, said = neighbours(neighbours="none")
-    assert used == "none" and "no answer" in said
+    assert used == "none" and "does not move (--neighbours none)" in said
     configuration.write_text('neighbours = "some"\n')
     with pytest.raises(FormatError, match="expected one of profile, borrow, none"):
         neighbours()
