@@ -15,7 +15,7 @@ from xosc_lateral.world.road.positions import RoadMark
 MOST_LANES = 1000
 """No lane id is further from 0: tables of lanes grow with it."""
 
-WIDEST = 1000.0
+MAXIMUM_LANE_WIDTH = 1000.0
 """No lane is wider, or further off its reference line. [m]"""
 
 _REVERSED = "laneSection/*/lane[@direction='reversed']"
@@ -204,10 +204,10 @@ def _check_lanes(road: XmlElement, sections: Sequence[LaneSection], source: Road
         for lane in section.lanes:
             for s in (*lane.starts, section.end):
                 centre, _, width = lane.state_at(s)
-                if max(abs(centre), abs(width)) > WIDEST:
+                if max(abs(centre), abs(width)) > MAXIMUM_LANE_WIDTH:
                     raise source.error(
                         f"lane {lane.id} at s={s:g} m: {width:g} m wide, {centre:g} m off the reference line; "
-                        f"limit {WIDEST:g} m",
+                        f"limit {MAXIMUM_LANE_WIDTH:g} m",
                         road,
                     )
             if not any(any(cubic) for cubic in lane.width):

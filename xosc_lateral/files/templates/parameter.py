@@ -116,12 +116,12 @@ class Declared:
 
 Parameter = Number | Choice | Declared
 
-_WHOLE, _UNSIGNED = r"[+-]?[0-9]+", r"\+?[0-9]+"
+_INTEGER_PATTERNS, _UNSIGNED = r"[+-]?[0-9]+", r"\+?[0-9]+"
 
 _TYPES: dict[str, re.Pattern[str]] = {
     "double": re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?"),
-    "integer": re.compile(_WHOLE),
-    "int": re.compile(_WHOLE),
+    "integer": re.compile(_INTEGER_PATTERNS),
+    "int": re.compile(_INTEGER_PATTERNS),
     "unsignedInt": re.compile(_UNSIGNED),
     "unsignedShort": re.compile(_UNSIGNED),
     "boolean": re.compile("true|false|1|0"),

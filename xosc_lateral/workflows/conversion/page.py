@@ -13,7 +13,7 @@ from xosc_lateral.workflows.playing import figures as figures
 from xosc_lateral.workflows.playing.figures import COMFORTABLE
 from xosc_lateral.workflows.playing.page import add_notes
 from xosc_lateral.workflows.playing.scene import scene_of
-from xosc_lateral.world.motion.gaps import REACH, Gap
+from xosc_lateral.world.motion.gaps import MAXIMUM_GAP, Gap
 
 MOST_PANELS, MOST_DYNAMICS = 12, 6
 """Entities with panels of their own, for offsets and for dynamics; those with the largest offsets come first."""
@@ -152,7 +152,7 @@ def _add_gaps(page: Page, enriched: Enriched) -> None:
     page.section(
         "Gaps",
         "The smallest free space between the bounding boxes of two vehicles that come within "
-        f"{REACH:g} m of each other.",
+        f"{MAXIMUM_GAP:g} m of each other.",
     )
     before = {gap.names: gap for gap in enriched.gaps_before}
     after = {gap.names: gap for gap in enriched.gaps_after}

@@ -31,7 +31,7 @@ MOST_FRAMES = 60_000
 MILLI, ANGLE, LINE = 1e-3, 1e-4, 5e-3
 """Resolution of positions [m] and speeds [m/s]; of headings, 0.5 mm at the end of a car of 5 m [rad]; of lines [m]."""
 
-REACH = 250.0
+ROAD_REACH = 250.0
 """Roads are shown as far as this around every place where a vehicle was. [m]"""
 
 PIECE = 200.0
@@ -146,7 +146,7 @@ def _roads(network: RoadNetwork, places: FloatArray, origin: FloatArray) -> dict
     dashes go on from piece to piece) [m].
     """
     lanes, marks = [], []
-    cells = {(int(i), int(k)) for i, k in np.unique(np.floor(places / REACH), axis=0)}
+    cells = {(int(i), int(k)) for i, k in np.unique(np.floor(places / ROAD_REACH), axis=0)}
     near = {(i + a, k + b) for i, k in cells for a in (-1, 0, 1) for b in (-1, 0, 1)}
 
     def line(road: int, s: FloatArray, t: FloatArray) -> FloatArray:
@@ -175,6 +175,6 @@ def _pieces_near(network: RoadNetwork, road: int, near: set[tuple[int, int]]) ->
     edges = np.linspace(0.0, length, max(1, int(np.ceil(length / PIECE))) + 1).tolist()
     for first, last in pairwise(edges):
         poses = network.road_to_world(road, np.linspace(first, last, 5))
-        cells = np.floor(np.column_stack([poses.x, poses.y]) / REACH)
+        cells = np.floor(np.column_stack([poses.x, poses.y]) / ROAD_REACH)
         if last > first and any((int(i), int(k)) in near for i, k in cells):
             yield first, last

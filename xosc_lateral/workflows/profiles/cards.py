@@ -30,13 +30,13 @@ CHANGED: Mapping[Acts, str] = {
 }
 """What a column effect changes, in words."""
 
-FEW = 10
+SINGLE_DRIVER_DRIVES = 10
 """Drives below which a profile is taken to be of one driver."""
 
 SHOWN_DRIVERS, SHOWN_S = 4, 120.0
 """Sample paths that are drawn, and their length. [s]"""
 
-PROSE = ("", "lane", "sure", "source", "licence")
+WRAPPED_ROWS = ("", "lane", "sure", "source", "licence")
 """Rows of a card that are wrapped in the terminal."""
 
 
@@ -127,7 +127,7 @@ def card_text(profile: DriverProfile) -> str:
     """The card for the terminal."""
     lines = [profile.name]
     for label, value in [("", profile.provenance.notes), *card_rows(profile, summary_of(profile))]:
-        parts = textwrap.wrap(value, 100) if label in PROSE else [value]
+        parts = textwrap.wrap(value, 100) if label in WRAPPED_ROWS else [value]
         lines += [f"  {label if k == 0 else '':10s} {part}" for k, part in enumerate(parts)]
     return "\n".join([*lines, f"  {'sha256':10s} {profile_hash(profile)}"])
 
@@ -176,7 +176,7 @@ def _spread(known: Provenance, summary: MovementSummary) -> str:
 def _sureness(known: Provenance, keeping: LaneKeeping) -> str:
     """How well one driver's mean and spread are known from so much driving; empty where it is of many or unknown."""
     independent = 3600.0 * known.hours / (2.0 * keeping.memory) if keeping.memory else 0.0
-    if "derived_from" in known.fit or not 0.0 < known.drives < FEW or independent < 1.0:
+    if "derived_from" in known.fit or not 0.0 < known.drives < SINGLE_DRIVER_DRIVES or independent < 1.0:
         return ""
     mean = NORMAL_95 * keeping.sdlp / independent**0.5
     spread = NORMAL_95 * keeping.sdlp / (2.0 * independent) ** 0.5

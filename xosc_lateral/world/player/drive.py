@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import inf, pi
 
-from xosc_lateral.world.player.state import NOWHERE, EntityState
+from xosc_lateral.world.player.state import NO_ROAD, EntityState
 from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.road import LaneLink
 from xosc_lateral.world.road.moving import most_turning
@@ -20,7 +20,7 @@ def drive(state: EntityState, distance: float) -> None:
     Without a road there is no lane to follow: the entity stops.
     """
     state.follow_lane()
-    if state.road == NOWHERE:
+    if state.road == NO_ROAD:
         state.set_speed(0.0)
         return
     move_along_lane(state, distance)

@@ -27,7 +27,7 @@ DRIVING: frozenset[str] = frozenset(
 WALKED: frozenset[str] = DRIVING | {"sidewalk", "walking"}
 """Lane types that pedestrians follow, as in the reference player; OpenDRIVE 1.8 calls a sidewalk "walking"."""
 
-NARROW = 0.1
+MINIMUM_LANE_WIDTH = 0.1
 """A lane narrower than this at some s does not count as one there (it opens or closes). [m]"""
 
 

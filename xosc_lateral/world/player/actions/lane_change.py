@@ -9,7 +9,7 @@ from xosc_lateral.world.player.actions.base import Domain, Maker, RunningPrivate
 from xosc_lateral.world.player.distances import is_turned
 from xosc_lateral.world.player.drive import move_along_lane
 from xosc_lateral.world.player.positions.resolve import beside
-from xosc_lateral.world.player.state import NOWHERE, EntityState
+from xosc_lateral.world.player.state import NO_ROAD, EntityState
 from xosc_lateral.world.player.transition import EPSILON, Transition
 from xosc_lateral.world.scenario.enums import DynamicsDimension, DynamicsShape
 from xosc_lateral.world.scenario.private_actions import AbsoluteTargetLane, LaneChangeAction
@@ -32,7 +32,7 @@ class RunningLaneChange(RunningPrivateAction):
     def _begin(self) -> None:
         state = self.actor
         state.locate()
-        if state.road == NOWHERE:
+        if state.road == NO_ROAD:
             self._refuse(f"'{state.name}' is on no road: the lane change is not played")
             return
         lane, network = self._target_lane(), state.network

@@ -7,7 +7,7 @@ from math import atan, pi
 from xosc_lateral.world.motion.nominal import Activity
 from xosc_lateral.world.player.actions.base import Domain, Maker, RunningPrivateAction
 from xosc_lateral.world.player.distances import is_turned
-from xosc_lateral.world.player.state import NOWHERE
+from xosc_lateral.world.player.state import NO_ROAD
 from xosc_lateral.world.player.transition import EPSILON, Transition
 from xosc_lateral.world.scenario.enums import DynamicsDimension, DynamicsShape
 from xosc_lateral.world.scenario.private_actions import LaneOffsetAction
@@ -32,7 +32,7 @@ class RunningLaneOffset(RunningPrivateAction):
     def _begin(self) -> None:
         state = self.actor
         state.locate()
-        if state.road == NOWHERE:
+        if state.road == NO_ROAD:
             self._refuse(f"'{state.name}' is on no road: the lane offset is not played")
             return
         state.follow_lane()
