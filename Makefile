@@ -36,6 +36,7 @@ demo: $(STAMP)
 	@$(BIN)/xosc-lateral convert out/demo/cut-in.xosc -o out/demo/cut-in_lifelike.xosc --seed 1 --report out/demo/cut-in_report.html
 	@echo
 	@echo "Look at the report:     out/demo/cut-in_report.html (in a browser)"
+	@echo "Play it in a browser:   xosc-lateral view out/demo/cut-in_lifelike.xosc"
 	@echo "Play it in esmini:      esmini --window 60 60 1000 500 --osc out/demo/cut-in_lifelike.xosc"
 	@echo "Use the command line:   source $(BIN)/activate && xosc-lateral --help"
 

@@ -44,7 +44,7 @@ MODULES = {
 }  # fmt: skip
 """Verbs whose module, which is loaded when they are used, is not called like them."""
 
-LOOKS: dict[str, Any] = {
+TYPER_STYLE: dict[str, Any] = {
     "no_args_is_help": True,
     "pretty_exceptions_enable": False,
     "context_settings": {"help_option_names": ["-h", "--help"]},
@@ -68,7 +68,7 @@ def _root(
 
 def group_of_verbs() -> typer.Typer:
     """What a module adds its verbs to: a group, though of one."""
-    found = typer.Typer(**LOOKS)
+    found = typer.Typer(**TYPER_STYLE)
     found.callback()(_root)
     return found
 
@@ -92,7 +92,9 @@ class _Verbs(TyperGroup):
         return name, known and verb(str(name)), rest
 
 
-app = typer.Typer(cls=_Verbs, name="xosc-lateral", help="Lifelike lateral movement for OpenSCENARIO traffic.", **LOOKS)
+app = typer.Typer(
+    cls=_Verbs, name="xosc-lateral", help="Lifelike lateral movement for OpenSCENARIO traffic.", **TYPER_STYLE
+)
 app.callback()(_root)
 
 
