@@ -30,7 +30,7 @@ PASS_STEP = 0.18
 ATTENUATION = 50.0
 """Of what would fold back: a movement of 1 m leaves 3 mm. [dB]"""
 
-PASSED, STOPPED = 1.5, 2.5
+PASS_BAND_EDGES, STOPPED = 1.5, 2.5
 """Of the low-pass, for rows at `STEP`. [Hz]"""
 
 
@@ -41,7 +41,7 @@ def resample(time: FloatArray, values: FloatArray, grid: FloatArray) -> FloatArr
     """
     if _is_sparse(time, grid):
         return np.interp(grid, time, values)
-    kernel = low_pass_between(PASSED, STOPPED, STEP / OVERSAMPLING, ATTENUATION)
+    kernel = low_pass_between(PASS_BAND_EDGES, STOPPED, STEP / OVERSAMPLING, ATTENUATION)
     fine = np.interp(_fine_grid(grid), time, values)
     return _decimate(mirrored(fine, len(kernel) // 2), kernel, len(grid))
 
