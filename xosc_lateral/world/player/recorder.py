@@ -146,7 +146,7 @@ class Rows:
             offset *= direction
             if len(looked_up):
                 height = free[unknown, 2] if self._knows_height else None
-                _look_up(network, looked_up, free[unknown], height, where, direction)
+                _look_up(network, looked_up, free[unknown], height, where, direction, self.state.lane_types)
             to_lane = along - np.where(direction > 0, 0.0, pi)
             on_road = road >= 0
             pose = _poses(network, where, to_lane)
@@ -237,12 +237,13 @@ def _look_up(
     height: FloatArray | None,
     where: _Where,
     direction: FloatArray,
+    lane_types: frozenset[str],
 ) -> None:
     """Road coordinates of rows that only have a world pose."""
     if not network.road_ids:
         where.road[rows] = NO_ROAD
         return
-    found = network.world_to_lane(free[:, 0], free[:, 1], height)
+    found = network.world_to_lane(free[:, 0], free[:, 1], height, lane_types=lane_types)
     where.road[rows], where.lane[rows], where.s[rows], where.offset[rows] = (
         found.road,
         found.lane,
