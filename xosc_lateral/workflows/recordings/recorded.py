@@ -16,12 +16,12 @@ from xosc_lateral.world.road.positions import Poses
 BESIDE = 1.0
 """So far beside every driving lane a vehicle still keeps to one: it drives on its marking. [m]"""
 LONGEST_GAP = 1.0
-"""Rows farther apart than this are not of one passage, as in `formats.importers.cuts`. [s]"""
+"""Rows farther apart than this are not of one passage, as in `recordings.cuts`. [s]"""
 FARTHEST = 1e8
 """No map projection gives such a position: the Earth's circumference is 4e7 m. [m]"""
 SHORTEST_STEP = 1e-4
 """Rows that follow sooner are of the same moment: no sensor has 10 kHz. [s]"""
-SHORTEST = 2.0
+MINIMUM_PASSAGE = 2.0
 """Passages below this are left out: a speed and its change can't be told in less. [s]"""
 LEAP = 1.5
 """Farther than it can have driven by this much (half a narrow lane): an identifier that has gone to another vehicle.
@@ -145,7 +145,7 @@ def _place(track: Track, rows: NDArray[np.intp], network: RoadNetwork, left_out:
     reasons = {"off the lanes": int((~on_lane).sum()), "across a lane or backwards": int(elsewhere.sum())}
     if not passages:
         said = "".join(f", {rows} of {len(time)} rows {why}" for why, rows in reasons.items() if rows)
-        left_out.append(f"{track.name}: no {SHORTEST:g} s along a driving lane without a gap{said}")
+        left_out.append(f"{track.name}: no {MINIMUM_PASSAGE:g} s along a driving lane without a gap{said}")
         return None
     best = max(passages, key=lambda part: time[part[-1]] - time[part[0]])
     lost = len(time) - len(best)
@@ -210,13 +210,8 @@ def _steady_heading(
 
 def _across(velocity: FloatArray, lane_heading: FloatArray) -> NDArray[np.bool_]:
     """Rows at which it moves across its lane more than along it, as a person on foot does."""
-    vx, vy = velocity
-    along, across = (np.abs(vx * np.cos(lane_heading + turn) + vy * np.sin(lane_heading + turn)) for turn in TURNS)
-    return np.asarray((across > along) & (np.hypot(vx, vy) >= MOVING_SPEED))
-
-
-TURNS = (0.0, 0.5 * np.pi)
-"""Along and across. [rad]"""
+    turn = np.arctan2(velocity[1], velocity[0]) - lane_heading
+    return np.asarray((np.abs(np.sin(turn)) > np.abs(np.cos(turn))) & (np.hypot(*velocity) >= MOVING_SPEED))
 
 
 def _backwards(x: FloatArray, y: FloatArray, heading: FloatArray) -> NDArray[np.bool_]:
@@ -227,7 +222,7 @@ def _backwards(x: FloatArray, y: FloatArray, heading: FloatArray) -> NDArray[np.
 
 
 def _passages(time: FloatArray, x: FloatArray, y: FloatArray, rows: NDArray[np.intp]) -> list[NDArray[np.intp]]:
-    """Stretches of the rows without a gap or a leap, `SHORTEST` at least: a bad row or two end none."""
+    """Stretches of the rows without a gap or a leap, `MINIMUM_PASSAGE` at least: a bad row or two end none."""
     from scipy.ndimage import median_filter
 
     step = np.maximum(np.diff(time[rows]), 1e-9)
@@ -241,4 +236,4 @@ def _passages(time: FloatArray, x: FloatArray, y: FloatArray, rows: NDArray[np.i
         broken |= np.hypot(*moved) > 2.0 * about * step + LEAP
         broken |= np.abs(across) > 0.5 * about * step + LEAP
     parts = np.split(rows, np.flatnonzero(broken) + 1)
-    return [part for part in parts if len(part) > 3 and time[part[-1]] - time[part[0]] >= SHORTEST]
+    return [part for part in parts if len(part) > 3 and time[part[-1]] - time[part[0]] >= MINIMUM_PASSAGE]
