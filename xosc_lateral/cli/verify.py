@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Allow, Library, RoadPath, Said, Written, command
+from xosc_lateral.cli.words import Allow, Library, Printing, RoadPath, Written, command
 
 app = group_of_verbs()
 
@@ -27,7 +27,7 @@ def verify(
     road_path: RoadPath = None,
     fast: Annotated[bool, typer.Option("--fast", help="Compare hashes alone; make nothing again.")] = False,
     jobs: Annotated[int, typer.Option(help="Number of processes; -1: one per core.")] = 1,
-    said: Said,
+    said: Printing,
 ) -> None:
     """Make outputs again in memory and name those that differ, and why: edited, other inputs, another version."""
     from xosc_lateral import verify as check
