@@ -146,10 +146,13 @@ def switches(content: object) -> Iterator[tuple[Domains, bool]]:
     return ((domain, on) for domain, on in found if on is not None)
 
 
-def switches_lateral(content: object) -> bool:
-    """Whether an action gives the lateral domain to a controller, or takes it from one."""
-    is_module = isinstance(content, AssignControllerAction) and content.controller and kind_of(content.controller)
-    return any(domain is Domains.LATERAL for domain, _ in switches(content)) or bool(is_module and is_module.at_once)
+def gives_lateral(content: object) -> bool | None:
+    """Whether an action gives the lateral domain to a controller, or takes it back; None: neither."""
+    found = next((on for domain, on in switches(content) if domain is Domains.LATERAL), None)
+    if isinstance(content, AssignControllerAction) and content.controller is not None:
+        kind = kind_of(content.controller)
+        return Domains.LATERAL in kind.drives if kind.at_once else found
+    return found
 
 
 def is_meant(controller: Controller, content: object) -> bool:
