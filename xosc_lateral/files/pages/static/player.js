@@ -74,14 +74,14 @@
 
   class Player {
     constructor(root) {
-      const scene = JSON.parse(document.getElementById("scene").textContent);
+      const scene = JSON.parse(root.nextElementSibling.textContent);
       this.root = root;
       this.vehicles = scene.entities.map((each) => new Vehicle(each, scene.step));
       this.lanes = scene.lanes.map((each) => shape(each, true));
       this.marks = scene.marks.map((each) => shape(each, false));
       this.followed = this.vehicles.find((each) => each.enriched) ?? this.vehicles[0] ?? null;
       Object.assign(this, { stretch: 1, scale: 0, center: [0, 0], course: 0, playing: false, speed: 1, showGhosts: true, boxes: [] });
-      clock.end = (scene.frames - 1) * scene.step;
+      clock.end = Math.max(clock.end, (scene.frames - 1) * scene.step);
       this.build();
       this.readColors();
       this.listen();
