@@ -33,7 +33,7 @@ from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.files.mapping import ColumnSource, MappingLike, as_mapping, factor, is_measured, parse_map, spelled
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import LONGEST_MESSAGE, foreign_errors
-from xosc_lateral.workflows.recordings.cuts import KEPT
+from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
 from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
 
 POSITIONS = (("offset", "lane_width"), ("distance_left", "distance_right"))
@@ -141,12 +141,12 @@ def _opened(source: Path) -> Iterator[Any]:
         try:
             log = MDF(opened.file if isinstance(opened.file, io.BytesIO) else source)
         except Exception as error:
-            raise FormatError(f"{_NO_MDF}: {_said(error)}", path=source) from None
+            raise FormatError(f"{_NO_MDF}: {_stated_unit(error)}", path=source) from None
         with log:
             yield log
 
 
-def _said(error: Exception) -> str:
+def _stated_unit(error: Exception) -> str:
     """Words of an error, after which nothing is left of what it broke off.
 
     asammdf's half-made objects complain on standard error when they are disposed of: here, and unheard.
@@ -238,5 +238,5 @@ def _table(signals: dict[str, Channel], source: Path, drive: str, step: float) -
         stamps = signals[name].time
         after = np.clip(np.searchsorted(stamps, time), 1, len(stamps) - 1)
         missing |= stamps[after] - stamps[after - 1] > STAYS_AWAY
-    state = np.where(missing, "gap", KEPT)
+    state = np.where(missing, "gap", KEPT_ROWS)
     return pd.DataFrame({"drive": drive, "time": np.round(time - start, 6), **columns, "state": state})

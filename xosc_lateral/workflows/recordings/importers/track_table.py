@@ -126,17 +126,17 @@ def tracks_of(
         step,
         x,
         y,
-        _given(order, "heading", travel_heading(x, y, vehicle, step)),
-        np.abs(_given(order, "speed", ground_speed(x, y, vehicle, step))),
-        _given(order, "length", usual),
+        _given_columns(order, "heading", travel_heading(x, y, vehicle, step)),
+        np.abs(_given_columns(order, "speed", ground_speed(x, y, vehicle, step))),
+        _given_columns(order, "length", usual),
         kinds,
         order["width"].to_numpy(dtype=np.float64) if "width" in order else None,
         is_reference=is_played,
-        rear=_given(order, "rear", np.zeros(len(order))) if "rear" in order else None,
+        rear=_given_columns(order, "rear", np.zeros(len(order))) if "rear" in order else None,
     )
 
 
-def _given(table: pd.DataFrame, name: str, otherwise: FloatArray) -> FloatArray:
+def _given_columns(table: pd.DataFrame, name: str, otherwise: FloatArray) -> FloatArray:
     if name not in table:
         return otherwise
     values = table[name].to_numpy(dtype=np.float64)
