@@ -12,9 +12,9 @@ from xosc_lateral.world.scenario import BoundingBox, Entity
 from xosc_lateral.world.scenario.enums import EntityCategory
 from xosc_lateral.world.scenario.place import Place
 
-NEAR = 120.0
+NEAR_DISTANCE = 120.0
 """Vehicles farther from the case's are left out. [m]"""
-HEIGHT = 1.5
+VEHICLE_HEIGHT = 1.5
 """Nobody sees it from above. [m]"""
 
 
@@ -39,7 +39,7 @@ def _is_near(track: Track, instants: np.ndarray, here: tuple[np.ndarray, np.ndar
     rows = instants - track.first
     there = (rows >= 0) & (rows < len(track))
     away = np.hypot(track.rows.x[rows[there]] - here[0][there], track.rows.y[rows[there]] - here[1][there])
-    return bool((away < NEAR).any())
+    return bool((away < NEAR_DISTANCE).any())
 
 
 def _motion(track: Track, instants: np.ndarray) -> EntityMotion:
@@ -47,7 +47,7 @@ def _motion(track: Track, instants: np.ndarray) -> EntityMotion:
     there = (rows >= 0) & (rows < len(track))
     rows, one = rows.clip(0, len(track) - 1), track.rows
     size = track.size
-    box = BoundingBox(size.ahead, 0.0, 0.5 * HEIGHT, size.length, size.width, HEIGHT)
+    box = BoundingBox(size.ahead, 0.0, 0.5 * VEHICLE_HEIGHT, size.length, size.width, VEHICLE_HEIGHT)
     entity = Entity(name=track.name, category=EntityCategory.VEHICLE, bounding_box=box, place=Place("", 0, ""))
     none = np.zeros(len(rows))
     numbers = one.road[rows].astype(np.int32), one.lane[rows].astype(np.int32)

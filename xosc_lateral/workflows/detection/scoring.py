@@ -70,15 +70,15 @@ class Tally:
             self.seconds[cluster] = self.seconds.get(cluster, 0.0) + float(keeping.sum()) * STEP
             before = self.counts.get(cluster, np.zeros(len(limits), dtype=np.int64))
             self.counts[cluster] = before + count_onsets(watched, keeping, limits)
-            self._keep_false_alarm(scene, view, watched, keeping)
+            self._add_false_alarm(scene, view, watched, keeping)
             for change in view.truth.changes:
                 if change.side == view.side and view.watched[change.begin]:
                     lead = lead_times(watched, change, limits)
                     self.change_clusters.append(cluster)
                     self.leads.append(lead)
-                    self._keep_change(scene, view, watched, change, float(lead[self.detector.chosen]))
+                    self._add_late_change(scene, view, watched, change, float(lead[self.detector.chosen]))
 
-    def _keep_false_alarm(self, scene: Scene, view: View, score: FloatArray, keeping: BoolArray) -> None:
+    def _add_false_alarm(self, scene: Scene, view: View, score: FloatArray, keeping: BoolArray) -> None:
         limit = float(self.detector.limits[self.detector.chosen])
         if not keeping.any():
             return
@@ -86,17 +86,17 @@ class Tally:
         if score[row] > limit:
             spread = float(np.ptp(self.detector.limits)) or 1.0
             badness = float(score[row] - limit) / spread
-            self._keep(Case("false alarm", scene, view, float(view.track.time[row]), badness, score, limit))
+            self._add_case(Case("false alarm", scene, view, float(view.track.time[row]), badness, score, limit))
 
-    def _keep_change(self, scene: Scene, view: View, score: FloatArray, change: LaneChange, lead: float) -> None:
+    def _add_late_change(self, scene: Scene, view: View, score: FloatArray, change: LaneChange, lead: float) -> None:
         limit = float(self.detector.limits[self.detector.chosen])
         time = float(view.track.time[change.crossing])
         if np.isnan(lead):
-            self._keep(Case("missed", scene, view, time, 1e6, score, limit))
+            self._add_case(Case("missed", scene, view, time, 1e6, score, limit))
         elif lead < 0.0:
-            self._keep(Case("late", scene, view, time, 1e3 - lead, score, limit))
+            self._add_case(Case("late", scene, view, time, 1e3 - lead, score, limit))
 
-    def _keep(self, case: Case) -> None:
+    def _add_case(self, case: Case) -> None:
         self.cases = sorted([*self.cases, case], key=lambda one: -one.badness)[:CASES]
 
     def curve(self) -> Curve:
