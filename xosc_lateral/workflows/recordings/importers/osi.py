@@ -94,9 +94,7 @@ def _placed(recorded: Recorded, path: Path, road: Path | None) -> tuple[PlacedTr
     elif recorded.opendrive is not None:
         network, where = read_road(recorded.opendrive, path.stem), "the road in it"
     if network is not None:
-        x, y = network.header_offset.undo(tracks.x, tracks.y)
-        heading = tracks.heading - network.header_offset.heading
-        placed, graph = place_on_road(replace(tracks, x=x, y=y, heading=heading), network)
+        placed, graph = place_on_road(tracks, network)
     elif (lanes := lanes_of(recorded)) is not None:
         (strips, graph), where = lanes, "the trace"
         placed = place_in_shapes(tracks, strips, graph.left)
