@@ -18,6 +18,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
+from xosc_lateral.files.labels import file_labels
 from xosc_lateral.files.xml import read_xml
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
 from xosc_lateral.workflows.recordings.importers.table import Imported, guarded
@@ -37,13 +38,15 @@ def import_commonroad(
     Raises `FormatError` if commonroad-io is not installed, or a file is no CommonRoad scenario; `NotEnoughDataError` if
     nothing is left once lane changes are cut.
     """
-    return import_each(sources, lambda file: _read(file, settings), keep_cut=keep_cut)
+    files = [sources] if isinstance(sources, Path) else list(sources)
+    labels = dict(zip(files, file_labels(files), strict=True))
+    return import_each(files, lambda file: _read(file, labels[file], settings), keep_cut=keep_cut)
 
 
-def _read(path: Path, settings: CutSettings) -> Imported:
+def _read(path: Path, label: str, settings: CutSettings) -> Imported:
     scenario = _opened(path)
     graph, shapes = _graph(scenario)
-    tracks = place_in_shapes(_tracks(scenario, path), shapes, graph.left)
+    tracks = place_in_shapes(_tracks(scenario, path, label), shapes, graph.left)
     require_lanes(tracks, "its lanelets", path)
     about = {"format": "commonroad", "version": str(getattr(scenario, "scenario_id", "unknown")), "licence": LICENCE}
     return import_placed(tracks, graph, settings, keep_cut=True, sources=[path], **about)
@@ -80,10 +83,10 @@ def _opened(path: Path) -> Any:
 
 def read_obstacles(path: Path) -> Tracks:
     """All obstacles that move along a recorded trajectory. Raises `FormatError`, `NotEnoughDataError`."""
-    return _tracks(_opened(path), path)
+    return _tracks(_opened(path), path, path.stem)
 
 
-def _tracks(scenario: Any, path: Path) -> Tracks:
+def _tracks(scenario: Any, path: Path, label: str) -> Tracks:
     names: list[str] = []
     rows: list[tuple[float, ...]] = []
     lengths: list[float] = []
@@ -97,7 +100,7 @@ def _tracks(scenario: Any, path: Path) -> Tracks:
             if position.shape == (2,):
                 speed = getattr(state, "velocity", np.nan)
                 rows.append((len(names), state.time_step, *position, getattr(state, "orientation", np.nan), speed))
-        names.append(f"{path.stem}:{obstacle.obstacle_id}")
+        names.append(f"{label}:{obstacle.obstacle_id}")
         lengths.append(float(getattr(obstacle.obstacle_shape, "length", 4.6)))
         kinds.append(str(obstacle.obstacle_type.value).lower())
     if len(rows) < 2:

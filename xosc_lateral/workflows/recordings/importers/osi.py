@@ -15,6 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.files.labels import file_labels
 from xosc_lateral.files.opendrive import read_opendrive, read_road
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
 from xosc_lateral.workflows.recordings.importers.table import Imported, guarded
@@ -54,17 +55,18 @@ def import_osi(
     `host`: keep this vehicle alone: its identifier or name in the trace; "host": the trace's host vehicle. `road`:
     OpenDRIVE file to take lanes from. `channel`: topic of an MCAP file with several.
     """
-    several = not isinstance(sources, Path) and len(sources) > 1
+    files = [sources] if isinstance(sources, Path) else list(sources)
+    labels = dict(zip(files, file_labels(files), strict=True))
 
     def read(path: Path) -> Imported:
         recorded = read_osi(path, channel)
         only = None if host is None else _named(recorded, host, path)
-        if several:
-            names = tuple(f"{path.stem}:{name}" for name in recorded.tracks.names)
+        if len(files) > 1:
+            names = tuple(f"{labels[path]}:{name}" for name in recorded.tracks.names)
             recorded = replace(recorded, tracks=replace(recorded.tracks, names=names))
-            only = None if only is None else {f"{path.stem}:{name}" for name in only}
-        placed, graph, files = _placed(recorded, path, None if road is None else Path(road))
-        about = {"format": "osi", "sources": files, "licence": LICENCE, "notes": recorded.notes}
+            only = None if only is None else {f"{labels[path]}:{name}" for name in only}
+        placed, graph, read_from = _placed(recorded, path, None if road is None else Path(road))
+        about = {"format": "osi", "sources": read_from, "licence": LICENCE, "notes": recorded.notes}
         return import_placed(placed, graph, settings, keep_cut=True, only=only, **about)
 
     return import_each(sources, read, keep_cut=keep_cut)

@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.files.clock import require_row_step, seconds_of_stamps
 from xosc_lateral.files.mapping import UNITS, MappingLike, TableMapping, as_mapping, parse_map
+from xosc_lateral.files.rows import chosen_rows, without_markers
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.states import COLUMNS
 from xosc_lateral.files.tables import foreign_errors, listed, numbers_of, read_table, unpacked_text
@@ -40,6 +42,10 @@ HEADERS: Mapping[str, tuple[str, ...]] = {
 
 USUAL_LENGTH = {"truck": 16.5, "bus": 12.0, "trailer": 12.0, "motorcycle": 2.2, "motorbike": 2.2}
 """Where no length is given; 4.6 m for the rest (EU new cars, 2023: mean 4.4 m). [m]"""
+
+
+BEHIND_MIDDLE = {"centre": 0.0, "front": -0.5, "rear": 0.5, "rear axle": 0.3}
+"""How far a point that recordings refer to lies behind a vehicle's middle, as a share of its length. [-]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +124,7 @@ def tracks_of(
     if not same.any():
         raise NotEnoughDataError(f"{path}: no vehicle has two rows")
     step = float(np.median(np.diff(time)[same]))
+    require_row_step(step, path)
     vehicle = codes.astype(np.int64)
     x, y = order["x"].to_numpy(dtype=np.float64), order["y"].to_numpy(dtype=np.float64)
     way, driven = travel_heading(x, y, vehicle, time, step), ground_speed(x, y, vehicle, time, step)
@@ -126,7 +133,9 @@ def tracks_of(
     _require_speed(speed, driven, path)
     kind = order["vehicle_class"].astype(str).str.lower().to_numpy(dtype=str) if "vehicle_class" in order else None
     kinds = np.full(len(order), "") if kind is None else kind
-    usual = np.array([USUAL_LENGTH.get(one, 4.6) for one in kinds])
+    length = _given(order, "length", np.array([USUAL_LENGTH.get(one, 4.6) for one in kinds]))
+    ahead = BEHIND_MIDDLE["centre" if saved is None else saved.reference] * length
+    x, y = x + ahead * np.cos(heading), y + ahead * np.sin(heading)
     return Tracks(
         tuple(f"{name}" for name in names),
         vehicle,
@@ -136,7 +145,7 @@ def tracks_of(
         y,
         heading,
         speed,
-        _given(order, "length", usual),
+        length,
         kinds,
         order["width"].to_numpy(dtype=np.float64) if "width" in order else None,
         is_reference=is_played,
@@ -170,7 +179,8 @@ def _columns(table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequen
     if unknown := mapping.keys() - HEADERS.keys():
         raise FormatError(f"--map {min(unknown)}: tracks have {', '.join(HEADERS)}", path=path)
     by_lower = {str(name).strip().lower(): name for name in reversed(list(table.columns))}
-    found = {}
+    found: dict[str, pd.Series] = {}
+    table = chosen_rows(without_markers(table, saved.missing, path), saved.rows, path)
     for name, headers in HEADERS.items():
         source = mapping.get(name)
         header = next((by_lower[one] for one in headers if one in by_lower), None) if source is None else source.column
@@ -180,11 +190,17 @@ def _columns(table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequen
                 raise FormatError(f"no column {header or name!r}; {there}", path=path, line=1)
             continue
         column = table[header]
-        if name in ("vehicle", "vehicle_class"):
+        if name == "vehicle":
             found[name] = column
+        elif name == "vehicle_class":
+            found[name] = saved.class_names(column, path)
         else:
             by = 1.0 if source is None else source.factor
-            found[name] = pd.Series(numbers_of(column, path, name) * by, index=column.index)
+            stamps = None
+            if name == "time" and not pd.api.types.is_numeric_dtype(column):
+                stamps = seconds_of_stamps(column, path, saved.time_zone, found["vehicle"])
+            numbers = numbers_of(column, path, name) * by if stamps is None else stamps
+            found[name] = pd.Series(numbers, index=column.index)
     made = pd.DataFrame(found).replace([np.inf, -np.inf], np.nan)
     return made.dropna(subset=["vehicle", "time", "x", "y"])
 
