@@ -12,7 +12,7 @@ import pytest
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main
 from xosc_lateral.workflows.recordings.importers.tracks import import_tracks
-from xosc_lateral.workflows.recordings.placed import LaneGraph
+from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
 
 WIDTH = 3.5
 HEADING = 0.3

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError
 
 MOVING = 3.0
@@ -24,6 +24,12 @@ AGREES = 0.7
 MAX_AGAINST = 0.1
 """Share of the moving rows that may contradict: mirrored or turned recordings have all, or half where headings are
 random; overtaking in the oncoming lane and vehicles that reverse have a few in a hundred. [-]"""
+
+STRAIGHT = np.cos(np.radians(3.0))
+"""Cosine of a vehicle's heading and its edge's that is of a straight edge. [-]"""
+
+LEAST_SPREAD = 0.1
+"""Standard deviation of places across the road from which their side can be told. [m]"""
 
 CLOCKWISE, NORTH = "counted clockwise", "counted clockwise from north"
 
@@ -62,6 +68,29 @@ def require_lane_direction(agreement: FloatArray, speed: FloatArray, where: str,
         what = f"{100 * share:.0f} % of the moving rows drive against the direction of their lanes in {where}: {cause}"
         raise FormatError(what, path=path)
     return np.asarray(against)
+
+
+def is_right_to_left(
+    x: FloatArray, y: FloatArray, heading: FloatArray, across: FloatArray, edge: IntArray
+) -> bool | None:
+    """Whether places across an edge, as counted by a source, grow to the left of travel, by where they are; None: it
+    can't be told. All of shape (n,). [m], [rad]"""
+    from_line, counted = list[FloatArray](), list[FloatArray]()
+    for number in np.unique(edge):
+        mine = np.flatnonzero((edge == number) & np.isfinite(x + y + heading))
+        if len(mine) < 2:
+            continue
+        way = float(np.arctan2(np.sin(heading[mine]).mean(), np.cos(heading[mine]).mean()))
+        straight = mine[np.cos(heading[mine] - way) > STRAIGHT]
+        if len(straight) > max(1, 0.9 * len(mine)):
+            left = np.cos(way) * y[straight] - np.sin(way) * x[straight]
+            from_line.append(left - left.mean())
+            counted.append(across[straight] - across[straight].mean())
+    left, places = (np.concatenate([np.zeros(0), *parts]) for parts in (from_line, counted))
+    if not len(left) or min(left.std(), places.std()) < LEAST_SPREAD:
+        return None
+    agreement = float(np.corrcoef(left, places)[0, 1])
+    return agreement > 0.0 if abs(agreement) > AGREES else None
 
 
 def _share(rows: BoolArray) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -10,103 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.workflows.recordings.cuts import CutSettings, Rows, cut_table
 from xosc_lateral.workflows.recordings.gate import MOVING, require_lane_direction
 from xosc_lateral.workflows.recordings.importers.table import Imported, finished, hash_files, without_cut
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks, rate
-from xosc_lateral.workflows.recordings.instants import pool_of
-from xosc_lateral.workflows.recordings.neighbours import find_neighbours
-
-
-@dataclass(frozen=True, eq=False)
-class LaneGraph:
-    """Pieces of lanes and how they hang together."""
-
-    length: FloatArray  # of each piece, along the road, shape (n,) [m]
-    left: IntArray  # piece beside it on the left that is driven the same way; -1: none, shape (n,)
-    following: Sequence[Sequence[int]]  # pieces that it leads to
-    # facing: of two pieces beside each other, ways along the first and those along the second that face them [m];
-    # without it they are of one length
-    facing: Mapping[tuple[int, int], tuple[FloatArray, FloatArray]] = field(default_factory=dict)
-
-    def layout(self) -> tuple[IntArray, list[tuple[FloatArray, FloatArray]], IntArray]:
-        """Part of the network, ways along each piece with the stations that they lie at [m], and its rank (growing to
-        the left).
-
-        Breadth first from the first piece of each part. Where ways meet that are of different length, as in a ring or
-        beyond a junction, the first one found counts; pieces that come to lie on one another there (two ways into one
-        place of a layout) get parts of their own.
-        """
-        n = len(self.length)
-        part, rank = np.full(n, -1), np.zeros(n, dtype=np.int64)
-        lines = [(np.zeros(1), np.zeros(1))] * n
-        steps = self._steps()
-        taken: dict[tuple[int, int], list[tuple[float, float]]] = {}
-        count = 0
-        for first in range(n):
-            if part[first] >= 0:
-                continue
-            waiting = deque([(first, self._straight(first, 0.0), 0)])
-            while waiting:
-                piece, line, level = waiting.popleft()
-                (at, end), here = (float(line[1][k]) for k in (0, -1)), taken.setdefault((count, level), [])
-                if part[piece] >= 0 or any(at < other - 1e-3 and end > begin + 1e-3 for begin, other in here):
-                    continue
-                part[piece], lines[piece], rank[piece] = count, line, level
-                here.append((at, end))
-                for other, side, where in steps[piece]:
-                    start = {0: at, 1: end, -1: at - float(self.length[other])}[where]
-                    faced = self.facing.get((other, piece)) if where == 0 else None
-                    other_line = self._straight(other, start) if faced is None else (faced[0], follow(faced[1], line))
-                    waiting.append((other, other_line, level + side))
-            count += 1
-        return part, lines, rank
-
-    def _straight(self, piece: int, start: float) -> tuple[FloatArray, FloatArray]:
-        return np.array([0.0, self.length[piece]]), np.array([start, start + self.length[piece]])
-
-    def stations(self, piece: IntArray, along: FloatArray) -> tuple[IntArray, FloatArray, IntArray, FloatArray]:
-        """Part, station [m] and rank of places in pieces, and metres along the piece per metre of station [-].
-
-        Shape (n,) each; `along`: from the piece's start. [m]
-        """
-        part, lines, rank = self.layout()
-        station, scale = np.array(along, dtype=np.float64), np.ones(len(along))
-        for number in np.unique(piece):
-            mine = piece == number
-            here = along[mine]
-            station[mine] = follow(here, lines[number])
-            ends = follow(here - SLOPE_LENGTH, lines[number]), follow(here + SLOPE_LENGTH, lines[number])
-            scale[mine] = 2.0 * SLOPE_LENGTH / np.maximum(ends[1] - ends[0], SLOPE_LENGTH)
-        return part[piece], station, rank[piece], scale
-
-    def _steps(self) -> list[list[tuple[int, int, int]]]:
-        """From each piece to the pieces about it: (piece, lanes to the left, +1 ahead or -1 behind)."""
-        steps: list[list[tuple[int, int, int]]] = [[] for _ in self.length]
-        for piece, left in enumerate(self.left):
-            if left >= 0:
-                steps[piece].append((int(left), 1, 0))
-                steps[int(left)].append((piece, -1, 0))
-        for piece, after in enumerate(self.following):
-            for other in after:
-                steps[piece].append((other, 0, 1))
-                steps[other].append((piece, 0, -1))
-        return steps
-
-
-SLOPE_LENGTH = 10.0
-"""To each side: over which metres of a lane are compared with those of its neighbour. [m]"""
-
-
-def follow(values: FloatArray, line: tuple[FloatArray, FloatArray]) -> FloatArray:
-    """Values through a line of (from, to), which goes on beyond its ends with slope 1. Shape as `values`."""
-    low, high = line[0][0], line[0][-1]
-    beyond = np.minimum(values - low, 0.0) + np.maximum(values - high, 0.0)
-    return np.asarray(np.interp(values, *line) + beyond)
-
+from xosc_lateral.workflows.recordings.lane_graph import LaneGraph, neighbour_columns
 
 TRUCKS = ("truck", "bus", "trailer", "semitrailer", "lorry", "van_trailer", "truck_trailer")
 
@@ -177,7 +88,11 @@ def _drive_table(placed: PlacedTracks, graph: LaneGraph, settings: CutSettings) 
     """The drive table with its column `state`."""
     tracks, inside = placed.tracks, placed.piece >= 0
     is_truck = np.isin(tracks.kind, TRUCKS)
-    near = _neighbours(placed, graph, is_truck)
+    middle = placed.along if tracks.rear is None else placed.along + tracks.rear  # gaps count from there
+    near = neighbour_columns(
+        graph, placed.piece, middle, tracks.time, tracks.vehicle, tracks.step, tracks.speed, tracks.length, is_truck,
+        scale=placed.scale,
+    )  # fmt: skip
     # A number that changes with the lane, and lateral position without jumps: a new piece ahead is no new lane.
     step = np.diff(placed.offset, prepend=placed.offset[:1])
     same = np.r_[False, tracks.vehicle[1:] == tracks.vehicle[:-1]]
@@ -198,27 +113,3 @@ def _drive_table(placed: PlacedTracks, graph: LaneGraph, settings: CutSettings) 
     rows = Rows(tracks.vehicle, tracks.time, lane, tracks.step)
     reasons = {"no lane": ~inside, **({"against the lane": against & inside} if against.any() else {})}
     return cut_table(columns, rows, settings, sideways=sideways, reasons=reasons, kind=tracks.kind, is_truck=is_truck)
-
-
-def _neighbours(placed: PlacedTracks, graph: LaneGraph, is_truck: BoolArray) -> dict[str, FloatArray]:
-    """Columns of leader and neighbours, shape (n,) each: where everybody is at the instants of the recording, whoever
-    is missing in a frame included."""
-    tracks, inside = placed.tracks, placed.piece >= 0
-    piece = np.maximum(placed.piece, 0)
-    middle = placed.along if tracks.rear is None else placed.along + tracks.rear  # gaps count from there
-    part, station, rank, scale = graph.stations(piece, middle)
-    scale = scale * placed.scale
-    pool = pool_of(tracks.time, tracks.vehicle, tracks.step)
-    row = pool.row
-    is_left = np.bincount(graph.left[graph.left >= 0], minlength=len(graph.left)) > 0  # of another piece
-    near = find_neighbours(
-        pool.instant * (int(part.max()) + 1) + part[row],
-        np.where(inside, rank - int(rank.min()), -1)[row],
-        pool.moved(station, np.where(inside, part, -1), tracks.speed / scale),
-        tracks.length[row],
-        is_truck[row],
-        lane_on_left=(graph.left[piece] >= 0)[row],
-        lane_on_right=is_left[piece][row],
-        scale=scale[row],
-    )
-    return {name: values[pool.of_row] for name, values in near.items()}

@@ -23,8 +23,9 @@ from xosc_lateral.files.xml import read_xml
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
 from xosc_lateral.workflows.recordings.importers.table import Imported, guarded
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks, ground_speed, travel_heading
+from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
 from xosc_lateral.workflows.recordings.lane_shapes import LaneShape, curvature_along, lane_graph, place_in_shapes
-from xosc_lateral.workflows.recordings.placed import LaneGraph, import_each, import_placed, require_lanes
+from xosc_lateral.workflows.recordings.placed import import_each, import_placed, require_lanes
 
 LICENCE = "that of the CommonRoad scenario and of the recording that it was made from"
 

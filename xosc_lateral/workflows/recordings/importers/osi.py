@@ -20,11 +20,11 @@ from xosc_lateral.files.opendrive import read_opendrive, read_road
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
 from xosc_lateral.workflows.recordings.importers.table import Imported, guarded
 from xosc_lateral.workflows.recordings.importers.tracks import place_on_road
+from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
 from xosc_lateral.workflows.recordings.lane_shapes import place_in_shapes
 from xosc_lateral.workflows.recordings.osi.read import Recorded, read_osi
 from xosc_lateral.workflows.recordings.osi.shapes import lanes_of
 from xosc_lateral.workflows.recordings.placed import (
-    LaneGraph,
     PlacedTracks,
     import_each,
     import_placed,

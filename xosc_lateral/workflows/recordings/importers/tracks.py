@@ -17,7 +17,8 @@ from xosc_lateral.files.opendrive import read_opendrive
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
 from xosc_lateral.workflows.recordings.importers.table import Imported, guarded
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks, read_tracks
-from xosc_lateral.workflows.recordings.placed import LaneGraph, PlacedTracks, import_placed, require_lanes
+from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
+from xosc_lateral.workflows.recordings.placed import PlacedTracks, import_placed, require_lanes
 from xosc_lateral.world.road.lanes import DRIVING, beside
 from xosc_lateral.world.road.network import RoadNetwork
 

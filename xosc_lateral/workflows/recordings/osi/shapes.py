@@ -10,9 +10,9 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.files.osi.extra import osi
+from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
 from xosc_lateral.workflows.recordings.lane_shapes import Strip, lane_graph, middle
 from xosc_lateral.workflows.recordings.osi.read import Recorded
-from xosc_lateral.workflows.recordings.placed import LaneGraph
 
 
 @dataclass(frozen=True)
