@@ -19,7 +19,10 @@ MOVING = 3.0
 """Slower vehicles have no direction: 2 cm of noise over 0.4 s turn the way of one at 3 m/s by 1 degree. [m/s]"""
 
 AGREES = 0.7
-"""Cosine of two directions that are taken to be one: 45 degrees. [-]"""
+"""Cosine of a vehicle's direction and that of the lane that it is taken to follow: 45 degrees. [-]"""
+
+AHEAD = 0.94
+"""Cosine of a vehicle's heading and of its way: 20 degrees, as of its front at R = 10 m. [-]"""
 
 MAX_AGAINST = 0.1
 """Share of the moving rows that may contradict: mirrored or turned recordings have all, or half where headings are
@@ -37,7 +40,7 @@ CLOCKWISE, NORTH = "counted clockwise", "counted clockwise from north"
 def require_headings(heading: FloatArray, way: FloatArray, speed: FloatArray, path: Path) -> None:
     """Refuse headings as recorded that are not those of the way through x and y; all of shape (n,). [rad], [m/s]"""
     moving = (speed > MOVING) & np.isfinite(heading + way)
-    wrong = _share(np.cos(heading - way)[moving] < AGREES)
+    wrong = _share(np.cos(heading - way)[moving] < AHEAD)
     if wrong <= MAX_AGAINST:
         return
     meant = {
@@ -48,7 +51,7 @@ def require_headings(heading: FloatArray, way: FloatArray, speed: FloatArray, pa
         "in degrees, " + CLOCKWISE: -np.radians(heading),
         "in degrees, " + NORTH: 0.5 * np.pi - np.radians(heading),
     }
-    shares = {name: _share(np.cos(other - way)[moving] < AGREES) for name, other in meant.items()}
+    shares = {name: _share(np.cos(other - way)[moving] < AHEAD) for name, other in meant.items()}
     likely = min(shares, key=lambda name: shares[name])
     meant_by_us = "radians counter-clockwise from x are meant"
     cause = f"; it may be {likely}" if shares[likely] <= MAX_AGAINST else f"; {meant_by_us}"

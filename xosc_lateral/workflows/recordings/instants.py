@@ -61,6 +61,7 @@ class Pool:
     """
 
     row: IntArray  # row of the recording, or of the last one before
+    after: IntArray  # row of the vehicle's next instant with a row; only where `share` is not 0
     instant: IntArray
     later: FloatArray  # time of the instant less that of `row` [s]
     share: FloatArray  # of the way from `row` to the vehicle's next, 0 where the instant is its own [-]
@@ -68,7 +69,7 @@ class Pool:
 
     def moved(self, along: FloatArray, part: IntArray, speed: FloatArray) -> FloatArray:
         """Way along the road at the instants: between two rows of one part of the road, else as fast as before. [m]"""
-        after = np.minimum(self.row + 1, len(along) - 1)
+        after = self.after
         between = (self.share > 0.0) & (part[after] == part[self.row])
         on = along[self.row] + speed[self.row] * self.later
         return np.where(between, along[self.row] + self.share * (along[after] - along[self.row]), on)
@@ -83,16 +84,16 @@ def pool_of(time: FloatArray, vehicle: IntArray, step: float, longest: float = M
     passed = np.r_[np.diff(time[row]), 0.0]
     missing = np.where(np.r_[np.diff(vehicle[row]) == 0, False] & (passed <= longest + 1e-9), missing, 0)
     missing = np.maximum(missing, 0)
-    last = np.repeat(row, missing)  # the row before each instant that is filled
+    last, following = np.repeat(row, missing), np.repeat(np.r_[row[1:], row[-1]], missing)  # about what is filled
     after = np.arange(len(last)) - np.repeat(np.cumsum(missing) - missing, missing) + 1
     times = np.full(int(instant.max()) + 1, np.nan)
     times[instant] = when
     filled = instant[last] + after
     known = np.isfinite(times[filled])  # nobody was seen at others
-    last, filled = last[known], filled[known]
+    last, following, filled = last[known], following[known], filled[known]
     later = times[filled] - time[last]
-    share = later / np.maximum(time[np.minimum(last + 1, len(time) - 1)] - time[last], 1e-9)
+    share = later / np.maximum(time[following] - time[last], 1e-9)
     return Pool(
-        np.r_[row, last], np.r_[instant[row], filled], np.r_[when[row] - time[row], later],
+        np.r_[row, last], np.r_[row, following], np.r_[instant[row], filled], np.r_[when[row] - time[row], later],
         np.r_[np.zeros(len(row)), np.clip(share, 0.0, 1.0)], np.cumsum(new) - 1,
     )  # fmt: skip
