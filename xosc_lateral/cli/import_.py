@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from xosc_lateral.cli import LOOKS, VERBS, group_of_verbs
+from xosc_lateral.cli import TYPER_STYLE, VERBS, group_of_verbs
 from xosc_lateral.cli.words import Columns, Mapped, MappingFile, Written, command, pairs, spelled_out, write_stdout
 
 Output = Annotated[
@@ -61,7 +61,7 @@ def _formats() -> list[str]:
 def _plain_command(name: str) -> Any:
     from xosc_lateral.workflows.recordings.importers import find_importer
 
-    one = typer.Typer(context_settings=LOOKS["context_settings"], rich_markup_mode=None)
+    one = typer.Typer(context_settings=TYPER_STYLE["context_settings"], rich_markup_mode=None)
 
     def run(
         sources: Annotated[list[Path], typer.Argument(metavar="SOURCE...", show_default=False)],

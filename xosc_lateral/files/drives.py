@@ -14,7 +14,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.segment import CONTEXT_UNITS
-from xosc_lateral.drivers.drives.cleaning import MAX_MEDIAN_SPEED, MAX_OUTSIDE, OWN, clean_drive
+from xosc_lateral.drivers.drives.cleaning import DRIVE_COLUMNS, MAX_MEDIAN_SPEED, MAX_OUTSIDE, clean_drive
 from xosc_lateral.drivers.drives.cuts import MIN_RUN
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.model.plausibility import first_implausible, implausible, implausible_rows, nobody
@@ -119,7 +119,7 @@ def _numeric_columns(table: pd.DataFrame, path: Path) -> dict[str, FloatArray]:
     for name in table.columns:
         if name in LABELS:
             continue
-        if name in (*OWN, "speed") or pd.api.types.is_numeric_dtype(table[name]):
+        if name in (*DRIVE_COLUMNS, "speed") or pd.api.types.is_numeric_dtype(table[name]):
             columns[name] = _cleaned(table, name, path)
         elif table[name].isna().all():
             columns[name] = np.full(len(table), np.nan)
@@ -134,7 +134,7 @@ def _cleaned(table: pd.DataFrame, name: str, path: Path) -> FloatArray:
     """A column of numbers without what is none."""
     values = numbers_of(table[name], path, name)
     values[np.isinf(values) & ~nobody(name, values)] = np.nan
-    if name not in OWN:
+    if name not in DRIVE_COLUMNS:
         _leave_out_nonsense(values, name, path)
     return values
 
@@ -153,7 +153,7 @@ def _leave_out_nonsense(values: FloatArray, name: str, path: Path) -> None:
 
 def _holds_levels(name: str, values: FloatArray) -> bool:
     """Counts, indices and flags do; a speed that happens to be constant doesn't."""
-    if name in OWN or CONTEXT_UNITS.get(name, "-") != "-":
+    if name in DRIVE_COLUMNS or CONTEXT_UNITS.get(name, "-") != "-":
         return False
     known = values[~np.isnan(values)]
     return bool(np.all(known == np.round(known)) and len(np.unique(known)) <= MAX_LEVELS)

@@ -35,7 +35,7 @@ MAX_CONTRADICTIONS = 0.01
 RUN = "following_run"
 """Column of tables that an import has cut: number of the road-following stretch. What it has cut is not cut again."""
 
-OWN = frozenset({"time", "drive", "driver", "offset", "lane_width", "distance_left", "distance_right", RUN})
+DRIVE_COLUMNS = frozenset({"time", "drive", "driver", "offset", "lane_width", "distance_left", "distance_right", RUN})
 """Columns that are no context."""
 
 
@@ -73,7 +73,7 @@ def clean_drive(
         good &= np.isfinite(speed)
     if good.sum() < 2:
         return None
-    every = {key: values[good] for key, values in columns.items() if key not in OWN}
+    every = {key: values[good] for key, values in columns.items() if key not in DRIVE_COLUMNS}
     empty = frozenset(key for key, values in every.items() if np.isnan(values).all())
     context = {key: values for key, values in every.items() if key not in empty} | {"lane_width": lane_width[good]}
     run = columns[RUN][good].astype(np.int64) if RUN in columns else None

@@ -10,7 +10,7 @@ that is not too quick, and without a corner.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -207,17 +207,31 @@ def _others(run: Run) -> list[FloatArray]:
     return [np.nan_to_num(run.context.get(name, np.zeros(len(run)))) for name in ("speed", "lane_index")]
 
 
-def beside_line(profile: DriverProfile, side: str) -> str:
-    """In words: what is known of a side."""
+UNMEASURED_RESPONSES = {
+    Basis.POPULATION: "moves as the drivers of its recording do",
+    Basis.DECLARED: "moves as its effects state",
+    Basis.MEASURED: "moves as its effects state",
+    Basis.UNKNOWN: "not known, does not move",
+}
+"""How a driver responds to vehicles beside him, by what that rests on, where the profile holds no figure."""
+
+
+def responses_in_words(profile: DriverProfile, borrowed: Collection[str] = ()) -> str:
+    """How a driver responds to vehicles on either side, in a line; on `borrowed` sides as the population does."""
+    words = {side: _response_in_words(profile, side, side in borrowed) for side in SIDES}
+    if len(set(words.values())) == 1:
+        return f"beside vehicles on either side: {words[SIDES[0]]}"
+    return "; ".join(f"beside vehicles on the {side}: {text}" for side, text in words.items())
+
+
+def _response_in_words(profile: DriverProfile, side: str, is_borrowed: bool) -> str:
+    if is_borrowed:
+        return "not known, moves as the population does"
     basis, known = basis_of(profile, side), profile.beside.get(side)
     if known is None or not known.seconds:
-        answer = ", as its effects have it" if basis is not Basis.UNKNOWN else ""
-        return f"{side} {basis}{answer}"
+        return UNMEASURED_RESPONSES[basis]
     way = "left" if known.shift > 0 else "right"
-    return (
-        f"{side} {basis} ({abs(known.shift):.2f} +- {known.error:.2f} m to the {way} alongside, "
-        f"{known.seconds:.0f} s beside somebody)"
-    )
+    return f"moves {abs(known.shift):.2f} +- {known.error:.2f} m to the {way} ({basis}, {known.seconds:.0f} s)"
 
 
 def neighbour_shapes(runs: Sequence[Run], least: int) -> list[ColumnEffect]:

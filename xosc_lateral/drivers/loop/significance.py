@@ -21,6 +21,7 @@ class LoopSeed(IntEnum):
     SPECTRUM = 7  # Runs whose spectrum is compared with the drives'.
     BLOCKS = 9  # Half samples of the blocks.
     SNIPPETS = 11  # Halves of the blocks whose snippets are compared.
+    OMNIBUS = 13  # Rotations that what is left is compared with.
 
 
 LEAST = 1e-300  # p-values stay above: their logarithm is taken. [-]

@@ -27,7 +27,7 @@ from xosc_lateral.workflows.live.paths import Moves
 from xosc_lateral.workflows.live.scene import KINDS
 from xosc_lateral.workflows.live.surroundings import Places
 from xosc_lateral.workflows.live.traffic import Moment, Traffic
-from xosc_lateral.world.surroundings.around import REACH, Reach
+from xosc_lateral.world.surroundings.around import SIGHT_DISTANCE, Reach
 from xosc_lateral.world.surroundings.context import TRUCKS
 
 HOLD = 0.5
@@ -151,12 +151,12 @@ class SumoRoads:
         """See `Roads`."""
         found = [Reach(road, 0.0, self._length[road, lane], lane, 0.0, s, 1)]
         name, ahead, edge = self._name[road, lane], self._length[road, lane] - s, self._length[road, lane]
-        while ahead < REACH + edge and (name := self._next.get(name, "")):
+        while ahead < SIGHT_DISTANCE + edge and (name := self._next.get(name, "")):
             place = self.place[name]
             found.append(Reach(place[0], 0.0, self._length[place], place[1], ahead, 0.0, 1))
             ahead += self._length[place]
         name, behind = self._name[road, lane], s
-        while behind < REACH + edge and (name := self._before.get(name, "")):
+        while behind < SIGHT_DISTANCE + edge and (name := self._before.get(name, "")):
             place = self.place[name]
             behind += self._length[place]
             found.append(Reach(place[0], 0.0, self._length[place], place[1], -behind, 0.0, 1))

@@ -47,7 +47,7 @@ def loop_text(result: LoopResult) -> str:
     """The outcome in a few lines; what is left is worked out unless it is given."""
     lines = [f"{finding_sentence(finding)} (p = {finding.p_value:.1e})" for finding in result.findings]
     lines = lines or ["no effect added"]
-    lines += [f"{taken_back_words(item)}: {item.why}" for item in result.identified.taken_back]
+    lines += [f"{taken_back_words(one)}, p = {one.p_value:.1e}: {one.why}" for one in result.identified.taken_back]
     for item in result.identified.usable.feedback:
         sure = "possibly a" if item.doubtful else "a"
         lines.append(f"{item.column}: {sure} consequence of the car's movement, not used as a cause")

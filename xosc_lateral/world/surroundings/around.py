@@ -18,17 +18,17 @@ from xosc_lateral.base.segment import FADES
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario import BoundingBox
 
-REACH = 200.0
+SIGHT_DISTANCE = 200.0
 """How far a driver looks for others [m]; beyond it there is none (about what a series radar sees)."""
 
-IN_SIGHT = 2.0 * REACH + 100.0
+IN_SIGHT = 2.0 * SIGHT_DISTANCE + 100.0
 """Vehicles never nearer than this in a straight line are not searched along the lane. Free space is counted along the
 reference line, which on the tightest ramp is half as long as its outer lane; the rest is for two road trains. [m]"""
 
 ALONGSIDE = 10.0
 """A vehicle in the next lane counts half as alongside at this free space lengthwise, wholly at half of it. [m]"""
 
-NEAR = 40.0
+INFLUENCE_DISTANCE = 40.0
 """Free space over which the influence of others fades to 37 %, as in `driver.neighbours`: with so much more free space
 for each factor e that less of a body lies in the lane, its influence is the product of both. [m]"""
 
@@ -46,12 +46,12 @@ class Reach(NamedTuple):
 
 
 def lane_path(network: RoadNetwork, road: int, lane: int, s: float, forward: int) -> list[Reach]:
-    """Sections along a lane within `REACH` both ways, in a coordinate u that is 0 at `s` and grows along travel."""
+    """Sections along a lane within `SIGHT_DISTANCE` both ways; their coordinate u is 0 at `s`, growing along travel."""
     low, high = network.section_at(road, s)
     path = [Reach(road, low, high, lane, 0.0, s, forward)]
     for way in (1, -1):
         here, direction, done = (road, lane, s), way * forward, 0.0
-        while done < REACH + (high - low):
+        while done < SIGHT_DISTANCE + (high - low):
             section = network.section_at(here[0], here[2])
             left = (section[1] - here[2]) if direction > 0 else (here[2] - section[0])
             step = network.advance(*here, left + _INTO_NEXT, direction=direction)
@@ -158,12 +158,14 @@ class Around:
         Shape (m,) each.
         """
         with np.errstate(invalid="ignore"):
-            there = (gap <= REACH) & ~np.isnan(seen.left)
-            # he comes into sight in the last quarter of the reach, and is gone within `NEAR` once he has passed
-            share = 1.0 - smooth_step(np.where(seen.ahead > 0, 4.0 * gap / REACH - 3.0, gap / NEAR))
+            there = (gap <= SIGHT_DISTANCE) & ~np.isnan(seen.left)
+            # he comes into sight in the last quarter of it, and is gone within `INFLUENCE_DISTANCE` once he has passed
+            share = 1.0 - smooth_step(
+                np.where(seen.ahead > 0, 4.0 * gap / SIGHT_DISTANCE - 3.0, gap / INFLUENCE_DISTANCE)
+            )
             k = np.flatnonzero(there & seen.oncoming & (share > 0))
             there &= ~seen.oncoming
-        np.fmin.at(self.oncoming, rows[k], gap[k] - NEAR * np.log(share[k]))
+        np.fmin.at(self.oncoming, rows[k], gap[k] - INFLUENCE_DISTANCE * np.log(share[k]))
         np.maximum.at(self.oncoming_there, rows[k], share[k])
         for side, middle in ZONES.items():
             share = _share_inside(seen.left / width - middle, other_width / width)
@@ -204,12 +206,12 @@ class _Side:
 
     def add(self, rows: IntArray, gap: FloatArray, share: FloatArray, is_truck: BoolArray) -> None:
         """More vehicles, each seen from a row, with free space `gap` [m], of which so much lies in the lane [-]."""
-        np.fmin.at(self.distance, rows, gap - NEAR * np.log(share))
-        influence = share * np.exp(-gap / NEAR)
+        np.fmin.at(self.distance, rows, gap - INFLUENCE_DISTANCE * np.log(share))
+        influence = share * np.exp(-gap / INFLUENCE_DISTANCE)
         np.add.at(self.influence, rows, influence)
         alongside = share * (1.0 - smooth_step(gap / ALONGSIDE - 0.5))
         # a truck comes into sight in the last quarter of the reach
-        np.add.at(self.of_trucks, rows, is_truck * influence * (1.0 - smooth_step(4.0 * gap / REACH - 3.0)))
+        np.add.at(self.of_trucks, rows, is_truck * influence * (1.0 - smooth_step(4.0 * gap / SIGHT_DISTANCE - 3.0)))
         np.maximum.at(self.truck_alongside, rows, is_truck * alongside)
         np.maximum.at(self.car_alongside, rows, ~is_truck * alongside)
 
