@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Allow, Library, RoadPath, Said, Written, command
+from xosc_lateral.cli.words import Allow, Library, Printing, RoadPath, Written, command
 
 app = group_of_verbs()
 
@@ -23,7 +23,7 @@ def verify(
     ],
     *,
     library: Library = None,
-    said: Said,
+    said: Printing,
 ) -> None:
     """Name outputs that were edited, whose inputs have changed, or that another version made; exit code 1 then."""
     from xosc_lateral import verify as check

@@ -17,7 +17,7 @@ from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.drivers.drives.cleaning import DRIVE_COLUMNS, MAX_MEDIAN_SPEED, MAX_OUTSIDE, clean_drive
 from xosc_lateral.drivers.drives.cuts import MIN_RUN
 from xosc_lateral.drivers.drives.drive import Drive
-from xosc_lateral.drivers.model.plausibility import first_implausible, implausible, implausible_rows, nobody
+from xosc_lateral.drivers.model.plausibility import drives_nobody, first_implausible, implausible, implausible_rows
 from xosc_lateral.files.clock import seconds_of_stamps
 from xosc_lateral.files.labels import file_label
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping
@@ -38,7 +38,7 @@ def read_drives(paths: str | Path | Sequence[str | Path], mapping: MappingLike |
     `NotEnoughDataError` when a file holds no drive with two rows of time, offset and lane width.
 
     `paths`: tables; the suffix gives the format. `mapping`: what columns are called, and how tables are written; see
-    `formats.mapping`. Returns list of Drive: in the order of the files and of first appearance; a drive without a name
+    `files.mapping`. Returns list of Drive: in the order of the files and of first appearance; a drive without a name
     is called after its file. Rows are sorted by time, repeated times dropped, rows with a missing value left out (a
     gap).
     """
@@ -133,7 +133,7 @@ def _numeric_columns(table: pd.DataFrame, path: Path) -> dict[str, FloatArray]:
 def _cleaned(table: pd.DataFrame, name: str, path: Path) -> FloatArray:
     """A column of numbers without what is none."""
     values = numbers_of(table[name], path, name)
-    values[np.isinf(values) & ~nobody(name, values)] = np.nan
+    values[np.isinf(values) & ~drives_nobody(name, values)] = np.nan
     if name not in DRIVE_COLUMNS:
         _leave_out_nonsense(values, name, path)
     return values

@@ -96,11 +96,11 @@ def identify(
         there = Counter(term.component for term in selection.final.terms)
         wanted = {component: there[component] for component in sorted(found)}
 
-        def done(share: float) -> None:
+        def finished(share: float) -> None:
             progress(0.3 + 0.3 * share, "selecting without a fold")
 
         return _worst_first(
-            Identified(usable, selection, search.quantities, nest(search, (*initial, *once), wanted, done))
+            Identified(usable, selection, search.quantities, nest(search, (*initial, *once), wanted, finished))
         )
 
 

@@ -92,7 +92,7 @@ class OffsetGroup:
         self._state = np.concatenate([self._state, np.zeros(len(new), dtype=_DRIVER)])
         return new
 
-    def keep(self, there: BoolArray) -> None:
+    def keep_present(self, there: BoolArray) -> None:
         """Drop the drivers that are not there, shape (n,)."""
         if there.all():
             return

@@ -169,7 +169,7 @@ class Page:
         self._main.append(_table(rows, list(rows[0]), caption, formats or {}, tones or {}))
 
     def player(self, scene: str, label: str) -> None:
-        """Add the player; `scene` is the JSON of `report.scene`."""
+        """Add the player; `scene` is the JSON of `playing.scene`."""
         self._need("player.js")
         self._main.append(
             f'<div class="player" aria-label="{escape(label)}">'

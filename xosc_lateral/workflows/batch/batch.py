@@ -34,7 +34,7 @@ _STOPPING = frozenset(
 )
 """Errors of the system that the next scenario would meet as well."""
 
-_KEPT = "what is finished is kept, run it again to go on"
+_GOES_ON = "what is finished is kept, run it again to go on"
 
 
 class JobState(StrEnum):
@@ -128,7 +128,7 @@ def convert_many(
         )
     except OSError as error:
         where = error.filename or batch.folder
-        raise BatchStoppedError(f"{where}: {error.strerror or error}; {_KEPT}") from error
+        raise BatchStoppedError(f"{where}: {error.strerror or error}; {_GOES_ON}") from error
 
 
 def _silent(_: str) -> None:
@@ -255,15 +255,15 @@ def _noted(job: Job, reply: _Reply | WorkerDiedError, journal: Journal, why: str
     if isinstance(reply, WorkerDiedError):
         reply = _Reply(job.row(f"{job.source}: {reply}"), 0.0)
     if reply.stop:
-        raise BatchStoppedError(f"{reply.stop}; {_KEPT}")
+        raise BatchStoppedError(f"{reply.stop}; {_GOES_ON}")
     row = reply.row
     if row.error and job.name in journal:
-        row = _kept(job, journal.row(job.name), row)
+        row = _kept_row(job, journal.row(job.name), row)
     journal.add(row, Timing(reply.seconds, reply.state))
     return JobOutcome(JobState.FAILED if row.error else JobState.WRITTEN, row, reply.seconds, why)
 
 
-def _kept(job: Job, former: ManifestRow, failed: ManifestRow) -> ManifestRow:
+def _kept_row(job: Job, former: ManifestRow, failed: ManifestRow) -> ManifestRow:
     """The row of an output of a former run that can't be made anew: what it was made of, and why not now."""
     there = bool(former.output_sha256) and _are({job.output: former.output_sha256})
     return replace(former, error=failed.error, stale=True) if there else failed

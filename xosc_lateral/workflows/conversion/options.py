@@ -164,7 +164,7 @@ def one_of(words: type[StrEnum]) -> Callable[[Any], StrEnum]:
     return read
 
 
-def whole(smallest: int) -> Callable[[str | int], int]:
+def whole_number(smallest: int) -> Callable[[str | int], int]:
     """A whole number."""
 
     def read(said: str | int) -> int:

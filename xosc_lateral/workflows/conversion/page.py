@@ -21,7 +21,7 @@ from xosc_lateral.world.motion.headways import Following
 MOST_PANELS, MOST_DYNAMICS = 12, 6
 """Entities with panels of their own, for offsets and for dynamics; those with the largest offsets come first."""
 
-SELDOM = 0.01
+ROUGH_SHARE = 0.01
 """Share of the time beyond which lateral acceleration is rougher than people's. [-]"""
 
 LONGEST_HEADWAY = 5.0
@@ -123,7 +123,7 @@ def _add_offsets(page: Page, enriched: Enriched, done: Sequence[EntityResult]) -
     page.section("Offsets", "The distance between the enriched and the nominal path, positive to the left of travel.")
     if done:
         page.figure(
-            figures.offsets_over_time(enriched, _largest(done, MOST_PANELS)),
+            figures.offsets_over_time(enriched, _with_largest_offsets(done, MOST_PANELS)),
             "Grey: not road-following; there the offset leads smoothly from one segment to the next."
             f"{_left_out(done, MOST_PANELS)}",
             "Offset over time of each enriched entity",
@@ -150,7 +150,7 @@ def _add_dynamics(page: Page, enriched: Enriched, done: Sequence[EntityResult]) 
     )
     if done:
         page.figure(
-            figures.accelerations_over_time(enriched, _largest(done, MOST_DYNAMICS)),
+            figures.accelerations_over_time(enriched, _with_largest_offsets(done, MOST_DYNAMICS)),
             "Lateral acceleration beyond what curves and lane changes require. Dashed: "
             f"{COMFORTABLE} m/s² to either side, which real drivers rarely exceed while they keep their lane. Grey: "
             "not road-following."
@@ -229,7 +229,7 @@ def _key_figures(enriched: Enriched, done: Sequence[EntityResult]) -> list[KeyFi
             f"{added.max():.2f} m/s²",
             "largest added lateral acceleration",
             f"above {COMFORTABLE} m/s² for {100.0 * rough:.1f} % of the time; real drivers rarely are, in their lane",
-            "bad" if rough > SELDOM else "",
+            "bad" if rough > ROUGH_SHARE else "",
         ),
     ]
     if enriched.gaps_after:
@@ -271,7 +271,7 @@ def _gap_row(before: Gap | None, after: Gap | None) -> dict[str, object]:
     }
 
 
-def _largest(entities: Sequence[EntityResult], most: int) -> list[EntityResult]:
+def _with_largest_offsets(entities: Sequence[EntityResult], most: int) -> list[EntityResult]:
     """At most so many of them, those with the largest offsets, in their own order."""
     ranked = sorted(entities, key=lambda entity: -float(np.abs(entity.deviation).max()))[:most]
     return [entity for entity in entities if entity in ranked]

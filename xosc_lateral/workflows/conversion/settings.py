@@ -101,7 +101,7 @@ class ConvertSettings:
         AUTO, say.profile, "--profile", "-p", kind=str, cell=say.profile_cell,
         help="Name or path of a driver profile; auto: motorway, the population.",
     )
-    seed: int = option(0, say.whole(0), cell=say.as_it_is)
+    seed: int = option(0, say.whole_number(0), cell=say.as_it_is)
     entity: Mapping[str, str | DriverProfile] = option(
         {}, say.profiles, kind=list[str] | None, metavar="NAME=PROFILE", prefix="profile:", entry=say.profile_cell,
         help="Profile of one entity; may be repeated.",
@@ -145,7 +145,7 @@ class ConvertSettings:
     road: Path | None = option(None, Path, cell=say.beside)
     road_path: tuple[Path, ...] = option((), say.paths)
     attempts: int = option(
-        1, say.whole(1), "--resample", kind=int, cell=say.as_it_is, min=1,
+        1, say.whole_number(1), "--resample", kind=int, cell=say.as_it_is, min=1,
         help="Attempts at most, while vehicles collide or leave their lane.",
     )
     time_limit: float | None = option(None, say.seconds, cell=say.as_it_is)

@@ -90,8 +90,8 @@ def facts(conversion: ConvertedScenario, report: Path | None = None) -> dict[str
             }
             for entity in enriched.entities
         ],
-        "gap_before": _smallest(enriched.gaps_before),
-        "gap_after": _smallest(enriched.gaps_after),
+        "gap_before": _smallest_gap(enriched.gaps_before),
+        "gap_after": _smallest_gap(enriched.gaps_after),
         "notes": [asdict(note) for note in enriched.motion.notes],
         "warnings": list(conversion.warnings),
         "provenance": provenance_record(conversion.provenance),
@@ -108,5 +108,5 @@ def provenance_record(provenance: ConversionProvenance) -> dict[str, Any]:
     return asdict(provenance) | {"profiles": profiles}
 
 
-def _smallest(gaps: tuple[Gap, ...]) -> float | None:
+def _smallest_gap(gaps: tuple[Gap, ...]) -> float | None:
     return min((round(gap.distance, 6) for gap in gaps), default=None)

@@ -43,7 +43,7 @@ _REASONS, _SIDES, _BLOCKED = 8 | 16 | 32 | 64, 2 | 4, 512 | 1024 | 2048 | 4096
 """Bits of a lane change state (`LaneChangeAction`): strategic, cooperative, for speed, keeping right; left or right;
 blocked by a leader or follower there."""
 
-OTHERS = frozenset(
+UNDRIVEN_CLASSES = frozenset(
     {"bicycle", "moped", "motorcycle", "scooter", "pedestrian", "wheelchair", "tram", "rail", "rail_urban", "rail_fast",
      "rail_electric", "ship", "container", "cable_car", "subway", "aircraft", "drone"}
 )  # fmt: skip
@@ -287,7 +287,10 @@ class SumoTraffic:
         length, width = np.array([(one.length, one.width) for one in vehicles]).reshape(-1, 2).T.copy()
         return Moment(
             names, speed, np.array([self.roads.width[place] for place in where]), offset, following,
-            np.array([name not in self._ego and one.kind not in OTHERS for name, one in self._known.items()], np.bool_),
+            np.array(
+                [name not in self._ego and one.kind not in UNDRIVEN_CLASSES for name, one in self._known.items()],
+                np.bool_,
+            ),
             np.array([KINDS.get(one.kind) in TRUCKS for one in vehicles], dtype=np.bool_),
             places=Places(x, y, heading, road, lane, s, length, width, -0.5 * length),
         )  # fmt: skip

@@ -1,7 +1,7 @@
 """Drivers of the vehicles of a running simulation: once per step they get what it knows, and say where they are.
 
 A driver goes on at the model's step (5 Hz), on what he sees at that moment; in between he follows the curve of
-`driver.upsampling`. What he sees he responds to a little later than in a conversion, which knows what comes
+`model.upsampling`. What he sees he responds to a little later than in a conversion, which knows what comes
 (`OffsetStream.preview`). Where a maneuver has moved a vehicle, its path leads over from there to the driver's.
 """
 
@@ -90,7 +90,7 @@ class Traffic:
     roads : Roads, optional
         Of the simulation; without, `Moment.places` serve for giving way alone.
     neighbours : Neighbours
-        See `enrich.enrich`.
+        See `conversion.enrich`.
     left_hand : bool
         One keeps left here.
 
@@ -159,19 +159,19 @@ class Traffic:
         if names != self._names:
             gone = self._index.keys() - set(names)
             if gone:
-                self._keep(gone)
+                self._keep_vehicles(gone)
             new = [name for name in names if name not in self._index]
             self._names += new
             self._index.update({name: k for k, name in enumerate(self._names)})
             self._state = np.concatenate([self._state, np.zeros(len(new), dtype=DRIVER)])
         return np.array([self._index[name] for name in names], dtype=np.int64)
 
-    def _keep(self, gone: set[str]) -> None:
+    def _keep_vehicles(self, gone: set[str]) -> None:
         self._state = self._state[[name not in gone for name in self._names]]
         self._names = [name for name in self._names if name not in gone]
         self._index = {name: k for k, name in enumerate(self._names)}
         for key, (group, members) in self._groups.items():
-            group.keep(np.array([name not in gone for name in members], dtype=np.bool_))
+            group.keep_present(np.array([name not in gone for name in members], dtype=np.bool_))
             self._groups[key] = (group, [name for name in members if name not in gone])
 
     def seed_of(self, name: str) -> np.random.SeedSequence:

@@ -15,7 +15,7 @@ from xosc_lateral.drivers.drives.cleaning import RUN
 from xosc_lateral.drivers.drives.cuts import MAX_GAP
 
 RATE_WINDOW = 0.5  # [s]; the lateral speed is a central difference over this
-KEPT = "kept"
+KEPT_ROWS = "kept"
 
 
 @dataclass(frozen=True)
@@ -89,21 +89,21 @@ def name_states(
     step: float,
     settings: CutSettings,
 ) -> NDArray[np.str_]:
-    """Per row `KEPT`, or the first reason that cuts it; "edge" at the ends of what is left, "short" for crumbs."""
-    state = np.select(list(reasons.values()), list(reasons), default=KEPT)
+    """Per row `KEPT_ROWS`, or the first reason that cuts it; "edge" at the ends of what is left, "short" for crumbs."""
+    state = np.select(list(reasons.values()), list(reasons), default=KEPT_ROWS)
     run = _kept_runs(state, lane, vehicle, time)
     count = np.bincount(run)
     place = np.arange(len(run)) - (np.cumsum(count) - count)[run]
     edge = round(settings.edge / step)
     at_edge = (place < edge) | (place >= count[run] - edge)
     short = (count[run] - 2 * edge) * step < settings.shortest
-    return np.where(state == KEPT, np.where(short, "short", np.where(at_edge, "edge", KEPT)), state)
+    return np.where(state == KEPT_ROWS, np.where(short, "short", np.where(at_edge, "edge", KEPT_ROWS)), state)
 
 
 def number_runs(state: NDArray[np.str_], lane: IntArray, vehicle: IntArray, time: FloatArray) -> IntArray:
     """Number of the kept stretch of each row, counted from 0 in every vehicle; -1 for rows that are cut."""
     run = _kept_runs(state, lane, vehicle, time)
-    kept = state == KEPT
+    kept = state == KEPT_ROWS
     begins = kept & np.r_[True, (run[1:] != run[:-1])]
     counted = np.cumsum(begins)
     start = np.searchsorted(vehicle, vehicle, side="left")
@@ -143,7 +143,7 @@ def cut_table(
 
 def _kept_runs(state: NDArray[np.str_], lane: IntArray, vehicle: IntArray, time: FloatArray) -> IntArray:
     """Number of each row's stretch of equal fate, in one lane and without a gap that `fit` would not bridge."""
-    kept = state == KEPT
+    kept = state == KEPT_ROWS
     other = (kept[1:] != kept[:-1]) | (vehicle[1:] != vehicle[:-1]) | (lane[1:] != lane[:-1])
     new = other | (np.diff(time) > MAX_GAP + 1e-9)
     return _runs(new)

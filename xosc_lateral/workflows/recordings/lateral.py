@@ -14,10 +14,10 @@ from xosc_lateral.workflows.recordings.recorded import RecordedVehicle
 from xosc_lateral.workflows.recordings.transitions import SHAPES, Rough, Transition, fit_transition
 
 SETTLED = 0.7
-"""Nobody has settled in a lane who is farther from its centre, see `formats.importers.cuts`. [m]"""
+"""Nobody has settled in a lane who is farther from its centre, see `recordings.cuts`. [m]"""
 CALM = 0.1
 """A lane change reaches to where the lateral speed falls below this, see there. [m/s]"""
-LONGEST = 8.0
+MAXIMUM_HALF_DURATION = 8.0
 """From the crossing to either end, see there. [s]"""
 STILL, STEADY = 1e-3, 0.5
 """Lateral speed below which a vehicle stands still sideways [m/s], for at least so long [s]."""
@@ -188,14 +188,14 @@ class _Course:
 
     def _begin(self, before: int, crossing: int, level: float, side: float) -> int:
         """Row at which movement to a side begins: the last calm one near the level, else the nearest to it."""
-        low = int(np.searchsorted(self.time, self.time[crossing] - LONGEST))
+        low = int(np.searchsorted(self.time, self.time[crossing] - MAXIMUM_HALF_DURATION))
         away = self.y[low : before + 1] - level
         calm = np.flatnonzero((side * self.rate[low : before + 1] < CALM) & (np.abs(away) < SETTLED))
         return low + (int(calm[-1]) if len(calm) else _nearest(away))
 
     def _end(self, crossing: int, after: int, level: float, side: float) -> int:
         """Row at which movement to a side is over: the first calm one near the level, else the nearest to it."""
-        high = min(int(np.searchsorted(self.time, self.time[crossing] + LONGEST)), len(self.time) - 1)
+        high = min(int(np.searchsorted(self.time, self.time[crossing] + MAXIMUM_HALF_DURATION)), len(self.time) - 1)
         away = self.y[after : high + 1] - level
         calm = np.flatnonzero((side * self.rate[after : high + 1] < CALM) & (np.abs(away) < SETTLED))
         return after + (int(calm[0]) if len(calm) else _nearest(away))

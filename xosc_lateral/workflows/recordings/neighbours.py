@@ -6,8 +6,8 @@ import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 
-REACH = 200.0  # [m]; who is farther away is none, as in `motion.around`
-LONGEST = 30.0  # [m]; no vehicle is longer (German road traffic regulations: 25.25 m)
+REACH = 200.0  # [m]; who is farther away is none, as in `surroundings.around`
+MAXIMUM_LENGTH = 30.0  # [m]; no vehicle is longer (German road traffic regulations: 25.25 m)
 
 
 def find_neighbours(
@@ -35,7 +35,7 @@ def find_neighbours(
     group = np.where(known, frame * 64 + lane, -1)
     order = np.lexsort((s, group))
     # One sorted axis for all groups: each gets its own, far apart from the next.
-    span = float(np.ptp(s)) + 4.0 * (REACH + LONGEST) if len(s) else 1.0
+    span = float(np.ptp(s)) + 4.0 * (REACH + MAXIMUM_LENGTH) if len(s) else 1.0
     base = float(s.min()) if len(s) else 0.0
     axis = group[order] * span + (s[order] - base)
 

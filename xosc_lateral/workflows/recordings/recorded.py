@@ -18,12 +18,12 @@ from xosc_lateral.world.road.positions import Poses
 BESIDE = 1.0
 """So far beside every driving lane a vehicle still keeps to one: it drives on its marking. [m]"""
 LONGEST_GAP = 1.0
-"""Rows farther apart than this are not of one passage, as in `formats.importers.cuts`. [s]"""
+"""Rows farther apart than this are not of one passage, as in `recordings.cuts`. [s]"""
 FARTHEST = 1e8
 """No map projection gives such a position: the Earth's circumference is 4e7 m. [m]"""
 SHORTEST_STEP = 1e-4
 """Rows that follow sooner are of the same moment: no sensor has 10 kHz. [s]"""
-SHORTEST = 2.0
+MINIMUM_PASSAGE = 2.0
 """Passages below this are left out: a speed and its change can't be told in less. [s]"""
 LEAP = 1.5
 """Farther than it can have driven by this much (half a narrow lane): an identifier that has gone to another vehicle.
@@ -142,7 +142,7 @@ def _place(track: Track, rows: NDArray[np.intp], network: RoadNetwork, left_out:
     reasons = {"off the lanes": int((~on_lane).sum()), "across a lane or backwards": int(elsewhere.sum())}
     if not passages:
         said = "".join(f", {rows} of {len(time)} rows {why}" for why, rows in reasons.items() if rows)
-        left_out.append(f"{track.name}: no {SHORTEST:g} s along a driving lane without a gap{said}")
+        left_out.append(f"{track.name}: no {MINIMUM_PASSAGE:g} s along a driving lane without a gap{said}")
         return None
     best = max(passages, key=lambda part: time[part.stop - 1] - time[part.start])
     lost = len(time) - (best.stop - best.start)
@@ -185,7 +185,7 @@ def _elsewhere(
 
 
 def _passages(time: FloatArray, x: FloatArray, y: FloatArray, on_lane: NDArray[np.bool_]) -> list[slice]:
-    """Stretches of rows on a lane without a gap or a leap, `SHORTEST` at least."""
+    """Stretches of rows on a lane without a gap or a leap, `MINIMUM_PASSAGE` at least."""
     from scipy.ndimage import median_filter
 
     step = np.maximum(np.diff(time), 1e-9)
@@ -203,4 +203,8 @@ def _passages(time: FloatArray, x: FloatArray, y: FloatArray, on_lane: NDArray[n
         cuts = part.start + 1 + np.flatnonzero(broken[part.start : part.stop - 1])
         edges = [part.start, *cuts.tolist(), part.stop]
         parts += [slice(a, b) for a, b in pairwise(edges)]
-    return [part for part in parts if time[part.stop - 1] - time[part.start] >= SHORTEST and part.stop - part.start > 3]
+    return [
+        part
+        for part in parts
+        if time[part.stop - 1] - time[part.start] >= MINIMUM_PASSAGE and part.stop - part.start > 3
+    ]

@@ -63,7 +63,7 @@ def fit_speed(time: FloatArray, way: FloatArray, *, error: float, apart: float =
     if len(t) < 4:
         speed = max((w[-1] - w[0]) / (t[-1] - t[0]), 0.0)
         return SpeedProfile(t[[0, -1]], np.array([speed, speed]), float(w[0]))
-    knots = _moved(t, w, _thinned(t, w, _enough(t, w, error, apart), error), apart)
+    knots = _moved(t, w, _thinned(t, w, _has_enough_rows(t, w, error, apart), error), apart)
     knots = _moved(t, w, _thinned(t, w, knots, error), apart)
     spline = _spline(t, w, knots)
     corners = np.r_[t[0], knots, t[-1]]
@@ -76,7 +76,7 @@ def _spline(t: FloatArray, w: FloatArray, knots: FloatArray) -> BSpline[np.float
     return make_lsq_spline(t, w, np.r_[[t[0]] * 3, knots, [t[-1]] * 3], 2)
 
 
-def _enough(t: FloatArray, w: FloatArray, error: float, apart: float) -> FloatArray:
+def _has_enough_rows(t: FloatArray, w: FloatArray, error: float, apart: float) -> FloatArray:
     """Corners added in the middle of the worst piece until the bound holds."""
     knots = np.empty(0)
     while True:

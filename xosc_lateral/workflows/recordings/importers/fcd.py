@@ -28,7 +28,7 @@ from xosc_lateral.files.sumo import (
     usual_length,
     wrong_element,
 )
-from xosc_lateral.workflows.recordings.cuts import KEPT
+from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
 from xosc_lateral.workflows.recordings.gate import is_right_to_left
 from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph, neighbour_columns
@@ -108,7 +108,7 @@ def _table(
         "drive": names[vehicle], "time": time, "offset": (-side if left_hand else side) + 0.0, "speed": speed,
         "lane_width": [one.width for one in lane], "lane_index": index[piece], "lane_count": count[piece],
         "is_truck": is_truck.astype(np.float64), **near,
-        "state": np.where(is_inner, "junction", np.where(piece < 0, "no lane", KEPT)),
+        "state": np.where(is_inner, "junction", np.where(piece < 0, "no lane", KEPT_ROWS)),
     })  # fmt: skip
 
 

@@ -56,7 +56,7 @@ def import_table(sources: Path | Sequence[Path], *, mapping: MappingLike | None 
     """Tables under standard names, in standard units; a table without `drive` is a drive called after its file.
 
     `mapping`: without it, headers are taken to be standard names. Raises `FormatError`, `NotEnoughDataError`: as
-    `formats.drives.read_drives`: what is written here can be read.
+    `files.drives.read_drives`: what is written here can be read.
     """
     known = as_mapping(mapping)
     files = [sources] if isinstance(sources, Path) else list(sources)

@@ -40,7 +40,7 @@ from xosc_lateral.files.mapping import ColumnSource, MappingLike, as_mapping, fa
 from xosc_lateral.files.rows import refuse_marker
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import LONGEST_MESSAGE, foreign_errors
-from xosc_lateral.workflows.recordings.cuts import KEPT
+from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
 from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
 
 POSITIONS = (("offset", "lane_width"), ("distance_left", "distance_right"))
@@ -178,12 +178,12 @@ def _opened(source: Path) -> Iterator[Any]:
         try:
             log = MDF(opened.file if isinstance(opened.file, io.BytesIO) else source)
         except Exception as error:
-            raise FormatError(f"{_NO_MDF}: {_said(error)}", path=source) from None
+            raise FormatError(f"{_NO_MDF}: {_stated_unit(error)}", path=source) from None
         with log:
             yield log
 
 
-def _said(error: Exception) -> str:
+def _stated_unit(error: Exception) -> str:
     """Words of an error, after which nothing is left of what it broke off.
 
     asammdf's half-made objects complain on standard error when they are disposed of: here, and unheard.
@@ -313,9 +313,9 @@ def _table(signals: dict[str, Channel], source: Path, drive: str, step: float) -
     unknown = np.any(list(missing.values()), axis=0)
     if "distance_left" in missing:  # one side has jumped, the other not yet
         unknown |= np.abs(columns["distance_left"] + columns["distance_right"] - width) > JUMP * width
-    state = np.where(unknown, "gap", KEPT)
+    state = np.where(unknown, "gap", KEPT_ROWS)
     if "speed" in columns:
-        state = np.where((state == KEPT) & np.isnan(columns["speed"]), "no speed", state)
+        state = np.where((state == KEPT_ROWS) & np.isnan(columns["speed"]), "no speed", state)
     others = [name for name, values in columns.items() if name not in missing and pd.isna(values).any()]
     notes = [
         f"{drive}: {name} is known in {100 * (~pd.isna(columns[name])).mean():.0f} % of the time" for name in others

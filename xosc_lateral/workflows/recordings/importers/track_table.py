@@ -128,12 +128,12 @@ def tracks_of(
     vehicle = codes.astype(np.int64)
     x, y = order["x"].to_numpy(dtype=np.float64), order["y"].to_numpy(dtype=np.float64)
     way, driven = travel_heading(x, y, vehicle, time, step), ground_speed(x, y, vehicle, time, step)
-    heading, speed = _given(order, "heading", way), np.abs(_given(order, "speed", driven))
+    heading, speed = _given_columns(order, "heading", way), np.abs(_given_columns(order, "speed", driven))
     require_headings(heading, way, driven, path)
     _require_speed(speed, driven, path)
     kind = order["vehicle_class"].astype(str).str.lower().to_numpy(dtype=str) if "vehicle_class" in order else None
     kinds = np.full(len(order), "") if kind is None else kind
-    length = _given(order, "length", np.array([USUAL_LENGTH.get(one, 4.6) for one in kinds]))
+    length = _given_columns(order, "length", np.array([USUAL_LENGTH.get(one, 4.6) for one in kinds]))
     ahead = BEHIND_MIDDLE["centre" if saved is None else saved.reference] * length
     x, y = x + ahead * np.cos(heading), y + ahead * np.sin(heading)
     return Tracks(
@@ -149,7 +149,7 @@ def tracks_of(
         kinds,
         order["width"].to_numpy(dtype=np.float64) if "width" in order else None,
         is_reference=is_played,
-        rear=_given(order, "rear", np.zeros(len(order))) if "rear" in order else None,
+        rear=_given_columns(order, "rear", np.zeros(len(order))) if "rear" in order else None,
     )
 
 
@@ -166,7 +166,7 @@ def _require_speed(speed: FloatArray, driven: FloatArray, path: Path) -> None:
     raise FormatError(f"is {ratio:.3g} times as fast as x and y move; {cause}", path=path, element="column 'speed'")
 
 
-def _given(table: pd.DataFrame, name: str, otherwise: FloatArray) -> FloatArray:
+def _given_columns(table: pd.DataFrame, name: str, otherwise: FloatArray) -> FloatArray:
     if name not in table:
         return otherwise
     values = table[name].to_numpy(dtype=np.float64)

@@ -166,17 +166,17 @@ def relative_object_position(position: RelativeObjectPosition, simulation: Simul
     rise = (left * sin(pose.roll) + up * cos(pose.roll)) * cos(pose.pitch) - ahead * sin(pose.pitch)
     x = pose.x + flat_ahead * c - flat_left * s
     y = pose.y + flat_ahead * s + flat_left * c
-    return _near(position, simulation, pose, x, y, pose.z + rise)
+    return _nearby_place(position, simulation, pose, x, y, pose.z + rise)
 
 
 def relative_world_position(position: RelativeWorldPosition, simulation: Simulation) -> Placement:
     """Along the world's axes."""
     pose = simulation.entity(position.entity_ref, position.place).pose
     dx, dy = simulation.network.header_offset.turned_back(position.dx, position.dy)
-    return _near(position, simulation, pose, pose.x + dx, pose.y + dy, pose.z + (position.dz or 0.0))
+    return _nearby_place(position, simulation, pose, pose.x + dx, pose.y + dy, pose.z + (position.dz or 0.0))
 
 
-def _near(
+def _nearby_place(
     position: RelativeObjectPosition | RelativeWorldPosition,
     simulation: Simulation,
     pose: Pose,
