@@ -14,7 +14,7 @@ from xosc_lateral.base.lazy import pd
 
 DAY = 86_400.0
 
-FOLD = (1700.0, 3601.0)
+FOLD_LENGTHS = (1700.0, 3601.0)
 """Where clocks are put back at the end of summer time, stamps go back by half an hour (Lord Howe) to an hour, less the
 row's own step or the gap there. [s]"""
 
@@ -101,7 +101,7 @@ def _refuse_fold(seconds: FloatArray, whose: NDArray[np.intp], known: pd.Series,
             continue
         row = int(back[0])
         before = float(seconds[np.flatnonzero(whose[:row] == whose[row])[-1]])
-        if FOLD[0] <= before - float(seconds[row]) <= FOLD[1]:
+        if FOLD_LENGTHS[0] <= before - float(seconds[row]) <= FOLD_LENGTHS[1]:
             what = f"{known.iloc[row]} after {known.iloc[row - 1]}: local time, put back at the end of summer time"
             line = int(known.index[row]) + 2
             raise FormatError(f"{what}? {advice}", path=path, line=line, element="column 'time'")

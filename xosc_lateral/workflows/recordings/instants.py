@@ -9,13 +9,13 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.drivers.drives.cuts import MAX_GAP
 
-APART = 0.25
+STAMP_DISTANCE = 0.25
 """Stamps farther apart than this are of two instants ... [steps]"""
 
-WIDEST = 0.5
+INSTANT_WIDTH = 0.5
 """... if no instant is then wider than this; else every vehicle has a clock of its own. [steps]"""
 
-FIRST_ROWS = 100
+FIRST_STEPS = 100
 """A common clock is fitted to so many steps first, then to twice as many, and so on: never off by half a step."""
 
 
@@ -25,10 +25,10 @@ def instants(time: FloatArray, vehicle: IntArray, step: float) -> tuple[IntArray
     `step`: median step of a vehicle. [s]
     """
     stamps, at = np.unique(time, return_inverse=True)
-    new = np.r_[True, np.diff(stamps) > APART * step]
+    new = np.r_[True, np.diff(stamps) > STAMP_DISTANCE * step]
     number = np.cumsum(new) - 1
     first = stamps[new]
-    if (np.r_[stamps[:-1][new[1:]], stamps[-1]] - first <= WIDEST * step).all():
+    if (np.r_[stamps[:-1][new[1:]], stamps[-1]] - first <= INSTANT_WIDTH * step).all():
         return number[at], first[number][at]
     step, start = _clock(time, vehicle, step)
     number = np.round((time - start) / step).astype(np.int64)
@@ -41,7 +41,7 @@ def _clock(time: FloatArray, vehicle: IntArray, step: float) -> tuple[float, flo
     count = np.round(passed / step)
     near = (count >= 1.0) & (count <= 3.0)
     step = float(passed[near].sum() / count[near].sum())
-    start, span = float(time.min()), FIRST_ROWS * step
+    start, span = float(time.min()), FIRST_STEPS * step
     begin = start
     while True:
         rows = time <= begin + span

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
-from xosc_lateral.workflows.recordings.gate import AGREES
+from xosc_lateral.workflows.recordings.gate import LANE_AGREEMENT
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
 from xosc_lateral.workflows.recordings.placed import PlacedTracks
@@ -84,7 +84,7 @@ def find_lanes(
         inside = (np.abs(aside) <= 0.5 * wide) & np.isfinite(way)
         along_lane = np.cos(heading[near] - ahead)
         agreement[near[inside]] = np.fmax(agreement[near[inside]], along_lane[inside])
-        better = inside & (along_lane > AGREES) & (np.abs(aside) < nearest[near])
+        better = inside & (along_lane > LANE_AGREEMENT) & (np.abs(aside) < nearest[near])
         rows = near[better]
         piece[rows], nearest[rows] = number, np.abs(aside[better])
         along[rows], offset[rows], width[rows], curvature[rows] = way[better], aside[better], wide[better], bend[better]

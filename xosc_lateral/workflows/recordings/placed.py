@@ -14,7 +14,7 @@ from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.workflows.recordings.cuts import CutSettings, Rows, cut_table
-from xosc_lateral.workflows.recordings.gate import MOVING, require_lane_direction
+from xosc_lateral.workflows.recordings.gate import MOVING_SPEED, require_lane_direction
 from xosc_lateral.workflows.recordings.importers.table import Imported, finished, hash_files, without_cut
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks, rate
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph, neighbour_columns
@@ -109,7 +109,7 @@ def _drive_table(placed: PlacedTracks, graph: LaneGraph, settings: CutSettings) 
         **placed.road,
         **near,
     }
-    against = (tracks.speed > MOVING) & (placed.agreement < 0.0)
+    against = (tracks.speed > MOVING_SPEED) & (placed.agreement < 0.0)
     rows = Rows(tracks.vehicle, tracks.time, lane, tracks.step)
     reasons = {"no lane": ~inside, **({"against the lane": against & inside} if against.any() else {})}
     return cut_table(columns, rows, settings, sideways=sideways, reasons=reasons, kind=tracks.kind, is_truck=is_truck)

@@ -51,7 +51,7 @@ _NO_MDF = "not an MDF file that asammdf can read"
 LISTED = 40
 """Channel names in a message, at most."""
 
-DIFFERENT = 0.2
+MAX_CHANNEL_DISTANCE = 0.2
 """Median distance of two channels of one name, as a share of the standard deviation, that is not one of rates. [-]"""
 
 SPARSE_STEPS = 2.5
@@ -259,7 +259,7 @@ def _of_one_name(
             both = (one.timestamps >= first.timestamps[0]) & (one.timestamps <= first.timestamps[-1])
             other = np.interp(one.timestamps[both], first.timestamps, first.samples.astype(np.float64))
             apart = np.abs(one.samples[both].astype(np.float64) - other)
-            if both.any() and float(np.median(apart)) > DIFFERENT * spread:
+            if both.any() and float(np.median(apart)) > MAX_CHANNEL_DISTANCE * spread:
                 raise wrong(f" is in several groups, which differ: name one of {there}")
     return [f"{name}: channel {channel} is in several groups ({there}): the one with most samples is taken"]
 

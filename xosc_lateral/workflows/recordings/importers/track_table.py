@@ -20,7 +20,7 @@ from xosc_lateral.files.rows import chosen_rows, without_markers
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.states import COLUMNS
 from xosc_lateral.files.tables import foreign_errors, listed, numbers_of, read_table, unpacked_text
-from xosc_lateral.workflows.recordings.gate import MOVING, require_headings
+from xosc_lateral.workflows.recordings.gate import MOVING_SPEED, require_headings
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -155,7 +155,7 @@ def tracks_of(
 
 def _require_speed(speed: FloatArray, driven: FloatArray, path: Path) -> None:
     """Refuse speeds as recorded that are not those of x and y. [m/s]"""
-    moving = (driven > MOVING) & (speed > 0.0)
+    moving = (driven > MOVING_SPEED) & (speed > 0.0)
     ratio = float(np.median(speed[moving] / driven[moving])) if moving.any() else 1.0
     if 1.0 / MAX_SPEED_RATIO <= ratio <= MAX_SPEED_RATIO:
         return

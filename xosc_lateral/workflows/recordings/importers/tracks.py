@@ -24,7 +24,7 @@ from xosc_lateral.world.road.network import RoadNetwork
 
 LICENCE = "your own recording"
 
-BESIDES = ("lane_width", "agreement", "scale")
+LANE_VALUES = ("lane_width", "agreement", "scale")
 """What is found of a lane, and is no column of its road."""
 
 INTO_NEXT = 1e-3
@@ -98,7 +98,7 @@ def place_on_road(tracks: Tracks, network: RoadNetwork) -> tuple[PlacedTracks, L
     columns = {name: np.full(len(piece), np.nan) for name in values}
     for name, known in values.items():
         columns[name][there] = known
-    offset, (width, agreement, scale) = np.where(piece >= 0, found.offset, np.nan), map(columns.pop, BESIDES)
+    offset, (width, agreement, scale) = np.where(piece >= 0, found.offset, np.nan), map(columns.pop, LANE_VALUES)
     return PlacedTracks(tracks, piece, along, offset, width, agreement, columns, np.nan_to_num(scale, nan=1.0)), graph
 
 
