@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -237,6 +238,7 @@ def is_esmini_log(path: Path) -> bool:
 def read_esmini_log(path: Path) -> pd.DataFrame:
     """Rows of all vehicles, one below the other: the columns of `_LOGGED`, and `time`.
 
+    A line holds a group of columns for every vehicle that is there at that time, the head those for the first line.
     Raises `FormatError`: a column is missing, or the table is damaged.
     """
     with open_source(path) as source, foreign_errors(path, "can't be read as a log of esmini"):
@@ -245,19 +247,19 @@ def read_esmini_log(path: Path) -> pd.DataFrame:
         names = next((line.rstrip().rstrip(",").split(",") for line in head if line.startswith(HEAD)), None)
         if names is None:
             raise FormatError(f"a log of esmini without a line that begins with '{HEAD}'", path=path)
-        table = pd.read_csv(text, header=None, names=range(len(names)), skipinitialspace=True, index_col=False)
-    places: dict[str, dict[str, int]] = {}
-    for column, name in enumerate(names):
-        if found := _NAME.match(name):
-            places.setdefault(found[1], {})[found[2]] = column
-    frames = []
-    for number, mine in places.items():
-        if missing := sorted(set(_LOGGED.values()) - mine.keys()):
-            raise FormatError(f"vehicle #{number}: no column {missing[0]}", path=path)
-        frame = pd.DataFrame({name: table[mine[theirs]] for name, theirs in _LOGGED.items()})
-        frames.append(frame.assign(time=table[1]).dropna(subset=["vehicle"]))  # one that has not come yet is empty
-    if not frames:
+        lines = text.read()
+        width = max((line.count(b",") + 1 for line in lines.splitlines()), default=len(names))
+        table = pd.read_csv(BytesIO(lines), header=None, names=range(width), skipinitialspace=True, index_col=False)
+    matches = [_NAME.match(name) for name in names]
+    group = {match[2]: column for column, match in enumerate(matches) if match and match[1] == "1"}
+    if not group:
         raise FormatError("no vehicle in the table's head", path=path)
+    if missing := sorted(set(_LOGGED.values()) - group.keys()):
+        raise FormatError(f"vehicle #1: no column {missing[0]}", path=path)
+    frames = []
+    for shift in range(0, width - max(group.values()), len(group)):
+        frame = pd.DataFrame({name: table[group[theirs] + shift] for name, theirs in _LOGGED.items()})
+        frames.append(frame.assign(time=table[1]).dropna(subset=["vehicle"]))  # fewer vehicles: empty
     rows = pd.concat(frames, ignore_index=True)
     rows["vehicle"] = rows["vehicle"].astype(str).str.strip()
     return rows
