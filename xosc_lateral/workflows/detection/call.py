@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.files.hashes import parsed_hashes
 from xosc_lateral.files.mapping import MappingLike, as_mapping
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
 from xosc_lateral.workflows.detection.command import ANSWER_TIME, Command
+from xosc_lateral.workflows.detection.detected import Detected
 from xosc_lateral.workflows.detection.detectors import RULES, Detector, read_rule
 from xosc_lateral.workflows.detection.logistic import train
 from xosc_lateral.workflows.detection.observation import PERFECT, Sensor, View, read_numbers, read_sensor, views_of
-from xosc_lateral.workflows.detection.scoring import Case, Curve, Tally, worst_of
-from xosc_lateral.workflows.detection.sources import Source, SourceSettings, checked, sources_of
+from xosc_lateral.workflows.detection.scoring import Curve, Tally
+from xosc_lateral.workflows.detection.sources import SourceSettings, checked, sources_of
 from xosc_lateral.workflows.detection.truth import moves_in_lane
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths, write_page
 
@@ -120,7 +119,7 @@ def detect(
         tallies += own
         still |= set() if moves else {source.label}
     files = [path for path in (*paths, *trainers) if path.is_file()]
-    return Detection(tallies, looked_at, seen_with, seed, files, still)
+    return Detection(Detected(tallies, looked_at, seen_with, seed, frozenset(still)), files)
 
 
 def _read_detector(word: str, threshold: float, answer_time: float) -> Detector | float | None:
@@ -168,47 +167,38 @@ def _training_views(trainers: Sequence[Path], settings: SourceSettings, sensor: 
 class Detection(Result):
     """What detectors did on sources."""
 
-    __slots__ = ("_files", "_sources", "_tallies", "curves", "seed", "sensor", "still")
+    __slots__ = ("_detected", "_files")
 
-    def __init__(
-        self,
-        tallies: Sequence[Tally],
-        sources: Sequence[Source],
-        sensor: Sensor,
-        seed: int,
-        files: Sequence[Path],
-        still: Collection[str],
-    ) -> None:
-        self._tallies, self._sources, self._files = tuple(tallies), tuple(sources), tuple(files)
-        self.sensor, self.seed = sensor, seed
-        self.curves: tuple[Curve, ...] = tuple(tally.curve() for tally in tallies)
+    def __init__(self, detected: Detected, files: Sequence[Path]) -> None:
+        self._detected, self._files = detected, tuple(files)
+
+    @property
+    def curves(self) -> tuple[Curve, ...]:
         """Of each detector on each source, in the order of the sources."""
-        self.still = frozenset(still)
-        """Sources in which no vehicle moves inside its lane."""
+        return self._detected.curves
 
     @property
     def sources(self) -> tuple[str, ...]:
         """Their labels."""
-        return tuple(source.label for source in self._sources)
+        return tuple(source.label for source in self._detected.sources)
+
+    @property
+    def still(self) -> frozenset[str]:
+        """Sources in which no vehicle moves inside its lane."""
+        return self._detected.still
 
     def headline(self) -> str:
         """One line."""
-        detectors = len(self.curves) // len(self._sources)
-        hours = sum({curve.source: float(curve.hours.sum()) for curve in self.curves}.values())
-        return f"{detectors} detectors on {len(self._sources)} sources, {hours:.2f} h of lane keeping"
+        return self._detected.headline()
 
     def __str__(self) -> str:
         from xosc_lateral.workflows.detection.text import as_text
 
-        return as_text(self)
+        return as_text(self._detected)
 
     def rows(self, *, every: bool = False) -> list[dict[str, Any]]:
         """A row for each source and detector at the threshold that is set, or at every threshold."""
-        found = []
-        for curve in self.curves:
-            chosen = curve.detector.chosen
-            found += _rows(curve, range(len(curve.rate)) if every else [chosen])
-        return found
+        return self._detected.rows(every=every)
 
     def to_frame(self) -> pd.DataFrame:
         """One row per source, detector and threshold; `is_set` marks the one that is set. [1/h], [s], shares."""
@@ -216,35 +206,7 @@ class Detection(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them."""
-        return {
-            "sources": [{"label": one.label, "files": [path.name for path in one.files]} for one in self._sources],
-            "sensor": {"noise": self.sensor.noise, "delay": self.sensor.delay, "rate": self.sensor.rate},
-            "rows": [_plain(row) for row in self.rows()],
-            "curves": [
-                {
-                    "source": curve.source,
-                    "detector": curve.detector.label(),
-                    "quantity": curve.detector.quantity,
-                    "threshold": curve.detector.thresholds.tolist(),
-                    "false_alarms_per_hour": _listed(curve.rate),
-                    "seen": _listed(curve.seen),
-                    "seen_before_marking": _listed(curve.in_time),
-                    "median_lead_s": _listed(curve.lead(0.5)),
-                }
-                for curve in self.curves
-            ],
-            "worst": [
-                {"kind": case.kind, "source": source, "detector": detector, "scene": case.scene.name,
-                 "vehicle": case.view.track.name, "side": "left" if case.view.side > 0 else "right",
-                 "time": round(case.time, 3)}
-                for source, detector, case in self.worst()
-            ],
-            "provenance": self._provenance(),
-        }  # fmt: skip
-
-    def worst(self) -> list[tuple[str, str, Case]]:
-        """Source, detector and case of the worst ones of all."""
-        return worst_of([(one.source, one.detector.label(), case) for one in self._tallies for case in one.cases])
+        return self._detected.to_dict()
 
     def plot(self) -> Figure:
         """Cut-ins seen in time, and the median time before the marking, over false alarms an hour."""
@@ -258,51 +220,12 @@ class Detection(Result):
 
         output = output_file(path, "detection.csv", output_suffixes())
         claim([output], self._files, force=force)
-        write_frame(self.to_frame(), output, self._provenance())
+        write_frame(self.to_frame(), output, self._detected.provenance())
         return output
 
     def write_report(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the HTML page: table, curves, and the worst cases in the player."""
         from xosc_lateral.workflows.detection.page import detection_page
 
-        return write_page(path, "detection.html", lambda: detection_page(self), inputs=self._files, force=force)
-
-    def _provenance(self) -> dict[str, Any]:
-        files = [path for one in self._sources for path in one.files if path.is_file()]
-        return {"seed": self.seed, "inputs": parsed_hashes(files)}
-
-
-def _rows(curve: Curve, numbers: Sequence[int]) -> list[dict[str, Any]]:
-    detector, rates, seen = curve.detector, curve.rate_interval(), curve.seen_interval()
-    in_time, medians = curve.seen_interval(in_time=True), curve.lead_interval()
-    low, middle, high = (curve.lead(share) for share in (0.05, 0.5, 0.95))
-    fixed: dict[str, Any] = {"source": curve.source, "detector": detector.label()}
-    counts = {"vehicles": len(curve.hours), "hours": float(curve.hours.sum()), "cut_ins": len(curve.leads)}
-    found = []
-    for k in numbers:
-        is_set = k == detector.chosen
-        found.append({
-            **fixed, "threshold": float(detector.thresholds[k]), "is_set": is_set, **counts,
-            "false_alarms": int(curve.counts[:, k].sum()),
-            "false_alarms_per_hour": float(curve.rate[k]),
-            "false_alarms_low": float(rates[0, k]), "false_alarms_high": float(rates[1, k]),
-            "seen": float(curve.seen[k]), "seen_low": float(seen[0, k]), "seen_high": float(seen[1, k]),
-            "seen_before_marking": float(curve.in_time[k]),
-            "seen_before_marking_low": float(in_time[0, k]), "seen_before_marking_high": float(in_time[1, k]),
-            "lead_median": float(middle[k]), "lead_5": float(low[k]), "lead_95": float(high[k]),
-            "lead_median_low": medians[0] if is_set else np.nan,
-            "lead_median_high": medians[1] if is_set else np.nan,
-        })  # fmt: skip
-    return found
-
-
-def _listed(values: Any) -> list[float | None]:
-    return [None if np.isnan(value) else round(float(value), 6) for value in values]
-
-
-def _plain(row: dict[str, Any]) -> dict[str, Any]:
-    """NaN as None, numbers rounded."""
-    return {
-        name: (None if np.isnan(value) else round(value, 6)) if isinstance(value, float) else value
-        for name, value in row.items()
-    }
+        html = partial(detection_page, self._detected)
+        return write_page(path, "detection.html", html, inputs=self._files, force=force)

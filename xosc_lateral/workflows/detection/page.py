@@ -15,7 +15,7 @@ from xosc_lateral.workflows.detection.scoring import Case, Curve
 from xosc_lateral.workflows.detection.text import HEADINGS, cells, notes
 
 if TYPE_CHECKING:
-    from xosc_lateral.workflows.detection.call import Detection
+    from xosc_lateral.workflows.detection.detected import Detected
 
 LEAST_RATE = 0.1
 """False alarms below this are drawn there: the axis is logarithmic. [1/h]"""
@@ -23,7 +23,7 @@ AROUND = 6.0
 """Of a case, before and after its moment. [s]"""
 
 
-def detection_page(result: Detection) -> str:
+def detection_page(result: Detected) -> str:
     """HTML page, self-contained; same input, same bytes."""
     page = Page("Cut-in detectors")
     page.lead(f"{result.headline()}.", *notes(result))
@@ -45,7 +45,7 @@ def detection_page(result: Detection) -> str:
         if scene is not None:
             page.player(scene, f"Case {number} from above", anchor=f"scene-{number}")
         page.figure(_case_figure(case), f"Towards the neighbouring lane; shaded: alarm of {detector}")
-    return page.html(result.to_dict()["provenance"])
+    return page.html(result.provenance())
 
 
 def _case_row(number: int, source: str, detector: str, case: Case) -> dict[str, object]:

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from xosc_lateral.workflows.detection.call import Detection
+    from xosc_lateral.workflows.detection.detected import Detected
 
 HEADINGS = ("source", "detector", "false alarms / h", "seen", "before the marking", "time before it [s]")
 
 
-def as_text(result: Detection) -> str:
+def as_text(result: Detected) -> str:
     """The table at the thresholds that are set, then notes."""
     rows = [HEADINGS, *(cells(row) for row in result.rows())]
     widths = [max(len(row[k]) for row in rows) for k in range(len(HEADINGS))]
@@ -46,7 +46,7 @@ def _with_interval(row: Mapping[str, Any], name: str, low: str, high: str, digit
     return f"{value:.{digits}f}{unit}{between}"
 
 
-def notes(result: Detection) -> Sequence[str]:
+def notes(result: Detected) -> Sequence[str]:
     """What the numbers count, and what can't be read from them."""
     lines = [
         "False alarms: alarms that begin while a vehicle keeps its lane, an hour, seen from one neighbouring lane. "
