@@ -64,7 +64,7 @@ laboratory: $(DEV_STAMP)
 # Mutants of every input format against its reader: bytes damaged, then well-formed files that say something else;
 # twenty minutes or so. What hurts lands in out/faults.
 fuzz: $(DEV_STAMP)
-	for how in bytes structure; do $(BIN)/python -m tests.faults --how $$how --count 300 --seed $(or $(SEED),1) || exit 1; done
+	for how in bytes structure doors; do $(BIN)/python -m tests.faults --how $$how --count 300 --seed $(or $(SEED),1) || exit 1; done
 
 format: $(DEV_STAMP)
 	$(BIN)/ruff check --fix .

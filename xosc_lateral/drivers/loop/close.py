@@ -182,7 +182,7 @@ def close_loop(
     if paper:  # what the two-level model lacks is found once, by replacing it: the autoregressive one has both
         final = found.selection.final
         tested = compare_spectrum_shapes(base, timeline, root), test_population(final, between_shift(final))
-        lacks = [lack for lack in tested if lack is not None and lack.found]
+        lacks = [lack for lack in tested if lack is not None and lack.is_found]
     setting = Setting(
         coarse, base if given and not in_sample else None, kind, ModelKind.AUTOREGRESSIVE if lacks else kind, root
     )

@@ -91,10 +91,10 @@ def identify(
             return Identified(usable, selection, search.quantities)
         accepted = [one.term for one in selection.accepted]
 
-        def done(share: float) -> None:
+        def finished(share: float) -> None:
             progress(0.3 + 0.3 * share, "selecting without a fold")
 
-        nested = nest(search, initial, accepted, done)
+        nested = nest(search, initial, accepted, finished)
         return _worst_first(Identified(usable, selection, search.quantities, nested))
 
 

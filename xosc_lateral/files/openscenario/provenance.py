@@ -97,14 +97,14 @@ def write_sealed(path: Path, pieces: Iterable[bytes], *, save: bool) -> tuple[st
     digest = hashlib.sha256(first[:begin])
     digest.update(first[end:])
 
-    def whole() -> Iterator[bytes]:
+    def sealed() -> Iterator[bytes]:
         yield first
         for piece in rest:
             digest.update(piece)
             yield piece
 
     def write_to(file: IO[bytes]) -> str:
-        file.writelines(whole())
+        file.writelines(sealed())
         if place >= 0:
             file.seek(place)
             file.write(digest.hexdigest().encode())

@@ -211,6 +211,7 @@ def panel_svg(panel: Panel, left: float, top: float, width: float, height: float
         low, high = axis.ends
         about += f' data-{name}="{low:.9g} {high:.9g}{" log" if axis.log else ""}"'
         about += f' data-{name}-label="{escape(axis.label)}"' if axis.label else ""
+    about += f' data-title="{escape(panel.title)}"' if panel.title else ""
     return f'<svg class="panel" {about}>{"".join(_mark(panel, mark, width, height) for mark in panel.marks)}</svg>'
 
 

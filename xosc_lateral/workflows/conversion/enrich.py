@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
-from xosc_lateral.base.rows import blocks, columns, give_back, kept
+from xosc_lateral.base.rows import blocks, columns, give_back, stored
 from xosc_lateral.drivers.model.drivability import drivable
 from xosc_lateral.drivers.model.plausibility import check_offsets
 from xosc_lateral.drivers.model.profile import DriverProfile
@@ -24,7 +24,7 @@ from xosc_lateral.workflows.conversion.seen import NOTHING_SEEN, SAMPLE_STEP, Co
 from xosc_lateral.world.motion.deviation import SETTLING_TIME, SampledDeviation, deviation_through
 from xosc_lateral.world.motion.gaps import Gap
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
-from xosc_lateral.world.motion.segments import SegmentSpan, cut_segments
+from xosc_lateral.world.motion.segments import SegmentKind, SegmentSpan, cut_segments
 from xosc_lateral.world.motion.trajectory import WorldTrajectory, displace, distance_driven
 from xosc_lateral.world.road.network import RoadNetwork
 
@@ -46,6 +46,7 @@ def enrich(
     neighbours: Neighbours = Neighbours.BORROW,
     with_sensor: bool = False,
     uncertain: Collection[str] = (),
+    heeds_controllers: bool = True,
     at_least: float = 0.0,
 ) -> Enriched:
     """Enrich a played scenario.
@@ -76,8 +77,10 @@ def enrich(
         Add what the sensor added to the drives that each profile was fitted on. Nobody drives that: it is added after
         drivers have given way and after what nobody could drive was smoothed.
     uncertain : collection of str
-        Entities whose motion will be another one, since it depends on a vehicle under test: nobody responds to where
-        they nominally are, nor do they to others.
+        Entities whose motion will be another one, since it depends on a vehicle under test or a controller: nobody
+        responds to where they nominally are, nor do they to others.
+    heeds_controllers : bool
+        Where a controller of the player steers, nothing is sampled.
     at_least : float
         Time for which each segment is sampled, should it last longer in another run. [s]
 
@@ -87,8 +90,10 @@ def enrich(
         When the sensor is asked for and a profile knows of none.
     """
     trailers, words = trailers or {}, entropy or {}
-    few = sum(len(entity.time) for entity in motion.entities) <= FEW and not context
-    run = (_run if few else _run.__wrapped__)(motion, network, frozenset(trailers), frozenset(uncertain), neighbours)
+    few = sum(len(entity.time) for entity in motion.entities) <= KEPT_ROWS and not context
+    run = (_run if few else _run.__wrapped__)(
+        motion, network, frozenset(trailers), frozenset(uncertain), neighbours, heeds_controllers
+    )
 
     def drawn_for(index: int, attempt: int) -> _Drawn:
         entity = motion.entities[index]
@@ -192,7 +197,7 @@ class _Drawn:
         return columns(len(distance), ([through(distance[part])] for part in blocks(len(distance))))[0]
 
 
-FEW = 100_000
+KEPT_ROWS = 100_000
 """Rows of all entities of a run up to which what drivers see is kept for its next variant: a run like that of 16 cars
 for two minutes then keeps about 10 MB. [-]"""
 
@@ -219,8 +224,12 @@ def _run(
     pulled: frozenset[str],
     uncertain: frozenset[str],
     neighbours: Neighbours,
+    heeds_controllers: bool,
 ) -> _Run:
-    spans = tuple(cut_segments(entity, network, is_trailer=entity.name in pulled) for entity in motion.entities)
+    spans = tuple(
+        cut_segments(entity, network, is_trailer=entity.name in pulled, heeds_controllers=heeds_controllers)
+        for entity in motion.entities
+    )
     gaps = gaps_of(motion, [_nominal(entity) for entity in motion.entities])
     certain = tuple(one for one in motion.entities if one.name not in uncertain)
     return _Run(spans, gaps, replace(motion, entities=certain), {}, {})
@@ -229,7 +238,8 @@ def _run(
 def _draw(blank: _Drawn, driver: DriverProfile, seed: np.random.SeedSequence, with_sensor: bool, least: int) -> _Drawn:
     """With the offsets of one entity; each segment goes on to `least` rows."""
     if not blank.seen.segments:
-        return replace(blank, why="no road-following segment")
+        steered = any(span.kind is SegmentKind.STEERED for span in blank.spans)
+        return replace(blank, why="steered by its controller" if steered else "no road-following segment")
     sampler, sensor = OffsetSampler(driver, seed), known_sensor(driver) if with_sensor else None
     samples: list[_Sample] = []
     for span, knots, segment, side, responses in blank.seen.segments:
@@ -239,8 +249,8 @@ def _draw(blank: _Drawn, driver: DriverProfile, seed: np.random.SeedSequence, wi
         beyond = side * sampler.copy().sample(going_on(segment, more)) if more > 0 else np.empty(0)
         who = f"profile {driver.name} for {blank.motion.name!r}"
         check_offsets(offset, segment.lane_width[segment.inside], who, segment.time[segment.inside])
-        error = kept(sensor_error(sensor, offset, SAMPLE_STEP, seed, part=len(samples)))
-        samples.append(_Sample(span, knots, kept(offset), error, beyond))
+        error = stored(sensor_error(sensor, offset, SAMPLE_STEP, seed, part=len(samples)))
+        samples.append(_Sample(span, knots, stored(offset), error, beyond))
     return replace(blank, seen=blank.seen._replace(segments=()), samples=tuple(samples))
 
 
@@ -265,7 +275,7 @@ def _apart(
 
 def _moved(sample: _Sample, rows: IntArray, move: FloatArray) -> _Sample:
     give_back(len(rows))
-    return sample._replace(offset=kept(sample.offset + np.interp(sample.knots, rows, move)))
+    return sample._replace(offset=stored(sample.offset + np.interp(sample.knots, rows, move)))
 
 
 def _sampled(one: _Drawn, rows: IntArray) -> SampledVehicle:
@@ -276,7 +286,7 @@ def _sampled(one: _Drawn, rows: IntArray) -> SampledVehicle:
         for sample in one.samples:
             can_move[(rows >= sample.span.first) & (rows <= sample.span.last)] = True
     give_back(len(one.motion.time))
-    return SampledVehicle(one.motion, kept(deviation), kept(can_move), one.seen.responds, one.seen.alone)
+    return SampledVehicle(one.motion, stored(deviation), stored(can_move), one.seen.responds, one.seen.alone)
 
 
 def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:
@@ -288,7 +298,7 @@ def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:
         *(drivable(one.offset, SAMPLE_STEP, entity.speed[one.knots]) for one in drawn.samples), strict=True
     )
     samples = tuple(
-        one._replace(offset=kept(offset + one.error)) for one, offset in zip(drawn.samples, driven, strict=True)
+        one._replace(offset=stored(offset + one.error)) for one, offset in zip(drawn.samples, driven, strict=True)
     )
     deviation = replace(drawn, samples=samples).deviation()
     return EntityResult(
@@ -296,7 +306,7 @@ def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:
         drawn.spans,
         drawn.profile,
         "",
-        tuple(SampledSegment(one.span, kept(entity.time[one.knots]), one.offset, one.beyond) for one in samples),
+        tuple(SampledSegment(one.span, stored(entity.time[one.knots]), one.offset, one.beyond) for one in samples),
         deviation,
         displace(entity, network, deviation),
         drawn.seen.neutral,

@@ -34,6 +34,12 @@ MILLI, ANGLE, LINE = 1e-3, 1e-4, 5e-3
 ROAD_REACH = 250.0
 """Roads are shown as far as this around every place where a vehicle was. [m]"""
 
+ROAD_WIDTH = 7.0
+"""Shown where there is no road. [m]"""
+
+PLACES = 20
+"""At which it is looked how wide the road is. [-]"""
+
 PIECE = 200.0
 """Length of one piece of a lane or marking: pieces out of sight are not drawn. [m]"""
 
@@ -53,11 +59,30 @@ def scene_of(motion: NominalMotion, network: RoadNetwork, results: Sequence[Enti
     scene = {
         "step": round(float(rows[1] - rows[0]) * motion.step if len(rows) > 1 else FRAME, 9),
         "frames": len(rows),
+        "across": round(_across(network, shown), 2),
         "entities": [_entity(network, number, each, result, rows, origin) for number, each, result in shown],
         **_roads(network, np.concatenate(places) if places else np.empty((0, 2)), origin),
     }
     # "<" would end the script element that holds this
     return json.dumps(scene, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c")
+
+
+def _across(network: RoadNetwork, shown: Sequence[tuple[int, EntityMotion, EntityResult | None]]) -> float:
+    """How far the player looks to either side of the vehicle that it follows first: driving lanes, one beside its own.
+
+    In m.
+    """
+    first = next((motion for _, motion, result in shown if result is None or result.is_enriched), None)
+    if first is None:
+        return ROAD_WIDTH
+    there = np.flatnonzero(_present(first) & (first.road >= 0))
+    reach = [ROAD_WIDTH / 2]
+    for row in there[:: max(1, len(there) // PLACES)].tolist():
+        road, s = int(first.road[row]), float(first.s[row])
+        t = float(network.offset_to_t(road, int(first.lane[row]), s, float(first.offset[row])))
+        lanes = [lane for lane in network.lanes_at(road, s) if lane.type in DRIVING]
+        reach += [min(abs(lane.centre_t - t) + 0.5 * lane.width, 1.6 * lane.width) for lane in lanes]
+    return max(reach)
 
 
 def packed(values: ArrayLike, resolution: float) -> dict[str, Any]:

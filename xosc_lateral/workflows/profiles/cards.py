@@ -14,7 +14,7 @@ from xosc_lateral.base.normal import NORMAL_95
 from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, keeping_of
 from xosc_lateral.drivers.evaluation.metrics import DURATION, MovementSummary, free_runs, summarise, summary_of
 from xosc_lateral.drivers.evaluation.spectra import spectrum
-from xosc_lateral.drivers.fitting.answers import basis_of, beside_line
+from xosc_lateral.drivers.fitting.answers import basis_of, responses_in_words
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.drivers.model.profile import SIDES, DriverProfile, Provenance
 from xosc_lateral.files.pages.chart import SAMPLED
@@ -36,7 +36,7 @@ SINGLE_DRIVER_DRIVES = 10
 SHOWN_DRIVERS, SHOWN_S = 4, 120.0
 """Sample paths that are drawn, and their length. [s]"""
 
-WRAPPED_ROWS = ("", "lane", "sure", "source", "licence")
+WRAPPED_ROWS = ("", "lane", "known to", "source", "licence")
 """Rows of a card that are wrapped in the terminal."""
 
 
@@ -141,12 +141,12 @@ def card_rows(profile: DriverProfile, summary: MovementSummary) -> list[tuple[st
     rows = [
         ("model", f"{profile.model.kind}, {effects}, lane width {profile.lane_width:.2f} m"),
         *(("effect", effect_line(effect)) for effect in profile.effects),
-        ("neighbours", "; ".join(beside_line(profile, side) for side in SIDES)),
+        ("neighbours", responses_in_words(profile)),
         ("mean", f"{abs(summary.mean_offset):.2f} m to the {side} of the lane centre"),
         ("spread", f"{_spread(known, summary)}; 90 % within {summary.low:+.2f} to {summary.high:+.2f} m"),
         ("speed", f"{summary.lateral_speed:.3f} m/s lateral (rms)"),
         ("lane", keeping.words),
-        ("sure", _sureness(known, keeping)),
+        ("known to", _sureness(known, keeping)),
         ("fitted on", _amount(known)),
         ("source", known.source),
         ("licence", known.licence),
@@ -182,8 +182,8 @@ def _sureness(known: Provenance, keeping: LaneKeeping) -> str:
     mean = NORMAL_95 * keeping.sdlp / independent**0.5
     spread = NORMAL_95 * keeping.sdlp / (2.0 * independent) ** 0.5
     return (
-        f"from {60 * known.hours:.3g} min his mean is known to +- {mean:.2f} m, his SDLP to +- {spread:.2f} m (95 %), "
-        "other days apart"
+        f"mean within {mean:.2f} m, SDLP within {spread:.2f} m (95 %, from {60 * known.hours:.3g} min of driving; on "
+        "another day the same driver may differ by more)"
     )
 
 

@@ -86,8 +86,8 @@ def _unexplained(result: LoopResult) -> dict[str, Any]:
         "measure": "root of error after squared minus floor squared, m",
         "size_m": result.lack_of_fit.unexplained,
         "p_value": result.lack_of_fit.p_value,
-        "clear": result.lack_of_fit.clear,
-        "where": [group.name for group in result.lack_of_fit.where] if result.lack_of_fit.clear else [],
+        "clear": result.lack_of_fit.is_clear,
+        "where": [group.name for group in result.lack_of_fit.where] if result.lack_of_fit.is_clear else [],
         "sentence": lack_of_fit_words(result),
         "omnibus": asdict(result.remainder) | {"within_chance": result.remainder.silent},
     }

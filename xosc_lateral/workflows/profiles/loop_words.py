@@ -213,7 +213,7 @@ def taken_back_words(item: Rejected) -> str:
 def lack_of_fit_words(result: LoopResult) -> str:
     """What is left unexplained, in a sentence."""
     left = result.lack_of_fit
-    if not left.clear:
+    if not left.is_clear:
         return f"{_total_words(left)} {_remainder_words(result)}"
     where = ", ".join(
         f"{group_words(group.name, result)} ({_mm(group.after)}, between halves {_mm(group.floor)})"
@@ -272,7 +272,7 @@ def _hidden_sentence(finding: Finding) -> str:
 
 
 # Where a driver is, by the column that says so.
-OTHERS: Mapping[str, str] = MappingProxyType(
+PLACES_BY_COLUMN: Mapping[str, str] = MappingProxyType(
     {
         "left_distance": "beside vehicles on his left",
         "right_distance": "beside vehicles on his right",
@@ -288,7 +288,7 @@ OTHERS: Mapping[str, str] = MappingProxyType(
     }
 )
 
-FAR = 200.0  # Free space at which others count as far away. [m]
+FAR_DISTANCE = 200.0  # Free space at which others count as far away. [m]
 
 
 def beside_words(effect: ColumnEffect, error: float = 0.0) -> str:
@@ -298,19 +298,19 @@ def beside_words(effect: ColumnEffect, error: float = 0.0) -> str:
     By where the effect puts him, whatever the sign of a distance: with somebody alongside, less with nobody near. The
     range is where 1/e of the shift is left.
     """
-    if effect.acts is not Acts.LOCATION or len(effect.columns) != 1 or effect.columns[0] not in OTHERS:
+    if effect.acts is not Acts.LOCATION or len(effect.columns) != 1 or effect.columns[0] not in PLACES_BY_COLUMN:
         return ""
     column = effect.columns[0]
     if not column.endswith("distance"):
         off, on = effect.weighed(effect.quantity({column: np.array([0.0, 1.0])}))
-        return _moves(float(on - off), error, OTHERS[column], "")
-    free = np.linspace(0.0, FAR, 2001)
+        return _moves(float(on - off), error, PLACES_BY_COLUMN[column], "")
+    free = np.linspace(0.0, FAR_DISTANCE, 2001)
     place = effect.weighed(effect.quantity({column: free}))
     shift = place - place[-1]
     largest = int(np.argmax(np.abs(shift)))
     near = np.flatnonzero(np.abs(shift) >= np.abs(shift[largest]) * np.exp(-1.0))
-    begins = f", from {free[near[-1]]:.0f}{GAP}m on" if near[-1] > 0 and free[near[-1]] < FAR - 1.0 else ""
-    return _moves(float(shift[largest]), error, OTHERS[column], begins)
+    begins = f", from {free[near[-1]]:.0f}{GAP}m on" if near[-1] > 0 and free[near[-1]] < FAR_DISTANCE - 1.0 else ""
+    return _moves(float(shift[largest]), error, PLACES_BY_COLUMN[column], begins)
 
 
 def _moves(shift: float, error: float, where: str, begins: str) -> str:

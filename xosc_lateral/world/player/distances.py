@@ -101,6 +101,14 @@ def free_road_gap(state: EntityState, other: EntityState, *, limit: float = UNRE
     return gap and replace(gap, ds=ds)
 
 
+def is_turned(state: EntityState, other: EntityState) -> bool:
+    """Whether s runs the other way on the road of another entity: +t is on the other side there."""
+    if state.road == other.road:
+        return False
+    gap = road_gap(state, spot_of(other))
+    return gap is not None and gap.is_turned
+
+
 def _gap_between(state: EntityState, own: Spot, spot: Spot, limit: float) -> RoadGap | None:
     path = _path_between(state, own, spot, limit)
     if path is None:

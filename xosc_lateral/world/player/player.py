@@ -15,7 +15,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import PlaybackError
-from xosc_lateral.base.rows import BLOCK, columns, give_back, kept
+from xosc_lateral.base.rows import BLOCK, columns, give_back, stored
 from xosc_lateral.world.motion.nominal import CUT_OFF, Activity, NominalMotion, Note
 from xosc_lateral.world.player.drive import drive, halt_at_road_end
 from xosc_lateral.world.player.recorder import NO_LANE
@@ -208,7 +208,7 @@ class _Player:
         for rows in self.rows:
             rows.put_away()
         if self.times:
-            self._times_put_away.append(kept(np.array(self.times)))
+            self._times_put_away.append(stored(np.array(self.times)))
             del self.times[:]
         give_back()
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from xosc_lateral.base.errors import PlaybackError
-from xosc_lateral.base.rows import BLOCK, columns, kept
+from xosc_lateral.base.rows import BLOCK, columns, stored
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
 from xosc_lateral.world.player.state import NO_ROAD, EntityState
 from xosc_lateral.world.road import RoadNetwork
@@ -115,9 +115,9 @@ class Rows:
             rows, free = np.array(self._free_rows), np.array(self._free).reshape(-1, 6)
             unknown = np.array(self._road)[rows - self._rows_put_away] == _UNKNOWN
             self._knows_height &= not np.isnan(free[unknown, 2]).any()
-            self._free_put_away.append((kept(rows), kept(free.ravel()).reshape(-1, 6)))
+            self._free_put_away.append((stored(rows), stored(free.ravel()).reshape(-1, 6)))
         self._rows_put_away += len(self._road)
-        self._put_away.append(kept(np.frombuffer(b"".join(self._columns), dtype=np.uint8)))
+        self._put_away.append(stored(np.frombuffer(b"".join(self._columns), dtype=np.uint8)))
         for column in (*self._columns, self._free_rows, self._free):
             del column[:]
 
@@ -146,7 +146,7 @@ class Rows:
             offset *= direction
             if len(looked_up):
                 height = free[unknown, 2] if self._knows_height else None
-                _look_up(network, looked_up, free[unknown], height, where, direction)
+                _look_up(network, looked_up, free[unknown], height, where, direction, self.state.lane_types)
             to_lane = along - np.where(direction > 0, 0.0, pi)
             on_road = road >= 0
             pose = _poses(network, where, to_lane)
@@ -237,12 +237,13 @@ def _look_up(
     height: FloatArray | None,
     where: _Where,
     direction: FloatArray,
+    lane_types: frozenset[str],
 ) -> None:
     """Road coordinates of rows that only have a world pose."""
     if not network.road_ids:
         where.road[rows] = NO_ROAD
         return
-    found = network.world_to_lane(free[:, 0], free[:, 1], height)
+    found = network.world_to_lane(free[:, 0], free[:, 1], height, lane_types=lane_types)
     where.road[rows], where.lane[rows], where.s[rows], where.offset[rows] = (
         found.road,
         found.lane,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from math import cos, nan, pi, sin
 from typing import NamedTuple, Protocol
@@ -11,8 +11,11 @@ from xosc_lateral.world.motion.nominal import Activity
 from xosc_lateral.world.player.angles import difference, is_forward, wrap
 from xosc_lateral.world.player.paths.base import PathProgress
 from xosc_lateral.world.road import LaneLink, Pose, RoadNetwork, RouteStep
+from xosc_lateral.world.road.lanes import DRIVING, WALKED
 from xosc_lateral.world.road.places import turn_for_heading, turned_in_surface
 from xosc_lateral.world.scenario import Entity
+from xosc_lateral.world.scenario.controllers import DrivingControllers
+from xosc_lateral.world.scenario.enums import EntityCategory
 
 NO_ROAD = -1
 """Road of what is on none."""
@@ -135,6 +138,9 @@ class EntityState:
     _located: bool = True
     _pose: Pose | None = None
     activity: int = 0
+    controllers: DrivingControllers = field(default_factory=lambda: DrivingControllers((), for_carla=False))
+    steered: int = 0
+    """`Activity.STEERED` while a controller has its lateral domain."""
     longitudinal_taken: bool = False
     """An action has moved the entity along in this frame: the default driver does not."""
     speed_taken: bool = False
@@ -161,6 +167,11 @@ class EntityState:
     def name(self) -> str:
         """The entity's name in the scenario."""
         return self.entity.name
+
+    @property
+    def lane_types(self) -> frozenset[str]:
+        """Types of the lanes that it is placed in."""
+        return WALKED if self.entity.category is EntityCategory.PEDESTRIAN else DRIVING
 
     @property
     def place(self) -> Placement:
@@ -236,7 +247,7 @@ class EntityState:
         if self._located or self.free_pose is None:
             return
         near = (self.road, self.s) if self.road != NO_ROAD else None
-        self.put(locate(self.network, self.free_pose, near=near))
+        self.put(locate(self.network, self.free_pose, near=near, lane_types=self.lane_types))
 
     def road_heading(self) -> float:
         """Heading of the road's s-direction where the entity is; its own without a road. [rad]"""
@@ -246,7 +257,7 @@ class EntityState:
     # ---- what happened to it -----------------------------------------------------------------------------------------
     def begin_frame(self) -> None:
         """Forget what happened in the frame before."""
-        self.activity = _ACTIVE if self.active else 0
+        self.activity = _ACTIVE | self.steered if self.active else 0
         self.longitudinal_taken = False
         self.speed_taken = False
         self.teleported = False
@@ -304,11 +315,19 @@ def _is_whole(free: Pose) -> bool:
     return free.z == free.z and free.pitch == free.pitch and free.roll == free.roll
 
 
-def locate(network: RoadNetwork, pose: Pose, *, near: tuple[int, float] | None = None) -> Placement:
+def locate(
+    network: RoadNetwork,
+    pose: Pose,
+    *,
+    near: tuple[int, float] | None = None,
+    lane_types: Collection[str] = DRIVING,
+) -> Placement:
     """Road coordinates under a world pose, which is kept; road -1 where the network has no roads."""
     if not network.road_ids:
         return Placement(NO_ROAD, 0, 0.0, 0.0, pose.heading, pose)
-    found = network.world_to_lane_at(pose.x, pose.y, pose.z if pose.z == pose.z else None, near=near)
+    found = network.world_to_lane_at(
+        pose.x, pose.y, pose.z if pose.z == pose.z else None, near=near, lane_types=lane_types
+    )
     lane_pose = network.pose_at(found.road, found.lane, found.s, found.offset)
     heading = difference(pose.heading, lane_pose.heading)
     if lane_pose.pitch or lane_pose.roll:

@@ -61,7 +61,7 @@ class SurfaceIndex:
     def _candidates(self, x: FloatArray, y: FloatArray, types: frozenset[str] | None) -> Candidates:
         if types not in self._samples:
             self._samples[types] = Samples(self._tables, types)
-        return self._samples[types].near(x, y)
+        return self._samples[types].near_pieces(x, y)
 
     def path_to_lane(
         self, x: ArrayLike, y: ArrayLike, road: ArrayLike, s: ArrayLike, *, lane_types: Collection[str] | None

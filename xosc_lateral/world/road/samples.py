@@ -67,7 +67,7 @@ class Samples:
     def _cell(self, x: FloatArray, y: FloatArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         return ((x - self._x0) // CELL).astype(np.int64), ((y - self._y0) // CELL).astype(np.int64)
 
-    def near(self, x: FloatArray, y: FloatArray) -> Candidates:
+    def near_pieces(self, x: FloatArray, y: FloatArray) -> Candidates:
         """Every piece of road that may be the nearest one, once per point; at least one for every point.
 
         `x`, `y` of shape (n,). [m]

@@ -29,7 +29,7 @@ ALONGSIDE = 10.0
 """A vehicle in the next lane counts half as alongside at this free space lengthwise, wholly at half of it. [m]"""
 
 INFLUENCE_DISTANCE = 40.0
-"""Free space over which the influence of others fades to 37 %, as in `driver.neighbours`: with so much more free space
+"""Free space over which the influence of others fades to 37 %, as in `fitting.answers`: with so much more free space
 for each factor e that less of a body lies in the lane, its influence is the product of both. [m]"""
 
 
@@ -69,7 +69,7 @@ _INTO_NEXT = 1e-6
 """Step beyond a section's end that brings one into the next. [m]"""
 
 
-class Others(NamedTuple):
+class OtherVehicles(NamedTuple):
     """Where another vehicle is, seen along the own lane: u ahead [m], from the own path to the left [m], which way."""
 
     ahead: FloatArray
@@ -90,7 +90,7 @@ def see_along(
     t: FloatArray,
     direction: NDArray[np.integer],
     centre_t: Callable[[int, int, FloatArray], FloatArray],
-) -> Others:
+) -> OtherVehicles:
     """Where others are along one's lane path, row by row: other moments, or other vehicles. Shape (n,) each.
 
     From where one is on the path (`lane_path`) and from its lane's centre, positive left [m]; where the other is, road,
@@ -98,7 +98,7 @@ def see_along(
     Others elsewhere are not seen (NaN).
     """
     n = len(own_u)
-    seen = Others(np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool))
+    seen = OtherVehicles(np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool))
     for part in path:
         on = (direction != 0) & (road == part.road) & (s >= part.s_low - 1e-9) & (s <= part.s_high + 1e-9)
         k = np.flatnonzero(on)
@@ -121,7 +121,7 @@ class Extent(NamedTuple):
     center_x: FloatArray
 
 
-def free_space(seen: Others, own: BoundingBox | Extent, other: BoundingBox | Extent) -> FloatArray:
+def free_space(seen: OtherVehicles, own: BoundingBox | Extent, other: BoundingBox | Extent) -> FloatArray:
     """Bumper to bumper, 0 while overlapping lengthwise. [m]"""
     turned = np.where(seen.oncoming, -1.0, 1.0)
     between_centres = seen.ahead + turned * other.center_x - own.center_x
@@ -140,14 +140,14 @@ class Around:
     oncoming_there: FloatArray
 
     @classmethod
-    def nobody(cls, n: int) -> Around:
+    def with_no_one(cls, n: int) -> Around:
         """Nobody around anybody."""
-        return cls({side: _Side.nobody(n) for side in ZONES}, np.full(n, np.nan), np.zeros(n))
+        return cls({side: _Side.with_no_one(n) for side in ZONES}, np.full(n, np.nan), np.zeros(n))
 
     def add(
         self,
         rows: IntArray,
-        seen: Others,
+        seen: OtherVehicles,
         gap: FloatArray,
         width: FloatArray,
         other_width: float | FloatArray,
@@ -201,7 +201,7 @@ class _Side:
     car_alongside: FloatArray
 
     @classmethod
-    def nobody(cls, n: int) -> _Side:
+    def with_no_one(cls, n: int) -> _Side:
         return cls(np.full(n, np.nan), *np.zeros((4, n)))
 
     def add(self, rows: IntArray, gap: FloatArray, share: FloatArray, is_truck: BoolArray) -> None:

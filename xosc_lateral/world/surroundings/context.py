@@ -29,7 +29,7 @@ from xosc_lateral.world.surroundings.around import (
     SIGHT_DISTANCE,
     Around,
     Extent,
-    Others,
+    OtherVehicles,
     Reach,
     free_space,
     lane_path,
@@ -129,7 +129,7 @@ def _neighbours(
     every = int(steps[0]) if len(steps) and (steps == steps[0]).all() else 1
     traffic = _traffic(motion, network, int(grid[0]) % every, every)
     columns = grid // every
-    around = Around.nobody(len(grid))
+    around = Around.with_no_one(len(grid))
     groups = _own_lane_groups(own, network, grid, traffic.direction[index, columns])
     width = _own_lane_width(own, network, grid)
     extent, box = traffic.extent, own.entity.bounding_box
@@ -154,7 +154,7 @@ def _neighbours(
                 road, s, t, direction = traffic.of(others, columns[members])
                 seen = see_along(path, u, offset, road, s, t, direction, network.lane_centre_t)
                 k = np.flatnonzero(np.abs(seen.ahead) <= far)
-                seen = Others(seen.ahead[k], seen.left[k], seen.oncoming[k])
+                seen = OtherVehicles(seen.ahead[k], seen.left[k], seen.oncoming[k])
                 who, rows = others[k // len(members)], members[k % len(members)]
                 gap = free_space(seen, box, Extent(*(values[who] for values in extent)))
                 around.add(rows, seen, gap, width[rows], traffic.width[who], traffic.is_truck[who])

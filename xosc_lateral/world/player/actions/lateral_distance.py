@@ -71,7 +71,10 @@ class BesideOnRoad:
         ahead = sqrt(max(state.speed * state.speed - across * across, 0.0))
         state.take_control(Activity.LATERAL)
         state.speed_taken = True
+        was_forward = state.is_forward
         move_along_lane(state, copysign(ahead * step, state.speed))
+        if state.is_forward is not was_forward:  # onto a road whose s runs the other way: +t is the other side
+            across, self._speed, self._acceleration = -across, -self._speed, -self._acceleration
         state.move_to(state.road, state.lane, state.s, state.offset_t + across * step)
         if abs(rest) <= abs(across) * step + EPSILON and self._most_acceleration == inf:
             rest = 0.0
