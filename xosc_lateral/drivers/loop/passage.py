@@ -41,14 +41,14 @@ class Passage:
         return int(np.argmax(np.abs(self.path)))
 
     @property
-    def largest(self) -> tuple[float, float]:
+    def largest_shift(self) -> tuple[float, float]:
         """The farthest that the car goes, to the left, and its standard error. [m]"""
         return float(self.path[self.at]), float(self.error[self.at])
 
     @property
     def share_of_error(self) -> float:
         """Of the farthest. [-]"""
-        size, error = self.largest
+        size, error = self.largest_shift
         return error / max(abs(size), 1e-12)
 
     def with_path(self, path: FloatArray, error: FloatArray) -> Passage:

@@ -130,7 +130,7 @@ def _draw_passage(panel: Panel, passage: Passage, column: str) -> None:
     """Where the car is, and, from 0 to the path's height, what the column does."""
     about = TWO_ERRORS * passage.error
     there = coarse_mean(np.nan_to_num((passage.column - np.nan_to_num(passage.usual)) / (passage.high or 1.0)))
-    scale = passage.largest[0] / max(float(np.abs(there).max()), 1e-300)
+    scale = passage.largest_shift[0] / max(float(np.abs(there).max()), 1e-300)
     panel.line(passage.time, scale * there, BEFORE, label=f"{column} (scaled)")
     panel.band(passage.time, passage.path - about, passage.path + about, AFTER, opacity=0.2)
     panel.line(passage.time, passage.path, AFTER)

@@ -340,7 +340,7 @@ def passage_words(passage: Passage, column: str) -> str:
 def _passage_sentence(passage: Passage, column: str) -> str:
     """How far to either side the car goes in a typical passage, and when."""
     sides: list[str] = []
-    for at in dict.fromkeys((passage.at, int(np.argmax(-np.sign(passage.largest[0]) * passage.path)))):
+    for at in dict.fromkeys((passage.at, int(np.argmax(-np.sign(passage.largest_shift[0]) * passage.path)))):
         size, error = float(passage.path[at]), 2.0 * float(passage.error[at])
         if not sides or abs(size) > error:
             when = float(passage.time[at])

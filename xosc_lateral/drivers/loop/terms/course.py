@@ -110,7 +110,7 @@ class CourseTerm(MeanTerm):
         """What the car does in a typical passage: the farthest that it goes."""
         passage = self._passage(fitted, *self._weights(fitted))
         described = super().describe(fitted, effects, key)
-        size, error = passage.largest
+        size, error = passage.largest_shift
         shape = f"{described.shape}, over time"
         return replace(
             described, shape=shape, size_m=size, size_error=error, lag_s=None, response_s=None, passage=passage
