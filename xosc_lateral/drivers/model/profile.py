@@ -140,7 +140,9 @@ class DriverProfile(Record, frozen=True):
                 f"profile {self.name}: lane width {self.lane_width} m, expected above 0, at most {MAX_LANE_WIDTH:g} m"
             )
         if abs(self.model.step - STEP) > 1e-9 * STEP:
-            raise DriverProfileError(f"profile {self.name}: model.step {self.model.step} s; drivers have steps of {STEP} s")
+            raise DriverProfileError(
+                f"profile {self.name}: model.step {self.model.step} s; drivers have steps of {STEP} s"
+            )
         for side in self.beside:
             if side not in SIDES:
                 raise DriverProfileError(f"profile {self.name}: beside {side!r}, expected left or right")
