@@ -13,7 +13,7 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main
 from xosc_lateral.workflows.recordings.importers.track_table import read_esmini_log
 from xosc_lateral.workflows.recordings.importers.tracks import import_tracks
-from xosc_lateral.workflows.recordings.placed import LaneGraph
+from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
 
 WIDTH = 3.5
 HEADING = 0.3
@@ -105,7 +105,7 @@ def test_a_lane_change_is_cut_and_a_new_section_is_none(road, tmp_path):
 
 def test_tracks_in_other_coordinates_are_told(road, tmp_path):
     source = tmp_path / "tracks.csv"
-    driven("a", 1, 100.0, 30.0).assign(x=lambda rows: rows.x + 5e5).to_csv(source, index=False)
+    driven("a", 1, 100.0, 30.0).drop(columns="psi").assign(x=lambda rows: rows.x + 5e5).to_csv(source, index=False)
     with pytest.raises(FormatError, match=r"tracks\.csv: no row lies in a driving lane of road\.xodr: x from 5001"):
         import_tracks(source, road=road)
     with pytest.raises(FormatError, match=r"no column 'vehicle'.*--map vehicle=COLUMN"):
@@ -115,11 +115,11 @@ def test_tracks_in_other_coordinates_are_told(road, tmp_path):
 
 def test_a_layout_of_lanes_puts_the_next_piece_ahead_and_the_left_one_beside():
     graph = LaneGraph(np.array([100.0, 100.0, 50.0, 50.0]), np.array([1, -1, 3, -1]), [[2], [3], [], []])
-    part, station, rank = graph.layout()
+    part, station, rank, _ = graph.stations(np.arange(4), np.zeros(4))
     assert set(part) == {0}
     assert station.tolist() == [0.0, 0.0, 100.0, 100.0] and rank.tolist() == [0, 1, 0, 1]
     ring = LaneGraph(np.array([10.0, 20.0]), np.array([-1, -1]), [[1], [0]])
-    assert ring.layout()[1].tolist() == [0.0, 10.0]
+    assert ring.stations(np.arange(2), np.zeros(2))[1].tolist() == [0.0, 10.0]
 
 
 @pytest.mark.filterwarnings("default")

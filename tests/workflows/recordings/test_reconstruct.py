@@ -280,6 +280,9 @@ def test_numbers_that_no_vehicle_has_are_named_or_passed_over(tracks, road, tmp_
     assert "C: no vehicle has 4.5 m x nan m" in said
     assert set(placed(tmp_path / "out/odd.xosc")) == {"A", "B", "C"}
     rows.assign(time=1e6 * rows["time"]).to_csv(path, index=False)
+    with pytest.raises(FormatError, match=r"s apart \(median\)"):
+        xl.reconstruct(path, road=road, columns=COLUMNS)
+    rows.assign(time=rows["time"] + 1e6 * (rows["id"] == "A")).to_csv(path, index=False)
     with pytest.raises(FormatError, match="--from and --to"):
         xl.reconstruct(path, road=road, columns=COLUMNS)
 

@@ -36,7 +36,7 @@ def reconstruct(
     Parameters
     ----------
     recording : str or Path
-        Tracks of several vehicles: DLR Highway Traffic, levelX, an OSI trace, CommonRoad, SUMO's FCD output, or a table.
+        Tracks of several vehicles: DLR Highway Traffic, levelX, OSI traces, CommonRoad, SUMO's FCD output, or a table.
     output : str or Path, optional
         Folder to write to, see `Reconstruction.write`; without it nothing is written.
     format : str, optional

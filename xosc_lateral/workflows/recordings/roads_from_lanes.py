@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -137,8 +138,7 @@ def _road(road_number: int, lanes: Sequence[DrivenLane], name: str) -> WrittenRo
         shared = np.where(np.isnan(beyond), right, 0.5 * (right + beyond))
         borders.append(np.where(np.isnan(right), borders[-1], shared))
     written = [
-        WrittenLane("driving", _straight_pieces(s, np.maximum(one - other, 0.0)))
-        for one, other in zip(borders, borders[1:], strict=False)
+        WrittenLane("driving", _straight_pieces(s, np.maximum(one - other, 0.0))) for one, other in pairwise(borders)
     ]
     offset = _straight_pieces(s, np.nan_to_num(borders[0]))
     plan = curved_plan(line, piece=PIECE_LENGTH)

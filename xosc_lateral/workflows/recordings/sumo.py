@@ -153,12 +153,12 @@ def read_fcd(path: Path) -> Tracks:
     kind = np.array(kinds)[vehicle]
     length = np.array([LENGTHS[one] for one in kinds])[vehicle]
     heading = 0.5 * np.pi - np.radians(angle)
-    for rows in np.split(np.arange(len(x)), np.flatnonzero(~same) + 1):
-        behind = REAR_FROM_FRONT * length[rows[0]]
-        start = [x[rows[0]] - behind * np.cos(heading[rows[0]]), y[rows[0]] - behind * np.sin(heading[rows[0]])]
-        path = np.vstack([start, np.stack([x[rows], y[rows]], axis=1)])
-        way = np.r_[0.0, np.cumsum(np.hypot(*np.diff(path, axis=0).T))]
-        x[rows], y[rows] = (np.interp(way[1:] - behind, way, path[:, axis]) for axis in (0, 1))
+    for mine in np.split(np.arange(len(x)), np.flatnonzero(~same) + 1):
+        first, behind = mine[0], REAR_FROM_FRONT * length[mine[0]]
+        start = [x[first] - behind * np.cos(heading[first]), y[first] - behind * np.sin(heading[first])]
+        front = np.vstack([start, np.stack([x[mine], y[mine]], axis=1)])
+        way = np.r_[0.0, np.cumsum(np.hypot(*np.diff(front, axis=0).T))]
+        x[mine], y[mine] = (np.interp(way[1:] - behind, way, front[:, axis]) for axis in (0, 1))
     when = time_of_row - float(time_of_row.min()), float(np.median(np.diff(time_of_row)[same]))
     rear = (REAR_FROM_FRONT - 0.5) * length
     return Tracks(tuple(names), vehicle, *when, x, y, heading, speed, length, kind, rear=rear)
