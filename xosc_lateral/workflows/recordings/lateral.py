@@ -50,7 +50,7 @@ class LateralPlan:
 
 def lateral_plan(vehicle: RecordedVehicle, begin: float) -> LateralPlan:
     """Find and fit all lateral maneuvers; none starts before `begin` [s]."""
-    course = _Course.of(vehicle)
+    course = Course.of(vehicle)
     y = course.y
     still = _still(course.time, course.rate)
     driven = np.hypot(lateral_speed(vehicle.time, vehicle.x), lateral_speed(vehicle.time, vehicle.y))
@@ -91,7 +91,7 @@ def _still(time: FloatArray, rate: FloatArray) -> NDArray[np.bool_]:
 
 
 # ---- who stands still between maneuvers ------------------------------------------------------------------------------
-def _between_levels(course: _Course, still: NDArray[np.bool_]) -> list[Rough]:
+def _between_levels(course: Course, still: NDArray[np.bool_]) -> list[Rough]:
     y, base, lanes = course.y, course.base, course.lanes
     rough = []
     parts = true_slices(still)
@@ -131,7 +131,7 @@ def _reach(y: FloatArray, first: int, last: int, before: float, after: float) ->
 
 # ---- drivers ---------------------------------------------------------------------------------------------------------
 @dataclass(frozen=True, eq=False, slots=True)
-class _Course:
+class Course:
     """How a vehicle moves across its lanes, at the recorded rows; arrays of shape (n,)."""
 
     time: FloatArray  # [s]
@@ -142,7 +142,7 @@ class _Course:
     side: FloatArray  # offset at which a side comes to a marking; negative of a vehicle that is wider than its lane [m]
 
     @classmethod
-    def of(cls, vehicle: RecordedVehicle) -> _Course:
+    def of(cls, vehicle: RecordedVehicle) -> Course:
         """Of a recorded vehicle."""
         base, lanes = vehicle.levels
         y = vehicle.offset + base

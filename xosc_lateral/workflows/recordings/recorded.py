@@ -65,15 +65,8 @@ class RecordedVehicle:
 
     @property
     def levels(self) -> tuple[FloatArray, IntArray]:
-        """Lateral position of each row's lane centre from the first row's [m], and how many lanes to its left it is.
-
-        A step of the offset by more than half a lane is a new lane; one lane that goes over into another one ahead
-        has none. Shape (n,) each.
-        """
-        step = np.diff(self.offset)
-        width = 0.5 * (self.lane_width[1:] + self.lane_width[:-1])
-        lanes = np.where(np.abs(step) > 0.5 * width, -np.round(step / width), 0.0)
-        return np.r_[0.0, np.cumsum(lanes * width)], np.r_[0, np.cumsum(lanes)].astype(np.int64)
+        """See `lane_levels`."""
+        return lane_levels(self.offset, self.lane_width)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -84,6 +77,17 @@ class Recording:
     left_out: tuple[str, ...]
     start: float  # start, end: of the window [s]
     end: float
+
+
+def lane_levels(offset: FloatArray, lane_width: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Lateral position of each row's lane centre from the first row's [m], and how many lanes to its left it is.
+
+    A step of the offset by more than half a lane is a new lane; one lane that goes over into another one ahead has
+    none. Shape (n,) each, as the arguments.
+    """
+    step, width = np.diff(offset), 0.5 * (lane_width[1:] + lane_width[:-1])
+    lanes = np.where(np.abs(step) > 0.5 * width, -np.round(step / width), 0.0)
+    return np.r_[0.0, np.cumsum(lanes * width)], np.r_[0, np.cumsum(lanes)].astype(np.int64)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
