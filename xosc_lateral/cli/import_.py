@@ -175,12 +175,15 @@ def fcd(
     source: Annotated[Path, typer.Argument(help="What --fcd-output wrote (.xml).", show_default=False)],
     *,
     output: Output,
-    net: Annotated[Path | None, typer.Option(help="Road network (.net.xml): widths and counts of lanes.")] = None,
+    net: Annotated[
+        Path | None, typer.Option(help="Road network (.net.xml): lanes, side of the road, who is on the next edge.")
+    ] = None,
+    types: Annotated[Path | None, typer.Option(help="File with the vehicle types (.rou.xml): lengths.")] = None,
     lane_width: Annotated[float, typer.Option(help="Without a network. [m]", min=1, max=10)] = 3.2,
     said: Written,
 ) -> None:
     """SUMO's FCD output of a run with the sublane model: a drive for every vehicle."""
-    _import("fcd", [source], output, said, net=net, lane_width=lane_width)
+    _import("fcd", [source], output, said, net=net, types=types, lane_width=lane_width)
 
 
 @command(group, "commonroad", "CommonRoad scenarios.", "import commonroad DEU_A9-1_1_T-1.xml -o drives.parquet")

@@ -35,7 +35,7 @@ MAX_CONTRADICTIONS = 0.01
 RUN = "following_run"
 """Column of tables that an import has cut: number of the road-following stretch. What it has cut is not cut again."""
 
-DRIVE_COLUMNS = frozenset({"time", "drive", "offset", "lane_width", "distance_left", "distance_right", RUN})
+DRIVE_COLUMNS = frozenset({"time", "drive", "driver", "offset", "lane_width", "distance_left", "distance_right", RUN})
 """Columns that are no context."""
 
 

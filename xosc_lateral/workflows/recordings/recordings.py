@@ -47,6 +47,7 @@ class RecordedTraffic:
     road_name: str  # of the file
     sources: tuple[Path, ...]  # what was read
     notes: tuple[str, ...] = field(default=())
+    host: str | None = None  # vehicle that the recording calls its host
 
     @property
     def span(self) -> tuple[float, float]:
@@ -93,7 +94,8 @@ def _osi(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraf
 
     recorded = read_osi(source)
     traffic = _on_road(recorded.tracks, source, road)
-    return replace(traffic, notes=(*recorded.notes, *traffic.notes))
+    host = recorded.hosts[0] if len(recorded.hosts) == 1 else None
+    return replace(traffic, notes=(*recorded.notes, *traffic.notes), host=host)
 
 
 def _commonroad(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
