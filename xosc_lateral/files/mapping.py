@@ -221,6 +221,8 @@ def read_mapping(path: Path) -> TableMapping:
     decimal = values.get("decimal", ".")
     if decimal not in (".", ","):
         raise FormatError(f"decimal {decimal!r}, expected . or ,", path=path)
+    if decimal == values.get("separator"):
+        raise FormatError(f"separator and decimal are both {decimal!r}", path=path)
     for key in ("encoding", "separator"):
         if not isinstance(values.get(key, ""), str) or values.get(key) == "":
             raise FormatError(f"{key} {values[key]!r}, expected a text", path=path)
@@ -243,7 +245,7 @@ def read_mapping(path: Path) -> TableMapping:
             for name, entry in values.get("values", {}).items()
             if name != "vehicle_class"
         },
-        {name: _text(entry, path, f"[roles] {name}") for name, entry in values.get("roles", {}).items()},
+        {name: _role(entry, path, f"[roles] {name}") for name, entry in values.get("roles", {}).items()},
         values.get("encoding"),
         values.get("separator"),
         decimal,
@@ -263,6 +265,14 @@ def _marker(entry: Any, path: Path) -> float | str:
     if isinstance(entry, bool) or not isinstance(entry, int | float | str):
         raise FormatError(f"{entry!r}, expected a number or a text", path=path, element="missing")
     return entry if isinstance(entry, str) else float(entry)
+
+
+def _role(entry: Any, path: Path, where: str) -> str:
+    from xosc_lateral.drivers.loop.columns import Role
+
+    if _text(entry, path, where) not in list(Role):
+        raise FormatError(f"{entry!r} is none of {', '.join(Role)}", path=path, element=where)
+    return str(entry)
 
 
 def _text(entry: Any, path: Path, where: str) -> str:
