@@ -74,11 +74,17 @@ def fit(
     """
     from msgspec.structs import replace
 
+    from xosc_lateral.drivers.drives.frozen import summary_of
     from xosc_lateral.drivers.fitting.fitting import fit_profile
     from xosc_lateral.drivers.model.profile import Provenance
 
     given = given_drives(drives, columns)
-    known = Provenance(source=source or ", ".join(given.inputs), licence=licence, inputs=dict(given.inputs))
+    known = Provenance(
+        source=source or ", ".join(given.inputs),
+        licence=licence,
+        inputs=dict(given.inputs),
+        fit=dict(summary_of(given.drives)),
+    )
     with naming(given):
         profile = fit_profile(
             given.drives,
