@@ -92,7 +92,7 @@ def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.Dat
         if name != "drive" and source.factor != 1.0:
             column = pd.Series(numbers_of(column, path, name) * source.factor, index=column.index)
         kept[name] = column
-    return pd.DataFrame(kept)
+    return pd.DataFrame(kept).assign(**{name: value for name, value in mapping.recorded.items() if name not in kept})
 
 
 def _numeric_columns(table: pd.DataFrame, path: Path) -> dict[str, FloatArray]:

@@ -1,7 +1,8 @@
 """What foreign tables hold, in standard names: a mapping given word by word (``--map``) or saved in a file.
 
-A file is TOML: how tables are written (``encoding``, ``separator``, ``decimal``), ``[columns]`` with a line per
-standard name, as in ``--map``, ``[values.NAME]`` with the number that each text of a column stands for, ``[roles]``.
+A file is TOML: how tables are written (``encoding``, ``separator``, ``decimal``), what the recording shows
+(``valid_below`` in Hz, ``resolution`` in m), ``[columns]`` with a line per standard name, as in ``--map``,
+``[values.NAME]`` with the number that each text of a column stands for, ``[roles]``.
 """
 
 from __future__ import annotations
@@ -95,7 +96,10 @@ def factor(column: str, unit: str) -> float:
     return sign * to_si / target_to_si
 
 
-KEYS = ("encoding", "separator", "decimal", "columns", "values", "roles")
+RECORDED = ("valid_below", "resolution")
+"""What a mapping says of the recordings: driving below a frequency [Hz], offsets to a step [m]."""
+
+KEYS = ("encoding", "separator", "decimal", *RECORDED, "columns", "values", "roles")
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +124,7 @@ class TableMapping:
     encoding: str | None = None  # encoding, separator: of text files; None: found out
     separator: str | None = None
     decimal: str = "."
+    recorded: Mapping[str, float] = field(default_factory=dict)  # by the names in `RECORDED`
 
     def with_words(self, words: Mapping[str, str]) -> TableMapping:
         """With further columns, as ``--map`` has them, in place of those of the same name."""
@@ -207,7 +212,14 @@ def read_mapping(path: Path) -> TableMapping:
         values.get("encoding"),
         values.get("separator"),
         decimal,
+        {key: _above_zero(values[key], path, key) for key in RECORDED if key in values},
     )
+
+
+def _above_zero(entry: Any, path: Path, key: str) -> float:
+    if isinstance(entry, bool) or not isinstance(entry, int | float) or not 0.0 < entry < np.inf:
+        raise FormatError(f"{key} {entry!r}, expected a number above 0", path=path)
+    return float(entry)
 
 
 def _text(entry: Any, path: Path, where: str) -> str:

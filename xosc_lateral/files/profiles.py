@@ -191,6 +191,8 @@ def describe_profile(profile: DriverProfile) -> str:
     )
     if profile.columns:
         text += f" of {', '.join(profile.columns)}"
+    if valid := profile.validity.in_words():
+        text += f"\nvalid: {valid}"
     if one := known.fit.get("one_marking"):
         text += (
             f"\n{100 * one:.1f} % of the rows follow one lane marking, because the other was misjudged; "
