@@ -36,6 +36,7 @@ demo: $(STAMP)
 	@$(BIN)/xosc-lateral convert out/demo/cut-in.xosc -o out/demo/cut-in_lifelike.xosc --seed 1 --report out/demo/cut-in_report.html
 	@echo
 	@echo "Look at the report:     out/demo/cut-in_report.html (in a browser)"
+	@echo "Play it in a browser:   xosc-lateral view out/demo/cut-in_lifelike.xosc"
 	@echo "Play it in esmini:      esmini --window 60 60 1000 500 --osc out/demo/cut-in_lifelike.xosc"
 	@echo "Use the command line:   source $(BIN)/activate && xosc-lateral --help"
 
@@ -63,7 +64,7 @@ laboratory: $(DEV_STAMP)
 # Mutants of every input format against its reader: bytes damaged, then well-formed files that say something else;
 # twenty minutes or so. What hurts lands in out/faults.
 fuzz: $(DEV_STAMP)
-	for how in bytes structure; do $(BIN)/python -m tests.faults --how $$how --count 300 --seed $(or $(SEED),1) || exit 1; done
+	for how in bytes structure doors; do $(BIN)/python -m tests.faults --how $$how --count 300 --seed $(or $(SEED),1) || exit 1; done
 
 format: $(DEV_STAMP)
 	$(BIN)/ruff check --fix .

@@ -1,4 +1,4 @@
-"""Lateral gaps of vehicles side by side, beside those of any two vehicles of the two lanes: `enrich.give_way.GAPS`.
+"""Lateral gaps of vehicles side by side, beside those of any two vehicles of the two lanes: `conversion.give_way.GAPS`.
 
     python -m laboratory.give_way WHEEL [--profile motorway motorway-refined] [--seeds 12] [--write PAGE.md]
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from laboratory.markers import show
 from xosc_lateral.workflows.recordings import lanes_from_tracks
-from xosc_lateral.workflows.recordings.cuts import KEPT
+from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
 from xosc_lateral.workflows.recordings.importers import dlr_ht
 from xosc_lateral.world.road.road_from_tracks import fit_reference_line
 
@@ -57,7 +57,7 @@ def lanes_of(source: Path) -> tuple[list[Lane], list[FloatArray]]:
     forward = dlr_ht.travels_north(tracks)
     line, s, d = fit_reference_line(tracks[["center_easting", "center_northing"]].to_numpy(), forward)
     s, d = np.where(forward, s, line.length - s), np.where(forward, d, -d)
-    kept = (table["state"] == KEPT).to_numpy()
+    kept = (table["state"] == KEPT_ROWS).to_numpy()
     lane, vehicle = table["lane_index"].to_numpy(), tracks["vehicle"].to_numpy()
     height = tracks["dimension_height"].to_numpy()
     lanes = []

@@ -30,7 +30,7 @@ from laboratory.refined import NOTES, refine_population, refined_profile
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.drives.cuts import all_runs
 from xosc_lateral.drivers.drives.drive import Drive, Run
-from xosc_lateral.drivers.drives.resampling import PASSED, STEP
+from xosc_lateral.drivers.drives.resampling import PASS_BAND_EDGES, STEP
 from xosc_lateral.drivers.evaluation.metrics import snippet_metrics, summary_of
 from xosc_lateral.drivers.evaluation.record import scores_to_dict
 from xosc_lateral.drivers.evaluation.scores import SNIPPET, score_profile
@@ -144,7 +144,7 @@ def _rural(gnss: Sequence[Path], model: str) -> tuple[DriverProfile, FastPart]:
     bands = tuple(replace(band, source=GNSS) for band in profile.validity.bands)
     profile = replace(profile, validity=replace(profile.validity, bands=bands, roads=("rural road",)))
     runs = driver_runs(all_runs(drives), drives)[0]
-    return profile, fast_part_of_runs(runs, profile.validity.highest or PASSED, GNSS)
+    return profile, fast_part_of_runs(runs, profile.validity.highest or PASS_BAND_EDGES, GNSS)
 
 
 BANDS = (0.04, 0.08, 0.12, 0.2, 0.32, 0.5, 1.0)

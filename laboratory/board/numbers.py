@@ -12,7 +12,7 @@ from laboratory.board.ranked import SHORT, ranked_numbers
 from laboratory.board.result import ModelScore
 from laboratory.board.sampled_half import SampledHalf
 from xosc_lateral.drivers.evaluation.classifier import classifier_two_sample_test
-from xosc_lateral.drivers.evaluation.distances import PROPER, proper_scores
+from xosc_lateral.drivers.evaluation.distances import SCORE_UNITS, proper_scores
 from xosc_lateral.drivers.evaluation.measures import UNITS, differences, named_distances
 from xosc_lateral.drivers.evaluation.parts import SnippetCondition
 
@@ -96,4 +96,4 @@ def _classified_floors(half: Half) -> dict[str, float]:
 
 def _unit(name: str) -> str:
     head = name.split(",")[0]
-    return PROPER.get(head.replace(" ", "_")) or UNITS.get(head) or ("-" if head == "auc" else "sd")
+    return SCORE_UNITS.get(head.replace(" ", "_")) or UNITS.get(head) or ("-" if head == "auc" else "sd")

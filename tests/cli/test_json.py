@@ -61,6 +61,7 @@ def test_every_schema_is_one_and_is_listed():
         ("sample", "sample -p motorway --like drives.csv -o snippets.parquet"),
         ("fit", "fit drives.csv -o fitted.json"),
         ("evaluate", "evaluate drives.csv -p motorway --no-classify"),
+        ("detect", "detect in/cut-in.xosc drives.csv --variants 1 --report detection.html -o detection.csv"),
         ("close-loop", "close-loop short.csv -o refined.json --report loop"),
         ("template-list", "template list"),
         ("template-write", "template write curves -o written --set radius=800"),

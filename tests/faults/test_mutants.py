@@ -8,6 +8,7 @@ import pytest
 
 from tests.faults.__main__ import CHANGES
 from tests.faults.attack import Count, attack
+from tests.faults.doors import DOORS, attack_door
 from tests.faults.reader import Reader
 from tests.faults.readers import READERS
 
@@ -28,3 +29,12 @@ def test_mutants_are_refused_in_one_line_or_make_sense(reader: Reader, tmp_path:
         ]
         assert not faults
         assert tally.refused + tally.accepted == max(1, round(reader.share * COUNT))
+
+
+@pytest.mark.parametrize("door", DOORS)
+def test_lines_of_a_simulation_are_answered_in_one_line_and_refused_ones_change_nothing(
+    door: str, tmp_path: Path
+) -> None:
+    tally = Count()
+    assert not [f"{fault.seed}: {fault.what}" for fault in attack_door(door, 20 * COUNT, 1, tmp_path, tally)]
+    assert min(tally.refused, tally.accepted) > COUNT

@@ -173,3 +173,35 @@ def test_the_offset_of_the_header_moves_what_leaves_the_program(tmp_path):
     assert (x[0], y[0], z[0], heading[0]) == pytest.approx((-202.0, 101.0, 3.5, 0.25 + np.pi / 2))
     assert offset.undo(-202.0, 101.0) == pytest.approx((1.0, 2.0))
     assert not read_opendrive(DATA / "valid" / "odd.xodr").header_offset
+
+
+@pytest.mark.parametrize("order", [("permanent", "temporary"), ("temporary", "permanent"), (None, "temporary")])
+def test_of_two_lane_layers_the_permanent_one_counts(tmp_path, order):
+    """OpenDRIVE 1.9: lanes, offsets and links of the other one are no part of it."""
+    layers = {
+        "permanent": (0.0, 3.5, '<successor id="-1"/><successor id="-1" layer="temporary"/>', ""),
+        "temporary": (1.35, 3.0, '<successor id="-9" layer="temporary"/>', 'direction="reversed"'),
+    }
+    written = ""
+    for layer in order:
+        offset, width, link, direction = layers[layer or "permanent"]
+        named = f'layer="{layer}"' if layer else ""
+        sections = "".join(
+            f'<laneSection s="{s}"><center><lane id="0" type="none"/></center><right><lane id="-1" type="driving" '
+            f'{direction}><link>{link}</link><width sOffset="0" a="{width}" b="0" c="0" d="0"/></lane></right>'
+            "</laneSection>"
+            for s in ((0, 60) if layer != "temporary" else (20, 40))
+        )
+        written += f'<lanes {named}><laneOffset s="0" a="{offset}" b="0" c="0" d="0"/>{sections}</lanes>'
+    path = tmp_path / "layers.xodr"
+    path.write_text(
+        '<OpenDRIVE><header revMajor="1" revMinor="9"/><road id="1" length="100" junction="-1"><planView>'
+        f'<geometry s="0" x="0" y="0" hdg="0" length="100"><line/></geometry></planView>{written}</road></OpenDRIVE>'
+    )
+    network = read_opendrive(path)
+    assert [section.start for section in network.roads[0].sections] == [0.0, 60.0]
+    assert network.roads[0].sections[0].by_id[-1].successors == (-1,)
+    assert network.travel_direction(0, -1) == 1
+    for s in (10.0, 30.0, 50.0, 90.0):
+        assert network.lane_state_at(0, -1, s)[::2] == pytest.approx((-1.75, 3.5))
+    assert any("temporary lanes are left out" in note for note in network.notes)

@@ -36,7 +36,7 @@ from xosc_lateral.files.openscenario.write.lane_offset_scenario import write_lan
 from xosc_lateral.files.openscenario.write.lateral_actions import lateral_actions
 from xosc_lateral.files.openscenario.write.trajectory_scenario import write_trajectory_scenario
 from xosc_lateral.world.motion.nominal import NominalMotion
-from xosc_lateral.world.motion.offset_chain import MOST_TURNING, TOLERANCE, OffsetChain, ramps
+from xosc_lateral.world.motion.offset_chain import OffsetChain, ring_along
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.player.player import play
 from xosc_lateral.world.scenario import Scenario
@@ -327,40 +327,11 @@ def test_a_trajectory_with_nan_is_a_wrong_call(tmp_path: Path) -> None:
     assert not (tmp_path / "out.xosc").exists()
 
 
-def sine_chain(entity_name: str, begin: float, end: float) -> OffsetChain:
-    time = np.arange(begin, end, STEP)
-    return OffsetChain(entity_name, time, 0.2 * np.sin(2 * np.pi * (time - begin) / 8.0))
-
-
-def test_transitions_follow_the_chain_within_the_tolerance_and_turn_gently() -> None:
-    """Half cosines on half cosines: a sine is met by one transition from each of its ends to the next."""
-    chain = sine_chain("Ego", 0.0, 30.0)
-    found = ramps(chain)
-    followed = np.full(len(chain.time), np.nan)
-    for ramp in found:
-        rows = (chain.time >= ramp.start - 1e-9) & (chain.time <= ramp.end + 1e-9)
-        share = (chain.time[rows] - ramp.start) / (ramp.end - ramp.start)
-        followed[rows] = ramp.origin + 0.5 * (1.0 - np.cos(np.pi * share)) * (ramp.target - ramp.origin)
-    settled = chain.time >= found[0].end
-    assert np.abs(followed - chain.offset_t)[settled & np.isfinite(followed)].max() <= TOLERANCE + 2e-3
-    assert len(found) < 30
-    turning = [0.5 * np.pi**2 * abs(r.target - r.origin) / (r.end - r.start) ** 2 / 30.0 for r in found]
-    assert max(turning) <= MOST_TURNING + 1e-9
-    assert 1.5 <= found[0].end - found[0].start <= 2.5
-
-
-def test_a_stretch_too_short_to_get_anywhere_is_left_alone() -> None:
-    time = np.arange(0.0, 0.5, STEP)
-    assert ramps(OffsetChain("Ego", time, np.full(len(time), 0.4))) == ()
-
-
-def test_no_transition_begins_where_the_t_axis_flips() -> None:
-    chain = sine_chain("Ego", 0.0, 20.0)
-    side = np.where(chain.time < 10.0, 1.0, -1.0)
-    flipped = OffsetChain("Ego", chain.time, chain.offset_t * side, flips=(10.0,))
-    found = ramps(flipped)
-    assert all(abs(ramp.start - 10.0) >= 0.29 for ramp in found)
-    assert any(ramp.start >= 10.29 for ramp in found)
+def sine_chain(entity_name: str, after: tuple[str, ...] | None = None) -> OffsetChain:
+    """20 cm to each side every 8 s; from the start, it begins at the left turn."""
+    time = np.arange(0.0, 40.0, 0.1)
+    ring = ring_along(time, 0.2 * np.sin(2 * np.pi * time / 8.0), from_middle=False)
+    return OffsetChain(entity_name, after, ring, None if after else ring.origin)
 
 
 @pytest.mark.parametrize("minor", [0, 1, 2, 3])
@@ -372,7 +343,7 @@ def test_lane_offset_output_is_valid_and_keeps_the_maneuvers(
     write_lane_offset_scenario(
         scenario,
         motion,
-        [sine_chain("Ego", 0.0, 10.0)],
+        [sine_chain("Ego")],
         tmp_path / "out.xosc",
         provenance=provenance(scenario),
         summary="seed 3",
@@ -384,20 +355,25 @@ def test_lane_offset_output_is_valid_and_keeps_the_maneuvers(
     assert len(set(names)) == len(names)
 
 
-def test_offsets_come_out_when_the_lane_offset_scenario_is_played(tmp_path: Path) -> None:
-    scenario = made(tmp_path, stop=time_condition(20))
-    motion = played(scenario, 30.0)
-    chain = sine_chain("Ego", 0.0, 20.0)
+def test_offsets_come_out_when_the_lane_offset_scenario_is_played_and_go_on(tmp_path: Path) -> None:
+    """For longer than the ring, which has three periods of the sine, and at its pace."""
+    nothing = "<UserDefinedAction><CustomCommandAction type='nothing'/></UserDefinedAction>"
+    stories, init = story(event("nothing", action("nothing", nothing))), private("Ego", teleport(), speed_action("14"))
+    scenario = made(tmp_path, stop=time_condition(60), init=init, stories=stories)
+    motion = played(scenario, 70.0)
+    chain = sine_chain("Ego")
     write_lane_offset_scenario(
         scenario, motion, [chain], tmp_path / "out.xosc", provenance=provenance(scenario), summary="seed 3"
     )
-    ego = played(read_scenario(tmp_path / "out.xosc"), 30.0).entities[0]
-    # Lane -1 of a right-hand road: the direction of travel is that of s, so +t is left.
-    wanted = np.interp(ego.time, chain.time, chain.offset_t)
-    settled = (ego.time > 2.5) & (ego.time < 19.5)
-    assert np.abs(ego.offset - wanted)[settled].max() < 0.02
-    turn = np.abs(np.diff(ego.heading_relative)) / STEP
-    assert turn.max() <= 0.3e-3 / 0.01
+    ego = played(read_scenario(tmp_path / "out.xosc"), 70.0).entities[0]
+    # Lane -1 of a right-hand road: the direction of travel is that of s, so +t is left. The ring begins at a turn.
+    assert ego.offset[0] == pytest.approx(chain.placed_t, abs=1e-4)
+    wanted = 0.2 * np.cos(2 * np.pi * (ego.time - 0.12) / 8.0)
+    assert np.abs(ego.offset - wanted)[ego.time < 16.0].max() < 0.025
+    for begin in (0.0, 20.0, 40.0):
+        rows = (ego.time >= begin) & (ego.time < begin + 20.0)
+        assert np.ptp(ego.offset[rows]) == pytest.approx(0.4, abs=0.03)
+    assert np.sqrt(np.mean(np.diff(ego.offset) ** 2)) / STEP == pytest.approx(0.2 * 2 * np.pi / 8.0 / 2**0.5, rel=0.05)
 
 
 LANE_CHANGE = (
@@ -422,23 +398,24 @@ def test_a_lane_change_overrules_the_offsets_whenever_it_comes(tmp_path: Path) -
 
     scenario = read_scenario(write_scenario(tmp_path, text(8.01)))
     motion = played(scenario, 30.0)
-    end = next(p.end for p in motion.actions if p.action.name == "change")
-    assert end is not None
-    chains = [sine_chain("Ego", 0.0, 8.0), sine_chain("Ego", end, 25.0)]
+    path = next(p.path for p in motion.actions if p.action.name == "change")
+    chains = [sine_chain("Ego"), sine_chain("Ego", path)]
     write_lane_offset_scenario(
         scenario, motion, chains, tmp_path / "out.xosc", provenance=provenance(scenario), summary="seed 3"
     )
     # The test drive makes the change come 3 s earlier than planned.
     output = tmp_path / "out.xosc"
     output.write_text(output.read_text().replace('value="8.01"', 'value="5.01"'))
-    ego = played(read_scenario(output), 30.0).entities[0]
+    run = played(read_scenario(output), 30.0)
+    ego = run.entities[0]
+    assert [p.end for p in run.actions if p.action.name == "change"] == [pytest.approx(9.02, abs=0.05)]
     assert ego.lane[np.searchsorted(ego.time, 4.9)] == -1
     after = ego.time > 9.1
     assert set(ego.lane[after].tolist()) == {-2}
     # The second chain starts with the end of the change, not at the planned time.
-    shifted = np.interp(ego.time, chains[1].time - 3.0, chains[1].offset_t)
-    settled = (ego.time > 12.5) & (ego.time < 20)
-    assert np.abs(ego.offset - shifted)[settled].max() < 0.05
+    for begin in (9.5, 17.0):
+        rows = (ego.time >= begin) & (ego.time < begin + 8.0)
+        assert np.ptp(ego.offset[rows]) > 0.3
 
 
 def test_a_scenario_that_is_over_at_once_is_refused(tmp_path: Path) -> None:

@@ -6,6 +6,8 @@ fault (exit 1, one line); anything else is our bug and keeps its traceback.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 
 class XoscLateralError(Exception):
     """Base of all errors that a user can cause. `str()` of it is one line, fit for stderr."""
@@ -53,6 +55,14 @@ class DriverProfileError(XoscLateralError, ValueError):
 
 class NotEnoughDataError(XoscLateralError, ValueError):
     """Too little measured data: the message carries what was found and what was needed."""
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """`` (did you mean 'motorway'?)``, or nothing where no known name is like that one."""
+    from difflib import get_close_matches
+
+    near = get_close_matches(name, list(known), n=1)
+    return f" (did you mean {near[0]!r}?)" if near else ""
 
 
 def locate(what: str, *, path: object = None, line: int | None = None, element: str | None = None) -> str:

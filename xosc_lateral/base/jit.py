@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
@@ -14,6 +15,9 @@ def njit(body: Body) -> Body:
     The compiled code is kept beside the module or in the user's cache. Who has neither (a read-only installation, a
     service without a home) compiles once per process: numba itself would refuse.
     """
+    # A `.numba_config.yaml` in the working folder, which may be anybody's, must not say where compiled code lies.
+    for name in ("NUMBA_CACHE_DIR", "NUMBA_CACHE_LOCATOR_CLASSES"):
+        os.environ.setdefault(name, "")
     import numba
 
     try:

@@ -79,6 +79,11 @@ JOB_TIMEOUT = Limit(
 )
 JOB_MEMORY = Limit(4000, "MB", "memory for one scenario", "500 entities for a minute take 1.5 GB")
 
+LIVE_PAUSE = Limit(
+    600, "s", "time between two steps of a running simulation", "drivers catch up within a second or two"
+)
+LIVE_LINE = Limit(100, "MB", "a line of live stdio", "100 000 vehicles; one that sends no end of line fills any memory")
+
 OFFSET_LANES = Limit(
     1.5,
     "",
@@ -133,6 +138,19 @@ CONTEXT_RANGES: Mapping[str, Range] = MappingProxyType(
 
 DISTANCES = frozenset({"lead_distance", "left_distance", "right_distance"})
 """To vehicles in lanes; infinite where a lane has nobody in it."""
+
+LIVE_RANGES: Mapping[str, Range] = MappingProxyType(
+    {
+        "offset": Range(-1e4, 1e4, "10 km"),
+        "base": Range(-1e4, 1e4, "10 km"),
+        "lane": Range(-1e4, 1e4, "lanes of a road"),
+        "s": Range(-1e9, 1e9, "along any road"),
+        "length": Range(0.01, 1e3, "the longest road trains: 53 m"),
+        "width": Range(0.01, 1e3, "as length"),
+        "center_x": Range(-1e3, 1e3, "as length"),
+    }
+)
+"""What a running simulation says of a vehicle beside its context."""
 
 ANY_CONTEXT = Range(-1e30, 1e30, "other names, whatever their unit: squares and cubes stay far from overflow")
 

@@ -1,7 +1,7 @@
 """Columns of a run: what is beyond a fixed amount of memory lies in a file, and is worked on in blocks of rows.
 
 A run of a day has millions of rows, one of an hour with hundreds of cars a hundred million. Whoever works on all of
-them does so with `blocks`, and makes columns that last with `columns`, `kept` and `empty`. Within `beside`, columns
+them does so with `blocks`, and makes columns that last with `columns`, `stored` and `empty`. Within `beside`, columns
 beyond `IN_MEMORY` are mapped from a file without a name, which is gone with the last of them, however the process ends.
 Pages of it that are in memory are given back after a block as soon as they are more than `MAPPED`; nothing is lost by
 that, since the mapping is shared with the file (madvise(2), MADV_DONTNEED). Where the system can't, all is in memory.
@@ -91,7 +91,7 @@ class _Store:
 
 # Of all runs whose columns somebody still has: where they are in memory, and the numbers of their files.
 _chunks = weakref.WeakKeyDictionary[mmap.mmap, tuple[int, int]]()
-_others = 0  # pages of other files: libraries [byte]
+_other_pages = 0  # pages of other files: libraries [byte]
 _rows = 0  # since they were looked at
 _store: ContextVar[_Store | None] = ContextVar("store", default=None)
 
@@ -112,15 +112,15 @@ def beside(folder: Path | None) -> Iterator[None]:
 
 def give_back(rows: int = BLOCK) -> None:
     """After work on so many rows: pages of the file leave memory if they are too many; looked at once a block."""
-    global _others, _rows
+    global _other_pages, _rows
     _rows += rows
     if _rows < BLOCK:
         return
     _rows = 0
-    if _chunks and status_bytes(2) - _others > MAPPED:
+    if _chunks and status_bytes(2) - _other_pages > MAPPED:
         for chunk in tuple(_chunks):
             chunk.madvise(mmap.MADV_DONTNEED)
-        _others = status_bytes(2)
+        _other_pages = status_bytes(2)
 
 
 def empty(shape: int | tuple[int, ...], kind: DTypeLike = np.float64) -> NDArray[Any]:
@@ -150,7 +150,7 @@ def scratch(n: int) -> NDArray[np.float64]:
     return np.frombuffer(store.grown(8 * n), dtype=np.float64, count=n)
 
 
-def kept(values: NDArray[Any]) -> NDArray[Any]:
+def stored(values: NDArray[Any]) -> NDArray[Any]:
     """Values as a column that lasts, shape (n,): themselves while there is memory, read-only where all are the same."""
     store = _store.get()
     if store is None or store.memory >= values.nbytes or not len(values):
@@ -178,7 +178,7 @@ def columns(n: int, parts: Iterable[Sequence[NDArray[Any]]]) -> list[NDArray[Any
     begin = 0
     for part in parts:
         end = begin + len(part[0])
-        found = found or [kept(values) if end == n else values[:1].copy() for values in part]
+        found = found or [stored(values) if end == n else values[:1].copy() for values in part]
         for k, values in enumerate(part if end - begin < n else ()):
             if len(found[k]) == 1 and not _is_all(values, found[k]):
                 column = empty(n, values.dtype)

@@ -8,12 +8,14 @@ import time
 from collections.abc import Sequence
 from functools import cache
 from importlib import import_module
+from signal import SIGINT
 from typing import Annotated, Any, cast
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
 from xosc_lateral.base.errors import FormatError, XoscLateralError
+from xosc_lateral.base.signals import Interrupted, raising_signals
 from xosc_lateral.base.version import __version__
 from xosc_lateral.files.source import guarding_inputs
 
@@ -28,6 +30,7 @@ VERBS = {
     "fit": "Fit a profile to measured drives.",
     "sample": "Sample offsets alone, as a table.",
     "evaluate": "Score a profile on measured drives.",
+    "detect": "Cut-in detectors on scenarios and real traffic.",
     "close-loop": "Find and add what a profile lacks.",
     "import": "Convert recordings into drive tables.",
     "profiles": "The library of driver profiles.",
@@ -42,7 +45,7 @@ MODULES = {
 }  # fmt: skip
 """Verbs whose module, which is loaded when they are used, is not called like them."""
 
-LOOKS: dict[str, Any] = {
+TYPER_STYLE: dict[str, Any] = {
     "no_args_is_help": True,
     "pretty_exceptions_enable": False,
     "context_settings": {"help_option_names": ["-h", "--help"]},
@@ -66,7 +69,7 @@ def _root(
 
 def group_of_verbs() -> typer.Typer:
     """What a module adds its verbs to: a group, though of one."""
-    found = typer.Typer(**LOOKS)
+    found = typer.Typer(**TYPER_STYLE)
     found.callback()(_root)
     return found
 
@@ -90,7 +93,9 @@ class _Verbs(TyperGroup):
         return name, known and verb(str(name)), rest
 
 
-app = typer.Typer(cls=_Verbs, name="xosc-lateral", help="Lifelike lateral movement for OpenSCENARIO traffic.", **LOOKS)
+app = typer.Typer(
+    cls=_Verbs, name="xosc-lateral", help="Lifelike lateral movement for OpenSCENARIO traffic.", **TYPER_STYLE
+)
 app.callback()(_root)
 
 
@@ -113,10 +118,10 @@ def _as_dict(error: XoscLateralError | OSError) -> dict[str, Any]:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; 0 done, 1 the input is at fault (one line on stderr), 2 wrong usage, 130 interrupted."""
+    """Run one command; 0 done, 1 the input is at fault (one line on stderr), 2 wrong usage, 128 + a signal."""
     words = sys.argv[1:] if argv is None else list(argv)
     try:
-        with guarding_inputs():
+        with guarding_inputs(), raising_signals():
             code = app(args=words, standalone_mode=False)
     except (XoscLateralError, OSError) as error:
         if isinstance(error, BrokenPipeError):  # `... -o - | head` has seen enough
@@ -130,12 +135,12 @@ def main(argv: Sequence[str] | None = None) -> int:
             if "--json" in words:
                 print(json.dumps(_as_dict(error), ensure_ascii=False))
             code = 1
-    except (typer.Abort, KeyboardInterrupt):
+    except (typer.Abort, KeyboardInterrupt, Interrupted) as error:
         print(
-            "\nxosc-lateral: interrupted; files that were written are complete. Run it again for the rest.",
+            "xosc-lateral: interrupted; files that were written are complete. Run it again for the rest.",
             file=sys.stderr,
         )
-        code = 130
+        code = 128 + (error.number if isinstance(error, Interrupted) else SIGINT)
     except Exception as error:
         # Typer's usage errors come from a click that is vendored in some of its releases: known by attributes.
         if not hasattr(error, "exit_code") or not hasattr(error, "format_message"):

@@ -10,6 +10,7 @@ import typer
 from typer.core import TyperCommand
 
 from xosc_lateral.base.limits import JOB_MEMORY, JOB_TIMEOUT
+from xosc_lateral.base.signals import Interrupted
 from xosc_lateral.cli import VERBS, group_of_verbs
 from xosc_lateral.cli.words import Osi, Written, command, say_json, warn, write_stdout
 from xosc_lateral.files.openscenario.write.target import Player
@@ -184,12 +185,12 @@ def _convert_batch(inputs: Sequence[str], output: str | None, options: Mapping[s
 
     try:
         result = convert_many(list(inputs), output, on_outcome=show, **options)
-    except KeyboardInterrupt:
+    except Interrupted as signal:
         typer.echo(
-            f"\nxosc-lateral: interrupted; {finished} outputs in {output} are finished, and the same command continues",
+            f"xosc-lateral: interrupted; {finished} outputs in {output} are finished, and the same command continues",
             err=True,
         )
-        raise typer.Exit(130) from None
+        raise typer.Exit(128 + signal.number) from None
     said.say_words(str(result), {"kind": "summary", **result.totals()}, err=False)
     if result.cut_off and (said.quiet or said.as_json):
         warn([f"{len(result.cut_off)} runs end at the time limit, not by themselves: {result.cut_off[0]} is one"])

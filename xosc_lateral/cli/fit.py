@@ -38,7 +38,7 @@ def fit(
         typer.Option(
             parser=_known_model,
             metavar="[two-level|autoregressive|PLUG-IN]",
-            help="two-level: Neis and Beyerer; autoregressive: the default (formerly best).",
+            help="two-level: Neis and Beyerer; autoregressive: the default; best: the same.",
         ),
     ] = "autoregressive",
     mapped: Mapped,

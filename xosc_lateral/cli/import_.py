@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from xosc_lateral.cli import LOOKS, VERBS, group_of_verbs
+from xosc_lateral.cli import TYPER_STYLE, VERBS, group_of_verbs
 from xosc_lateral.cli.words import Columns, Mapped, MappingFile, Written, command, pairs, spelled_out, write_stdout
 
 Output = Annotated[
@@ -61,7 +61,7 @@ def _formats() -> list[str]:
 def _plain_command(name: str) -> Any:
     from xosc_lateral.workflows.recordings.importers import find_importer
 
-    one = typer.Typer(context_settings=LOOKS["context_settings"], rich_markup_mode=None)
+    one = typer.Typer(context_settings=TYPER_STYLE["context_settings"], rich_markup_mode=None)
 
     def run(
         sources: Annotated[list[Path], typer.Argument(metavar="SOURCE...", show_default=False)],
@@ -175,12 +175,15 @@ def fcd(
     source: Annotated[Path, typer.Argument(help="What --fcd-output wrote (.xml).", show_default=False)],
     *,
     output: Output,
-    net: Annotated[Path | None, typer.Option(help="Road network (.net.xml): widths and counts of lanes.")] = None,
+    net: Annotated[
+        Path | None, typer.Option(help="Road network (.net.xml): lanes, side of the road, who is on the next edge.")
+    ] = None,
+    types: Annotated[Path | None, typer.Option(help="File with the vehicle types (.rou.xml): lengths.")] = None,
     lane_width: Annotated[float, typer.Option(help="Without a network. [m]", min=1, max=10)] = 3.2,
     said: Written,
 ) -> None:
     """SUMO's FCD output of a run with the sublane model: a drive for every vehicle."""
-    _import("fcd", [source], output, said, net=net, lane_width=lane_width)
+    _import("fcd", [source], output, said, net=net, types=types, lane_width=lane_width)
 
 
 @command(

@@ -132,12 +132,12 @@ def stdio(
     import os
     import sys
 
-    from xosc_lateral.workflows.live.stdio import Pipe
+    from xosc_lateral.workflows.live.stdio import Pipe, lines_of
     from xosc_lateral.workflows.result import given_profile
 
     pipe = Pipe(given_profile(profile, library or ()), seed=seed, road=road)
     try:
-        for line in pipe.answers(sys.stdin):
+        for line in pipe.answers(lines_of(sys.stdin.buffer)):
             print(line, flush=True)
     except BrokenPipeError:  # nobody listens any more; nor is there anybody to flush to at the end
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -14,10 +14,10 @@ from xosc_lateral.cli.words import (
     Force,
     Osi,
     Parameters,
+    Printing,
     Quiet,
     Road,
     RoadPath,
-    Said,
     TimeLimit,
     Written,
     command,
@@ -104,7 +104,7 @@ def segments(
     time_limit: TimeLimit = None,
     parameter: Parameters = None,
     allow: Allow = None,
-    said: Said,
+    said: Printing,
 ) -> None:
     """List each entity's road-following segments, and the reason for everything else."""
     from xosc_lateral import play, segments

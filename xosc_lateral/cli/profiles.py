@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Library, Said, Seed, Written, command, pairs, say_json, write_stdout
+from xosc_lateral.cli.words import Library, Printing, Seed, Written, command, pairs, say_json, write_stdout
 
 Name = Annotated[str, typer.Argument(metavar="NAME|PATH", help="Driver profile.", show_default=False)]
 Names = Annotated[list[str], typer.Argument(metavar="NAME|PATH...", help="Driver profiles.", show_default=False)]
@@ -37,7 +37,7 @@ def list_(
         list[str] | None,
         typer.Option(metavar="FIELD=VALUE", help="Only profiles with this value, e.g. country=DE; may be repeated."),
     ] = None,
-    said: Said,
+    said: Printing,
 ) -> None:
     """List all profiles with model and source, and name files that cannot be read."""
     from xosc_lateral import list_profiles
@@ -169,7 +169,7 @@ def tag(
     tags: Tags = None,
     remove: Annotated[list[str] | None, typer.Option(metavar="TAG", help="Tag to remove; may be repeated.")] = None,
     fields: Fields = None,
-    said: Said,
+    said: Printing,
 ) -> None:
     """Change tags and metadata of a profile of your own, in its file."""
     from xosc_lateral.files.profiles import facts_of
@@ -209,7 +209,7 @@ def export(
 
 
 @command(group, "check", "Check a library for broken files.", "profiles check --library team/")
-def check(*, library: Library = None, said: Said) -> None:
+def check(*, library: Library = None, said: Printing) -> None:
     """Read every profile of the library; exit with 1 if one cannot be read or its id is not its file's name."""
     from xosc_lateral import list_profiles
 

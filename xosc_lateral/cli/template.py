@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Said, Written, command, pairs
+from xosc_lateral.cli.words import Printing, Written, command, pairs
 
 app = group_of_verbs()
 group = typer.Typer(help="Maneuver-based motorway scenarios to start from.", no_args_is_help=True)
@@ -18,7 +18,7 @@ app.add_typer(group, name="template", short_help=VERBS["template"])
 def list_(
     name: Annotated[str | None, typer.Argument(help="Show this template's settings.", show_default=False)] = None,
     *,
-    said: Said,
+    said: Printing,
 ) -> None:
     """List the templates, or one template's settings with units, defaults and ranges."""
     from xosc_lateral import list_templates

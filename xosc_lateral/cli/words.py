@@ -151,7 +151,7 @@ class Mapped:
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
+class Printing:
     """Options of verbs that say what came out, and how it is said."""
 
     quiet: Quiet = False
@@ -182,7 +182,7 @@ class Said:
 
 
 @dataclass(frozen=True, slots=True)
-class Written(Said):
+class Written(Printing):
     """The same of verbs that write files."""
 
     force: Force = False
@@ -228,7 +228,7 @@ def _is_settings(kind: Any) -> bool:
 def spelled_out(verb: Callable[..., Any]) -> Callable[..., None]:
     """The verb with options of its own for those that it has together in one parameter.
 
-    Such a parameter is a dataclass as `Said`, or a mapping that is annotated with a class of settings.
+    Such a parameter is a dataclass as `Printing`, or a mapping that is annotated with a class of settings.
     """
     own = list[Parameter]()
     groups = dict[str, tuple[Callable[..., Any], list[Parameter]]]()

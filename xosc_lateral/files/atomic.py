@@ -4,12 +4,31 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 
 from xosc_lateral.files.source import refuse_guarded
+
+_RUN: ContextVar[str] = ContextVar("run", default="")
+
+
+@contextmanager
+def files_of_run(run: str) -> Iterator[None]:
+    """While the block runs, temporary files carry this id: what a kill leaves is told from what others are writing."""
+    token = _RUN.set(run)
+    try:
+        yield
+    finally:
+        _RUN.reset(token)
+
+
+def temporary_files(runs: Iterable[str]) -> re.Pattern[str]:
+    """Names that temporary files of these runs have."""
+    return re.compile(rf"\..+\.(?:{'|'.join(map(re.escape, runs))})-[0-9a-z_]{{8}}\.tmp(?:\.\w+)?")
 
 
 def write_atomically(path: Path | str, data: bytes | str, *, durable: bool = False) -> Path:
@@ -50,7 +69,8 @@ def replace_atomically(path: Path | str, write: Callable[[Path], object]) -> Pat
 def _temporary_beside(path: Path) -> Iterator[Path]:
     # The suffix stays: some writers (Parquet, CSV.gz) choose the format by it.
     path.parent.mkdir(parents=True, exist_ok=True)
-    descriptor, name = tempfile.mkstemp(prefix=f".{path.stem[:40]}.", suffix=f".tmp{path.suffix}", dir=path.parent)
+    prefix = f".{path.stem[:40]}.{_RUN.get() or os.getpid()}-"
+    descriptor, name = tempfile.mkstemp(prefix=prefix, suffix=f".tmp{path.suffix}", dir=path.parent)
     os.close(descriptor)
     temporary = Path(name)
     mask = os.umask(0)

@@ -11,7 +11,7 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.source import read_toml
 
 SETTINGS = frozenset({"ego", "neighbours"})
-"""Of a conversion (`pipeline.settings.ConvertSettings`), that may stand there."""
+"""Of a conversion (`conversion.settings.ConvertSettings`), that may stand there."""
 
 KEYS = ("library", *sorted(SETTINGS))
 

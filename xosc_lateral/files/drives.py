@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,12 +14,18 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.segment import CONTEXT_UNITS
-from xosc_lateral.drivers.drives.cleaning import MAX_MEDIAN_SPEED, MAX_OUTSIDE, OWN, clean_drive
+from xosc_lateral.drivers.drives.cleaning import DRIVE_COLUMNS, MAX_MEDIAN_SPEED, MAX_OUTSIDE, clean_drive
 from xosc_lateral.drivers.drives.cuts import MIN_RUN
 from xosc_lateral.drivers.drives.drive import Drive
-from xosc_lateral.drivers.model.plausibility import first_implausible, implausible, implausible_rows, nobody
+from xosc_lateral.drivers.model.plausibility import drives_nobody, first_implausible, implausible, implausible_rows
+from xosc_lateral.files.clock import seconds_of_stamps
+from xosc_lateral.files.labels import file_label
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping
+from xosc_lateral.files.rows import chosen_rows, without_markers
 from xosc_lateral.files.tables import comma_numbers, indicators, listed, numbers_of, plain_cells, read_table
+
+LABELS = ("drive", "driver")
+"""Columns that say which drive a row is of, and whose."""
 
 MAX_LEVELS = 12
 """A column of whole numbers with at most so many values holds levels, not a quantity."""
@@ -31,7 +38,7 @@ def read_drives(paths: str | Path | Sequence[str | Path], mapping: MappingLike |
     `NotEnoughDataError` when a file holds no drive with two rows of time, offset and lane width.
 
     `paths`: tables; the suffix gives the format. `mapping`: what columns are called, and how tables are written; see
-    `formats.mapping`. Returns list of Drive: in the order of the files and of first appearance; a drive without a name
+    `files.mapping`. Returns list of Drive: in the order of the files and of first appearance; a drive without a name
     is called after its file. Rows are sorted by time, repeated times dropped, rows with a missing value left out (a
     gap).
     """
@@ -45,11 +52,15 @@ def read_drives(paths: str | Path | Sequence[str | Path], mapping: MappingLike |
 
 
 def with_distinct_names(drives: Sequence[Drive]) -> list[Drive]:
-    """Drives of several tables; those of one name are called by their table as well."""
-    names = [drive.name for drive in drives]
+    """Drives of several tables; those of one name are called by their table as well, of one table's by number."""
+    names = Counter(drive.name for drive in drives)
+    apart = [drive.name if names[drive.name] == 1 else f"{drive.source}:{drive.name}" for drive in drives]
+    seen, again = Counter[str](), Counter(apart)
+    for k, name in enumerate(apart):
+        seen[name] += 1
+        apart[k] = name if again[name] == 1 else f"{name} #{seen[name]}"
     return [
-        drive if names.count(drive.name) == 1 else replace(drive, name=f"{drive.source}:{drive.name}")
-        for drive in drives
+        drive if name == drive.name else replace(drive, name=name) for drive, name in zip(drives, apart, strict=True)
     ]
 
 
@@ -67,7 +78,8 @@ def drives_of_table(table: pd.DataFrame, mapping: MappingLike, path: Path | str 
         clean_drive(name, {key: values[rows] for key, values in columns.items()}, levels, path)
         for name, rows in zip(names, every, strict=True)
     ]
-    found = [drive for drive in drives if drive is not None]
+    drivers = [_driver(table, name, rows, path) for name, rows in zip(names, every, strict=True)]
+    found = [replace(drive, driver=driver) for drive, driver in zip(drives, drivers, strict=True) if drive is not None]
     if not found:
         what = f"no drive has two rows with time, offset and lane width; {MIN_RUN:g} s are needed"
         raise NotEnoughDataError(f"{path}: {what}")
@@ -85,13 +97,17 @@ def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.Dat
         if source.column not in table.columns:
             what = f"no column {source.column!r} for {name}; there are {listed(table.columns)}"
             raise FormatError(what, path=path, line=1)
+    table = chosen_rows(without_markers(table, mapping.missing, path), mapping.rows, path)
     own = [name for name in table.columns if name not in taken and name not in mapping.columns]
     kept = {name: mapping.numbers(name, plain_cells(table[name]), path) for name in own}
     for name, source in mapping.columns.items():
         column = mapping.numbers(name, plain_cells(table[source.column]), path)
-        if name != "drive" and source.factor != 1.0:
+        if name not in LABELS and source.factor != 1.0:
             column = pd.Series(numbers_of(column, path, name) * source.factor, index=column.index)
         kept[name] = column
+    if "time" in kept and not pd.api.types.is_numeric_dtype(kept["time"]):
+        seconds = seconds_of_stamps(kept["time"], path, mapping.time_zone, kept.get("drive"))
+        kept["time"] = kept["time"] if seconds is None else pd.Series(seconds, index=table.index)
     return pd.DataFrame(kept).assign(**{name: value for name, value in mapping.recorded.items() if name not in kept})
 
 
@@ -101,9 +117,9 @@ def _numeric_columns(table: pd.DataFrame, path: Path) -> dict[str, FloatArray]:
 
     columns: dict[str, FloatArray] = {}
     for name in table.columns:
-        if name == "drive":
+        if name in LABELS:
             continue
-        if name in (*OWN, "speed") or pd.api.types.is_numeric_dtype(table[name]):
+        if name in (*DRIVE_COLUMNS, "speed") or pd.api.types.is_numeric_dtype(table[name]):
             columns[name] = _cleaned(table, name, path)
         elif table[name].isna().all():
             columns[name] = np.full(len(table), np.nan)
@@ -117,8 +133,8 @@ def _numeric_columns(table: pd.DataFrame, path: Path) -> dict[str, FloatArray]:
 def _cleaned(table: pd.DataFrame, name: str, path: Path) -> FloatArray:
     """A column of numbers without what is none."""
     values = numbers_of(table[name], path, name)
-    values[np.isinf(values) & ~nobody(name, values)] = np.nan
-    if name not in OWN:
+    values[np.isinf(values) & ~drives_nobody(name, values)] = np.nan
+    if name not in DRIVE_COLUMNS:
         _leave_out_nonsense(values, name, path)
     return values
 
@@ -137,7 +153,7 @@ def _leave_out_nonsense(values: FloatArray, name: str, path: Path) -> None:
 
 def _holds_levels(name: str, values: FloatArray) -> bool:
     """Counts, indices and flags do; a speed that happens to be constant doesn't."""
-    if name in OWN or CONTEXT_UNITS.get(name, "-") != "-":
+    if name in DRIVE_COLUMNS or CONTEXT_UNITS.get(name, "-") != "-":
         return False
     known = values[~np.isnan(values)]
     return bool(np.all(known == np.round(known)) and len(np.unique(known)) <= MAX_LEVELS)
@@ -156,10 +172,21 @@ def _require_columns(columns: Mapping[str, FloatArray], path: Path) -> None:
 
 def _drive_names(table: pd.DataFrame, path: Path) -> tuple[list[str], list[NDArray[np.intp]]]:
     if "drive" not in table.columns:
-        return [path.name.split(".")[0]], [np.arange(len(table))]
+        return [file_label(path)], [np.arange(len(table))]
     codes, names = table["drive"].factorize()
     if (codes < 0).any():
         raise FormatError("no value", path=path, line=int(np.argmax(codes < 0)) + 2, element="column 'drive'")
     order = np.argsort(codes, kind="stable")
     bounds = np.searchsorted(codes[order], np.arange(1, len(names)))
     return [str(name) for name in names], list(np.split(order, bounds))
+
+
+def _driver(table: pd.DataFrame, name: str, rows: NDArray[np.intp], path: Path) -> str:
+    """Who drove, empty where the table doesn't say."""
+    if "driver" not in table.columns:
+        return ""
+    found = table["driver"].iloc[rows].dropna().unique()
+    if len(found) > 1:
+        what = f"drive {name}: {found[0]} and {found[1]}; a drive has one driver"
+        raise FormatError(what, path=path, element="column 'driver'")
+    return str(found[0]) if len(found) else ""

@@ -26,18 +26,26 @@ def parse_json(data: bytes, path: Path) -> Any:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise FormatError(f"not JSON in UTF-8 ({error}): save it as UTF-8", path=path) from error
-    depth = deepest = 0
-    for bracket in _BRACKETS.finditer(_STRINGS.sub("", text)):
-        depth += 1 if bracket[0] in "[{" else -1
-        deepest = max(deepest, depth)
-    if deepest > JSON_DEPTH.value:
-        raise FormatError(JSON_DEPTH.refusal(deepest), path=path)
+    try:
+        refuse_depth(text)
+    except ValueError as error:
+        raise FormatError(str(error), path=path) from error
     try:
         return json.loads(text, parse_constant=_refuse_constant, parse_float=_finite)
     except json.JSONDecodeError as error:
         raise FormatError(f"not JSON: {error.msg}", path=path, line=error.lineno) from error
     except ValueError as error:
         raise FormatError(f"not JSON: {error}", path=path) from error
+
+
+def refuse_depth(text: str) -> None:
+    """Refuse what is nested deeper than `limits.JSON_DEPTH`, JSON or TOML, with a `ValueError`."""
+    depth = deepest = 0
+    for bracket in _BRACKETS.finditer(_STRINGS.sub("", text)):
+        depth += 1 if bracket[0] in "[{" else -1
+        deepest = max(deepest, depth)
+    if deepest > JSON_DEPTH.value:
+        raise ValueError(JSON_DEPTH.refusal(deepest))
 
 
 def _finite(text: str) -> float:

@@ -2,7 +2,10 @@
 
 A file is TOML: how tables are written (``encoding``, ``separator``, ``decimal``), what the recording shows
 (``valid_below`` in Hz, ``resolution`` in m), ``[columns]`` with a line per standard name, as in ``--map``,
-``[values.NAME]`` with the number that each text of a column stands for, ``[roles]``.
+``[values.NAME]`` with the number that each text of a column stands for (of `vehicle_class`: the class that a number
+stands for), ``[roles]``; besides, ``rows = ["quality >= 2"]``: which rows
+count, ``missing = [-9999]``: what stands for no value, ``time_zone = "Europe/Berlin"``: of local stamps,
+``reference = "front"``, "centre", "rear" or "rear axle": the point of tracks that x and y are of.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ import numpy as np
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.segment import CONTEXT_UNITS
+from xosc_lateral.files.rows import as_word, parse_condition
 from xosc_lateral.files.source import read_toml
 
 # Factors to SI. Degrees stay apart from radians only by their factor.
@@ -99,7 +103,12 @@ def factor(column: str, unit: str) -> float:
 RECORDED = ("valid_below", "resolution")
 """What a mapping says of the recordings: driving below a frequency [Hz], offsets to a step [m]."""
 
-KEYS = ("encoding", "separator", "decimal", *RECORDED, "columns", "values", "roles")
+KEYS = (
+    "encoding", "separator", "decimal", *RECORDED, "columns", "values", "roles", "rows", "missing", "time_zone",
+    "reference",
+)  # fmt: skip
+
+REFERENCES = ("centre", "front", "rear", "rear axle")
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +133,25 @@ class TableMapping:
     encoding: str | None = None  # encoding, separator: of text files; None: found out
     separator: str | None = None
     decimal: str = "."
+    classes: Mapping[str, str] = field(default_factory=dict)  # vehicle classes by what the table has for them
+    rows: tuple[str, ...] = ()  # conditions that rows have to fulfil
+    missing: tuple[float | str, ...] | None = None  # what stands for no value; None: not said
+    time_zone: str = ""  # of local stamps
+    reference: str = "centre"  # of `REFERENCES`: the point of a vehicle that x and y of tracks are of
     recorded: Mapping[str, float] = field(default_factory=dict)  # by the names in `RECORDED`
+
+    def class_names(self, column: pd.Series, path: Path) -> pd.Series:
+        """Vehicle classes in words.
+
+        Raises `FormatError`: they are numbers, and the mapping does not say of what.
+        """
+        words = column.map(as_word)
+        if self.classes:
+            return words.map(lambda word: self.classes.get(word, word))
+        if pd.api.types.is_numeric_dtype(column) and column.notna().any():
+            what = f"numbers such as {words.iloc[0]}: [values.vehicle_class] of the mapping says what they stand for"
+            raise FormatError(what, path=path, element=f"column {str(column.name)!r}")
+        return words
 
     def with_words(self, words: Mapping[str, str]) -> TableMapping:
         """With further columns, as ``--map`` has them, in place of those of the same name."""
@@ -139,7 +166,7 @@ class TableMapping:
         if name not in self.values:
             return column
         known = {text.strip().lower(): number for text, number in self.values[name].items()}
-        texts = column.map(lambda cell: "" if pd.isna(cell) else _as_word(cell))
+        texts = column.map(lambda cell: "" if pd.isna(cell) else as_word(cell))
         strange = texts[(texts != "") & ~texts.isin(list(known))]
         if len(strange):
             what = f"{strange.iloc[0]!r} is not in [values.{name}] of the mapping: {', '.join(self.values[name])}"
@@ -162,11 +189,6 @@ def as_mapping(given: MappingLike | None) -> TableMapping:
     words = {name: entry for name, entry in given.items() if isinstance(entry, str)}
     sources = {name: entry for name, entry in given.items() if isinstance(entry, ColumnSource)}
     return TableMapping(sources).with_words(words)
-
-
-def _as_word(cell: object) -> str:
-    whole = isinstance(cell, float) and cell.is_integer()
-    return str(int(cell) if whole else cell).strip().lower()  # type: ignore[call-overload]
 
 
 def parse_map(words: Iterable[str]) -> dict[str, ColumnSource]:
@@ -205,15 +227,42 @@ def read_mapping(path: Path) -> TableMapping:
     for key in ("encoding", "separator"):
         if not isinstance(values.get(key, ""), str) or values.get(key) == "":
             raise FormatError(f"{key} {values[key]!r}, expected a text", path=path)
+    for key in ("rows", "missing"):
+        if not isinstance(values.get(key, []), list):
+            raise FormatError(f"{key} {values[key]!r}, expected a list", path=path)
+    rows = [_text(entry, path, "rows") for entry in values.get("rows", [])]
+    for condition in rows:
+        parse_condition(condition, path)
+    reference = values.get("reference", "centre")
+    if reference not in REFERENCES:
+        raise FormatError(f"reference {reference!r}, expected {', '.join(REFERENCES)}", path=path)
     return TableMapping(
         {name: _column(name, entry, path) for name, entry in values.get("columns", {}).items()},
-        {name: _numbers(name, entry, path) for name, entry in values.get("values", {}).items()},
+        {
+            name: _numbers(name, entry, path)
+            for name, entry in values.get("values", {}).items()
+            if name != "vehicle_class"
+        },
         {name: _text(entry, path, f"[roles] {name}") for name, entry in values.get("roles", {}).items()},
         values.get("encoding"),
         values.get("separator"),
         decimal,
+        {
+            str(number).strip().lower(): _text(entry, path, f"[values.vehicle_class] {number}")
+            for number, entry in values.get("values", {}).get("vehicle_class", {}).items()
+        },
+        tuple(rows),
+        None if "missing" not in values else tuple(_marker(entry, path) for entry in values["missing"]),
+        _text(values.get("time_zone", "-"), path, "time_zone").removeprefix("-"),
+        reference,
         {key: _above_zero(values[key], path, key) for key in RECORDED if key in values},
     )
+
+
+def _marker(entry: Any, path: Path) -> float | str:
+    if isinstance(entry, bool) or not isinstance(entry, int | float | str):
+        raise FormatError(f"{entry!r}, expected a number or a text", path=path, element="missing")
+    return entry if isinstance(entry, str) else float(entry)
 
 
 def _above_zero(entry: Any, path: Path, key: str) -> float:

@@ -12,7 +12,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from xosc_lateral.base.errors import DriverProfileError, FormatError, XoscLateralError
+from xosc_lateral.base.errors import DriverProfileError, FormatError, XoscLateralError, did_you_mean
 from xosc_lateral.base.limits import PROFILE_SIZE
 from xosc_lateral.base.plugins import plugins
 from xosc_lateral.base.shipped import shipped_folder
@@ -58,7 +58,10 @@ def find_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -
     if (offered := _from_plugins().get(text)) is not None:
         return offered
     known = sorted({path.stem for path in list_profiles(folders)})
-    raise DriverProfileError(f"no profile {text!r}; known are {', '.join(known) or 'none'}, or give the path of a file")
+    raise DriverProfileError(
+        f"no profile {text!r}{did_you_mean(text, known)}; known are {', '.join(known) or 'none'}, "
+        "or give the path of a file"
+    )
 
 
 def list_profiles(folders: Iterable[str | Path] = ()) -> list[Path]:

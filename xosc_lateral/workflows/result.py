@@ -126,7 +126,7 @@ def given_drives(drives: DrivesLike, columns: MappingLike | None = None) -> Give
     Raises
     ------
     FormatError, NotEnoughDataError
-        See `formats.drives.read_drives`.
+        See `files.drives.read_drives`.
     """
     from xosc_lateral.files.drives import drives_of_table, read_drives, with_distinct_names
     from xosc_lateral.files.mapping import as_mapping

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from xosc_lateral.drivers.evaluation.classifier import classifier_two_sample_test
-from xosc_lateral.drivers.evaluation.filters import HIGHEST, PASSED, below_half_hertz, thinned
+from xosc_lateral.drivers.evaluation.filters import PASS_FREQUENCY, STOP_FREQUENCY, below_half_hertz, thinned
 
 STEP = 0.2
 
 
 @pytest.mark.parametrize(
-    ("frequency", "left"), [(0.1, 1.0), (PASSED, 1.0), (0.45, 0.5), (HIGHEST, 0.0), (0.6, 0.0), (1.5, 0.0)]
+    ("frequency", "left"),
+    [(0.1, 1.0), (PASS_FREQUENCY, 1.0), (0.45, 0.5), (STOP_FREQUENCY, 0.0), (0.6, 0.0), (1.5, 0.0)],
 )
 def test_movement_above_half_a_hertz_is_gone(frequency: float, left: float) -> None:
     wave = np.sin(2.0 * np.pi * frequency * STEP * np.arange(800) + 0.4)
@@ -44,8 +45,8 @@ def test_rows_are_thinned_to_what_is_left(step: float, every: int) -> None:
 
 def test_a_classifier_sees_nothing_of_what_is_faster() -> None:
     rng = np.random.default_rng(1)
-    slow = np.array([coloured(rng, 0.0, HIGHEST, 1500) for _ in range(150)])
-    fast = np.array([coloured(rng, HIGHEST, 1.0, 1500) for _ in range(150)])
+    slow = np.array([coloured(rng, 0.0, STOP_FREQUENCY, 1500) for _ in range(150)])
+    fast = np.array([coloured(rng, STOP_FREQUENCY, 1.0, 1500) for _ in range(150)])
     drives = np.array([f"d{number}" for number in range(150)])
     middle = slice(675, 825)  # 30 s, as far from the ends as the filter sees
     apart = classifier_two_sample_test(slow[:, middle], (slow + fast)[:, middle], drives, drives, fast=True, seed=0)

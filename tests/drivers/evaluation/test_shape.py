@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import periodogram
 from scipy.stats import entropy, kurtosis
 
-from xosc_lateral.drivers.evaluation.shape import EXTREME, LARGE_CHANGE, SHAPES, shape_features
+from xosc_lateral.drivers.evaluation.shape import EXTREME_QUANTILE, LARGE_CHANGE, SHAPES, shape_features
 
 RNG = np.random.default_rng(41)
 TIME = 0.2 * np.arange(51)
@@ -66,8 +66,8 @@ def described(snippet: np.ndarray) -> dict[str, float]:
         "large_changes": float((np.abs(change) > LARGE_CHANGE).mean()),
         "centroid": float(share @ np.linspace(0.0, 1.0, len(share))),
         "low_power": float(share[: max(1, len(share) // 5)].sum()),
-        "late_extremes_high": median_place(z, z > EXTREME),
-        "late_extremes_low": median_place(z, z < -EXTREME),
+        "late_extremes_high": median_place(z, z > EXTREME_QUANTILE),
+        "late_extremes_low": median_place(z, z < -EXTREME_QUANTILE),
         "motifs": words(z),
         "forecast_error": float(np.std([z[k] - z[k - 3 : k].mean() for k in range(3, m)])),
         "kurtosis": float(kurtosis(z, fisher=False)),

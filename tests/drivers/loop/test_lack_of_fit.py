@@ -45,7 +45,7 @@ def test_groups_that_stand_out_are_named_the_largest_first() -> None:
 def test_something_is_left_when_it_is_sure_and_beyond_the_floor(
     unexplained: float, p_value: float, clear: bool
 ) -> None:
-    assert LackOfFit({}, (), 0.1, unexplained, p_value).clear is clear
+    assert LackOfFit({}, (), 0.1, unexplained, p_value).is_clear is clear
 
 
 def test_cells_that_nobody_drove_in_do_not_count() -> None:
@@ -82,10 +82,10 @@ def test_every_group_has_its_own_error_and_floor(drive: Any) -> None:
 def test_a_profile_that_is_the_drive_leaves_nothing(drive: Any) -> None:
     lack = left_by(drive, drive[0].offset)
     assert lack.where == ()
-    assert (lack.unexplained, lack.p_value, lack.clear) == (0.0, 1.0, False)
+    assert (lack.unexplained, lack.p_value, lack.is_clear) == (0.0, 1.0, False)
 
 
 def test_an_error_that_no_half_of_the_drives_has_is_as_rare_as_the_draws_can_say(drive: Any) -> None:
     lack = left_by(drive, 100.0 * drive[0].offset)
     assert lack.p_value == pytest.approx(1.0 / 65.0)
-    assert lack.clear
+    assert lack.is_clear

@@ -46,7 +46,7 @@ def test_the_probability_is_that_of_an_analysis_of_variance_with_halves_as_repea
 def test_the_scatter_that_was_planted_comes_back_without_the_noise(shift, log_spread):
     """200 drives: a standard deviation is known to 5 %, and what is not there to about a hundredth."""
     found, _ = drivers(2, 200, shift=shift, log_spread=log_spread)
-    assert found is not None and found.found and found.drives == 200
+    assert found is not None and found.is_found and found.drives == 200
     assert found.shift == pytest.approx(shift, rel=0.15, abs=0.01)
     assert found.log_spread == pytest.approx(log_spread, rel=0.15, abs=0.05)
 
@@ -63,7 +63,7 @@ def test_drives_of_one_driver_are_told_from_none_and_their_probabilities_are_eve
 def test_what_an_effect_between_drives_explains_is_no_driver():
     keeps = np.linspace(-0.4, 0.4, 60)
     explained, _ = drivers(3, 60, known=keeps)
-    assert explained is not None and not explained.found and explained.shift < 0.02
+    assert explained is not None and not explained.is_found and explained.shift < 0.02
 
 
 def test_few_drives_and_short_ones_say_nothing():

@@ -34,7 +34,7 @@ def test_a_profile_s_own_drives_show_its_spectrum(profile: DriverProfile) -> Non
         core_model.compare_spectrum_shapes(profile, driven(STEADY, seed), np.random.SeedSequence(1))
         for seed in (21, 22, 23)
     ]
-    assert not any(one.found for one in found)
+    assert not any(one.is_found for one in found)
     assert max(one.p_value for one in found) > 0.05
     for one in found:
         np.testing.assert_allclose(one.ratio, 1.0, atol=0.15)
@@ -43,7 +43,7 @@ def test_a_profile_s_own_drives_show_its_spectrum(profile: DriverProfile) -> Non
 def test_a_drive_with_more_fine_movement_is_found_and_the_band_told(profile: DriverProfile) -> None:
     rough = replace(STEADY, fine=replace(STEADY.fine, damping=3.0 * STEADY.fine.damping))
     found = core_model.compare_spectrum_shapes(profile, driven(rough, 24), np.random.SeedSequence(1))
-    assert found.found
+    assert found.is_found
     assert found.ratio[0] == pytest.approx(1.0 / 3.0, rel=0.2)
     np.testing.assert_allclose(found.ratio[-1], 1.0, atol=0.15)
 
@@ -78,13 +78,13 @@ def test_too_short_a_drive_says_nothing(profile: DriverProfile) -> None:
     timeline = timeline_of(movement(np.random.default_rng(2), 300.0))
     found = core_model.compare_spectrum_shapes(profile, timeline, np.random.SeedSequence(1))
     assert found.p_value == 1.0
-    assert not found.found
+    assert not found.is_found
 
 
 @pytest.mark.parametrize(("p_value", "ratio", "found"), [(1e-6, 1.2, True), (1e-6, 1.03, False), (0.2, 3.0, False)])
 def test_a_difference_is_sure_and_large_enough_or_none(p_value: float, ratio: float, found: bool) -> None:
-    assert SpectrumShape(TIMES_S, np.array([1.0, ratio]), p_value).found is found
-    assert SpectrumShape(TIMES_S, np.array([1.0, 1.0 / ratio]), p_value).found is found
+    assert SpectrumShape(TIMES_S, np.array([1.0, ratio]), p_value).is_found is found
+    assert SpectrumShape(TIMES_S, np.array([1.0, 1.0 / ratio]), p_value).is_found is found
     assert np.log(1.03) < WORTH_ADDING < np.log(1.2)
 
 

@@ -58,7 +58,7 @@ def test_each_driver_is_the_stream_of_his_seed_whoever_comes_and_goes(name: str)
     streams = {k: OffsetStream(profile, seeds[k], rate=20.0) for k in range(n)}
     there: list[int] = []
     for tick, context in enumerate(rows):
-        group.keep(np.array([goes[k] > tick for k in there], dtype=bool))
+        group.keep_present(np.array([goes[k] > tick for k in there], dtype=bool))
         there = [k for k in there if goes[k] > tick]
         new = [k for k in range(n) if comes[k] == tick]
         group.add([seeds[k] for k in new])

@@ -7,7 +7,13 @@ import pytest
 
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.limits import OFFSET_LANES
-from xosc_lateral.drivers.model.plausibility import NARROW, check_context, check_offsets, first_implausible, implausible
+from xosc_lateral.drivers.model.plausibility import (
+    MINIMUM_LANE_WIDTH,
+    check_context,
+    check_offsets,
+    first_implausible,
+    implausible,
+)
 
 REACH = OFFSET_LANES.value
 
@@ -21,9 +27,9 @@ def test_offsets_up_to_the_limit_pass_and_beyond_it_are_refused_to_either_side(s
 
 
 def test_a_lane_that_opens_is_held_against_a_narrow_one() -> None:
-    check_offsets(np.array([REACH * NARROW - 0.01]), np.array([0.1]), "x")
+    check_offsets(np.array([REACH * MINIMUM_LANE_WIDTH - 0.01]), np.array([0.1]), "x")
     with pytest.raises(DriverProfileError):
-        check_offsets(np.array([REACH * NARROW + 0.01]), np.array([0.1]), "x")
+        check_offsets(np.array([REACH * MINIMUM_LANE_WIDTH + 0.01]), np.array([0.1]), "x")
 
 
 def test_the_first_bad_row_is_named_with_its_time() -> None:

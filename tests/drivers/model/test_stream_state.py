@@ -50,7 +50,7 @@ def test_every_part_is_under_the_seal(state: dict[str, Any], name: str) -> None:
 
 @pytest.mark.parametrize("values", [{}, {"format": "another"}, [], None], ids=str)
 def test_what_is_no_state_is_refused(values: Any) -> None:
-    with pytest.raises(DriverProfileError, match="not a state of an offset stream"):
+    with pytest.raises(DriverProfileError, match="not a state of offset stream"):
         unsealed(values)
 
 

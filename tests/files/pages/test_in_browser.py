@@ -38,7 +38,8 @@ def player(browser):
     """At time 0, following the ego vehicle, true to scale, nominal places hidden."""
     run(
         browser,
-        "p.toggle(false); c.set(0); p.follow(p.vehicles[0]); p.setStretch(1); p.showGhosts = false; p.scale = 12",
+        "p.toggle(false); c.set(0); p.follow(p.vehicles[0]); p.setStretch(1); p.showGhosts = p.sideBySide = false; "
+        "p.scale = 12",
     )
     yield browser
     assert [line["message"] for line in browser.get_log("browser") if line["level"] == "SEVERE"] == []
@@ -115,6 +116,52 @@ def test_on_the_arc_a_stretch_is_across_the_lane_that_is_followed(player, enrich
     seen = (middle(van) - middle(ego)) * np.exp(-1j * ego.heading[row])
     along, left = metres(player, VERMILLION)
     assert (along, left) == pytest.approx((seen.real, seen.imag), abs=0.6)
+
+
+def test_the_page_opens_stretched_and_side_by_side(browser):
+    browser.refresh()
+    first = browser.execute_script("const p = xoscLateral.players[0]; return [p.sideBySide, p.stretch, p.height]")
+    assert first[0]
+    assert first[1] > 1.0
+
+
+def test_side_by_side_the_written_car_is_above_and_the_lifelike_one_below(player, enriched):
+    """The two halves show the same place; the car is off the middle of the lower one alone."""
+    run(player, "p.sideBySide = true; c.set(2.5)")
+    added, high = enriched.entity("Ego").deviation[125], player.execute_script("return xoscLateral.players[0].height")
+    scale = player.execute_script("return xoscLateral.players[0].scale")
+    _, across = box_centre(player, BLUE)  # of both boxes together
+    assert across == pytest.approx(0.5 * scale * added, abs=2.0)
+    boxes = player.execute_script(
+        "return xoscLateral.players[0].boxes.filter(b => b.vehicle.name === 'Ego').map(b => b.outline.map(p => p[1]))"
+    )
+    above, below = (np.mean(each) for each in boxes)
+    assert (above, below) == pytest.approx((0.25 * high, 0.75 * high - scale * added), abs=0.5)
+
+
+def test_a_figure_is_saved_as_picture_and_as_table(player):
+    """What the buttons hand to the browser: a picture that needs no page, and the drawn lines as a table."""
+    saved = player.execute_async_script(
+        """
+        const done = arguments[0], made = [], create = URL.createObjectURL;
+        URL.createObjectURL = (blob) => (made.push(blob), create.call(URL, blob));
+        const figure = [...document.querySelectorAll("figure.time")][0];
+        for (const button of figure.querySelectorAll(".save button")) button.click();
+        setTimeout(async () => {
+          URL.createObjectURL = create;
+          const content = (blob) => (blob.type === "image/png" ? blob.size : blob.text());
+          done(await Promise.all(made.map(async (blob) => [blob.type, await content(blob)])));
+        }, 1500);
+        """
+    )
+    kinds = dict(saved)
+    assert set(kinds) == {"image/svg+xml", "text/csv", "image/png"}
+    assert "var(" not in kinds["image/svg+xml"]
+    assert kinds["image/svg+xml"].startswith("<svg")
+    assert kinds["image/png"] > 5000
+    head, *rows = kinds["text/csv"].strip().split("\n")
+    assert head == 'panel,line,"time [s]","added offset [m]"'
+    assert {row.split(",")[0] for row in rows} >= {'"Ego"', '"Van"'}
 
 
 def test_play_moves_time_and_pause_stops_it(player):

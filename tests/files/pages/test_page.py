@@ -12,7 +12,7 @@ import pytest
 import xosc_lateral
 from xosc_lateral.files.pages.chart import BLUE
 from xosc_lateral.files.pages.figure import Figure
-from xosc_lateral.files.pages.page import NOTHING, Html, KeyFigure, Page, format_number, inline
+from xosc_lateral.files.pages.page import MISSING_TEXT, Html, KeyFigure, Page, format_number, inline
 
 VOID = {"meta", "img", "br", "link", "input"}
 
@@ -128,7 +128,7 @@ def test_numbers_are_short_and_what_is_missing_is_a_dash():
         format_number(value)
         for value in (0.2134, 1234.5, 3.0, 0.0, -0.00012345, 1.234e-9, float("nan"), 2.5e7, float("inf"))
     ]
-    assert written == ["0.213", "1234", "3", "0", "-0.000123", "1.23e-09", NOTHING, "2.50e+07", "∞"]
+    assert written == ["0.213", "1234", "3", "0", "-0.000123", "1.23e-09", MISSING_TEXT, "2.50e+07", "∞"]
 
 
 def table(rows, caption="", **more) -> str:
@@ -159,8 +159,8 @@ def test_an_empty_table_says_so():
 def test_lists_and_mappings_in_the_footer_are_written_out():
     html = Page("p").html({"inputs": ["a", "b"], "parameters": {"speed": 30.0, "n": None}, "nothing": []})
     assert "<dd>a, b</dd>" in html
-    assert f"<dd>speed: 30, n: {NOTHING}</dd>" in html
-    assert f"<dt>nothing</dt><dd>{NOTHING}</dd>" in html
+    assert f"<dd>speed: 30, n: {MISSING_TEXT}</dd>" in html
+    assert f"<dt>nothing</dt><dd>{MISSING_TEXT}</dd>" in html
 
 
 def test_figures_take_their_colours_from_the_page():

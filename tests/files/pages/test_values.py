@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from xosc_lateral.files.pages.page import NOTHING, format_number, format_value
+from xosc_lateral.files.pages.page import MISSING_TEXT, format_number, format_value
 
 
 @given(st.floats(-1e12, 1e12).filter(lambda value: abs(value) > 1e-12))
@@ -28,7 +28,8 @@ def test_no_number_shows_more_digits_than_it_was_asked_for_unless_they_stand_bef
 @pytest.mark.parametrize(
     ("value", "shown"),
     [(0.2134, "0.213"), (9.996, "10.0"), (0.9996, "1.00"), (99.96, "100"), (1234.6, "1235"), (1.2e-9, "1.20e-09"),
-     (0.0, "0"), (-0.0, "0"), (12.0, "12"), (3e9, "3.00e+09"), (math.inf, "∞"), (-math.inf, "-∞"), (math.nan, NOTHING)],
+     (0.0, "0"), (-0.0, "0"), (12.0, "12"), (3e9, "3.00e+09"), (math.inf, "∞"), (-math.inf, "-∞"),
+      (math.nan, MISSING_TEXT)],
 )  # fmt: skip
 def test_numbers_at_the_edges_of_the_rule(value, shown):
     assert format_number(value) == shown
@@ -36,9 +37,9 @@ def test_numbers_at_the_edges_of_the_rule(value, shown):
 
 @pytest.mark.parametrize(
     ("value", "shown"),
-    [(None, NOTHING), ("", NOTHING), (True, "yes"), (np.bool_(False), "no"), (np.float32(0.5), "0.500"),
-     (np.int64(7), "7"), (float("nan"), NOTHING), ([1.0, None, "a"], f"1, {NOTHING}, a"), ([], NOTHING),
-     ({"b": 2.5, "a": []}, f"b: 2.50, a: {NOTHING}"), ("<b>", "<b>")],
+    [(None, MISSING_TEXT), ("", MISSING_TEXT), (True, "yes"), (np.bool_(False), "no"), (np.float32(0.5), "0.500"),
+     (np.int64(7), "7"), (float("nan"), MISSING_TEXT), ([1.0, None, "a"], f"1, {MISSING_TEXT}, a"), ([], MISSING_TEXT),
+     ({"b": 2.5, "a": []}, f"b: 2.50, a: {MISSING_TEXT}"), ("<b>", "<b>")],
 )  # fmt: skip
 def test_whatever_a_result_holds_is_written_out(value, shown):
     assert format_value(value) == shown
@@ -46,4 +47,4 @@ def test_whatever_a_result_holds_is_written_out(value, shown):
 
 def test_a_format_of_the_callers_own_is_kept_but_for_what_is_not_there():
     assert format_value(0.5, ".1%") == "50.0%"
-    assert format_value(math.nan, ".1%") == NOTHING
+    assert format_value(math.nan, ".1%") == MISSING_TEXT

@@ -132,7 +132,7 @@ def test_a_bad_setting_is_refused_in_one_line(settings, message, tmp_path, capsy
 
 
 def test_an_unknown_template_is_refused():
-    with pytest.raises(XoscLateralError, match="unknown template 'cutin'; there are cut-in, "):
+    with pytest.raises(XoscLateralError, match=r"'cutin' \(did you mean 'cut-in'\?\); there are cut-in, "):
         find_template("cutin")
 
 

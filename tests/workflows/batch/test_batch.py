@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import json
 import os
 import random
 import signal
@@ -267,8 +268,10 @@ def test_killed_three_times_the_outputs_are_those_of_a_calm_run(tmp_path: Path, 
             for _ in range(rng.randint(1, 12)):
                 process.stdout.readline()
             process.kill()
-    (out / ".000.xosc.0123abcd.tmp").write_text("half")  # what a kill in the middle of writing leaves
-    assert (out / STATE / "lock").exists()
+    runs = json.loads((out / STATE / "lock").read_text())["runs"]
+    assert len(runs) == 3
+    for killed in runs:  # what a kill in the middle of writing leaves
+        (out / f".000.{killed}-0123abcd.tmp.xosc").write_text("half")
     (inputs / "go").touch()
     outcomes = run(inputs, out, workers=workers)
     assert JobState.UP_TO_DATE in {outcome.state for outcome in outcomes}

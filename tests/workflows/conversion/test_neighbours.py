@@ -32,12 +32,12 @@ def test_an_argument_comes_before_the_configuration_and_both_are_said(tmp_path: 
         return made.to_dict()["provenance"]["options"]["neighbours"], str(made)
 
     used, said = neighbours()
-    assert used == "borrow" and "left unknown: borrowed from the population" in said
+    assert used == "borrow" and "not known, moves as the population does" in said
     configuration.write_text('neighbours = "profile"\n')
     used, said = neighbours()
-    assert used == "profile" and "left unknown" in said and "borrowed" not in said
+    assert used == "profile" and "not known, does not move" in said and "population" not in said
     used, said = neighbours(neighbours="none")
-    assert used == "none" and "no answer" in said
+    assert used == "none" and "does not move (--neighbours none)" in said
     configuration.write_text('neighbours = "some"\n')
     with pytest.raises(FormatError, match="expected one of profile, borrow, none"):
         neighbours()
@@ -61,6 +61,8 @@ def test_the_command_line_takes_it_and_profiles_show_says_what_is_known(
     assert b'"neighbours": "profile"' in output.read_bytes().replace(b'"neighbours":"', b'"neighbours": "')
     capsys.readouterr()
     assert main(["profiles", "show", "motorway-vehicle-1"]) == 0
-    assert "neighbours left unknown; right unknown" in capsys.readouterr().out
+    assert "neighbours beside vehicles on either side: not known, does not move" in capsys.readouterr().out
     assert main(["profiles", "show", "motorway"]) == 0
-    assert "neighbours left population, as its effects have it" in capsys.readouterr().out
+    assert (
+        "neighbours beside vehicles on either side: moves as the drivers of its recording do" in capsys.readouterr().out
+    )

@@ -65,9 +65,17 @@ def test_the_state_goes_to_another_process_and_on() -> None:
         ('{"time": 0, "vehicles": {"a": {"speed": 3}}}', "vehicle 'a': lane_width is null"),
         ('{"time": 0, "vehicles": {"a": {"speed": 30, "lane_width": 3, "curvature": 9}}}', "curvature 9 is not within"),
         ('{"restore": {}}', "not a state of live traffic"),
+        ('{"time": 0, "vehicles": {"a": {"speed": 1%s, "lane_width": 3}}}' % ("0" * 400), "a number of 401 digits"),
+        ('{"time": 1%s, "vehicles": {}}' % ("0" * 5000), "no JSON: Exceeds the limit"),
+        ("[" * 1000, "levels of nested JSON: 1000, at most 64"),
+        ('{"time": 0, "vehicles": {"\\ud800": {"speed": 30, "lane_width": 3}}}', "surrogates not allowed"),
+        ('{"time": 0, "vehicles": {"a": {"speed": 30, "lane_width": 3, "following": "no"}}}', "expected true or false"),
+        ('{"time": 0, "vehicles": {"a": {"speed": 30, "lane_width": 3, "curvatur": 0}}}', "unknown column 'curvatur'"),
+        ('{"time": 1e11, "vehicles": {}}', "time is 1e+11 s"),
+        (b'{"time": 0, "vehicles": {"\xff": {}}}', "can't decode byte 0xff"),
     ],
 )
-def test_a_line_that_is_no_good_is_answered_and_the_next_one_goes_on(line: str, words: str) -> None:
+def test_a_line_that_is_no_good_is_answered_and_the_next_one_goes_on(line: str | bytes, words: str) -> None:
     pipe = Pipe(read_profile("motorway"), seed=1)
     wrong, good = pipe.answers([line, *lines(1)])
     assert words in json.loads(wrong)["error"]

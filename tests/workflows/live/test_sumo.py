@@ -152,6 +152,17 @@ def test_a_vehicle_that_says_nonsense_or_vanishes_is_left_alone_and_the_others_d
     assert all(np.isfinite(offset) for offset, _ in traffic.moves.values())
 
 
+def test_a_road_may_be_empty_for_a_while(tmp_path: Path) -> None:
+    config = write_run(tmp_path, end=140.0)
+    cars = "".join(f'<vehicle id="v{t}" route="r" depart="{t}" departSpeed="max"/>' for t in (0, 90))
+    (tmp_path / "run.rou.xml").write_text(f'<routes><route id="r" edges="e0"/>{cars}</routes>')
+    states = xl.live_sumo(config, duration=140.0).to_frame()
+    gone = states.time[states.name == "v0"].max()
+    assert gone < 90.0
+    assert states[states.name == "v90"].steered.iloc[1:].all()
+    assert states[states.name == "v90"].offset.std() > 0.01
+
+
 def test_nobody_collides_and_drivers_differ(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["live", "sumo", str(run / "run.sumocfg"), "--seed", "1", "--duration", "30"]) == 0
     said = capsys.readouterr()

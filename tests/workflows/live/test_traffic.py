@@ -14,8 +14,9 @@ from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import sample_offsets
+from xosc_lateral.drivers.model.stream import sealed
 from xosc_lateral.workflows.live.paths import TURN, Moves
-from xosc_lateral.workflows.live.traffic import Moment, Traffic
+from xosc_lateral.workflows.live.traffic import FORMAT, Moment, Traffic
 from xosc_lateral.workflows.profiles.profiles import read_profile
 
 DT = 0.01
@@ -145,6 +146,56 @@ def test_the_state_goes_through_a_file_and_on(profile: DriverProfile) -> None:
         Traffic(read_profile("motorway-vehicle-3")).restore(state)
     with pytest.raises(SimulationError, match="not a state"):
         Traffic(profile).restore({"format": "x"})
+
+
+def test_when_all_have_gone_the_next_ones_drive_as_if_they_were_the_first(profile: DriverProfile) -> None:
+    around = {name: np.full(2, value) for name, value in (("left_distance", 30.0), ("right_distance", np.inf))}
+    traffic, fresh = Traffic(profile, seed=9), Traffic(profile, seed=9)
+    drive(traffic, 3.0, context=around)
+    found = []
+    for one in (traffic, fresh):
+        one.step(3.0, moment((), context={name: np.empty(0) for name in around}))
+        moves = [one.step(3.2 + 0.2 * k, moment(("c", "d"), context=around)) for k in range(60)]
+        found.append(column(moves, "rate"))
+    np.testing.assert_allclose(*found, atol=1e-9)
+    assert np.std(found[0]) > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [(("knots",), -(10**9)), (("time",), None), (("time",), "3"), (("drivers", "a", 0), [1e300] * 6),
+     (("drivers", "z"), []), (("groups", "", "members"), ["a", "c"]), (("groups", "", "drives"), []),
+     (("groups", "", "drives", 0, "samples"), [float("nan")] * 4), (("groups", "", "responses"), []),
+     (("groups", "", "drives", 0, "drawn", 0, 0), 1e300), (("columns",), 5), (("seed",), -1), (("knots",), None)],
+)  # fmt: skip
+def test_a_damaged_state_is_refused_though_sealed_anew_and_the_drive_goes_on(
+    profile: DriverProfile, place: tuple[Any, ...], value: object
+) -> None:
+    traffic = Traffic(profile, seed=6)
+    drive(traffic, 1.0)
+    state = json.loads(json.dumps(traffic.to_dict()))
+    holder = state
+    for key in place[:-1]:
+        holder = holder[key]
+    holder[place[-1]] = value
+    before = json.dumps(traffic.to_dict())
+    for damaged in (state, sealed({key: own for key, own in state.items() if key != "sha256"}, FORMAT)):
+        with pytest.raises(SimulationError, match="damaged") as caught:
+            traffic.restore(damaged)
+        assert "\n" not in str(caught.value)
+    assert json.dumps(traffic.to_dict()) == before
+
+
+def test_a_leap_in_time_and_a_vehicle_named_twice_are_refused(profile: DriverProfile) -> None:
+    traffic = Traffic(profile, seed=6)
+    drive(traffic, 1.0)
+    with pytest.raises(SimulationError, match=r"simulation: 1e\+09 s, at most 600 s"):
+        traffic.step(1e9, moment())
+    with pytest.raises(ValueError, match="named twice"):
+        traffic.step(1.0, moment(("a", "a")))
+    with pytest.raises(ValueError, match="driven: 1 rows for 2 vehicles"):
+        traffic.step(1.0, moment(driven=np.ones(1, dtype=bool)))
+    drive(traffic, 1.0, 1.0)
 
 
 @pytest.mark.parametrize(

@@ -169,7 +169,7 @@ def test_an_error_clearly_above_the_floor_is_called_unexplained(result: LoopResu
     assert left.unexplained == pytest.approx(np.sqrt(result.error_before**2 - left.floor**2))
     left = replace(left, p_value=0.01)  # how rare that is is not asked here
     worse = replace(result, findings=(), scored=scored, lack_of_fit=left)
-    assert left.clear
+    assert left.is_clear
     sentence = lack_of_fit_words(worse)
     assert sentence.startswith(f"Unexplained residual of {1000 * left.unexplained:.0f}\N{NO-BREAK SPACE}mm")
     record = loop_record(worse, [table])
@@ -195,7 +195,7 @@ def test_the_json_keeps_to_the_schema_and_adds_the_meaning(result: LoopResult, t
     assert finding["kind"] == "location"
     assert "grade" in finding["meaning"]
     assert {row["group"] for row in record["residual"]} == set(result.scored.real)
-    assert record["unexplained"]["clear"] is result.lack_of_fit.clear
+    assert record["unexplained"]["clear"] is result.lack_of_fit.is_clear
 
 
 @pytest.mark.parametrize("effect", HIDDEN, ids=lambda effect: effect.kind)

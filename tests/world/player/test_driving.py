@@ -13,9 +13,11 @@ from tests.kit.stage import (
     Stage,
     after,
     arc,
+    car,
     entity,
     event,
     facing,
+    follow,
     in_world,
     lane_change,
     lanes,
@@ -23,6 +25,7 @@ from tests.kit.stage import (
     maneuvers,
     map_of,
     on_lane,
+    polyline,
     private_action,
     road,
     row,
@@ -49,6 +52,13 @@ MIRRORED = map_of(
     road("2", line(500.0, 0.0, pi, 300.0), 300.0, link=SUCCESSOR.format("1", "end"), sections=TURNED),
 )
 """Two straight roads whose ends meet: s runs back on the second, and lane ids change their sign."""
+
+
+WALKER = (
+    '<ScenarioObject name="Ego"><Pedestrian name="walker" model="walker" mass="80" pedestrianCategory="pedestrian">'
+    '<BoundingBox><Center x="0" y="0" z="0.9"/><Dimensions width="0.5" length="0.5" height="1.8"/></BoundingBox>'
+    "<Properties/></Pedestrian></ScenarioObject>"
+)
 
 
 def ego(lane: int, s: float, v: float = 20.0, road: str = "1") -> dict[str, str]:
@@ -101,6 +111,39 @@ def test_a_lane_change_over_such_a_border_goes_on(tmp_path: Path) -> None:
     motion = entity(played)
     u = np.clip(motion.time / 4.0, 0.0, 1.0)
     np.testing.assert_allclose(motion.y, -1.5 * WIDTH + WIDTH * 0.5 * (1.0 - np.cos(pi * u)), atol=1e-9)
+
+
+SIDEWALK = (
+    '<lane id="-1" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/><width sOffset="40" a="3.5" b="0.05" '
+    'c="0" d="0"/><width sOffset="80" a="5.5" b="0" c="0" d="0"/></lane>'
+    '<lane id="-2" type="{kind}"><width sOffset="0" a="2" b="0" c="0" d="0"/></lane>'
+)
+"""Beside a lane that widens from 3.5 to 5.5 m."""
+
+
+@pytest.mark.parametrize("kind", ["sidewalk", "walking"])
+@pytest.mark.parametrize(("who", "y"), [(WALKER, -6.5), (car("Ego"), -5.5)], ids=["pedestrian", "car"])
+def test_after_a_trajectory_a_pedestrian_keeps_to_the_sidewalk(tmp_path: Path, kind: str, who: str, y: float) -> None:
+    """The middle of the sidewalk lies 1 m beyond the driving lane; a car keeps its distance to that lane's middle."""
+    roads = map_of(road("1", line(length=120.0), 120.0, sections=section("", SIDEWALK.format(kind=kind))))
+    way = polyline(*((None, on_lane(-2, s)) for s in (5.0, 25.0)))
+    start = {"Ego": teleport(on_lane(-2, 5.0)) + speed(2.0)}
+    played = Stage(tmp_path, roads).play(maneuvers(event(follow(way))), start=start, last=50.0, entities=(who,))
+    motion = entity(played)
+    assert motion.y[-1] == pytest.approx(y, abs=1e-6)
+    assert {int(lane) for lane in motion.lane} == {-2 if who is WALKER else -1}
+
+
+def test_of_two_lanes_that_lead_into_one_the_nearer_is_taken_on_the_way_back(tmp_path: Path) -> None:
+    """Road 2 names no link; both lanes of road 1 name its only lane. The way back goes on straight."""
+    merging = section(lanes(2, 1, links=dict.fromkeys((1, 2), (None, 1))), lanes(-1))
+    merged = section(lanes(1, links={1: (None, None)}), lanes(-1))
+    roads = map_of(
+        road("1", line(length=200.0), 200.0, link=SUCCESSOR.format("2", "start"), sections=merging),
+        road("2", line(200.0, length=200.0), 200.0, link=PREDECESSOR.format("1", "end"), sections=merged),
+    )
+    motion = entity(Stage(tmp_path, roads).play(start=ego(1, 50.0, road="2"), last=9.0))
+    np.testing.assert_allclose(motion.y, 0.5 * WIDTH, atol=1e-9)
 
 
 def test_the_end_of_the_road_stops_and_is_flagged(tmp_path: Path) -> None:

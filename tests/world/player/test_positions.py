@@ -75,6 +75,24 @@ def test_relative_to_an_entity_that_drives_against_s(tmp_path: Path) -> None:
     assert along_travel[:2] == pytest.approx((80.0, 0.5 * WIDTH))
 
 
+@pytest.mark.parametrize(
+    ("position", "place", "missing"),
+    [
+        ('<RelativeRoadPosition entityRef="Ref" dt="3.5"/>', (100.0, -0.5 * WIDTH), "ds"),
+        ('<RelativeRoadPosition entityRef="Ref" ds="20"/>', (120.0, -1.5 * WIDTH), "dt"),
+        ('<RelativeLanePosition entityRef="Ref" dLane="1"/>', (100.0, -0.5 * WIDTH), "ds"),
+        ('<RelativeLanePosition entityRef="Ref" ds="20"/>', (120.0, -1.5 * WIDTH), "dLane"),
+    ],
+)
+def test_a_missing_distance_is_none_and_said(
+    tmp_path: Path, position: str, place: tuple[float, float], missing: str
+) -> None:
+    played = Stage(tmp_path).play(start={"Ref": REF, "Ego": teleport(position)}, last=0.1)
+    motion = entity(played)
+    assert (motion.x[0], motion.y[0]) == pytest.approx(place)
+    assert any(f"{missing} is missing: taken as 0" in str(note) for note in played.motion.notes)
+
+
 def test_relative_positions_go_on_over_road_borders(tmp_path: Path) -> None:
     x, y, _, lane = placed(tmp_path, '<RelativeLanePosition entityRef="Ref" ds="150" dLane="0"/>', roads=MIRRORED)
     assert (x, y) == pytest.approx((250.0, -1.5 * WIDTH))

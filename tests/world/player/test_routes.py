@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from xosc_lateral.world.player.state import NOWHERE, Placement, RouteGuide, guide
+from xosc_lateral.world.player.state import NO_ROAD, Placement, RouteGuide, guide
 from xosc_lateral.world.road import LaneLink, RouteStep
 
 STEPS = (RouteStep(0, 1, 20.0, 100.0), RouteStep(7, -1, 50.0, 0.0), RouteStep(3, 1, 0.0, 30.0))
@@ -81,7 +81,7 @@ def test_a_road_that_it_takes_twice_is_looked_at_from_both_times() -> None:
     assert (first.road, second.road) == (7, 3)
 
 
-@pytest.mark.parametrize("stops", [[], [0], [0, NOWHERE]], ids=["none", "one", "one on no road"])
+@pytest.mark.parametrize("stops", [[], [0], [0, NO_ROAD]], ids=["none", "one", "one on no road"])
 def test_too_few_places_are_no_route(stops: list[int]) -> None:
     assert guide(network(), [Placement(road, -1, 5.0, 0.0, 0.0) for road in stops]) is None
 

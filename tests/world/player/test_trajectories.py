@@ -122,12 +122,28 @@ def test_written_headings_count(tmp_path: Path) -> None:
     np.testing.assert_allclose(motion.heading[1:], 0.1, atol=1e-9)
 
 
-def test_a_closed_trajectory_goes_round(tmp_path: Path) -> None:
-    corners = [(0.0, 0.0), (40.0, 0.0), (40.0, 40.0), (0.0, 40.0), (0.0, 0.0)]
-    way = polyline(*((None, in_world(x, y)) for x, y in corners), closed=True)
+@pytest.mark.parametrize("repeated", [True, False])
+@pytest.mark.parametrize("time", [None, 0.0], ids=["no times", "times that nothing refers to"])
+def test_a_closed_trajectory_goes_round(tmp_path: Path, repeated: bool, time: float | None) -> None:
+    """After 9 s at 20 m/s on a square of 160 m round: 20 m past its first corner, whether or not that is repeated."""
+    corners = [(0.0, 0.0), (40.0, 0.0), (40.0, 40.0), (0.0, 40.0), (0.0, 0.0)][: 5 if repeated else 4]
+    way = polyline(*((None if time is None else time + k, in_world(*at)) for k, at in enumerate(corners)), closed=True)
     motion = entity(Stage(tmp_path).play(maneuvers(event(follow(way))), start=EGO, last=12.0))
+    assert np.hypot(np.diff(motion.x), np.diff(motion.y))[1:].max() < 0.4 + 1e-6  # no jump at the end
     assert motion.x[row(motion, 9.0)] == pytest.approx(20.0, abs=1e-6)
     assert motion.y[row(motion, 9.0)] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_closed_trajectory_that_is_followed_by_its_times_ends_with_them(tmp_path: Path) -> None:
+    way = polyline((0.0, in_world(0.0, 0.0)), (2.0, in_world(40.0, 0.0)), (4.0, in_world(40.0, 40.0)), closed=True)
+    motion = entity(Stage(tmp_path).play(maneuvers(event(follow(way, timing=TIMING))), start=EGO, last=4.02))
+    assert (motion.x[row(motion, 4.0)], motion.y[row(motion, 4.0)]) == pytest.approx((40.0, 40.0), abs=0.5)
+
+
+def test_a_closed_curve_that_does_not_end_at_its_start_is_said_to_jump(tmp_path: Path) -> None:
+    shape = f'<Clothoid curvature="0" curvaturePrime="0" length="40"><Position>{in_world(0, 0)}</Position></Clothoid>'
+    played = Stage(tmp_path).play(maneuvers(event(follow(trajectory(shape, closed=True)))), start=EGO, last=1.0)
+    assert any("ends 40.00 m from its start" in str(note) for note in played.motion.notes)
 
 
 def test_vertices_nearer_than_a_decimetre_count_as_one(tmp_path: Path) -> None:

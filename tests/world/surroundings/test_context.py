@@ -18,7 +18,7 @@ from xosc_lateral.world.scenario import Action, Entity, Place
 from xosc_lateral.world.scenario.enums import VehicleCategory
 from xosc_lateral.world.scenario.environment import Environment, TimeOfDay, Weather
 from xosc_lateral.world.scenario.global_actions import EnvironmentAction
-from xosc_lateral.world.surroundings.around import NEAR
+from xosc_lateral.world.surroundings.around import INFLUENCE_DISTANCE
 from xosc_lateral.world.surroundings.context import STEERING, entity_context
 
 GRID = np.arange(0, 501, 10)
@@ -194,13 +194,13 @@ def test_neighbours_come_and_go_as_the_lane_change_does(tmp_path: Path, lane: in
     motion = together(*((still, moving) if who == "other" else (moving, still)))
     context = entity_context(motion, network, 0, GRID)
     near = {
-        side: np.exp(-np.nan_to_num(context[f"{side}_distance"], nan=np.inf) / NEAR)
+        side: np.exp(-np.nan_to_num(context[f"{side}_distance"], nan=np.inf) / INFLUENCE_DISTANCE)
         for side in ("lead", "left", "right")
     }
     # who goes to the left has the other on the right afterwards
     side = "left" if (to_left > 0) == (who == "other") else "right"
     other = {"left": "right", "right": "left"}[side]
-    np.testing.assert_allclose(near[side][[0, -1]], [0.0, np.exp(-15.0 / NEAR)], atol=1e-9)
+    np.testing.assert_allclose(near[side][[0, -1]], [0.0, np.exp(-15.0 / INFLUENCE_DISTANCE)], atol=1e-9)
     assert not near[other].any()
     assert (np.diff(near[side]) >= -1e-12).all()
     rate = np.abs(np.diff([near["lead"], near[side]], axis=1)).max()

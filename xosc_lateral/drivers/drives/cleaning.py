@@ -39,8 +39,11 @@ VALID_BELOW, RESOLUTION = "valid_below", "resolution"
 """Columns of what a recording shows: driving below this frequency [Hz], offsets to this step [m]; each is one number
 for a whole drive."""
 
-OWN = frozenset(
-    {"time", "drive", "offset", "lane_width", "distance_left", "distance_right", RUN, VALID_BELOW, RESOLUTION}
+DRIVE_COLUMNS = frozenset(
+    {
+        *("time", "drive", "driver", "offset", "lane_width", "distance_left", "distance_right"),
+        *(RUN, VALID_BELOW, RESOLUTION),
+    }
 )
 """Columns that are no context."""
 
@@ -79,7 +82,7 @@ def clean_drive(
         good &= np.isfinite(speed)
     if good.sum() < 2:
         return None
-    every = {key: values[good] for key, values in columns.items() if key not in OWN}
+    every = {key: values[good] for key, values in columns.items() if key not in DRIVE_COLUMNS}
     empty = frozenset(key for key, values in every.items() if np.isnan(values).all())
     context = {key: values for key, values in every.items() if key not in empty} | {"lane_width": lane_width[good]}
     run = columns[RUN][good].astype(np.int64) if RUN in columns else None

@@ -51,6 +51,8 @@ class Drive:
     empty : frozenset of str
         Columns of its table that hold nothing in this drive, and are not in `context`: there is none, all along (no
         lane to that side). Of a column that the table lacks, nothing is known.
+    driver : str
+        Who drove, where the table says; several drives may be one driver's.
     half_width : array, shape (n,), optional
         Half the lane width as a camera recorded it, with errors of both markings, as the offset has them. None: the
         lane width comes from a map, or from elsewhere than the offset. [m]
@@ -73,6 +75,7 @@ class Drive:
     half_width: FloatArray | None = None
     valid_below: float | None = None
     resolution: float | None = None
+    driver: str = ""
 
     def __post_init__(self) -> None:
         """Copy and freeze; refuse unequal lengths and what readers must have taken out."""

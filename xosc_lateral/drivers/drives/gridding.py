@@ -12,7 +12,7 @@ from xosc_lateral.drivers.drives.cuts import CutRules, cut_runs, grid_of
 from xosc_lateral.drivers.drives.drive import Drive, Run
 from xosc_lateral.drivers.drives.resampling import STEP, average, in_digits, nearest
 
-FEW = 8
+MAXIMUM_LEVELS = 8
 """A column with no more different values than this holds levels. [-]"""
 
 
@@ -26,7 +26,7 @@ def circular_period(drives: Sequence[FloatArray]) -> float:
     if len(values) < 100 or not np.isfinite(values).all():
         return 0.0
     extent = float(values.max() - values.min())
-    if extent <= 0.0 or len(np.unique(values)) <= FEW:
+    if extent <= 0.0 or len(np.unique(values)) <= MAXIMUM_LEVELS:
         return 0.0
     jump = np.concatenate([np.abs(np.diff(own)) for own in drives]) / extent
     wraps, between = int((jump > 0.9).sum()), int(((jump > 0.25) & (jump <= 0.9)).sum())

@@ -54,10 +54,10 @@ IMPOSSIBLE = 6.0
 LEAST_TRUST = 0.15
 """Rows with less in the mean of their two views are left out: both are 5 standard deviations off, and more. [-]"""
 
-MOVED = 0.05
+MENDED_OFFSET_CHANGE = 0.05
 """Rows whose offset changes by more are counted as mended. [m]"""
 
-ROUNDS, ENOUGH = 50, 1e-2
+ROUNDS, REWEIGHTING_LIMITS = 50, 1e-2
 """Of reweighting: at most, and when no error changes by more. [-]"""
 
 SINGULAR = 1e-9
@@ -139,7 +139,7 @@ class BothMarkings:
         left, right = _trust(self.offset - place, wider)
         change = 0.5 * wider * (right - left) / (left + right)
         kept = 0.5 * (left + right) >= LEAST_TRUST
-        shares = MarkingShares(float(np.mean(kept & (np.abs(change) > MOVED))), float(np.mean(~kept)))
+        shares = MarkingShares(float(np.mean(kept & (np.abs(change) > MENDED_OFFSET_CHANGE))), float(np.mean(~kept)))
         return Mended(self.offset + change, lane, kept, shares)
 
     def _smoothed(self) -> tuple[FloatArray, FloatArray] | None:
@@ -150,7 +150,10 @@ class BothMarkings:
             offset, width = self._most_likely(prior, scaled)
             found = (self.left - 0.5 * width + offset, self.right - 0.5 * width - offset)
             before, scaled = scaled, (self.seen * found[0] / self.noise, self.seen * found[1] / self.noise)
-            if max(float(np.abs(new - old).max()) for new, old in zip(scaled, before, strict=True)) < ENOUGH:
+            if (
+                max(float(np.abs(new - old).max()) for new, old in zip(scaled, before, strict=True))
+                < REWEIGHTING_LIMITS
+            ):
                 break
         worst = max(float(np.abs(one).max()) for one in scaled)
         return (offset, width) if worst > IMPOSSIBLE else None

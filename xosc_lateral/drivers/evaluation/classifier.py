@@ -27,7 +27,9 @@ BANDS = 16  # Of the log spectrum, from one period a snippet to the highest freq
 EVEN_BANDS = 25
 # Values of a snippet, and differences over as much, that are shown: more slow a tree down and add nothing. [-]
 VALUES = 20
-MOST = 1500  # Snippets of either kind that a classifier sees, spread evenly: an error of 0.01 in the area. [-]
+MAXIMUM_SNIPPETS = (
+    1500  # Snippets of either kind that a classifier sees, spread evenly: an error of 0.01 in the area. [-]
+)
 RESAMPLES = 200  # Of the drives, for the interval.
 
 
@@ -181,8 +183,8 @@ def classifier_two_sample_test(
 
 
 def spread_out(count: int) -> NDArray[np.int64]:
-    """At most `MOST` of so many rows, evenly. Shape (k,), k <= `MOST`. [-]"""
-    return np.unique(np.linspace(0, count - 1, min(count, MOST)).astype(np.int64))
+    """At most `MAXIMUM_SNIPPETS` of so many rows, evenly. Shape (k,), k <= `MAXIMUM_SNIPPETS`. [-]"""
+    return np.unique(np.linspace(0, count - 1, min(count, MAXIMUM_SNIPPETS)).astype(np.int64))
 
 
 def _judged(score: FloatArray, label: NDArray[np.bool_], groups: NDArray[np.generic], seed: int) -> TwoSampleResult:

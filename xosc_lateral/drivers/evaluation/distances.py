@@ -93,7 +93,7 @@ def split_groups(groups: NDArray[np.generic], rng: np.random.Generator) -> NDArr
     return np.isin(groups, names[chosen])
 
 
-PROPER = {"energy_score": "m", "variogram_score": "m"}  # Proper scores and their units.
+SCORE_UNITS = {"energy_score": "m", "variogram_score": "m"}  # Proper scores and their units.
 ORDER = 0.5  # Of the variogram score: the power that its authors found most sensitive to dependence. [-]
 
 
@@ -135,7 +135,7 @@ def variogram_score(real: FloatArray, ensemble: FloatArray, *, every: int = 5) -
 
 
 def proper_scores(real: FloatArray, ensemble: FloatArray) -> dict[str, float]:
-    """Mean of each score in `PROPER` over the windows; empty without the extra `board`. [m]
+    """Mean of each score in `SCORE_UNITS` over the windows; empty without the extra `board`. [m]
 
     `real` of shape (n, m), `ensemble` of shape (n, members, m).
     """
@@ -143,7 +143,7 @@ def proper_scores(real: FloatArray, ensemble: FloatArray) -> dict[str, float]:
         scores = energy_score(real, ensemble), variogram_score(real, ensemble)
     except ImportError:
         return {}
-    return {name: float(score.mean()) for name, score in zip(PROPER, scores, strict=True)}
+    return {name: float(score.mean()) for name, score in zip(SCORE_UNITS, scores, strict=True)}
 
 
 def _check(ensemble: FloatArray) -> None:

@@ -86,7 +86,7 @@ def resolved_bands(seconds: float, highest: float = float(BANDS[-1])) -> list[tu
     return [(low, high) for low, high in bands if low * seconds >= 1.0 and high <= highest]
 
 
-SILENCE = 1e-9  # Added to power densities, so that no movement is a number too: 0.03 mm in 1 Hz. [m2/Hz]
+MINIMUM_POWER = 1e-9  # Added to power densities, so that no movement is a number too: 0.03 mm in 1 Hz. [m2/Hz]
 FAMILIES = ("metrics", "lane_keeping", "spectrum", "memory")  # Kinds of difference.
 UNITS = {"metrics": "sd", "lane_keeping": "sd", "spectrum": "dB", "memory": "-"}
 
@@ -106,7 +106,7 @@ def differences(real: Features, other: Features, rows: IntArray, other_rows: Int
         "metrics": float(np.mean(column_distances(real.metrics[rows], other.metrics[other_rows]))),
         "lane_keeping": float(np.mean(column_distances(real.indicators[rows], other.indicators[other_rows]))),
     }
-    level, beside = real.power[rows].mean(axis=0) + SILENCE, other.power[other_rows].mean(axis=0) + SILENCE
+    level, beside = real.power[rows].mean(axis=0) + MINIMUM_POWER, other.power[other_rows].mean(axis=0) + MINIMUM_POWER
     found["spectrum"] = float(np.sqrt(np.mean((10.0 * np.log10(beside / level)) ** 2)))
     own, others = autocorrelation_of(real, rows), autocorrelation_of(other, other_rows)
     found["memory"] = float(np.sqrt(np.mean((own - others) ** 2)))
@@ -135,7 +135,7 @@ def named_means(real: Features, other: Features) -> Mapping[str, tuple[float, fl
     return {name: (means[0][k], means[1][k]) for k, name in enumerate(INDICATORS)}
 
 
-NEAREST = 20  # A stand-in is drawn among so many windows of other drivers whose starts are nearest.
+NEIGHBOUR_COUNT = 20  # A stand-in is drawn among so many windows of other drivers whose starts are nearest.
 FLOOR_DRAWS = 4  # Sets of stand-ins with the same start that are averaged over.
 
 
@@ -147,7 +147,7 @@ def windows_with_the_same_start(
     rng: np.random.Generator,
     *,
     count: int = 1,
-    nearest: int = NEAREST,
+    nearest: int = NEIGHBOUR_COUNT,
 ) -> IntArray:
     """For each window `count` others by other drivers that start at nearly the same offset.
 

@@ -24,7 +24,7 @@ from xosc_lateral.drivers.evaluation.scores import SNIPPET
 from xosc_lateral.drivers.evaluation.spectra import Spectrum, spectrum
 from xosc_lateral.drivers.model.profile import DriverProfile
 
-HALVINGS, SURE = 40, 0.95
+HALVINGS, HALVING_COUNT_AND_SHARE = 40, 0.95
 """Random halves of a profile's drivers, and how many of them are no further apart than what counts as alike. [-]"""
 
 
@@ -134,7 +134,7 @@ def _from_itself(drivers: Sequence[FloatArray], fitted: int, scale: FloatArray, 
         half, rest = order[:count], order[-count:]
         found.append(_per_metric(*(np.concatenate([drivers[k] for k in part]) for part in (half, rest))) / scale)
     means = [float(gaps.mean()) for gaps in found]
-    return found[int(np.argsort(means)[round(SURE * (HALVINGS - 1))])]
+    return found[int(np.argsort(means)[round(HALVING_COUNT_AND_SHARE * (HALVINGS - 1))])]
 
 
 def _per_metric(one: FloatArray, other: FloatArray) -> FloatArray:

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.evaluation.classifier import TwoSampleResult, classifier_two_sample_test, context_features
-from xosc_lateral.drivers.evaluation.distances import PROPER, proper_scores, split_groups
-from xosc_lateral.drivers.evaluation.filters import PASSED, below_half_hertz, thinned
+from xosc_lateral.drivers.evaluation.distances import SCORE_UNITS, proper_scores, split_groups
+from xosc_lateral.drivers.evaluation.filters import PASS_FREQUENCY, below_half_hertz, thinned
 from xosc_lateral.drivers.evaluation.measures import (
     FLOOR_DRAWS,
     UNITS,
@@ -70,7 +70,7 @@ def variance_parts(windows: FloatArray, drivers: NDArray[np.generic]) -> Varianc
 
 
 SPLITS = 8  # Random halves of the drives that both are averaged over.
-LEAST = 20  # Fewer snippets of a length: it is left out.
+MINIMUM_GROUPS = 20  # Fewer snippets of a length: it is left out.
 # Sampled snippets for each of so many real ones of 10 s, spread evenly: proper scores need several of each.
 ENSEMBLE, SCORED = 8, 200
 
@@ -137,7 +137,7 @@ def score_realism(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
     found = []
     for seconds in LENGTHS:
         cut = snippets_of(runs, seconds, step)
-        if len(cut) < LEAST or len(np.unique(cut.group)) < 2:
+        if len(cut) < MINIMUM_GROUPS or len(np.unique(cut.group)) < 2:
             continue
         same = sample_snippets(profile, cut, seed + 1, with_sensor=True)
         slow = cut.cut_from(slow_real), cut.cut_from(slow_driver)
@@ -165,7 +165,7 @@ def _under(
 ) -> ConditionScores:
     """Scores of one condition; `real` and `sampled` of shape (n, m). [m]"""
     step = profile.model.step
-    highest = PASSED if condition.slow else np.inf
+    highest = PASS_FREQUENCY if condition.slow else np.inf
     own = features_of(real, cut.lane_width, step, highest=highest)
     made = features_of(sampled, cut.lane_width, step, highest=highest)
     families, named = _distances(condition, own, made, real, cut.group, seed)
@@ -230,5 +230,5 @@ def _with_proper_scores(scores: ConditionScores, profile: DriverProfile, cut: Sn
     drivers = windows_with_the_same_start(*starts, rng, count=ENSEMBLE)
     sampled = proper_scores(some.offset, np.stack(members, axis=1))
     real = proper_scores(some.offset, cut.offset[drivers])
-    added = {name: Beside(sampled[name], real[name], PROPER[name]) for name in sampled}
+    added = {name: Beside(sampled[name], real[name], SCORE_UNITS[name]) for name in sampled}
     return replace(scores, families={**scores.families, **added})

@@ -136,7 +136,7 @@ def score_profile(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
     driving).
     """
     step = profile.model.step
-    short = _enough(snippets_of(runs, SNIPPET, step))
+    short = _has_enough_snippets(snippets_of(runs, SNIPPET, step))
     long = snippets_of(runs, LONG_SNIPPET, step)
     sampled = sample_snippets(profile, short, seed)
     free = sample_runs(profile, runs, seed + 1)
@@ -180,7 +180,7 @@ def _traces(runs: Sequence[Run], sampled: Sequence[FloatArray], step: float) -> 
     )
 
 
-def _enough(snippets: Snippets) -> Snippets:
+def _has_enough_snippets(snippets: Snippets) -> Snippets:
     if len(snippets) < MIN_SNIPPETS:
         raise NotEnoughDataError(
             f"{len(snippets)} snippets of {SNIPPET:g} s are left after cutting; {MIN_SNIPPETS} are needed to compare"

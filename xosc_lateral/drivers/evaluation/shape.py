@@ -30,7 +30,7 @@ SHAPES = (
 )
 
 LARGE_CHANGE = 0.04  # Of a change from row to row, in standard deviations (pNN40 of catch22). [-]
-EXTREME = 1.0  # Beyond it a value counts as extreme, in standard deviations. [-]
+EXTREME_QUANTILE = 1.0  # Beyond it a value counts as extreme, in standard deviations. [-]
 
 
 def shape_features(snippets: FloatArray) -> FloatArray:
@@ -71,8 +71,8 @@ def shape_features(snippets: FloatArray) -> FloatArray:
             (change**3).mean(axis=1),
             (np.abs(change) > LARGE_CHANGE).mean(axis=1),
             *_spectral(z),
-            _median_place(z > EXTREME),
-            _median_place(z < -EXTREME),
+            _median_place(z > EXTREME_QUANTILE),
+            _median_place(z < -EXTREME_QUANTILE),
             _motif_entropy(z),
             _forecast_error(z),
             (z**4).mean(axis=1),

@@ -10,7 +10,7 @@ that is not too quick, and without a corner.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,7 +31,7 @@ LAG, RESPONSE, ORDER = -1.0, 1.0, 2
 """Delay, and two first-order lags: drivers see neighbours coming, and nobody moves at once. After a single lag of 2 s
 somebody who comes into the lane would be a corner in the path, which no car can drive. [s], [s], [-]"""
 
-SURE = 0.05
+MEASURED_ERROR = 0.05
 """A shift is measured when its standard error is at most this: what separates drivers who answer (0.2 m) from those who
 don't by four errors. [m]"""
 
@@ -49,7 +49,7 @@ CLUSTERED = 1.2
 """By which errors clustered by `BLOCK` are too small, found with simulated drivers whose memory is 10 s (60 seeds: 1.15
 to 1.2 with 12 to 30 minutes). [-]"""
 
-KEEP = 0.95
+MAXIMUM_PIECE_CORRELATION = 0.95
 """Most that one piece may say of the next: beyond, next to nothing of a level is left after differencing. [-]"""
 
 PIECE, BLOCK = 4.0, 60.0
@@ -84,13 +84,13 @@ def measure_beside(runs: Sequence[Run]) -> dict[str, Beside]:
     shapes = {side: shape for side in SIDES if (shape := _shape(runs, side)) is not None}
     if not shapes:
         return {}
-    near = {side: [_near(run, shape) for run in runs] for side, shape in shapes.items()}
+    near = {side: [_rows_beside(run, shape) for run in runs] for side, shape in shapes.items()}
     slopes, errors = _within_drives(runs, near)
     found = {}
     for side, slope, error in zip(shapes, slopes, errors, strict=True):
         beside = np.concatenate(near[side]) > np.exp(-1.0)
         seconds, away = STEP * beside.sum(), STEP * (~beside).sum()
-        sure = error <= SURE and min(seconds, away) >= LEAST_SECONDS
+        sure = error <= MEASURED_ERROR and min(seconds, away) >= LEAST_SECONDS
         if sure:
             found[side] = Beside(
                 Basis.MEASURED, round(float(seconds), 1), round(float(slope), 4), round(float(error), 4)
@@ -119,7 +119,7 @@ def _shape(runs: Sequence[Run], side: str) -> ColumnEffect | None:
     """By the distance, else by the flag for trucks or cars: of which there is somebody, without a coefficient."""
     for column in (f"{side}_distance", f"truck_{side}", f"car_{side}"):
         shape = _response_to(column)
-        if any(column in run.context and (_near(run, shape) > np.exp(-1.0)).any() for run in runs):
+        if any(column in run.context and (_rows_beside(run, shape) > np.exp(-1.0)).any() for run in runs):
             return shape
     return None
 
@@ -132,7 +132,7 @@ def _response_to(column: str) -> ColumnEffect:
     return Linear(acts=Acts.LOCATION, column=column, **response)
 
 
-def _near(run: Run, shape: ColumnEffect) -> FloatArray:
+def _rows_beside(run: Run, shape: ColumnEffect) -> FloatArray:
     """From 0 (nobody) to 1 (alongside), shape (n,); a run without the column had nobody there."""
     if any(column not in run.context for column in shape.columns):
         return np.zeros(len(run))
@@ -153,7 +153,7 @@ def _within_drives(runs: Sequence[Run], near: Mapping[str, Sequence[FloatArray]]
     rows, drive, block = [], [], []
     numbers = {name: k for k, name in enumerate(dict.fromkeys(run.drive for run in runs))}
     for k, run in enumerate(runs):
-        columns = [run.offset, *(values[k] for values in near.values()), *_others(run)]
+        columns = [run.offset, *(values[k] for values in near.values()), *_other_causes(run)]
         for j in range(len(run) // size):
             rows.append([float(column[j * size : (j + 1) * size].mean()) for column in columns])
             drive.append(numbers[run.drive])
@@ -166,7 +166,7 @@ def _within_drives(runs: Sequence[Run], near: Mapping[str, Sequence[FloatArray]]
     plain = _centred(table, groups)
     rest = plain[:, 0] - plain[:, 1:] @ (np.linalg.pinv(plain[:, 1:]) @ plain[:, 0])
     power = float(rest[follows - 1] @ rest[follows - 1])
-    keep = min(max(float(rest[follows] @ rest[follows - 1]) / max(power, 1e-12), 0.0), KEEP)
+    keep = min(max(float(rest[follows] @ rest[follows - 1]) / max(power, 1e-12), 0.0), MAXIMUM_PIECE_CORRELATION)
     # a driver's slow drift is separated from what he does beside somebody
     table, groups, number = table[follows] - keep * table[follows - 1], groups[follows], number[follows]
     table = _centred(table, groups)
@@ -202,22 +202,36 @@ def _centred(table: FloatArray, groups: IntArray) -> FloatArray:
     return np.stack([column - (np.bincount(groups, column) / counts)[groups] for column in table.T], axis=1)
 
 
-def _others(run: Run) -> list[FloatArray]:
+def _other_causes(run: Run) -> list[FloatArray]:
     """What else moves a driver and goes along with having somebody beside: speed and lane; 0 where unknown."""
     return [np.nan_to_num(run.context.get(name, np.zeros(len(run)))) for name in ("speed", "lane_index")]
 
 
-def beside_line(profile: DriverProfile, side: str) -> str:
-    """In words: what is known of a side."""
+UNMEASURED_RESPONSES = {
+    Basis.POPULATION: "moves as the drivers of its recording do",
+    Basis.DECLARED: "moves as its effects state",
+    Basis.MEASURED: "moves as its effects state",
+    Basis.UNKNOWN: "not known, does not move",
+}
+"""How a driver responds to vehicles beside him, by what that rests on, where the profile holds no figure."""
+
+
+def responses_in_words(profile: DriverProfile, borrowed: Collection[str] = ()) -> str:
+    """How a driver responds to vehicles on either side, in a line; on `borrowed` sides as the population does."""
+    words = {side: _response_in_words(profile, side, side in borrowed) for side in SIDES}
+    if len(set(words.values())) == 1:
+        return f"beside vehicles on either side: {words[SIDES[0]]}"
+    return "; ".join(f"beside vehicles on the {side}: {text}" for side, text in words.items())
+
+
+def _response_in_words(profile: DriverProfile, side: str, is_borrowed: bool) -> str:
+    if is_borrowed:
+        return "not known, moves as the population does"
     basis, known = basis_of(profile, side), profile.beside.get(side)
     if known is None or not known.seconds:
-        answer = ", as its effects have it" if basis is not Basis.UNKNOWN else ""
-        return f"{side} {basis}{answer}"
+        return UNMEASURED_RESPONSES[basis]
     way = "left" if known.shift > 0 else "right"
-    return (
-        f"{side} {basis} ({abs(known.shift):.2f} +- {known.error:.2f} m to the {way} alongside, "
-        f"{known.seconds:.0f} s beside somebody)"
-    )
+    return f"moves {abs(known.shift):.2f} +- {known.error:.2f} m to the {way} ({basis}, {known.seconds:.0f} s)"
 
 
 def neighbour_shapes(runs: Sequence[Run], least: int) -> list[ColumnEffect]:

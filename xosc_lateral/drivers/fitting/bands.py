@@ -11,7 +11,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.digits import all_significant, significant
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.drives.drive import Drive, Run
-from xosc_lateral.drivers.drives.resampling import PASSED, STEP
+from xosc_lateral.drivers.drives.resampling import PASS_BAND_EDGES, STEP
 from xosc_lateral.drivers.fitting.fast_part import (
     ROLL_OFF,
     SPLIT_AT,
@@ -93,11 +93,11 @@ def in_bands(
     if profile.model.kind != ModelKind.AUTOREGRESSIVE:
         return replace(profile, validity=known)
     if fast_runs:
-        highest = fast_runs[0].valid_below or PASSED
+        highest = fast_runs[0].valid_below or PASS_BAND_EDGES
         fast = fast_part_of_runs(fast_runs, highest, _sources(fast_runs))
         return with_fast_movement(profile, known, stated or SPLIT_AT, fast, names)
     highest = stated or visible_below(profile)
-    if prior is not None and highest < PASSED:
+    if prior is not None and highest < PASS_BAND_EDGES:
         return with_fast_movement(profile, known, highest, fast_part_of(prior), names)
     if highest < WHOLE and stated is not None:
         return replace(with_fast_part(profile, None, highest), validity=known)
@@ -122,16 +122,16 @@ def _sources(runs: Sequence[Run]) -> str:
 
 
 def visible_below(profile: DriverProfile) -> float:
-    """Frequency below which a profile's driver moves more than its sensor errs, at most `PASSED`. [Hz]"""
+    """Frequency below which a profile's driver moves more than its sensor errs, at most `PASS_BAND_EDGES`. [Hz]"""
     sensor = profile.sensor
     if sensor is None:
-        return PASSED
+        return PASS_BAND_EDGES
     rounding = 2.0 * STEP * uniform_variance(sensor.rounding)
     hidden = density_of(profile)(SEEN) < sensor.density(SEEN) + rounding
-    return PASSED if not hidden.any() else float(np.round(SEEN[np.argmax(hidden)], 2))
+    return PASS_BAND_EDGES if not hidden.any() else float(np.round(SEEN[np.argmax(hidden)], 2))
 
 
-SEEN = np.linspace(0.02, PASSED, 149)
+SEEN = np.linspace(0.02, PASS_BAND_EDGES, 149)
 """Frequencies at which driver and sensor are compared. [Hz]"""
 
 LEAST_SHARE = 0.2

@@ -22,7 +22,7 @@ from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.evaluation.lane_keeping import HIGHWAY_SPEED, LaneKeeping, highway_drives, lane_keeping
 from xosc_lateral.drivers.fitting.stated_figures import Asked, Preset
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
-from xosc_lateral.drivers.model.drivability import SELDOM, strain
+from xosc_lateral.drivers.model.drivability import UNCOMFORTABLE_SHARE, strain
 from xosc_lateral.drivers.model.effects import Acts, Adapted, ColumnEffect, Population
 from xosc_lateral.drivers.model.effects.base import FACTOR_LIMIT
 from xosc_lateral.drivers.model.profile import DriverProfile
@@ -161,7 +161,9 @@ def _handles(
     if want.sdlp is None and want.restlessness is not None and want.memory is not None:
         size = want.restlessness / (rate * known.restlessness)  # from speed and memory follows how far
     elif want.sdlp is None and want.near_line is not None:
-        size = _solved(lambda k: _near(mean + k * within, limit), want.near_line, 1 / FACTOR_LIMIT, FACTOR_LIMIT)
+        size = _solved(
+            lambda k: _within_tolerance(mean + k * within, limit), want.near_line, 1 / FACTOR_LIMIT, FACTOR_LIMIT
+        )
     elif want.sdlp is not None:
         size = want.sdlp / known.sdlp
     if want.restlessness is not None and want.memory is None:
@@ -180,7 +182,9 @@ def _handles(
             )
     if want.near_line is not None and want.mean is None and want.size_is_given:
         away = 1.0 if known.mean >= 0 else -1.0
-        moved = _solved(lambda m: _near(away * m + size * within, limit), want.near_line, 0.0, 0.5 * lane_width)
+        moved = _solved(
+            lambda m: _within_tolerance(away * m + size * within, limit), want.near_line, 0.0, 0.5 * lane_width
+        )
         mean = away * moved
     fine = start.fine * (size * rate if fine is None else fine)
     spread, rate = start.spread * size, start.rate * rate
@@ -194,7 +198,7 @@ def _handles(
     return Adapted(shift=start.shift + mean - known.mean, spread=spread, rate=rate, fine=fine)
 
 
-def _near(offset: FloatArray, limit: float) -> float:
+def _within_tolerance(offset: FloatArray, limit: float) -> float:
     return float((np.abs(offset) > limit).mean())
 
 
@@ -235,7 +239,7 @@ def _corrected(want: Asked, asked: Asked, reached: LaneKeeping) -> Asked:
 def _check_drivable(drives: FloatArray, profile: DriverProfile, speed: float) -> None:
     """Refuse what could not be driven, or is no lane keeping."""
     out = float((np.abs(drives) > 0.5 * profile.lane_width).mean())
-    if out > SELDOM:
+    if out > UNCOMFORTABLE_SHARE:
         raise DriverProfileError(
             f"the vehicle's middle would be out of its lane of {profile.lane_width:.2f} m for {out:.1%} of the time"
         )
@@ -244,7 +248,7 @@ def _check_drivable(drives: FloatArray, profile: DriverProfile, speed: float) ->
     if worst.excess > 1.0:  # in every second hour
         raise DriverProfileError(
             f"no car could drive it: lateral acceleration above {worst.seldom:.2f} m/s2 for 0.1 % of the time, at most "
-            f"{worst.largest:.2f} m/s2, jerk at most {worst.jerk:.1f} m/s3 (see `driver.drivability`)"
+            f"{worst.largest:.2f} m/s2, jerk at most {worst.jerk:.1f} m/s3 (see `model.drivability`)"
         )
 
 

@@ -46,7 +46,7 @@ KNOTS = (0.1, 0.3, 0.5, 0.7, 0.9)  # Quantiles at which a curve may bend. [-]
 SCALES = (0.25, 0.5, 0.75)  # Quantiles of a distance that are tried as scale of its influence. [-]
 # Scales that refinement tries, alone and in products, as shares of the median distance. [-]
 FINE_SCALES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0)
-NEAR = 2.0 / 3.0  # A distance comes near: its 5 % quantile is below this share of its median. [-]
+NEAR_SHARE = 2.0 / 3.0  # A distance comes near: its 5 % quantile is below this share of its median. [-]
 # Directions that an angle is projected on: at most 8 % of a score is lost between two of them. [rad]
 PHASES = np.pi * np.arange(4) / 4.0
 
@@ -222,7 +222,7 @@ def _scale(values: FloatArray, share: float) -> float:
     """
     size = np.abs(values[np.isfinite(values)])
     size = size[size > 0.0]
-    if not len(size) or float(np.quantile(size, 0.05)) > NEAR * float(np.median(size)):
+    if not len(size) or float(np.quantile(size, 0.05)) > NEAR_SHARE * float(np.median(size)):
         return 0.0
     return float(np.quantile(size, share))
 

@@ -20,6 +20,7 @@ from xosc_lateral.drivers.loop.cross_validation import Progress, held_out_words
 from xosc_lateral.drivers.loop.held_out import HeldOut, Scorecard, Setting, fit_without, score_held_out, score_runs
 from xosc_lateral.drivers.loop.identify import Identified, identify, initial_terms
 from xosc_lateral.drivers.loop.model import Description, Fitted, Term
+from xosc_lateral.drivers.loop.omnibus import Omnibus, check_remainder
 from xosc_lateral.drivers.loop.refinement import Alternatives
 from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.residual import LackOfFit, lack_of_fit_of, size_of
@@ -61,7 +62,8 @@ def describe_finding(one: Accepted, key: str, effects: tuple[Effect, ...], fitte
     return _finding(term.describe(fitted, effects, key), scored, effects=effects, **about)
 
 
-# The held-out error of a profile with more effects may be so many times the base's: 24 runs leave 2 % of noise. [-]
+# The held-out error of a profile with more effects may be so many times the base's, 24 runs leave 2 % of noise; or more
+# where other drives of the driver might show less. [-]
 NO_WORSE = 1.05
 # Why an effect that does not help is taken back.
 HARMFUL = "significant, but with it held-out blocks are predicted worse by its own quantity, beyond what chance does"
@@ -74,11 +76,13 @@ class LoopResult:
     base: DriverProfile
     refined: DriverProfile
     given: bool  # Whether the base was given; else it was fitted first.
+    in_sample: bool  # Whether it was given, and fitted on these very drives.
     findings: tuple[Finding, ...]
     coarse: Coarse
     identified: Identified  # Terms that are kept and those that are not, and the columns.
     scored: HeldOut  # Both profiles on held-out blocks.
     lack_of_fit: LackOfFit  # What is left.
+    remainder: Omnibus  # Whether any column predicts it.
     scores: Scorecard  # The ten metrics.
     seed: int
 
@@ -118,6 +122,7 @@ def close_loop(
     base: DriverProfile | None = None,
     *,
     seed: int,
+    in_sample: bool = False,
     name: str = "refined",
     provenance: Provenance | None = None,
     excluded: Sequence[str] = (),
@@ -133,6 +138,8 @@ def close_loop(
         Start from it and from its effects; without, one is fitted first.
     seed : int
         Same drives, base and seed: same result.
+    in_sample : bool
+        Whether the base was fitted on these very drives: it is then fitted again without each held-out fold.
     name : str
         Of the refined profile.
     provenance : Provenance, optional
@@ -168,8 +175,10 @@ def close_loop(
     if paper:  # what the two-level model lacks is found once, by replacing it: the autoregressive one has both
         final = found.selection.final
         tested = compare_spectrum_shapes(base, timeline, root), test_population(final, between_shift(final))
-        lacks = [lack for lack in tested if lack is not None and lack.found]
-    setting = Setting(coarse, base if given else None, kind, ModelKind.AUTOREGRESSIVE if lacks else kind, root)
+        lacks = [lack for lack in tested if lack is not None and lack.is_found]
+    setting = Setting(
+        coarse, base if given and not in_sample else None, kind, ModelKind.AUTOREGRESSIVE if lacks else kind, root
+    )
     found, scored = _that_helps(setting, found, progress)
     selection = found.selection
     progress(0.95, "refitting on everything")
@@ -184,11 +193,13 @@ def close_loop(
         base=base,
         refined=refined,
         given=given,
+        in_sample=given and in_sample,
         findings=tuple(findings),
         coarse=coarse,
         identified=found,
         scored=scored,
         lack_of_fit=lack_of_fit_of(scored.real, scored.before, scored.after, scored.halves),
+        remainder=check_remainder(selection.final, found.quantities, root),
         scores=score_runs(timeline, scored.runs_before, scored.runs_after, setting.blocks, rng),
         seed=seed,
     )
@@ -204,7 +215,7 @@ def _that_helps(setting: Setting, found: Identified, progress: Progress) -> tupl
         harmful = _most_harmful(found.selection, scored)
         if harmful is not None:
             found = found.without([harmful], HARMFUL)
-        elif setting.kind is setting.refined_kind and after > NO_WORSE * before:
+        elif setting.kind is setting.refined_kind and after > NO_WORSE * before and scored.surely_worse:
             why = f"with the effects that were found the held-out error rises from {before:.4f} to {after:.4f} m"
             found = found.without([one.term for one in found.selection.accepted], why)
         else:

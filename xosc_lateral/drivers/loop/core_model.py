@@ -16,7 +16,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.loop.model import Description, Fitted
 from xosc_lateral.drivers.loop.residual import simulated_runs
-from xosc_lateral.drivers.loop.significance import LEAST, LoopSeed
+from xosc_lateral.drivers.loop.significance import MINIMUM_P, LoopSeed
 from xosc_lateral.drivers.loop.timeline import Timeline, smoothed
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.seeds import child
@@ -46,7 +46,7 @@ class SpectrumShape:
     p_value: float
 
     @property
-    def found(self) -> bool:
+    def is_found(self) -> bool:
         """Whether the profile's spectrum has another shape, beyond chance and by enough to matter."""
         return self.p_value < SHAPE_LEVEL and bool(np.max(np.abs(np.log(self.ratio))) > WORTH_ADDING)
 
@@ -73,7 +73,7 @@ def compare_spectrum_shapes(profile: DriverProfile, timeline: Timeline, seed: np
     k, n = len(difference), len(real)
     statistic = float(difference @ np.linalg.pinv(covariance) @ difference)
     p_value = float(f.sf(statistic * (n - k) / (k * (n - 1)), k, n - k))
-    return SpectrumShape(TIMES_S, np.exp(difference), max(p_value, LEAST))
+    return SpectrumShape(TIMES_S, np.exp(difference), max(p_value, MINIMUM_P))
 
 
 def _shapes(offset: FloatArray, timeline: Timeline) -> FloatArray:
@@ -103,7 +103,7 @@ class DriverVariance:
     p_value: float
 
     @property
-    def found(self) -> bool:
+    def is_found(self) -> bool:
         """Whether drivers differ beyond chance."""
         return self.p_value < DRIVERS_LEVEL
 
@@ -131,7 +131,7 @@ def test_population(fitted: Fitted, known: FloatArray) -> DriverVariance | None:
         return None
     shift, p_shift = _scatter(np.array([[half.mean() for half in pair] for pair in halves]))
     log_spread, p_spread = _scatter(np.array([[np.log(max(half.std(), 1e-6)) for half in pair] for pair in halves]))
-    return DriverVariance(len(halves), shift, log_spread, max(min(1.0, 2.0 * min(p_shift, p_spread)), LEAST))
+    return DriverVariance(len(halves), shift, log_spread, max(min(1.0, 2.0 * min(p_shift, p_spread)), MINIMUM_P))
 
 
 def _scatter(halves: FloatArray) -> tuple[float, float]:

@@ -43,11 +43,11 @@ BAND = (0.2, 0.3, 0.4, 0.6, 0.8)
 # not. Causes that change over ten seconds and more stay below 0.06, also where they move the car by 0.9 m; a switch
 # that moves a car of little movement of its own by 0.2 m has 0.29, gusts of 3 s that push a car by 0.8 m up to 0.49;
 # consequences are above 0.5, and 0.35 where most of the column is something else. [-]
-CLEAR, ALONE = 0.2, 0.5
+FEEDBACK_COHERENCE, DOUBTFUL_COHERENCE = 0.2, 0.5
 # Share of a column's innovations that the movement predicts: from the first on it is feedback, from the second on
 # doubtful; below the last, coherence alone is doubtful too. Causes that share more than 0.2 (gusts that push a car by
 # 0.8 m) stay below 0.0006; a steering angle or a yaw rate that mostly follows the road's curves has 0.0065. [-]
-PREDICTED, PERHAPS, HARDLY = 0.05, 0.02, 0.003
+PREDICTED, DOUBTFUL_SHARE, NEGLIGIBLE_SHARE = 0.05, 0.02, 0.003
 # Squared coherence with its own mean given the present offset or lateral speed, from which a column is a function of
 # it. Warnings with hysteresis have 0.8, a lateral speed 0.4 to 0.7, causes below 0.06. [-]
 FUNCTION = 0.4
@@ -107,12 +107,14 @@ def find_feedback(
         predicted = _predicted_share(values, moved, rows) if changes else 0.0
         of, coherence, function = max(shared, key=lambda name: shared[name]), max(shared.values()), max(given.values())
         is_function = function >= max(FUNCTION, chance)
-        clear = predicted >= PREDICTED or (coherence >= max(CLEAR, chance) and predicted >= HARDLY)
-        doubtful = coherence >= max(ALONE, chance) or predicted >= PERHAPS
+        clear = predicted >= PREDICTED or (
+            coherence >= max(FEEDBACK_COHERENCE, chance) and predicted >= NEGLIGIBLE_SHARE
+        )
+        doubtful = coherence >= max(DOUBTFUL_COHERENCE, chance) or predicted >= DOUBTFUL_SHARE
         if is_function and not clear:
             of = max(given, key=lambda name: given[name])
         if assigned.role.is_exogenous:  # a name alone is overruled where both marks are strong
-            clear, doubtful = predicted >= PREDICTED and coherence >= max(ALONE, chance), False
+            clear, doubtful = predicted >= PREDICTED and coherence >= max(DOUBTFUL_COHERENCE, chance), False
         own = assigned.role is Role.OWN
         if own or clear or is_function or doubtful:
             sure, source = own or clear or is_function, assigned.source if own else ""

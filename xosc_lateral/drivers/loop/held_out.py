@@ -24,6 +24,7 @@ from xosc_lateral.drivers.loop.cross_validation import Nested, Progress, folds_o
 from xosc_lateral.drivers.loop.model import Fitted, Removal
 from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.residual import (
+    LEVEL,
     SummaryStatistics,
     error_between,
     expected,
@@ -111,6 +112,19 @@ class HeldOut:
     def errors(self) -> tuple[float, float]:
         """Errors before and after. [m]"""
         return error_between(self.real, self.before), error_between(self.real, self.after)
+
+    @property
+    def surely_worse(self) -> bool:
+        """Whether the error after is the larger one for whatever drives of this driver might have been measured.
+
+        Half samples less the whole vary about it as the whole does about the truth: added to what was measured, they
+        are other drives of the same length.
+        """
+        rises = []
+        for half in self.halves:
+            other = {name: values + np.nan_to_num(half[name]) for name, values in self.real.items()}
+            rises.append(error_between(other, self.after) > error_between(other, self.before))
+        return float(np.mean(rises)) >= 1.0 - LEVEL
 
     def error_of(self, group: str) -> tuple[float, float]:
         """Errors before and after in one group; 0 where there is none. [m]"""

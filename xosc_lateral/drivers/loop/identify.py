@@ -12,6 +12,7 @@ from msgspec import structs
 
 from xosc_lateral.drivers.loop.columns import Assigned, Column, Role, known_columns, roles_of
 from xosc_lateral.drivers.loop.cross_validation import Nested, Progress, nest
+from xosc_lateral.drivers.loop.dictionary import Quantities
 from xosc_lateral.drivers.loop.feedback import Feedback, find_feedback
 from xosc_lateral.drivers.loop.model import Term
 from xosc_lateral.drivers.loop.search import Search
@@ -46,6 +47,7 @@ class Identified:
 
     usable: Usable
     selection: Selection  # Terms that are kept, each with its held-out gain, and everything rejected.
+    quantities: Quantities  # What was searched.
     nested: Nested | None = None  # Selections of all folds; None: nothing was found.
     total: Gain | None = None  # Of all kept terms together.
     returned_base: str = ""  # Why nothing is kept although something was found; empty otherwise.
@@ -87,17 +89,19 @@ def identify(
         search = Search.over(coarse, usable.columns, seed, ERROR_BUDGET, lambda what: progress(0.1, what))
         selection = select(search, initial)
         if not selection.accepted:
-            return Identified(usable, selection)
+            return Identified(usable, selection, search.quantities)
         # what happened once can't be found without the block in which it happened: folds know when, and size it
         once = tuple(one.term for one in selection.accepted if one.term.component == StepTerm.component)
         found = {one.term.component for one in selection.accepted} - {StepTerm.component}
         there = Counter(term.component for term in selection.final.terms)
         wanted = {component: there[component] for component in sorted(found)}
 
-        def done(share: float) -> None:
+        def finished(share: float) -> None:
             progress(0.3 + 0.3 * share, "selecting without a fold")
 
-        return _worst_first(Identified(usable, selection, nest(search, (*initial, *once), wanted, done)))
+        return _worst_first(
+            Identified(usable, selection, search.quantities, nest(search, (*initial, *once), wanted, finished))
+        )
 
 
 def usable_columns(

@@ -8,7 +8,7 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.drivers.loop.autocorrelation import Whitener, fit_autoregression, start_factors
 
 ORDER = 12  # Past seconds that have a coefficient each in the movement's autoregression. [s]
-LONGEST = 96  # Past seconds that it sees as means over doubling times: drifts of a minute and a half. [s]
+MAXIMUM_ORDER = 96  # Past seconds that it sees as means over doubling times: drifts of a minute and a half. [s]
 # Shifts of a response that make up its smoothing: two standard deviations, to either side, of a Gaussian that leaves
 # 9 % at 0.5 Hz. [s]
 SMOOTHING_S = (-2, -1, 1, 2)
@@ -29,7 +29,7 @@ def own_levels(squares: FloatArray, valid: BoolArray, drive: IntArray) -> FloatA
 
 def _whitener(movement: FloatArray, valid: BoolArray, drive: IntArray, scale: FloatArray) -> Whitener:
     """What turns movement over scale, 0 where invalid, into independent rows, without measurement noise."""
-    return Whitener(fit_autoregression(movement, valid, ORDER, longest=LONGEST), valid, drive, scale)
+    return Whitener(fit_autoregression(movement, valid, ORDER, longest=MAXIMUM_ORDER), valid, drive, scale)
 
 
 def innovations(

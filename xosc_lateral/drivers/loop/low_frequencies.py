@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.drivers.loop.autocorrelation import Whitener, fit_autoregression
 from xosc_lateral.drivers.loop.dictionary import beside, orthonormal
-from xosc_lateral.drivers.loop.innovations import LONGEST, ORDER
+from xosc_lateral.drivers.loop.innovations import MAXIMUM_ORDER, ORDER
 from xosc_lateral.drivers.loop.model import Fitted
-from xosc_lateral.drivers.loop.significance import LEAST, upper_tail
+from xosc_lateral.drivers.loop.significance import MINIMUM_P, upper_tail
 from xosc_lateral.drivers.loop.timeline import MIN_DRIFT_S, Coarse
 from xosc_lateral.drivers.model.effects.hidden import half_cosines
 
@@ -50,7 +50,7 @@ def slow_rows(fitted: Fitted) -> tuple[FloatArray, Whitener]:
     slow = np.column_stack([np.ones(len(left)), half_cosines_of(coarse, number)]) * coarse.valid[:, None]
     basis = np.linalg.qr(slow)[0]
     movement = np.where(coarse.valid, beside(basis, left) / fitted.scale, 0.0)
-    process = fit_autoregression(movement, coarse.valid, ORDER, longest=LONGEST)
+    process = fit_autoregression(movement, coarse.valid, ORDER, longest=MAXIMUM_ORDER)
     whitener = Whitener(process, coarse.valid, coarse.drive, fitted.scale)
     return whitener.rows(left), whitener
 
@@ -86,7 +86,7 @@ def smooth_probabilities(rows: FloatArray, columns: FloatArray, orders: Sequence
             explained = float(np.sum(np.square(basis.T @ rows)))
             left = max(float(rows @ rows) - explained, 1e-300)
             ratio = explained / basis.shape[1] / (left / others)
-            found[order] = max(float(f.sf(ratio, basis.shape[1], others)), LEAST)
+            found[order] = max(float(f.sf(ratio, basis.shape[1], others)), MINIMUM_P)
     return found
 
 

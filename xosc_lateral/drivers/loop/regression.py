@@ -17,7 +17,7 @@ import numpy as np
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.drivers.fitting.answers import cluster_sums
 from xosc_lateral.drivers.loop.autocorrelation import Whitener, fit_autoregression, start_factors, unbiased
-from xosc_lateral.drivers.loop.innovations import CLIP, LONGEST, ORDER, own_levels
+from xosc_lateral.drivers.loop.innovations import CLIP, MAXIMUM_ORDER, ORDER, own_levels
 from xosc_lateral.drivers.loop.model import Fitted, Term, joined
 from xosc_lateral.drivers.loop.timeline import CLUSTER_S, Coarse, means_by_drive
 
@@ -49,9 +49,9 @@ def fit_model(coarse: Coarse, terms: Sequence[Term]) -> Fitted:
     for _ in range(ROUNDS):
         scale = np.exp(scales @ log_sizes + known) * spread[drive]
         movement = np.where(valid, (coarse.offset - columns @ sizes - levels[drive]) / scale, 0.0)
-        process = fit_autoregression(movement, valid, ORDER, longest=LONGEST, noise=MEASUREMENT_NOISE)
+        process = fit_autoregression(movement, valid, ORDER, longest=MAXIMUM_ORDER, noise=MEASUREMENT_NOISE)
         if not coarse.lasts:
-            process = unbiased(process, valid, drive, ORDER, longest=LONGEST)
+            process = unbiased(process, valid, drive, ORDER, longest=MAXIMUM_ORDER)
         whitener = Whitener(process, valid, drive, scale)
         observed, design = whitener.rows(coarse.offset), whitener.rows(columns)
         sizes, covariance = clustered_least_squares(design, observed, coarse.cluster)

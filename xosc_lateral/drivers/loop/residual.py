@@ -203,7 +203,7 @@ class LackOfFit:
     p_value: float
 
     @property
-    def clear(self) -> bool:
+    def is_clear(self) -> bool:
         """Whether more is left than chance explains."""
         return self.unexplained > 0.0 and self.p_value <= LEVEL
 

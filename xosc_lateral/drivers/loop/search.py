@@ -18,7 +18,7 @@ from xosc_lateral.drivers.loop.timeline import Coarse
 # twenty times as much.
 MAX_PRODUCT_COLUMNS = 24
 # Scored dictionaries that are kept, each of tens of megabytes: of the mean and of the spread beside the same fit.
-KEPT = 2
+KEPT_DICTIONARIES = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class Search:
         key = (kind, id(fitted))
         if key not in self._kept:
             self._kept[key] = (fitted, make())  # the fit is kept with it: no other has its id meanwhile
-            for old in list(self._kept)[:-KEPT]:
+            for old in list(self._kept)[:-KEPT_DICTIONARIES]:
                 del self._kept[old]
         return self._kept[key][1]
 

@@ -21,9 +21,10 @@ class LoopSeed(IntEnum):
     SPECTRUM = 7  # Runs whose spectrum is compared with the drives'.
     BLOCKS = 9  # Half samples of the blocks.
     SNIPPETS = 11  # Halves of the blocks whose snippets are compared.
+    OMNIBUS = 13  # Rotations that what is left is compared with.
 
 
-LEAST = 1e-300  # p-values stay above: their logarithm is taken. [-]
+MINIMUM_P = 1e-300  # p-values stay above: their logarithm is taken. [-]
 # Probability that chance is named: on 39 tables of 40 nothing wrong is to be, and now and then what goes along with an
 # effect is taken for it. [-]
 BUDGET = 0.02
@@ -31,7 +32,7 @@ BUDGET = 0.02
 TAIL_SHARE = 0.25
 HEAVY_TAIL_SHARE = 0.1  # Share that the tail of a quadratic form is fitted on: further in it is no exponential yet. [-]
 # So many independent draws that reach a score tell its probability to a third, without any law of the tail.
-ENOUGH = 10
+COUNTED_DRAWS = 10
 # Mean excess in the far tail of a chi-square with one degree of freedom, and of maxima of many. [-]
 CHI_SQUARE_EXCESS = 2.0
 # From so many drives on a table tells what differs between them, and its null is drawn by whole drives.
@@ -41,7 +42,7 @@ MANY_DRIVES = 20
 def upper_tail(
     score: float, null: FloatArray, *, tail_share: float = TAIL_SHARE, least_excess: float = CHI_SQUARE_EXCESS
 ) -> float:
-    """Probability, `LEAST` to 1, that chance gives `score` or more. [-]
+    """Probability, `MINIMUM_P` to 1, that chance gives `score` or more. [-]
 
     What many independent draws reach has their share. Beyond, the null's tail falls as an exponential, whose scale is
     known from no more than the draws in it: integrated over what it may be, the tail is a power [1]_, which an
@@ -65,12 +66,12 @@ def upper_tail(
         return 1.0
     independent, share = effective_number(null), float(np.mean(null >= score))
     knee = float(np.quantile(null, 1.0 - tail_share))
-    if score <= knee or share * independent >= ENOUGH:
+    if score <= knee or share * independent >= COUNTED_DRAWS:
         return share
     draws = max(tail_share * independent, 1.0)
     excess = max(float(np.mean(null[null > knee] - knee)) if np.any(null > knee) else 0.0, least_excess, 1e-300)
     p_value = tail_share * float(np.exp(-draws * np.log1p((score - knee) / (excess * draws))))
-    return max(min(p_value, ENOUGH / independent), LEAST)
+    return max(min(p_value, COUNTED_DRAWS / independent), MINIMUM_P)
 
 
 def effective_number(draws: FloatArray) -> float:
@@ -100,4 +101,4 @@ def as_one_degree(chi_square: FloatArray | float, degrees: int) -> FloatArray:
     """Chi-square with one degree of freedom that is as rare as one with `degrees`, of the same shape."""
     from scipy.stats import chi2
 
-    return np.asarray(chi2.isf(np.maximum(chi2.sf(chi_square, degrees), LEAST), 1))
+    return np.asarray(chi2.isf(np.maximum(chi2.sf(chi_square, degrees), MINIMUM_P), 1))

@@ -71,7 +71,7 @@ class Timeline:
         return [slice(int(first), int(last)) for first, last in pairwise(edges)]
 
     def respond(self, values: FloatArray, lag_s: float, response_s: float) -> FloatArray:
-        """`driver.effects.response.respond` drive by drive: shape of `values`, (n,) or (n, k), in their unit.
+        """`effects.response.respond` drive by drive: shape of `values`, (n,) or (n, k), in their unit.
 
         A lag of a minute would outlast the pad between two drives, so that one would respond to what the other met.
         """

@@ -36,13 +36,13 @@ LIMIT, JERK_LIMIT = 3.0, 5.0
 JERK_WINDOW = 0.5
 """Jerk is averaged over this. [s]"""
 
-SELDOM = 1e-3
+UNCOMFORTABLE_SHARE = 1e-3
 """Share of the time that lane keeping may be uncomfortable. [-]"""
 
 TRAFFIC = 0.6
 """Twice what 99.9 % of real motorway traffic stays below: beyond, a profile probably holds a sensor's noise. [m/s2]"""
 
-ROUGHEST, WIDEST = 0.1, 3.0
+MINIMUM_KERNEL_WIDTH, MAXIMUM_KERNEL_WIDTH = 0.1, 3.0
 """Standard deviations of the kernel by which paths are smoothed: from, to. [s]"""
 
 AS_GIVEN = 1.15
@@ -106,8 +106,8 @@ def strain(offset: FloatArray, step: float, speed: FloatArray) -> Strain:
 
 
 def _seldom_exceeded(values: FloatArray) -> float:
-    """What n values, n >= 2, exceed in `SELDOM` of the time: `np.quantile` to the bit, which would load `numpy.ma`."""
-    at = (len(values) - 1) * (1.0 - SELDOM)
+    """What n >= 2 values exceed in `UNCOMFORTABLE_SHARE` of the time: `np.quantile`, which would load `numpy.ma`."""
+    at = (len(values) - 1) * (1.0 - UNCOMFORTABLE_SHARE)
     low, high = np.partition(values, (int(at), int(at) + 1))[int(at) : int(at) + 2].tolist()
     share: float = at - int(at)
     return low + (high - low) * share if share < 0.5 else high - (high - low) * (1.0 - share)  # type: ignore[no-any-return]
@@ -121,8 +121,8 @@ def drivable(offset: FloatArray, step: float, speed: FloatArray) -> tuple[FloatA
     before = strain(offset, step, speed)
     if before.excess <= 1.0:
         return offset, None
-    width, smooth, after = ROUGHEST, offset, before
-    while after.excess > 1.0 and width <= WIDEST:
+    width, smooth, after = MINIMUM_KERNEL_WIDTH, offset, before
+    while after.excess > 1.0 and width <= MAXIMUM_KERNEL_WIDTH:
         smooth = _smoothed(offset, width / step)
         after = strain(smooth, step, speed)
         width *= 1.3

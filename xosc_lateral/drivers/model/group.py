@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.base.limits import LIVE_RANGES
 from xosc_lateral.base.segment import FADES
 from xosc_lateral.drivers.model.effects import Acts, EffectTerms
 from xosc_lateral.drivers.model.effects.base import terms_of
@@ -91,11 +92,13 @@ class OffsetGroup:
         self._state = np.concatenate([self._state, np.zeros(len(new), dtype=_DRIVER)])
         return new
 
-    def keep(self, there: BoolArray) -> None:
+    def keep_present(self, there: BoolArray) -> None:
         """Drop the drivers that are not there, shape (n,)."""
         if there.all():
             return
         self._drives = [drive for drive, stays in zip(self._drives, there, strict=True) if stays]
+        if not there.any():  # who comes next meets nobody's past
+            self._responses = [self._response(k) for k in range(len(self._effects))]
         for response, slopes in zip(self._responses, self._slopes, strict=True):
             state, known = response.state, there[: self._known(response, slopes.shape[1])]
             if state.held is not None:
@@ -202,6 +205,14 @@ class OffsetGroup:
             if values is not None:
                 rows[:, column] = values
         return float(movement.mean), rows
+
+    def try_next(self) -> None:
+        """Draw what comes after all that is drawn; a `ValueError` if a state from outside leads to no offsets."""
+        for k, (drive, own) in enumerate(zip(self._drives, self._state, strict=True)):
+            next_ = (0.0, own["drawn"]) if self._rated else self._block(drive, int(own["row"] + own["left"]))
+            for values in (own["mean"], own["samples"], own["drawn"], *next_):
+                if not np.abs(values).max() <= LIVE_RANGES["offset"].high:
+                    raise ValueError(f"drives[{k}]: a number that no driver has")
 
     # ---- state -------------------------------------------------------------------------------------------------------
     def to_dict(self) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from xosc_lateral.base.segment import Segment
 if TYPE_CHECKING:
     from xosc_lateral.drivers.model.profile import DriverProfile
 
-NARROW = 2.5
+MINIMUM_LANE_WIDTH = 2.5
 """Where a lane is narrower than this (it opens or closes), an offset is held against a lane of this width. [m]"""
 
 TRIAL = 150
@@ -30,7 +30,7 @@ def check_offsets(offset: FloatArray, lane_width: FloatArray | float, who: str, 
 
     Raises `DriverProfileError` with the first such offset: `who` says whose it is, `time` [s] of shape (n,) when.
     """
-    reach = OFFSET_LANES.value * np.maximum(lane_width, NARROW)
+    reach = OFFSET_LANES.value * np.maximum(lane_width, MINIMUM_LANE_WIDTH)
     far = np.flatnonzero(~(np.abs(offset) <= reach))  # also NaN
     if not len(far):
         return
@@ -43,7 +43,7 @@ def check_offsets(offset: FloatArray, lane_width: FloatArray | float, who: str, 
 
 def _lanes(offset: FloatArray, lane_width: FloatArray | float, row: int) -> float:
     width = np.broadcast_to(np.asarray(lane_width, dtype=np.float64), offset.shape)[row]
-    return float(abs(offset[row]) / max(width, NARROW))
+    return float(abs(offset[row]) / max(width, MINIMUM_LANE_WIDTH))
 
 
 def check_context(context: Mapping[str, float], who: str) -> None:
@@ -52,7 +52,7 @@ def check_context(context: Mapping[str, float], who: str) -> None:
     Raises `ValueError` with name, value and range.
     """
     for name, value in context.items():
-        if nobody(name, np.asarray(value)):
+        if drives_nobody(name, np.asarray(value)):
             continue
         if (why := implausible(name, float(value))) is not None:
             raise ValueError(f"{who}: {why}")
@@ -78,10 +78,10 @@ def implausible_rows(name: str, values: FloatArray, believed: Range | None = Non
     By what a context column of that name is believed to be, or by the range given.
     """
     believed = believed or context_range(name)
-    return (values < believed.low) | ((values > believed.high) & ~nobody(name, values))
+    return (values < believed.low) | ((values > believed.high) & ~drives_nobody(name, values))
 
 
-def nobody(name: str, values: FloatArray) -> BoolArray:
+def drives_nobody(name: str, values: FloatArray) -> BoolArray:
     """Where the distance to somebody says that nobody is within reach: it is infinite. Shape as `values`."""
     return np.isposinf(values) & (name in DISTANCES)
 

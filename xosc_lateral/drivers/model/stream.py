@@ -288,9 +288,9 @@ class OffsetStream:
         return stream
 
 
-def sealed(values: Mapping[str, Any]) -> dict[str, Any]:
+def sealed(values: Mapping[str, Any], form: str = FORMAT) -> dict[str, Any]:
     """A state's plain values with format, version and the hash of all of it."""
-    state = {"format": FORMAT, "version": VERSION, **values}
+    state = {"format": form, "version": VERSION, **values}
     return {**state, "sha256": _hash(state)}
 
 
@@ -299,14 +299,14 @@ def _hash(state: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(state, sort_keys=True).encode()).hexdigest()
 
 
-def unsealed(state: Mapping[str, Any]) -> dict[str, Any]:
+def unsealed(state: Mapping[str, Any], form: str = FORMAT) -> dict[str, Any]:
     """A state's values without format and version.
 
     Raises `DriverProfileError` if it is no state of a stream, of another version, or not what was written: nobody edits
     a generator's state.
     """
-    if not isinstance(state, Mapping) or state.get("format") != FORMAT:
-        raise DriverProfileError(f'not a state of an offset stream: "format" is not "{FORMAT}"')
+    if not isinstance(state, Mapping) or state.get("format") != form:
+        raise DriverProfileError(f'not a state of {form.removeprefix("xosc-lateral ")}: "format" is not "{form}"')
     if state.get("version") != VERSION:
         raise DriverProfileError(
             f"a state written by another version of xosc-lateral (format {state.get('version')!r}; this one reads "
@@ -314,7 +314,7 @@ def unsealed(state: Mapping[str, Any]) -> dict[str, Any]:
         )
     written = {name: value for name, value in state.items() if name != "sha256"}
     if state.get("sha256") != _hash(written):
-        raise DriverProfileError("the state of an offset stream is damaged: its sha256 is another")
+        raise DriverProfileError(f"the state of {form.removeprefix('xosc-lateral ')} is damaged: its sha256 is another")
     return {name: value for name, value in written.items() if name not in ("format", "version")}
 
 

@@ -17,7 +17,7 @@ from xosc_lateral.world.road.piecewise import Cubic
 
 XmlElement = etree._Element
 
-LARGEST = 1e12
+MAXIMUM_NUMBER = 1e12
 """No number of a road is larger; beyond, squares and cubes would overflow sooner or later."""
 
 
@@ -60,8 +60,8 @@ class RoadFile:
             raise self.error(f"{name}={text!r} is not a number", element) from None
         if not isfinite(value):
             raise self.error(f"{name}={text!r} is not finite", element)
-        if abs(value) > LARGEST:
-            raise self.error(f"{name}={text!r} is larger than {LARGEST:g}", element)
+        if abs(value) > MAXIMUM_NUMBER:
+            raise self.error(f"{name}={text!r} is larger than {MAXIMUM_NUMBER:g}", element)
         return value
 
     def appearance(self, element: XmlElement, name: str, default: float) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from math import inf
 
 from msgspec import Struct, structs
@@ -15,8 +15,10 @@ from xosc_lateral.world.road.positions import RoadMark
 MOST_LANES = 1000
 """No lane id is further from 0: tables of lanes grow with it."""
 
-WIDEST = 1000.0
+MAXIMUM_LANE_WIDTH = 1000.0
 """No lane is wider, or further off its reference line. [m]"""
+
+_REVERSED = "laneSection/*/lane[@direction='reversed']"
 
 SPEED_UNITS = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
 
@@ -34,7 +36,8 @@ def read_sections(
     road: XmlElement, length: float, rule: str, source: RoadFile
 ) -> tuple[tuple[LaneSection, ...], dict[int, int]]:
     """Lane sections, gapless over [0, length], and the travel direction of each lane id."""
-    offset_records = [(source.number(e, "s"), source.cubic(e)) for e in road.iterfind("lanes/laneOffset")]
+    offsets = [e for lanes in _permanent(road.iterfind("lanes")) for e in lanes.iterfind("laneOffset")]
+    offset_records = [(source.number(e, "s"), source.cubic(e)) for e in offsets]
     lane_offset = PiecewiseCubic.from_records(offset_records, begin=0.0)
     written = _read_all(road, length, source)
     directions = _directions(road, written, rule, source)
@@ -53,7 +56,11 @@ def read_sections(
 
 def _read_all(road: XmlElement, length: float, source: RoadFile) -> list[_Written]:
     by_start: dict[float, _Written] = {}
-    elements = sorted(road.iterfind("lanes/laneSection"), key=lambda e: source.number(e, "s"))
+    layers = list(road.iterfind("lanes"))
+    if (permanent := _permanent(layers)) != layers:
+        source.note("temporary lanes are left out: scenarios name lanes of the permanent layer", road)
+    sections = [e for lanes in permanent for e in lanes.iterfind("laneSection")]
+    elements = sorted(sections, key=lambda e: source.number(e, "s"))
     for element in elements:
         start = source.number(element, "s")
         if start >= length and by_start:
@@ -65,11 +72,16 @@ def _read_all(road: XmlElement, length: float, source: RoadFile) -> list[_Writte
     if not by_start:
         source.note("road without lane sections: it has no lanes", road)
         return [_Written(0.0, (), (), ())]
-    sections = list(by_start.values())
-    if sections[0].start > 0.0:
-        source.note(f"first lane section starts at s={sections[0].start:g} m: taken to start at 0", elements[0])
-    sections[0] = structs.replace(sections[0], start=0.0)
-    return sections
+    written = list(by_start.values())
+    if written[0].start > 0.0:
+        source.note(f"first lane section starts at s={written[0].start:g} m: taken to start at 0", elements[0])
+    written[0] = structs.replace(written[0], start=0.0)
+    return written
+
+
+def _permanent(elements: Iterable[XmlElement]) -> list[XmlElement]:
+    """Lanes, or links to lanes, of the permanent layer: what names no layer means it (OpenDRIVE 1.9, section 11.2)."""
+    return [element for element in elements if element.get("layer", "permanent") == "permanent"]
 
 
 def _read_section(element: XmlElement, start: float, source: RoadFile) -> _Written:
@@ -108,7 +120,7 @@ def _read_lane(element: XmlElement, start: float, source: RoadFile) -> LaneRecor
         for e in element.iterfind("height")
     )
     links = {
-        tag: tuple(source.integer(e, "id") for e in element.iterfind(f"link/{tag}"))
+        tag: tuple(source.integer(e, "id") for e in _permanent(element.iterfind(f"link/{tag}")))
         for tag in ("predecessor", "successor")
     }
     return LaneRecord(
@@ -162,7 +174,7 @@ def _directions(road: XmlElement, written: Sequence[_Written], rule: str, source
     directions = {
         lane.id: along if lane.id > 0 else -along for w in written for lane in (*(w.left or ()), *(w.right or ()))
     }
-    for element in road.iterfind(".//lane[@direction='reversed']"):
+    for element in (e for lanes in _permanent(road.iterfind("lanes")) for e in lanes.iterfind(_REVERSED)):
         lane = source.integer(element, "id")
         directions[lane] = -along if lane > 0 else along
         source.note(f"lane {lane} is driven against its side of the road, all along the road", element)
@@ -192,10 +204,10 @@ def _check_lanes(road: XmlElement, sections: Sequence[LaneSection], source: Road
         for lane in section.lanes:
             for s in (*lane.starts, section.end):
                 centre, _, width = lane.state_at(s)
-                if max(abs(centre), abs(width)) > WIDEST:
+                if max(abs(centre), abs(width)) > MAXIMUM_LANE_WIDTH:
                     raise source.error(
                         f"lane {lane.id} at s={s:g} m: {width:g} m wide, {centre:g} m off the reference line; "
-                        f"limit {WIDEST:g} m",
+                        f"limit {MAXIMUM_LANE_WIDTH:g} m",
                         road,
                     )
             if not any(any(cubic) for cubic in lane.width):

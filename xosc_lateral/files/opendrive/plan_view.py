@@ -97,7 +97,7 @@ def end_parameter(v: tuple[float, float, float, float], length: float) -> float:
 
 
 # Shorter elements are left out: rounding in the file, no road. [m]
-SHORTEST = 1e-9
+MINIMUM_ELEMENT_LENGTH = 1e-9
 
 
 class CubicRecord(Struct, frozen=True):
@@ -121,7 +121,7 @@ def read_plan_view(road: XmlElement, source: RoadFile) -> list[Record]:
     records: list[Record] = []
     for geometry in road.iterfind("planView/geometry"):
         length = source.number(geometry, "length")
-        if length < SHORTEST:
+        if length < MINIMUM_ELEMENT_LENGTH:
             source.note(f"geometry of length {length:g} m left out", geometry)
             continue
         records.append((source.number(geometry, "s"), length, _element(geometry, length, source)))

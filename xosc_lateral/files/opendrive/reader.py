@@ -19,10 +19,10 @@ from xosc_lateral.world.road.surface import HeaderOffset, Shape, Surface
 LENGTH_TOLERANCE = 0.01
 """road/@length and the end of its geometry may differ by this without a note. [m]"""
 
-FARTHEST = 1e8
+MAXIMUM_COORDINATE = 1e8
 """Largest coordinate; UTM stays below 1e7. [m]"""
 
-LONGEST = 1e6
+MAXIMUM_ROAD_LENGTH = 1e6
 """Longest road. The longest one in the field has 50 km. [m]"""
 
 
@@ -108,9 +108,9 @@ def _check_places(
     for (s, length, _), part in zip(plan, line, strict=True):
         for ds in (0.0, 0.5 * length, length):
             x, y, _ = part.at(ds)
-            if not max(abs(x), abs(y)) <= FARTHEST:
+            if not max(abs(x), abs(y)) <= MAXIMUM_COORDINATE:
                 raise source.error(
-                    f"at s={s + ds:g} m the road lies at x={x:g}, y={y:g}; limit {FARTHEST:g} m", element
+                    f"at s={s + ds:g} m the road lies at x={x:g}, y={y:g}; limit {MAXIMUM_COORDINATE:g} m", element
                 )
 
 
@@ -120,8 +120,8 @@ def _length(element: XmlElement, plan: Sequence[Record], source: RoadFile) -> fl
     length = source.number(element, "length", end)
     if length <= 0.0:
         raise source.error(f"length={length:g} m is not positive", element)
-    if length > LONGEST:
-        raise source.error(f"length={length:g} m; limit {LONGEST:g} m", element)
+    if length > MAXIMUM_ROAD_LENGTH:
+        raise source.error(f"length={length:g} m; limit {MAXIMUM_ROAD_LENGTH:g} m", element)
     if abs(length - end) > LENGTH_TOLERANCE:
         used = min(length, end)
         source.note(f"length={length:g} m, but the geometry ends at {end:g} m: {used:g} m used", element)

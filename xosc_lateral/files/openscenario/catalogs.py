@@ -41,7 +41,11 @@ def allowed_roots(scenario: Path, extra: Iterable[Path] = ()) -> tuple[Path, ...
     require_folders(extra)
     folder = Path(os.path.realpath(scenario)).parent
     beside = Path(os.path.realpath(Path(scenario).absolute().parent))
-    return tuple(dict.fromkeys([_highest(folder), _highest(beside), *(Path(os.path.realpath(path)) for path in extra)]))
+    return tuple(
+        dict.fromkeys(
+            [_highest_folder(folder), _highest_folder(beside), *(Path(os.path.realpath(path)) for path in extra)]
+        )
+    )
 
 
 def require_folders(folders: Iterable[Path]) -> None:
@@ -51,7 +55,7 @@ def require_folders(folders: Iterable[Path]) -> None:
             raise FormatError("no such folder to allow", path=folder)
 
 
-def _highest(folder: Path) -> Path:
+def _highest_folder(folder: Path) -> Path:
     root = folder
     for level in range(1, LEVELS_UP + 1):
         parent = root.parent

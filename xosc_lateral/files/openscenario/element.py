@@ -18,7 +18,7 @@ from xosc_lateral.world.scenario.place import Place
 E = TypeVar("E", bound=StrEnum)
 V = TypeVar("V")
 
-LARGEST = 1e15
+MAXIMUM_NUMBER = 1e15
 """Largest finite number that is taken: its square is still far from overflow, and no unit makes sense of it."""
 
 _TRUE = {"true", "1", "1.0000000000", "yes"}
@@ -101,8 +101,8 @@ class XmlElement:
             self.fail(f"{name}='{text[:60]}' is not a number")
         if math.isnan(value) or (finite and math.isinf(value)):
             self.fail(f"{name}='{text[:60]}' is not finite")
-        if finite and abs(value) > LARGEST:
-            self.fail(f"{name}='{text[:60]}' is implausibly large (at most {LARGEST:g})")
+        if finite and abs(value) > MAXIMUM_NUMBER:
+            self.fail(f"{name}='{text[:60]}' is implausibly large (at most {MAXIMUM_NUMBER:g})")
         return value
 
     def optional_integer(self, name: str) -> int | None:

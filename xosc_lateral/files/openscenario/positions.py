@@ -84,10 +84,23 @@ def _road_id(e: XmlElement) -> str:
 def _relative_lane(e: XmlElement, context: Context) -> RelativeLanePosition:
     ds, lanes = e.optional_number("ds"), e.optional_integer("dLane")
     if ds is None and e.optional_number("dsLane") is None:
-        ds = 0.0
+        ds = _number_or_zero(e, "ds", context)
     if lanes is None:
         context.remark(e, "dLane is missing: taken as 0, the same lane")
     return read_struct(RelativeLanePosition, e, context, d_lane=lanes or 0, ds=ds)
+
+
+def _relative_road(e: XmlElement, context: Context) -> RelativeRoadPosition:
+    ds, dt = (_number_or_zero(e, name, context) for name in ("ds", "dt"))
+    return read_struct(RelativeRoadPosition, e, context, ds=ds, dt=dt)
+
+
+def _number_or_zero(e: XmlElement, name: str, context: Context) -> float:
+    """A way from the reference entity; where the file has none it is 0, which is said. [m]"""
+    value = e.optional_number(name)
+    if value is None:
+        context.remark(e, f"{name} is missing: taken as 0 m")
+    return value or 0.0
 
 
 def _route(e: XmlElement, context: Context) -> RoutePosition:
@@ -116,10 +129,11 @@ def _geo(e: XmlElement, context: Context) -> GeoPosition:
 
 
 _POSITIONS: dict[str, Reader] = {
-    **declared(WorldPosition, RelativeWorldPosition, RelativeObjectPosition, RelativeRoadPosition, TrajectoryPosition),
+    **declared(WorldPosition, RelativeWorldPosition, RelativeObjectPosition, TrajectoryPosition),
     "RoadPosition": _road,
     "LanePosition": _lane,
     "RelativeLanePosition": _relative_lane,
+    "RelativeRoadPosition": _relative_road,
     "RoutePosition": _route,
     "GeoPosition": _geo,
 }

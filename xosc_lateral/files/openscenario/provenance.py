@@ -24,7 +24,7 @@ CONTENT = "content_sha256"
 """In the provenance: SHA-256 of the file without the provenance."""
 PENDING = "0" * 64
 """In its place until it is known."""
-_BEGIN, _END = f"<!-- {MARK}".encode(), b"-->"
+_COMMENT_START, _COMMENT_END = f"<!-- {MARK}".encode(), b"-->"
 
 
 def mark(root: etree._Element, provenance: Mapping[str, Any], summary: str) -> None:
@@ -57,7 +57,7 @@ def facts_in(data: bytes) -> Mapping[str, Any] | None:
     """Provenance in the bytes of a file of ours, which need not be well-formed any more; None: there is none."""
     begin, end = _comment_in(data)
     try:
-        found = json.loads(data[begin + len(_BEGIN) : end - len(_END)]) if begin < end else None
+        found = json.loads(data[begin + len(_COMMENT_START) : end - len(_COMMENT_END)]) if begin < end else None
     except (ValueError, RecursionError):
         return None
     return found if isinstance(found, dict) else None
@@ -97,14 +97,14 @@ def write_sealed(path: Path, pieces: Iterable[bytes], *, save: bool) -> tuple[st
     digest = hashlib.sha256(first[:begin])
     digest.update(first[end:])
 
-    def whole() -> Iterator[bytes]:
+    def sealed() -> Iterator[bytes]:
         yield first
         for piece in rest:
             digest.update(piece)
             yield piece
 
     def write_to(file: IO[bytes]) -> str:
-        file.writelines(whole())
+        file.writelines(sealed())
         if place >= 0:
             file.seek(place)
             file.write(digest.hexdigest().encode())
@@ -126,9 +126,9 @@ def write_sealed(path: Path, pieces: Iterable[bytes], *, save: bool) -> tuple[st
 
 def _comment_in(data: bytes) -> tuple[int, int]:
     """Where the provenance begins and ends; both at the end where there is none. [byte]"""
-    begin = data.find(_BEGIN)
-    end = data.find(_END, begin) if begin >= 0 else -1
-    return (begin, end + len(_END)) if end >= 0 else (len(data), len(data))
+    begin = data.find(_COMMENT_START)
+    end = data.find(_COMMENT_END, begin) if begin >= 0 else -1
+    return (begin, end + len(_COMMENT_END)) if end >= 0 else (len(data), len(data))
 
 
 def refuse_converted(root: etree._Element, path: object) -> None:

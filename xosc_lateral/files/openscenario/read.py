@@ -57,7 +57,7 @@ def remark_spellings(root: XmlElement) -> list[Unsupported]:
     return remarks
 
 
-NEWEST = (1, 3)
+NEWEST_VERSION = (1, 3)
 
 LEFT_HANDED = "written for CARLA: its left-handed coordinates are mirrored, its offsets count to the right"
 
@@ -128,8 +128,10 @@ def read_scenario(
         root.fail("is a catalog, not a scenario")
     remarks: list[Unsupported] = []
     header = read_header(root)
-    if header.version > NEWEST:
-        remarks.append(Unsupported("FileHeader", root.place(), f"version 1.{header.minor} is read as 1.{NEWEST[1]}"))
+    if header.version > NEWEST_VERSION:
+        remarks.append(
+            Unsupported("FileHeader", root.place(), f"version 1.{header.minor} is read as 1.{NEWEST_VERSION[1]}")
+        )
     remarks.extend(remark_spellings(root))
     scope, values = read_declarations(root, dict(parameters or {}), remarks)
     root = root.within(scope)

@@ -29,7 +29,7 @@ INK, MUTED, GRID, SHADE, PAPER = "#1b2126", "#6a737b", "#dde1e4", "#eef1f3", "#f
 MEASURED, SAMPLED = BLUE, VERMILLION
 NOMINAL, ENRICHED = MUTED, BLUE
 
-APART = {"x": 62.0, "y": 20.0}
+TICK_SPACING = {"x": 62.0, "y": 20.0}
 """Between two ticks, at least. [pt]"""
 
 DASHED = "3 2"
@@ -150,7 +150,9 @@ def ticks_of(panel: Panel, name: str, length: float) -> Ticks:
     if axis.ticks is not None:
         found = [(float(axis.share(value)), text) for value, text in axis.ticks]
     else:
-        values = _log_places(*axis.ends) if axis.log else _linear_places(*axis.ends, max(2.0, length / APART[name]))
+        values = (
+            _log_places(*axis.ends) if axis.log else _linear_places(*axis.ends, max(2.0, length / TICK_SPACING[name]))
+        )
         texts = [_power(value) for value in values.tolist()] if axis.log else _numbers(values)
         found = list(zip(axis.share(values).tolist(), texts, strict=True))
     return [(at, text) for at, text in found if -1e-6 <= at <= 1.0 + 1e-6]
@@ -209,6 +211,7 @@ def panel_svg(panel: Panel, left: float, top: float, width: float, height: float
         low, high = axis.ends
         about += f' data-{name}="{low:.9g} {high:.9g}{" log" if axis.log else ""}"'
         about += f' data-{name}-label="{escape(axis.label)}"' if axis.label else ""
+    about += f' data-title="{escape(panel.title)}"' if panel.title else ""
     return f'<svg class="panel" {about}>{"".join(_mark(panel, mark, width, height) for mark in panel.marks)}</svg>'
 
 

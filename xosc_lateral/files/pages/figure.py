@@ -48,7 +48,7 @@ FONT = "system-ui, sans-serif"
 TEXT, TITLE, LABEL, LEGEND, NUMBERS = 9.0, 17.0, 14.0, 17.0, 12.0
 """Size of texts; heights of a title, an axis' label, a row of the legend, the numbers below a panel. [pt]"""
 
-BETWEEN = 9.0
+PANEL_SPACING = 9.0
 """Free space between panels, and around them. [pt]"""
 
 PADDING = 0.04
@@ -142,7 +142,7 @@ def svg_of(figure: Figure, alt: str = "", *, themed: bool = False) -> str:
     """
     figure.settle()
     left, right = _margins(figure)
-    inner = (figure.width - sum(left) - right - (figure.columns - 1) * BETWEEN) / figure.columns
+    inner = (figure.width - sum(left) - right - (figure.columns - 1) * PANEL_SPACING) / figure.columns
     body, height = _body(figure, left, inner)
     head = f'viewBox="0 0 {figure.width:g} {height:g}" role="img" aria-label="{escape(alt)}" font-size="{TEXT:g}"'
     title = f"<title>{escape(alt)}</title>" if alt else ""
@@ -164,14 +164,14 @@ def _margins(figure: Figure) -> tuple[list[float], float]:
         widths = [text_width(name) for panel in panels for _, name in ticks_of(panel, "y", figure.height)]
         numbers = max(widths, default=0.0) + 7.0 if column == 0 or not figure.share_y else 2.0
         left.append(numbers + (16.0 if any(panel.y.label for panel in panels) else 0.0))
-    return left, BETWEEN + 3.0
+    return left, PANEL_SPACING + 3.0
 
 
 def _body(figure: Figure, left: list[float], inner: float) -> tuple[str, float]:
     """All panels and the legend; the height that they take. [pt]"""
     legend, top = _legend(figure, left[0]) if figure.legend else ("", 0.0)
     parts = [legend]
-    edge = BETWEEN if figure.axes else 4.0
+    edge = PANEL_SPACING if figure.axes else 4.0
     top += edge
     for number in range(figure.rows):
         panels = figure.row(number)
@@ -187,7 +187,7 @@ def _body(figure: Figure, left: list[float], inner: float) -> tuple[str, float]:
                 room = left[column] if column == 0 or not figure.share_y else 0.0
                 parts += _frame(panel, at, top, inner, figure.height, room, numbered[column]) if figure.axes else []
                 parts.append(panel_svg(panel, at, top, inner, figure.height))
-            at += inner + BETWEEN
+            at += inner + PANEL_SPACING
         top += figure.height + edge
         if figure.axes and any(numbered):
             top += NUMBERS + (LABEL if any(panel.x.label for panel in panels) else 0.0)

@@ -20,14 +20,14 @@ from typing import Any, Literal, NamedTuple
 from xosc_lateral.base.version import __version__
 from xosc_lateral.files.pages.figure import Figure, svg_of
 
-NOTHING = "–"
+MISSING_TEXT = "–"
 """Shown for a value that is not there (None or NaN)."""
 
 
 def format_number(value: float, digits: int = 3) -> str:
     """Format to so many significant digits: ``0.2134 -> 0.213``, ``1234.5 -> 1234``, ``1.2e-09``, NaN as a dash."""
     if math.isnan(value):
-        return NOTHING
+        return MISSING_TEXT
     if math.isinf(value):
         return "∞" if value > 0 else "-∞"
     if value == 0 or float(value).is_integer():
@@ -42,15 +42,15 @@ def format_number(value: float, digits: int = 3) -> str:
 def format_value(value: object, spec: str = "") -> str:
     """Format anything: numbers by the format specification or to three digits, lists and mappings written out."""
     if value is None or value == "":
-        return NOTHING
+        return MISSING_TEXT
     if isinstance(value, bool) or type(value).__name__ == "bool":  # numpy's bool is no subclass of bool
         return "yes" if value else "no"
     if isinstance(value, numbers.Real):
-        return NOTHING if math.isnan(value) else format(value, spec) if spec else format_number(float(value))
+        return MISSING_TEXT if math.isnan(value) else format(value, spec) if spec else format_number(float(value))
     if isinstance(value, Mapping):
         value = [f"{name}: {format_value(part)}" for name, part in value.items()]
     if isinstance(value, Sequence) and not isinstance(value, str):
-        return ", ".join(map(format_value, value)) or NOTHING
+        return ", ".join(map(format_value, value)) or MISSING_TEXT
     return str(value)
 
 
@@ -110,9 +110,10 @@ class Page:
         self._main.append(f'<h2 id="{anchor}">{inline(title)}</h2>')
         self.text(*paragraphs)
 
-    def heading(self, title: str) -> None:
-        """Begin a part of a section."""
-        self._main.append(f"<h3>{inline(title)}</h3>")
+    def heading(self, title: str, *, anchor: str = "") -> None:
+        """Begin a part of a section; `anchor`: what a link on the page leads to it by."""
+        place = f' id="{anchor}"' if anchor else ""
+        self._main.append(f"<h3{place}>{inline(title)}</h3>")
 
     def text(self, *paragraphs: str) -> None:
         """Add paragraphs."""
@@ -168,13 +169,13 @@ class Page:
             return
         self._main.append(_table(rows, list(rows[0]), caption, formats or {}, tones or {}))
 
-    def player(self, scene: str, label: str) -> None:
-        """Add the player; `scene` is the JSON of `report.scene`."""
+    def player(self, scene: str, label: str, *, anchor: str = "scene") -> None:
+        """Add the player; `scene` is the JSON of `playing.scene`, `anchor` what a link on the page leads to it by."""
         self._need("player.js")
         self._main.append(
             f'<div class="player" aria-label="{escape(label)}">'
             "<noscript>The player needs JavaScript; the figures below show the same.</noscript></div>\n"
-            f'<script type="application/json" id="scene">{scene}</script>{KEYS}'
+            f'<script type="application/json" id="{anchor}">{scene}</script>{KEYS}'
         )
 
     def html(self, provenance: Mapping[str, object]) -> str:

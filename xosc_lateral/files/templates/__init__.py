@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from xosc_lateral.base.errors import XoscLateralError
+from xosc_lateral.base.errors import XoscLateralError, did_you_mean
 from xosc_lateral.base.plugins import plugins
 from xosc_lateral.base.shipped import shipped_folder
 from xosc_lateral.files.templates.plain import PlainTemplate, plain_templates
@@ -42,4 +42,5 @@ def find_template(name: str) -> AnyTemplate:
     for one in all_templates():
         if one.name == name:
             return one
-    raise XoscLateralError(f"unknown template {name!r}; there are {', '.join(each.name for each in all_templates())}")
+    known = [each.name for each in all_templates()]
+    raise XoscLateralError(f"unknown template {name!r}{did_you_mean(name, known)}; there are {', '.join(known)}")

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from xosc_lateral.base.errors import XoscLateralError
+from xosc_lateral.base.errors import XoscLateralError, did_you_mean
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,12 +116,12 @@ class Declared:
 
 Parameter = Number | Choice | Declared
 
-_WHOLE, _UNSIGNED = r"[+-]?[0-9]+", r"\+?[0-9]+"
+_INTEGER_PATTERNS, _UNSIGNED = r"[+-]?[0-9]+", r"\+?[0-9]+"
 
 _TYPES: dict[str, re.Pattern[str]] = {
     "double": re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?"),
-    "integer": re.compile(_WHOLE),
-    "int": re.compile(_WHOLE),
+    "integer": re.compile(_INTEGER_PATTERNS),
+    "int": re.compile(_INTEGER_PATTERNS),
     "unsignedInt": re.compile(_UNSIGNED),
     "unsignedShort": re.compile(_UNSIGNED),
     "boolean": re.compile("true|false|1|0"),
@@ -143,7 +143,9 @@ class Settings:
         by_name = {parameter.name: parameter for parameter in parameters}
         for name in chosen:
             if name not in by_name:
-                raise XoscLateralError(f"unknown setting {name!r}; there are {', '.join(sorted(by_name))}")
+                raise XoscLateralError(
+                    f"unknown setting {name!r}{did_you_mean(name, by_name)}; there are {', '.join(sorted(by_name))}"
+                )
         self._values: dict[str, float | str] = {
             name: parameter.read(chosen[name]) if name in chosen else parameter.default
             for name, parameter in by_name.items()

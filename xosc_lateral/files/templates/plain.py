@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from xml.sax.saxutils import quoteattr, unescape
 
-from xosc_lateral.base.errors import FormatError, XoscLateralError
+from xosc_lateral.base.errors import FormatError, XoscLateralError, did_you_mean
 from xosc_lateral.files.templates.parameter import Declared
 
 SCENARIO, ROAD = ".xosc", ".xodr"
@@ -50,7 +50,10 @@ class PlainTemplate:
         text = self._text
         for name, value in (chosen or {}).items():
             if name not in by_name:
-                raise XoscLateralError(f"unknown setting {name!r}; there are {', '.join(sorted(by_name)) or 'none'}")
+                raise XoscLateralError(
+                    f"unknown setting {name!r}{did_you_mean(name, by_name)}; "
+                    f"there are {', '.join(sorted(by_name)) or 'none'}"
+                )
             text = _declared(text, name, by_name[name].read(value))
         return {self.path.name: text, f"{self.name}{ROAD}": self.path.with_suffix(ROAD).read_text(encoding="utf-8")}
 

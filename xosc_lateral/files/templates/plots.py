@@ -173,7 +173,7 @@ _REACTION = 0.9  # between two vehicles of a platoon, as in the scenario, like t
 _BRAKE_TIME, _SLOW_TIME = 12.0, 5.0  # when the platoon slows down, and for how long [s]
 _BRAKING, _RECOVERING = 1.5, 0.8  # how hard [m/s2]
 
-_AHEAD = {
+_START_PLACES = {
     "Ego": (1, 0.0), "MiddleAhead": (1, 1.0), "MiddleFirst": (1, 2.0), "MiddleBehind": (1, -1.0),
     "SlowFirst": (0, 2.5), "SlowSecond": (0, 1.0), "SlowThird": (0, -0.5),
     "FastFirst": (2, 1.3), "FastSecond": (2, -0.4), "FastThird": (2, -2.6),
@@ -192,7 +192,7 @@ def _dense_traffic(settings: Settings) -> Plot:
     brakings = [f"{who}Brakes" for who in ("First", "Second", "Ego", "Last")]
     return Plot(
         motorway(settings, *bends, reach=reach, lanes=3),
-        starts={name: ego + ahead * gap * speeds[lane] for name, (lane, ahead) in _AHEAD.items()},
+        starts={name: ego + ahead * gap * speeds[lane] for name, (lane, ahead) in _START_PLACES.items()},
         speeds=dict.fromkeys(brakings, round(speeds[1] - slow_down, 3)),
         times={"SlowPullsOut": recovered},
     )

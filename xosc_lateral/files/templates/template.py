@@ -15,7 +15,7 @@ from xosc_lateral.base.shipped import shipped_folder
 from xosc_lateral.files.templates.motorway import Bend, Motorway, Straight, document
 from xosc_lateral.files.templates.parameter import Choice, Number, Parameter, Settings
 
-COMMON: tuple[Parameter, ...] = (
+COMMON_SETTINGS: tuple[Parameter, ...] = (
     Choice("traffic", "right", ("right", "left"), "Side of the road that traffic keeps to."),
     Choice("version", "1.2", ("1.2", "1.3"), "Version of OpenSCENARIO that is written."),
     Number("lane_width", 3.75, 3.25, 4.25, "m", "Width of a driving lane."),
@@ -61,7 +61,7 @@ class Template:
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """All parameters, its own ones first."""
-        return self.own_parameters + COMMON
+        return self.own_parameters + COMMON_SETTINGS
 
     def files(self, chosen: Mapping[str, str] | None = None) -> dict[str, str]:
         """File name -> text of the scenario and its road; same settings, same bytes.

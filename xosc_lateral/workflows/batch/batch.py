@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import errno
 import os
-import re
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
 
 from xosc_lateral.base.errors import FormatError, XoscLateralError
+from xosc_lateral.base.signals import deferring_signals
 from xosc_lateral.base.version import BEHAVIOUR, __version__
+from xosc_lateral.files.atomic import files_of_run, temporary_files
 from xosc_lateral.files.hashes import file_hash, file_state
 from xosc_lateral.workflows.batch.guard import JobLimitError, JobLimits, within_limits
 from xosc_lateral.workflows.batch.jobs import Batch, Job
 from xosc_lateral.workflows.batch.journal import Journal, folder_lock
-from xosc_lateral.workflows.batch.manifest import ManifestRow, Timing
+from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, Timing, read_manifest
 from xosc_lateral.workflows.batch.workers import WorkerDiedError, open_pool, run_tasks
 
 Converter = Callable[[Job], ManifestRow]
@@ -28,15 +29,12 @@ Converter = Callable[[Job], ManifestRow]
 STATE = ".xosc-lateral"
 """Folder inside the output folder, there only while a batch is unfinished: journal and lock."""
 
-_HALF_WRITTEN = re.compile(r"\..+\.[0-9a-z_]{8}\.tmp(\.\w+)?")
-"""Names that files have while they are being written (`formats.atomic`)."""
-
 _STOPPING = frozenset(
     {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EMFILE, errno.ENFILE, errno.EIO, errno.ESTALE, errno.ENOTCONN}
 )
 """Errors of the system that the next scenario would meet as well."""
 
-_KEPT = "what is finished is kept, run it again to go on"
+_GOES_ON = "what is finished is kept, run it again to go on"
 
 
 class JobState(StrEnum):
@@ -130,7 +128,7 @@ def convert_many(
         )
     except OSError as error:
         where = error.filename or batch.folder
-        raise BatchStoppedError(f"{where}: {error.strerror or error}; {_KEPT}") from error
+        raise BatchStoppedError(f"{where}: {error.strerror or error}; {_GOES_ON}") from error
 
 
 def _silent(_: str) -> None:
@@ -139,7 +137,7 @@ def _silent(_: str) -> None:
 
 def _outcomes(
     batch: Batch,
-    work: Callable[[Job], _Reply],
+    work: Callable[[str, Job], _Reply],
     workers: int,
     cluster: str | None,
     again: bool,
@@ -150,13 +148,20 @@ def _outcomes(
     new = [folder for folder in (batch.folder, *batch.folder.parents) if not folder.exists()]
     try:
         yield from _locked(batch, work, workers, cluster, again, keep_old, notify, state)
+    except OSError as error:
+        if error.errno not in (errno.EROFS, errno.EACCES) or again:
+            raise
+        done = list(_up_to_date(batch))
+        if len(done) < len(batch):
+            raise
+        yield from done
     finally:
         _remove_empty([state, *new])
 
 
 def _locked(
     batch: Batch,
-    work: Callable[[Job], _Reply],
+    work: Callable[[str, Job], _Reply],
     workers: int,
     cluster: str | None,
     again: bool,
@@ -164,34 +169,45 @@ def _locked(
     notify: Callable[[str], None],
     state: Path,
 ) -> Iterator[JobOutcome]:
-    with folder_lock(state / "lock"):
-        _sweep(batch.folder)
-        with Journal(batch.folder, state / "journal.jsonl", notify) as journal:
-            todo, anew = [], {}
-            failed: set[Path] = set()
-            for job in batch.jobs:
-                former = journal.row(job.name) if job.name in journal else None
-                why = _why_anew(job, former, "" if former is None else journal.timing(job.name).state)
-                if former is not None and not again and (not why or (keep_old and why in CHANGES)):
-                    row = replace(former, error="", stale=bool(why))
-                    if row != former:
-                        journal.add(row, journal.timing(job.name))
-                    yield JobOutcome(JobState.KEPT if why else JobState.UP_TO_DATE, row, 0.0, why)
-                else:
-                    todo.append(job)
-                    anew[job.name] = why
-            if todo:
-                with open_pool(min(workers, len(todo)), cluster) as pool:
-                    for job, reply in run_tasks(pool, work, todo):
-                        outcome = _noted(job, reply, journal, anew[job.name])
-                        failed |= {job.output.parent} if outcome.row.error else set()
-                        yield outcome
-                _sweep(batch.folder)
-            _forget_missing(batch, journal)
+    with (
+        folder_lock(state / "lock") as runs,
+        _sweeping(batch.folder, runs),
+        Journal(batch.folder, state / "journal.jsonl", notify) as journal,
+    ):
+        todo, anew = [], {}
+        failed: set[Path] = set()
+        for job in batch.jobs:
+            former = journal.row(job.name) if job.name in journal else None
+            why = _why_anew(job, former, "" if former is None else journal.timing(job.name).state)
+            if former is not None and not again and (not why or (keep_old and why in CHANGES)):
+                row = replace(former, error="", stale=bool(why))
+                if row != former:
+                    journal.add(row, journal.timing(job.name))
+                yield JobOutcome(JobState.KEPT if why else JobState.UP_TO_DATE, row, 0.0, why)
+            else:
+                todo.append(job)
+                anew[job.name] = why
+        if todo:
+            with deferring_signals(), open_pool(min(workers, len(todo)), cluster) as pool:
+                for job, reply in run_tasks(pool, partial(work, runs[0]), todo):
+                    outcome = _noted(job, reply, journal, anew[job.name])
+                    failed |= {job.output.parent} if outcome.row.error else set()
+                    yield outcome
+        _forget_missing(batch, journal)
+        with files_of_run(runs[0]):
             journal.finish()
-            _remove_empty(
-                place for folder in failed for place in (folder, *folder.parents) if batch.folder in place.parents
-            )
+        _remove_empty(
+            place for folder in failed for place in (folder, *folder.parents) if batch.folder in place.parents
+        )
+
+
+def _up_to_date(batch: Batch) -> Iterator[JobOutcome]:
+    """Jobs with nothing to do, in a folder that can't be written."""
+    rows = {row.output: row for row in read_manifest(batch.folder / MANIFEST)}
+    for job in batch.jobs:
+        row = rows.get(job.name)
+        if row is not None and not row.error and not row.stale and not _why_anew(job, row, ""):
+            yield JobOutcome(JobState.UP_TO_DATE, row, 0.0)
 
 
 def _remove_empty(folders: Iterable[Path]) -> None:
@@ -212,14 +228,15 @@ class _Reply:
     """`file_state` of the output."""
 
 
-def _run(converter: Converter, limits: JobLimits, job: Job) -> _Reply:
+def _run(converter: Converter, limits: JobLimits, run: str, job: Job) -> _Reply:
     """One job, in a worker. Whatever goes wrong with this one scenario ends up in its row."""
     start = time.perf_counter()
     if job.package_version != __version__:  # a worker of a cluster that came later
         what = f"a worker has version {__version__}, the run was planned by {job.package_version}"
         return _Reply(job.row(what), 0.0, what)
     try:
-        row = job.row(job.error) if job.error else within_limits(converter, job, limits)
+        with files_of_run(run):
+            row = job.row(job.error) if job.error else within_limits(converter, job, limits)
     except JobLimitError as error:
         row = job.row(f"{job.source}: {error}")
     except OSError as error:
@@ -238,15 +255,15 @@ def _noted(job: Job, reply: _Reply | WorkerDiedError, journal: Journal, why: str
     if isinstance(reply, WorkerDiedError):
         reply = _Reply(job.row(f"{job.source}: {reply}"), 0.0)
     if reply.stop:
-        raise BatchStoppedError(f"{reply.stop}; {_KEPT}")
+        raise BatchStoppedError(f"{reply.stop}; {_GOES_ON}")
     row = reply.row
     if row.error and job.name in journal:
-        row = _kept(job, journal.row(job.name), row)
+        row = _kept_row(job, journal.row(job.name), row)
     journal.add(row, Timing(reply.seconds, reply.state))
     return JobOutcome(JobState.FAILED if row.error else JobState.WRITTEN, row, reply.seconds, why)
 
 
-def _kept(job: Job, former: ManifestRow, failed: ManifestRow) -> ManifestRow:
+def _kept_row(job: Job, former: ManifestRow, failed: ManifestRow) -> ManifestRow:
     """The row of an output of a former run that can't be made anew: what it was made of, and why not now."""
     there = bool(former.output_sha256) and _are({job.output: former.output_sha256})
     return replace(former, error=failed.error, stale=True) if there else failed
@@ -287,10 +304,20 @@ def _forget_missing(batch: Batch, journal: Journal) -> None:
             journal.forget(output)
 
 
-def _sweep(folder: Path) -> None:
-    """Remove what a killed run, or a killed worker of this one, was just writing."""
-    for path in folder.rglob(".*.tmp*"):
-        if _HALF_WRITTEN.fullmatch(path.name):
+@contextmanager
+def _sweeping(folder: Path, runs: Sequence[str]) -> Iterator[None]:
+    """Remove what killed runs were just writing, and afterwards what killed workers of this one were; nobody else's."""
+    try:
+        _sweep(folder, runs[1:])
+        yield
+    finally:
+        _sweep(folder, runs[:1])
+
+
+def _sweep(folder: Path, runs: Sequence[str]) -> None:
+    names = temporary_files(runs)
+    for path in folder.rglob(".*.tmp*") if runs else ():
+        if names.fullmatch(path.name):
             path.unlink(missing_ok=True)
 
 

@@ -91,8 +91,8 @@ def describe(job: Job, conversion: ConvertedScenario) -> ManifestRow:
         why_not={entity.name: entity.why for entity in enriched.entities if not entity.is_enriched},
         segment_seconds=_rounded(sum(entity.segment_seconds for entity in enriched.entities)),
         offset_spread=_rounded(np.std(np.concatenate(offsets))) if offsets else 0.0,
-        gap_before=_smallest(enriched.gaps_before),
-        gap_after=_smallest(enriched.gaps_after),
+        gap_before=_smallest_gap(enriched.gaps_before),
+        gap_after=_smallest_gap(enriched.gaps_after),
         warnings=conversion.warnings,
         version=provenance.version,
         mode=provenance.mode,
@@ -103,7 +103,7 @@ def describe(job: Job, conversion: ConvertedScenario) -> ManifestRow:
     )
 
 
-def _smallest(gaps: tuple[Gap, ...]) -> float | None:
+def _smallest_gap(gaps: tuple[Gap, ...]) -> float | None:
     return _rounded(min(gap.distance for gap in gaps)) if gaps else None
 
 

@@ -5,16 +5,19 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
+import secrets
 import socket
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Self
 
 from xosc_lateral.base.errors import FormatError, XoscLateralError
+from xosc_lateral.files.own_files import open_own
 from xosc_lateral.workflows.batch.manifest import (
     MANIFEST,
     TIMINGS,
@@ -33,31 +36,49 @@ class FolderInUseError(XoscLateralError):
 
 
 @contextmanager
-def folder_lock(path: Path) -> Iterator[None]:
-    """Hold a lock file while the block runs.
+def folder_lock(path: Path) -> Iterator[Sequence[str]]:
+    """Hold a lock file while the block runs; gives ids: that of this run, then those of killed runs before it.
 
     The operating system's lock counts, not the file: it goes with the process, however that ends, so a file that a
-    killed run has left is no obstacle. What the file says (process and host) is for the message.
+    killed run has left is no obstacle. What the file says (process and host) is for the message, and the ids for what
+    killed runs have left half-written.
 
-    Raises `FolderInUseError`: when another process holds it; `OSError`: when the folder can't be written.
+    Raises `FolderInUseError`: when another process holds it; `FormatError`: it is a link or somebody else's; `OSError`:
+    when the folder can't be written.
     """
     file = _open_locked(path)
     try:
+        runs = [secrets.token_hex(RUN_DIGITS // 2), *_killed_runs(file)]
+        values = {"pid": os.getpid(), "host": socket.gethostname(), "runs": runs}
         file.seek(0)
         file.truncate()
-        json.dump({"pid": os.getpid(), "host": socket.gethostname()}, file)
+        file.write(json.dumps(values).encode())
         file.flush()
-        yield
+        yield runs
     finally:
         path.unlink(missing_ok=True)  # while still locked: who waits for it finds that it is gone and makes a new one
         file.close()
 
 
-def _open_locked(path: Path) -> IO[str]:
+RUN_DIGITS = 12
+"""Hexadecimal digits of a run's id."""
+
+
+def _killed_runs(file: IO[bytes]) -> list[str]:
+    """What a lock file says that no run has taken away."""
+    file.seek(0)
+    try:
+        runs = json.loads(file.read())["runs"]
+        return [run for run in map(str, runs) if re.fullmatch(rf"[0-9a-f]{{{RUN_DIGITS}}}", run)]
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return []
+
+
+def _open_locked(path: Path) -> IO[bytes]:
     while True:
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
-            file = path.open("a+", encoding="utf-8")
+            file = open_own(path)
         except FileNotFoundError:
             continue  # a run that just ended has taken the folder away again
         if not _lock(file):
@@ -74,16 +95,16 @@ def _open_locked(path: Path) -> IO[str]:
         file.close()  # its owner has removed it between our opening and locking it
 
 
-def _holder(file: IO[str]) -> str:
+def _holder(file: IO[bytes]) -> str:
     file.seek(0)
     try:
         values = json.loads(file.read())
         return f"process {values['pid']} on {values['host']}"
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, RecursionError):
         return "starting right now"
 
 
-def _lock(file: IO[str]) -> bool:
+def _lock(file: IO[bytes]) -> bool:
     """Take the operating system's lock without waiting; False: another process has it."""
     try:
         if sys.platform == "win32":
@@ -125,9 +146,9 @@ class Journal:
         self._folder, self._path, self._notify = folder, path, notify
         self._begin: dict[str, int] = {}
         self._timings: dict[str, Timing] = {}
+        self._file = open_own(path)
         self._end = self._intact_end()
         self._changed = bool(self._begin)
-        self._file = path.open("r+b" if path.exists() else "w+b")
         self._file.truncate(self._end)
         self._adopt_manifest()
 
@@ -196,22 +217,19 @@ class Journal:
     def _intact_end(self) -> int:
         """Index the lines there are; returns where the last whole one ends. [byte]"""
         end = 0
-        if not self._path.exists():
-            return end
-        with self._path.open("rb") as file:
-            for line in file:
-                try:
-                    values = json.loads(line)
-                    output = ManifestRow.from_dict(values["row"]).output
-                    timing = Timing(float(values["seconds"]), str(values.get("state", "")))
-                    if not math.isfinite(timing.seconds):
-                        break
-                except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
+        for line in self._file:
+            try:
+                values = json.loads(line)
+                output = ManifestRow.from_dict(values["row"]).output
+                timing = Timing(float(values["seconds"]), str(values.get("state", "")))
+                if not math.isfinite(timing.seconds):
                     break
-                if not line.endswith(b"\n"):
-                    break
-                self._begin[output], self._timings[output] = end, timing
-                end += len(line)
+            except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
+                break
+            if not line.endswith(b"\n"):
+                break
+            self._begin[output], self._timings[output] = end, timing
+            end += len(line)
         return end
 
     def _adopt_manifest(self) -> None:

@@ -31,7 +31,7 @@ ROW_GROUP = 1000
 SCHEMA = 2
 """Version of a manifest's columns."""
 
-_LARGEST = 2**63 - 1
+_MAXIMUM_INTEGER = 2**63 - 1
 
 _OLD_NAMES = {
     "scenario_hash": "scenario_sha256",
@@ -138,7 +138,7 @@ class ManifestRow:
         if (version := named.setdefault("schema", 1)) not in range(1, SCHEMA + 1):
             raise ValueError(f"its columns are of version {version}, this program reads up to {SCHEMA}")
         row = msgspec.convert(named, cls)
-        if any(isinstance(value, int) and abs(value) > _LARGEST for value in named.values()):
+        if any(isinstance(value, int) and abs(value) > _MAXIMUM_INTEGER for value in named.values()):
             raise ValueError("a number has more than 64 bits")
         # no text or number that can't be written
         json.dumps(row.to_dict(), ensure_ascii=False, allow_nan=False).encode()

@@ -22,7 +22,7 @@ from xosc_lateral.files.openscenario.provenance import HEADER_MARK
 from xosc_lateral.files.output_paths import file_name
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import TABLE_SUFFIXES, as_text, read_text_table
-from xosc_lateral.workflows.conversion.options import Option, as_it_is, whole
+from xosc_lateral.workflows.conversion.options import Option, as_it_is, whole_number
 from xosc_lateral.workflows.conversion.settings import OPTIONS, ConvertSettings
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ COLUMNS = ("scenario", *(name for name, option in OPTIONS.items() if option.cell
 PREFIXES = (*(option.prefix for option in OPTIONS.values() if option.prefix), "user:")
 """What a table of scenarios may hold."""
 
-_VARIANTS = Option(whole(1), cell=as_it_is)
+_VARIANTS = Option(whole_number(1), cell=as_it_is)
 
 _GLOB_CHARACTERS = frozenset("*?[")
 

@@ -13,13 +13,15 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from concurrent.futures import ALL_COMPLETED, FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from contextlib import contextmanager
 from itertools import islice
 from types import TracebackType
 from typing import Any, Self, TypeVar
 
 from xosc_lateral.base.errors import XoscLateralError
+from xosc_lateral.base.signals import ENDING, Interrupted, pending_signal
 from xosc_lateral.base.version import __version__
 from xosc_lateral.workflows.batch.guard import let_worker_die
 
@@ -37,6 +39,12 @@ TRIES_ALONE = 3
 
 CHECK_EVERY = 5.0
 """How often it is looked whether a pool that does not answer still has workers. [s]"""
+
+SIGNAL_EVERY = 0.2
+"""How often it is looked whether a signal has come. [s]"""
+
+FINISH_TIME = 5.0
+"""What is at work when a signal comes may go on for so long. [s]"""
 
 
 class ClusterError(XoscLateralError):
@@ -106,7 +114,8 @@ class _LocalProcesses(Pool):
         return AHEAD * self._count
 
     def submit(self, work: Callable[[Task], Result], task: Task) -> Future[Result]:
-        future: Future[Result] = self._executor.submit(work, task)
+        with _safe_path():
+            future: Future[Result] = self._executor.submit(work, task)
         return future
 
     def recover(self) -> None:
@@ -123,9 +132,28 @@ class _LocalProcesses(Pool):
         threads = dict.fromkeys(
             ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
         )
-        return ProcessPoolExecutor(
-            max_workers=self._count, env=threads, initializer=_end_with_parent, initargs=(os.getpid(),)
-        )
+        with _safe_path():
+            return ProcessPoolExecutor(
+                max_workers=self._count, env=threads | _SAFE, initializer=_end_with_parent, initargs=(os.getpid(),)
+            )
+
+
+_SAFE = {"PYTHONSAFEPATH": "1"}
+
+
+@contextmanager
+def _safe_path() -> Iterator[None]:
+    """Python processes that start meanwhile import nothing from the working folder, which may be anybody's.
+
+    Workers are told in their own environment; joblib's process that tracks their resources has this one's.
+    """
+    before = os.environ.get(next(iter(_SAFE)))
+    os.environ.update(_SAFE)
+    try:
+        yield
+    finally:
+        del os.environ[next(iter(_SAFE))]
+        os.environ.update({name: before for name in _SAFE if before is not None})
 
 
 def _end_with_parent(parent: int) -> None:
@@ -135,6 +163,8 @@ def _end_with_parent(parent: int) -> None:
     and if the run was gone before this was said, a thread looks every `PARENT_CHECK`.
     """
     let_worker_die()
+    for number in ENDING:  # a terminal sends them to everybody: the run decides what becomes of its workers
+        signal.signal(number, signal.SIG_IGN)
     if sys.platform.startswith("linux"):
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
@@ -260,6 +290,8 @@ def run_tasks(
     ------
     ClusterError
         When the cluster is gone.
+    Interrupted
+        A signal has come (`deferring_signals`); results of what was at work have come as well.
     Exception
         What `work` raises.
     """
@@ -267,6 +299,9 @@ def run_tasks(
     running: dict[Future[Result], Task] = {}
     suspects: list[Task] = []
     while True:
+        if (number := pending_signal()) is not None:
+            yield from _finished(running)
+            raise Interrupted(number)
         if not suspects:
             for task in islice(waiting, max(pool.capacity() - len(running), 0)):
                 try:
@@ -282,10 +317,7 @@ def run_tasks(
                 task = suspects.pop(0)
                 yield task, _alone(pool, work, task)
             continue
-        done = wait(running, CHECK_EVERY, FIRST_COMPLETED).done
-        if not done:
-            pool.check()
-        for future in done:
+        for future in _wait_for_any(pool, running):
             task = running.pop(future)
             try:
                 result = future.result()
@@ -297,14 +329,34 @@ def run_tasks(
                 yield task, result
 
 
+def _wait_for_any(pool: Pool, running: Collection[Future[Result]]) -> Collection[Future[Result]]:
+    """What is done; nothing once a signal has come."""
+    begin = time.monotonic()
+    while pending_signal() is None:
+        if done := wait(running, SIGNAL_EVERY, FIRST_COMPLETED).done:
+            return done
+        if time.monotonic() - begin > CHECK_EVERY:
+            pool.check()
+            begin = time.monotonic()
+    return ()
+
+
+def _finished(running: Mapping[Future[Result], Task]) -> Iterator[tuple[Task, Result]]:
+    """Results of what was at work and ends well within `FINISH_TIME`; what was not is not begun."""
+    at_work = [future for future in running if not future.cancel()]
+    for future in wait(at_work, FINISH_TIME, ALL_COMPLETED).done:
+        if not future.cancelled() and future.exception() is None:
+            yield running[future], future.result()
+
+
 def _alone(pool: Pool, work: Callable[[Task], Result], task: Task) -> Result | WorkerDiedError:
     deaths = 1
     for _ in range(pool.tries_alone):
         begin = time.monotonic()
         try:
             future = pool.submit(work, task)
-            while not wait([future], CHECK_EVERY).done:
-                pool.check()
+            if not _wait_for_any(pool, [future]):
+                raise Interrupted(pending_signal() or signal.SIGINT)
             return future.result()
         except (Exception, CancelledError) as error:
             if not pool.lost(error):

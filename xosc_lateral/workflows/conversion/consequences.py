@@ -1,4 +1,4 @@
-"""What lifelike motion brings about: lane departures, and gaps between vehicles."""
+"""What lifelike motion brings about: lane departures, gaps between vehicles, headways."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
-from xosc_lateral.base.rows import blocks, give_back, kept, slices_where
+from xosc_lateral.base.rows import blocks, give_back, slices_where, stored
 from xosc_lateral.workflows.conversion.result import EntityResult, LaneDeparture
 from xosc_lateral.world.motion.gaps import BoxPath, Gap, smallest_gaps
+from xosc_lateral.world.motion.headways import Following, RoadPath, closest_following
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.road.network import RoadNetwork
@@ -79,7 +80,32 @@ def gaps_of(motion: NominalMotion, trajectories: Sequence[WorldTrajectory]) -> t
         box = entity.entity.bounding_box
         absent = (entity.activity[::every] & Activity.ACTIVE) == 0
         x = np.where(absent, np.nan, path.x[::every])
-        x, y, heading = (kept(values) for values in (x, path.y[::every], path.heading[::every]))
+        x, y, heading = (stored(values) for values in (x, path.y[::every], path.heading[::every]))
         paths.append(BoxPath(entity.name, x, y, heading, box.length, box.width, box.center_x))
         give_back(len(entity.time))
     return smallest_gaps(motion.entities[0].time[::every], paths)
+
+
+def followings_of(
+    entities: Sequence[EntityResult], network: RoadNetwork, *, enriched: bool
+) -> dict[tuple[str, str], Following]:
+    """Smallest headway and time to collision by (follower, leader), of the nominal or the enriched motion."""
+    vehicles = [entity for entity in entities if entity.motion.entity.is_vehicle]
+    return closest_following([_road_path(entity, network, enriched) for entity in vehicles])
+
+
+def _road_path(entity: EntityResult, network: RoadNetwork, enriched: bool) -> RoadPath:
+    motion, box = entity.motion, entity.motion.entity.bounding_box
+    every = max(1, round(GAP_STEP / (motion.time[1] - motion.time[0]))) if len(motion.time) > 1 else 1
+    road, lane, s = motion.road[::every], motion.lane[::every], motion.s[::every]
+    present = (motion.activity[::every] & Activity.ACTIVE) != 0
+    along = np.where(np.cos(motion.heading_relative[::every]) >= 0.0, 1, -1)
+    offset = motion.offset[::every] + (along * entity.deviation[::every] if enriched else 0.0)
+    t, forward = np.full(len(s), np.nan), np.ones(len(s), dtype=np.int_)
+    on_road = road >= 0
+    t[on_road] = network.offset_to_t(road[on_road], lane[on_road], s[on_road], offset[on_road])
+    forward[on_road] = along[on_road] * network.travel_directions(road[on_road], lane[on_road])
+    path = entity.trajectory if enriched else motion
+    x, y = (np.where(present, values[::every], np.nan) for values in (path.x, path.y))
+    speed = path.speed[::every]
+    return RoadPath(entity.name, x, y, road, s, t, forward, speed, box.length, box.width, box.center_x)

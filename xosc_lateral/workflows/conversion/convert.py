@@ -37,7 +37,7 @@ CHANGES = "with offsets, what happens would happen otherwise"
 LEAST_LONGER, LONGER = 1.3, 2.0
 """A vehicle under test may be later at what ends the run, or never come to it: others follow trajectories for so
 many times the nominal run. A fifth slower takes a quarter longer; a file of trajectories grows with their time. [-]"""
-SUPPLY = 10.0
+SUPPLY = 60.0
 """For so long at least, where it may last longer in another run, a stretch has movement of its own. What comes after it
 is the same again; some of the slow movement of a driver is seen in that time. [s]"""
 
@@ -285,22 +285,20 @@ def _write(
     facts = {field.name: getattr(provenance, field.name) for field in fields(provenance)}
     if not plan.is_replay:
         from xosc_lateral.files.openscenario.write.lane_offset_scenario import write_lane_offset_scenario
-        from xosc_lateral.files.openscenario.write.lateral_actions import awaited, lateral_actions, overruled_until
-        from xosc_lateral.world.motion.offset_chain import offset_chains
+        from xosc_lateral.files.openscenario.write.lateral_actions import lateral_actions
+        from xosc_lateral.workflows.conversion.chains import chains_of
 
         lateral = lateral_actions(played.scenario)
         chains = [
             chain
             for entity in enriched.entities
             if entity.name in plan.lane_offsets
-            for chain in offset_chains(
-                entity.motion,
+            for chain in chains_of(
+                entity,
+                played.motion,
                 played.network,
-                entity.deviation,
-                [segment.span for segment in entity.segments],
+                lateral.get(entity.name, ()),
                 tows=entity.name in played.trailers.values(),
-                beyond=[segment.later() for segment in entity.segments],
-                overruled_until=overruled_until(awaited(lateral.get(entity.name, ()), depends), played.motion),
             )
         ]
         return write_lane_offset_scenario(
@@ -313,7 +311,6 @@ def _write(
             save=save,
             target=settings.target,
             trajectories={name: enriched.entity(name).trajectory for name in sorted(plan.trajectories)},
-            depends=depends,
         )
     trajectories = {
         entity.name: entity.trajectory for entity in enriched.entities if replayed is None or entity.name in replayed

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from functools import cache, partial
 from pathlib import Path
 
-from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.errors import FormatError, did_you_mean
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.profiles import SHIPPED, find_profile, read_profile
 from xosc_lateral.workflows.conversion.enrich import Drivers
@@ -39,7 +39,8 @@ def choose_drivers(scenario: Scenario, settings: ConvertSettings, egos: Mapping[
         for name in sorted(names):
             if name not in known:
                 raise FormatError(
-                    f"{option} {name!r}: no such entity; there are {', '.join(sorted(known)) or 'none'}",
+                    f"{option} {name!r}: no such entity{did_you_mean(name, known)}; "
+                    f"there are {', '.join(sorted(known)) or 'none'}",
                     path=scenario.path,
                 )
     under_test = {name: f"vehicle under test: {why}" for name, why in (egos or {}).items()}

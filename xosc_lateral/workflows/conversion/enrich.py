@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
-from xosc_lateral.base.rows import blocks, columns, give_back, kept
+from xosc_lateral.base.rows import blocks, columns, give_back, stored
 from xosc_lateral.drivers.model.drivability import drivable
 from xosc_lateral.drivers.model.plausibility import check_offsets
 from xosc_lateral.drivers.model.profile import DriverProfile
@@ -87,7 +87,7 @@ def enrich(
         When the sensor is asked for and a profile knows of none.
     """
     trailers, words = trailers or {}, entropy or {}
-    few = sum(len(entity.time) for entity in motion.entities) <= FEW and not context
+    few = sum(len(entity.time) for entity in motion.entities) <= KEPT_ROWS and not context
     run = (_run if few else _run.__wrapped__)(motion, network, frozenset(trailers), frozenset(uncertain), neighbours)
 
     def drawn_for(index: int, attempt: int) -> _Drawn:
@@ -192,7 +192,7 @@ class _Drawn:
         return columns(len(distance), ([through(distance[part])] for part in blocks(len(distance))))[0]
 
 
-FEW = 100_000
+KEPT_ROWS = 100_000
 """Rows of all entities of a run up to which what drivers see is kept for its next variant: a run like that of 16 cars
 for two minutes then keeps about 10 MB. [-]"""
 
@@ -239,8 +239,8 @@ def _draw(blank: _Drawn, driver: DriverProfile, seed: np.random.SeedSequence, wi
         beyond = side * sampler.copy().sample(going_on(segment, more)) if more > 0 else np.empty(0)
         who = f"profile {driver.name} for {blank.motion.name!r}"
         check_offsets(offset, segment.lane_width[segment.inside], who, segment.time[segment.inside])
-        error = kept(sensor_error(sensor, offset, SAMPLE_STEP, seed, part=len(samples)))
-        samples.append(_Sample(span, knots, kept(offset), error, beyond))
+        error = stored(sensor_error(sensor, offset, SAMPLE_STEP, seed, part=len(samples)))
+        samples.append(_Sample(span, knots, stored(offset), error, beyond))
     return replace(blank, seen=blank.seen._replace(segments=()), samples=tuple(samples))
 
 
@@ -265,7 +265,7 @@ def _apart(
 
 def _moved(sample: _Sample, rows: IntArray, move: FloatArray) -> _Sample:
     give_back(len(rows))
-    return sample._replace(offset=kept(sample.offset + np.interp(sample.knots, rows, move)))
+    return sample._replace(offset=stored(sample.offset + np.interp(sample.knots, rows, move)))
 
 
 def _sampled(one: _Drawn, rows: IntArray) -> SampledVehicle:
@@ -276,7 +276,7 @@ def _sampled(one: _Drawn, rows: IntArray) -> SampledVehicle:
         for sample in one.samples:
             can_move[(rows >= sample.span.first) & (rows <= sample.span.last)] = True
     give_back(len(one.motion.time))
-    return SampledVehicle(one.motion, kept(deviation), kept(can_move), one.seen.responds, one.seen.alone)
+    return SampledVehicle(one.motion, stored(deviation), stored(can_move), one.seen.responds, one.seen.alone)
 
 
 def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:
@@ -288,7 +288,7 @@ def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:
         *(drivable(one.offset, SAMPLE_STEP, entity.speed[one.knots]) for one in drawn.samples), strict=True
     )
     samples = tuple(
-        one._replace(offset=kept(offset + one.error)) for one, offset in zip(drawn.samples, driven, strict=True)
+        one._replace(offset=stored(offset + one.error)) for one, offset in zip(drawn.samples, driven, strict=True)
     )
     deviation = replace(drawn, samples=samples).deviation()
     return EntityResult(
@@ -296,7 +296,7 @@ def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:
         drawn.spans,
         drawn.profile,
         "",
-        tuple(SampledSegment(one.span, kept(entity.time[one.knots]), one.offset, one.beyond) for one in samples),
+        tuple(SampledSegment(one.span, stored(entity.time[one.knots]), one.offset, one.beyond) for one in samples),
         deviation,
         displace(entity, network, deviation),
         drawn.seen.neutral,

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
-from xosc_lateral.base.rows import empty, give_back, kept, put
+from xosc_lateral.base.rows import empty, give_back, put, stored
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.surroundings.around import smooth_step
@@ -107,7 +107,7 @@ def give_way(
         meeting = [pair for pair in near_pairs if can_move[pair[0]] or can_move[pair[1]]]
         part = [table[:, stretch] for table in tables]
         for own, other in _together(meeting, part[0].shape[1]):
-            near = np.flatnonzero(_near(part, length, own, other))
+            near = np.flatnonzero(_rows_near(part, length, own, other))
             who, at = np.divmod(near, part[0].shape[1])
             own, other = own[who], other[who]
             first, second = (
@@ -128,7 +128,7 @@ def give_way(
     result: list[FloatArray | None] = []
     for k in range(count):
         aside = left[k] - right[k]
-        result.append(kept(_smoothed(aside, smoothed)) if aside.any() else None)
+        result.append(stored(_smoothed(aside, smoothed)) if aside.any() else None)
     return result
 
 
@@ -140,7 +140,7 @@ def _together(meeting: Sequence[tuple[int, int]], n: int) -> Iterator[tuple[IntA
         yield pairs[begin : begin + step, 0], pairs[begin : begin + step, 1]
 
 
-def _near(tables: Sequence[NDArray[Any]], length: FloatArray, own: IntArray, other: IntArray) -> BoolArray:
+def _rows_near(tables: Sequence[NDArray[Any]], length: FloatArray, own: IntArray, other: IntArray) -> BoolArray:
     """Where pairs of vehicles are near enough for `widened`, shape (pairs, n); `tables`: x, y ... of all vehicles."""
     x, y, present = tables[0], tables[1], tables[-1]
     reach = (FADES + 0.5 * (length[own] + length[other]) + MARGIN)[:, None]

@@ -125,9 +125,17 @@ def spelled_out(settings: type) -> Callable[[Verb], Verb]:
             for item in settable(settings)
         ]
         verb.__signature__ = signature.replace(parameters=[*own, *named])  # type: ignore[attr-defined]
+        verb.__doc__ = _with_parameters(verb.__doc__ or "", settings)
         return verb
 
     return with_options
+
+
+def _with_parameters(text: str, settings: type) -> str:
+    """A docstring with the settings' own parameters in place of the one line that refers to them."""
+    _, _, described = inspect.cleandoc(settings.__doc__ or "").partition("Parameters\n----------\n")
+    parameters, _, _ = described.partition("\n\nRaises")
+    return inspect.cleandoc(text).replace(f"options\n    `{settings.__name__}`.", parameters)
 
 
 def names(said: str | Collection[str]) -> frozenset[str]:
@@ -156,7 +164,7 @@ def one_of(words: type[StrEnum]) -> Callable[[Any], StrEnum]:
     return read
 
 
-def whole(smallest: int) -> Callable[[str | int], int]:
+def whole_number(smallest: int) -> Callable[[str | int], int]:
     """A whole number."""
 
     def read(said: str | int) -> int:

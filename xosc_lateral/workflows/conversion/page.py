@@ -2,24 +2,35 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from xosc_lateral.files.pages.page import KeyFigure, Page, Tone
+from xosc_lateral.workflows.conversion.consequences import followings_of
 from xosc_lateral.workflows.conversion.result import ConvertedScenario, Enriched, EntityResult
 from xosc_lateral.workflows.conversion.text import WRITTEN_AS, beside_text, under_test
 from xosc_lateral.workflows.playing import figures as figures
 from xosc_lateral.workflows.playing.figures import COMFORTABLE
 from xosc_lateral.workflows.playing.page import add_notes
 from xosc_lateral.workflows.playing.scene import scene_of
-from xosc_lateral.world.motion.gaps import REACH, Gap
+from xosc_lateral.world.motion.gaps import MAXIMUM_GAP, Gap
+from xosc_lateral.world.motion.headways import Following
 
 MOST_PANELS, MOST_DYNAMICS = 12, 6
 """Entities with panels of their own, for offsets and for dynamics; those with the largest offsets come first."""
 
-SELDOM = 0.01
+ROUGH_SHARE = 0.01
 """Share of the time beyond which lateral acceleration is rougher than people's. [-]"""
+
+LONGEST_HEADWAY = 5.0
+"""Pairs that stay farther apart do not follow one another: UN R157 and ALKS scenarios look at 2 s and less. [s]"""
+
+MOST_FOLLOWINGS = 20
+"""Pairs in the table of headways."""
+
+FOLLOWING_COLUMNS = ("headway nominal [s]", "headway enriched [s]", "TTC nominal [s]", "TTC enriched [s]")
 
 GAP_TIMES = ("at [s]", "at [s] ")
 """Headings of the times of the nominal and the enriched gap: a table's headings differ, if only by a blank."""
@@ -46,9 +57,9 @@ def conversion_page(conversion: ConvertedScenario) -> str:
         page.warning(warning)
     page.section(
         "Player",
-        "The scenario from above. Filled boxes are the enriched vehicles, dashed outlines their nominal places. A "
-        "lateral stretch above 1 widens the road, so that decimetres become visible. Click a vehicle to follow it, "
-        "point at it for its values, drag to look elsewhere.",
+        "The scenario from above: as written, and below it lifelike, with written places as dashed outlines. Across "
+        "the road everything is drawn wider, so that decimetres become visible. Click a vehicle to follow it, point at "
+        "it for its values, drag to look elsewhere.",
     )
     page.player(
         scene_of(enriched.motion, enriched.network, enriched.entities), "Scenario from above, nominal and enriched"
@@ -112,9 +123,9 @@ def _add_offsets(page: Page, enriched: Enriched, done: Sequence[EntityResult]) -
     page.section("Offsets", "The distance between the enriched and the nominal path, positive to the left of travel.")
     if done:
         page.figure(
-            figures.offsets_over_time(enriched, _largest(done, MOST_PANELS)),
-            "Shaded: road-following segments, where offsets are sampled. Between two segments, the offset leads "
-            f"smoothly from one to the other.{_left_out(done, MOST_PANELS)}",
+            figures.offsets_over_time(enriched, _with_largest_offsets(done, MOST_PANELS)),
+            "Grey: not road-following; there the offset leads smoothly from one segment to the next."
+            f"{_left_out(done, MOST_PANELS)}",
             "Offset over time of each enriched entity",
             over_time=True,
         )
@@ -139,9 +150,10 @@ def _add_dynamics(page: Page, enriched: Enriched, done: Sequence[EntityResult]) 
     )
     if done:
         page.figure(
-            figures.accelerations_over_time(_largest(done, MOST_DYNAMICS)),
-            "Lateral acceleration beyond what curves and lane changes require. The band reaches "
-            f"{COMFORTABLE} m/s² to either side; real drivers rarely leave it while they keep their lane."
+            figures.accelerations_over_time(enriched, _with_largest_offsets(done, MOST_DYNAMICS)),
+            "Lateral acceleration beyond what curves and lane changes require. Dashed: "
+            f"{COMFORTABLE} m/s² to either side, which real drivers rarely exceed while they keep their lane. Grey: "
+            "not road-following."
             f"{_left_out(done, MOST_DYNAMICS)}",
             "Added lateral acceleration over time",
             over_time=True,
@@ -152,7 +164,7 @@ def _add_gaps(page: Page, enriched: Enriched) -> None:
     page.section(
         "Gaps",
         "The smallest free space between the bounding boxes of two vehicles that come within "
-        f"{REACH:g} m of each other.",
+        f"{MAXIMUM_GAP:g} m of each other.",
     )
     before = {gap.names: gap for gap in enriched.gaps_before}
     after = {gap.names: gap for gap in enriched.gaps_after}
@@ -160,13 +172,40 @@ def _add_gaps(page: Page, enriched: Enriched) -> None:
     pairs.sort(key=lambda pair: min(gap.distance for gap in pair if gap is not None))
     if not pairs:
         page.text("No two vehicles come that close to each other.")
-        return
+    else:
+        page.table(
+            [_gap_row(*pair) for pair in pairs],
+            "Pairs of vehicles, the closest first. Marked: pairs that touch in the enriched scenario only.",
+            formats=dict.fromkeys(("nominal [m]", "enriched [m]", "change [m]"), ".2f")
+            | dict.fromkeys(GAP_TIMES, ".1f"),
+            tones=_tones(enriched, pairs),
+        )
+    _add_followings(page, enriched)
+
+
+def _add_followings(page: Page, enriched: Enriched) -> None:
+    """Smallest headway and time to collision of each pair, as written and as converted."""
+    before, after = (followings_of(enriched.entities, enriched.network, enriched=side) for side in (False, True))
+    names = [
+        pair
+        for pair in sorted(before | after)
+        if min(side[pair].headway if pair in side else math.inf for side in (before, after)) <= LONGEST_HEADWAY
+    ]
+    rows = [_following_row(before.get(pair, Following(*pair)), after.get(pair, Following(*pair))) for pair in names]
+    page.heading("Time headway and time to collision")
     page.table(
-        [_gap_row(*pair) for pair in pairs],
-        "Pairs of vehicles, the closest first. Marked: pairs that touch in the enriched scenario only.",
-        formats=dict.fromkeys(("nominal [m]", "enriched [m]", "change [m]"), ".2f") | dict.fromkeys(GAP_TIMES, ".1f"),
-        tones=_tones(enriched, pairs),
+        rows[:MOST_FOLLOWINGS],
+        "Smallest of each pair while one is behind the other on a road, their widths overlapping: free space over the "
+        f"speed of the vehicle behind, and over the closing speed. Pairs within {LONGEST_HEADWAY:g} s."
+        + (f" {len(rows) - MOST_FOLLOWINGS} more pairs are left out." if len(rows) > MOST_FOLLOWINGS else ""),
+        formats=dict.fromkeys(FOLLOWING_COLUMNS, ".2f"),
     )
+
+
+def _following_row(before: Following, after: Following) -> dict[str, object]:
+    values = (before.headway, after.headway, before.time_to_collision, after.time_to_collision)
+    shown = (value if math.isfinite(value) else None for value in values)
+    return {"pair": f"{before.follower} behind {before.leader}", **dict(zip(FOLLOWING_COLUMNS, shown, strict=True))}
 
 
 def _tones(enriched: Enriched, pairs: Sequence[tuple[Gap | None, Gap | None]]) -> dict[int, Tone]:
@@ -190,7 +229,7 @@ def _key_figures(enriched: Enriched, done: Sequence[EntityResult]) -> list[KeyFi
             f"{added.max():.2f} m/s²",
             "largest added lateral acceleration",
             f"above {COMFORTABLE} m/s² for {100.0 * rough:.1f} % of the time; real drivers rarely are, in their lane",
-            "bad" if rough > SELDOM else "",
+            "bad" if rough > ROUGH_SHARE else "",
         ),
     ]
     if enriched.gaps_after:
@@ -232,7 +271,7 @@ def _gap_row(before: Gap | None, after: Gap | None) -> dict[str, object]:
     }
 
 
-def _largest(entities: Sequence[EntityResult], most: int) -> list[EntityResult]:
+def _with_largest_offsets(entities: Sequence[EntityResult], most: int) -> list[EntityResult]:
     """At most so many of them, those with the largest offsets, in their own order."""
     ranked = sorted(entities, key=lambda entity: -float(np.abs(entity.deviation).max()))[:most]
     return [entity for entity in entities if entity in ranked]

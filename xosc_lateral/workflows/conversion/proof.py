@@ -30,7 +30,7 @@ SEEDS = range(4)
 STEP = 0.1
 """Of playback: stretches are stated to a second and shifts to a centimetre. [s]"""
 
-LEAST = 0.02
+MINIMUM_SHIFT = 0.02
 """A stretch on which an effect moves its driver by less is none. [m]"""
 
 
@@ -105,7 +105,7 @@ def _stretches(name: str, effect: ColumnEffect) -> Iterator[tuple[int, IntArray,
         if strength is None or not np.isfinite(strength).any():
             continue
         most = float(np.nanmax(np.abs(strength)))
-        if most >= LEAST:
+        if most >= MINIMUM_SHIFT:
             yield number, grid[np.abs(strength) >= 0.5 * most], most
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.base.rows import blocks, kept
+from xosc_lateral.base.rows import blocks, stored
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.fitting.answers import basis_of
 from xosc_lateral.drivers.model.profile import COLUMNS, SIDES, Basis, DriverProfile
@@ -88,7 +88,7 @@ def seen_by(
     segments: list[SeenSegment] = []
     neutral, responds, alone = set[str](), set[str](), set[str]()
     for span in spans:
-        knots = kept(np.arange(span.first, span.last + 1, every))
+        knots = stored(np.arange(span.first, span.last + 1, every))
         if not span.is_road_following or len(knots) < 2:
             continue
         _refuse_no_width(entity, span, network)

@@ -24,6 +24,9 @@ from xosc_lateral.workflows.conversion.result import Neighbours
 if TYPE_CHECKING:
     from xosc_lateral.drivers.model.profile import DriverProfile
 
+LEAST_STEP = 1e-3
+"""Of a simulation; below, a minute is a gigabyte. [s]"""
+
 STEP = 0.02
 """Of playback, as in the reference logs. [s]"""
 
@@ -101,7 +104,7 @@ class ConvertSettings:
         AUTO, say.profile, "--profile", "-p", kind=str, cell=say.profile_cell,
         help="Name or path of a driver profile; auto: motorway, the population.",
     )
-    seed: int = option(0, say.whole(0), cell=say.as_it_is)
+    seed: int = option(0, say.whole_number(0), cell=say.as_it_is)
     entity: Mapping[str, str | DriverProfile] = option(
         {}, say.profiles, kind=list[str] | None, metavar="NAME=PROFILE", prefix="profile:", entry=say.profile_cell,
         help="Profile of one entity; may be repeated.",
@@ -145,7 +148,7 @@ class ConvertSettings:
     road: Path | None = option(None, Path, cell=say.beside)
     road_path: tuple[Path, ...] = option((), say.paths)
     attempts: int = option(
-        1, say.whole(1), "--resample", kind=int, cell=say.as_it_is, min=1,
+        1, say.whole_number(1), "--resample", kind=int, cell=say.as_it_is, min=1,
         help="Attempts at most, while vehicles collide or leave their lane.",
     )
     time_limit: float | None = option(None, say.seconds, cell=say.as_it_is)
@@ -198,6 +201,8 @@ class ConvertSettings:
     def of_record(cls, values: Mapping[str, Any], folder: Path) -> ConvertSettings:
         """Settings from what `record` gave; `ValueError` for a value that can't be."""
         found: dict[str, Any] = {"step": float(values.get("step", STEP)), "names_may_lack": True}
+        if not LEAST_STEP <= found["step"] <= 1.0:
+            raise ValueError(f"step {found['step']} s is not within [{LEAST_STEP}, 1]")
         for name, said in values.items():
             one = OPTIONS.get(name)
             if one is not None and said is not None:

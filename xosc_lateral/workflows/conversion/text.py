@@ -6,7 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from xosc_lateral.drivers.fitting.answers import basis_of, beside_line, borrows
+from xosc_lateral.drivers.fitting.answers import basis_of, borrows, responses_in_words
 from xosc_lateral.drivers.model.profile import SIDES, DriverProfile
 from xosc_lateral.workflows.conversion.result import ConversionProvenance, ConvertedScenario, Neighbours
 from xosc_lateral.world.motion.gaps import Gap
@@ -26,9 +26,9 @@ def as_text(conversion: ConvertedScenario, report: Path | None = None) -> str:
                 f"offsets {entity.offset_spread:.2f} m (standard deviation), profile {entity.profile.name}, "
                 f"as {WRITTEN_AS.get(mode, mode)}"
             )
-            lines.append(f"    neighbours: {beside_text(entity.profile, conversion.provenance.options['neighbours'])}")
         else:
             lines.append(f"  {entity.name}: as in the scenario ({entity.why})")
+    lines += _responses(conversion)
     if conversion.provenance.options["with_sensor"]:
         lines.append("  offsets include the sensor error of the drives that the profiles were fitted to")
     lines += [f"  note: {note.what}" for note in conversion.enriched.motion.notes]
@@ -39,15 +39,21 @@ def as_text(conversion: ConvertedScenario, report: Path | None = None) -> str:
 
 
 def beside_text(profile: DriverProfile, neighbours: str) -> str:
-    """How a driver answers to vehicles beside him, and where that is known from, in a line."""
+    """How a driver responds to vehicles beside him, in a line."""
     if neighbours == Neighbours.NONE:
-        return "no answer (--neighbours none)"
+        return "beside vehicles: does not move (--neighbours none)"
     may_borrow = neighbours == Neighbours.BORROW
-    lines = []
-    for side in SIDES:
-        borrowed = ": borrowed from the population" if may_borrow and borrows(profile, side) else ""
-        lines.append(beside_line(profile, side) + borrowed)
-    return "; ".join(lines)
+    return responses_in_words(profile, [side for side in SIDES if may_borrow and borrows(profile, side)])
+
+
+def _responses(conversion: ConvertedScenario) -> list[str]:
+    """How drivers respond to vehicles beside them: a line for all who do so alike."""
+    alike: dict[str, list[str]] = {}
+    for entity in conversion.enriched.entities:
+        if entity.is_enriched and entity.profile is not None:
+            words = beside_text(entity.profile, conversion.provenance.options["neighbours"])
+            alike.setdefault(words, []).append(entity.name)
+    return [f"  {', '.join(names)} {words}" for words, names in alike.items()]
 
 
 def under_test(conversion: ConvertedScenario) -> str:
@@ -84,8 +90,8 @@ def facts(conversion: ConvertedScenario, report: Path | None = None) -> dict[str
             }
             for entity in enriched.entities
         ],
-        "gap_before": _smallest(enriched.gaps_before),
-        "gap_after": _smallest(enriched.gaps_after),
+        "gap_before": _smallest_gap(enriched.gaps_before),
+        "gap_after": _smallest_gap(enriched.gaps_after),
         "notes": [asdict(note) for note in enriched.motion.notes],
         "warnings": list(conversion.warnings),
         "provenance": provenance_record(conversion.provenance),
@@ -102,5 +108,5 @@ def provenance_record(provenance: ConversionProvenance) -> dict[str, Any]:
     return asdict(provenance) | {"profiles": profiles}
 
 
-def _smallest(gaps: tuple[Gap, ...]) -> float | None:
+def _smallest_gap(gaps: tuple[Gap, ...]) -> float | None:
     return min((round(gap.distance, 6) for gap in gaps), default=None)

@@ -24,7 +24,7 @@ from xosc_lateral.files.atomic import write_atomically
 from xosc_lateral.files.profiles import profile_hash, read_profile, write_profile
 from xosc_lateral.workflows.live.traffic import Moment, Traffic
 
-NOBODY = 1000.0
+ABSENT_DISTANCE = 1000.0
 """Distances from here on mean that nobody is there: files of FMI have no infinity that every tool reads. [m]"""
 
 UNITS: dict[str, dict[str, float]] = {
@@ -222,18 +222,21 @@ _WORDS = {
     "offset": "From the lane's centre, positive left", "rate": "Change of the offset per time",
     "heading": "Relative to the lane, positive left", "position": "Where the vehicle is while it does not follow",
     "lane_index": "0: rightmost", "curvature": "Positive: to the left",
-    **{f"{side}_distance": f"Free space; {NOBODY:g} or more: nobody" for side in ("lead", "left", "right", "oncoming")},
+    **{
+        f"{side}_distance": f"Free space; {ABSENT_DISTANCE:g} or more: nobody"
+        for side in ("lead", "left", "right", "oncoming")
+    },
 }  # fmt: skip
 
 
 def _start(name: str, profile: DriverProfile) -> float:
     if name.endswith("_distance"):
-        return NOBODY
+        return ABSENT_DISTANCE
     return {"speed": 30.0, "lane_width": profile.lane_width, "lane_count": 2.0, "friction": 1.0}.get(name, 0.0)
 
 
 def _seen(name: str, value: float) -> float:
-    return float("inf") if name.endswith("_distance") and value >= NOBODY else float(value)
+    return float("inf") if name.endswith("_distance") and value >= ABSENT_DISTANCE else float(value)
 
 
 def _complete(root: Any, units: Mapping[str, str]) -> None:

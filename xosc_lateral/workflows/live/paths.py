@@ -33,7 +33,7 @@ _STANDSTILL = 0.1
 SPEEDS = 6
 """Model steps of speed remembered: acceleration is over one second, as in a conversion. [-]"""
 
-_NOTHING = 1e-12
+_NEGLIGIBLE_REST = 1e-12
 """A remainder this small is none. [m]"""
 
 DRIVER = np.dtype(
@@ -102,7 +102,7 @@ def drive_on(
         _lead_over(state, taken_over, gap, gap_rate, speed)
     went_on = is_driven & state["following"]
     state["slip"] = np.where(went_on, state["slip"] - (1.0 - pace) * (own - state["own"]), 0.0)
-    slipped = is_driven & (state["over"] <= 0.0) & (np.abs(state["slip"]) > _NOTHING)
+    slipped = is_driven & (state["over"] <= 0.0) & (np.abs(state["slip"]) > _NEGLIGIBLE_REST)
     if slipped.any():
         _lead_over(state, slipped, state["slip"], np.zeros(len(state)), speed)
         state["slip"][slipped] = 0.0

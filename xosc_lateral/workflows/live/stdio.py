@@ -5,13 +5,15 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from xosc_lateral.base.errors import SimulationError
+from xosc_lateral.base.limits import LIVE_LINE, LIVE_RANGES
 from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.files.json_text import refuse_depth
 from xosc_lateral.files.opendrive import read_opendrive
 from xosc_lateral.workflows.live.surroundings import OpenDriveRoads, Places
 from xosc_lateral.workflows.live.traffic import Moment, Traffic
@@ -20,6 +22,17 @@ SIZE = {"length": 4.6, "width": 1.9, "center_x": 1.4}
 """Of a vehicle that nobody knows the size of: a usual car's, from its rear axle. [m]"""
 
 _PLACE = ("road", "lane", "s")
+
+_VEHICLE_KEYS = (*_PLACE, *SIZE, "speed", "lane_width", "offset", "base", "following", "driven", "is_truck")
+"""What a line says of a vehicle beside its context."""
+
+
+def lines_of(file: BinaryIO) -> Iterator[bytes]:
+    """Lines of a pipe; of one that is longer than any may be, its beginning."""
+    while line := file.readline(LIVE_LINE.bytes + 1):
+        yield line
+        while not line.endswith(b"\n") and line:
+            line = file.readline(LIVE_LINE.bytes + 1)
 
 
 class Pipe:
@@ -33,9 +46,10 @@ class Pipe:
         roads = None if self.network is None else OpenDriveRoads(self.network)
         left_hand = self.network is not None and any(one.rule == "LHT" for one in self.network.roads)
         self.traffic = Traffic(profile, seed=seed, roads=roads, left_hand=left_hand)
+        self._known = (set(CONTEXT_UNITS) | set(profile.columns)) - set(_VEHICLE_KEYS)
         self._columns: set[str] = set()
 
-    def answers(self, lines: Iterable[str]) -> Iterator[str]:
+    def answers(self, lines: Iterable[str | bytes]) -> Iterator[str]:
         """One line for each; what can't be used is answered by an `error`, and the next line goes on."""
         for line in lines:
             if line.strip():
@@ -44,17 +58,25 @@ class Pipe:
                 except SimulationError as error:
                     yield json.dumps({"error": " ".join(str(error).split())})
 
-    def answer(self, line: str) -> dict[str, Any]:
+    def answer(self, line: str | bytes) -> dict[str, Any]:
         """To one line.
 
         Raises `SimulationError`: if it can't be used; nothing has changed then.
         """
+        if len(line) > LIVE_LINE.bytes:
+            raise SimulationError(LIVE_LINE.refusal(len(line) / 1e6))
         try:
-            given = json.loads(line)
-        except json.JSONDecodeError as error:
+            text = line if isinstance(line, str) else line.decode()
+            refuse_depth(text)
+            given = json.loads(text)
+            if "\\u" in text:
+                json.dumps(given, ensure_ascii=False).encode()  # half a letter is none
+        except ValueError as error:
             raise SimulationError(f"no JSON: {error}") from error
         if not isinstance(given, dict):
             raise SimulationError("a line has to be a JSON object")
+        if unknown := given.keys() - {"time", "vehicles", "save", "restore"}:
+            raise SimulationError(f"unknown: {min(unknown)!r}; a line says time and vehicles, save, or restore")
         if "save" in given:
             return {"state": self.traffic.to_dict()}
         if "restore" in given:
@@ -63,20 +85,23 @@ class Pipe:
         vehicles = given.get("vehicles")
         if not isinstance(vehicles, dict) or not all(isinstance(one, dict) for one in vehicles.values()):
             raise SimulationError("`vehicles` has to be an object of objects, by name")
-        moves = self.traffic.step(_number(given, "time", "the line"), self._moment(vehicles))
-        columns = (moves.offset.tolist(), moves.rate.tolist(), moves.heading.tolist(), moves.steered.tolist())
+        columns = self._columns.union(*vehicles.values()) & self._known
+        moves = self.traffic.step(_number(given, "time", "the line"), self._moment(vehicles, columns))
+        self._columns = columns
+        values = (moves.offset.tolist(), moves.rate.tolist(), moves.heading.tolist(), moves.steered.tolist())
         return {
             "time": given["time"],
             "vehicles": {
                 name: {"offset": offset, "rate": rate, "heading": heading, "steered": steered}
-                for name, offset, rate, heading, steered in zip(vehicles, *columns, strict=True)
+                for name, offset, rate, heading, steered in zip(vehicles, *values, strict=True)
             },
         }
 
-    def _moment(self, vehicles: Mapping[str, Mapping[str, Any]]) -> Moment:
+    def _moment(self, vehicles: Mapping[str, Mapping[str, Any]], columns: set[str]) -> Moment:
         seen = [(f"vehicle {name!r}", one) for name, one in vehicles.items()]
-        known = set(CONTEXT_UNITS) - {"speed", "lane_width", "is_truck"}
-        self._columns |= {name for _, one in seen for name in one if name in known}
+        for who, one in seen:
+            if unknown := one.keys() - self._known - set(_VEHICLE_KEYS):
+                raise SimulationError(f"{who}: unknown column {min(unknown)!r}; see docs/schemas/live.json")
         placed = self.network is not None and all(all(key in one for key in _PLACE) for _, one in seen)
         places = self._places(seen) if placed else None
         if self.network is not None and not placed and seen:
@@ -91,13 +116,13 @@ class Pipe:
             np.array([_number(one, "speed", who) for who, one in seen]),
             width,
             np.array([_number(one, "offset", who, 0.0) for who, one in seen]),
-            np.array([bool(one.get("following", True)) for _, one in seen], dtype=np.bool_)
+            np.array([_flag(one, "following", who, True) for who, one in seen], dtype=np.bool_)
             & (True if places is None else places.road >= 0),
-            np.array([bool(one.get("driven", True)) for _, one in seen], dtype=np.bool_),
-            np.array([bool(one.get("is_truck", False)) for _, one in seen], dtype=np.bool_),
+            np.array([_flag(one, "driven", who, True) for who, one in seen], dtype=np.bool_),
+            np.array([_flag(one, "is_truck", who, False) for who, one in seen], dtype=np.bool_),
             base=np.array([_number(one, "base", who, 0.0) for who, one in seen]),
             context={
-                name: np.array([_number(one, name, who, float("nan")) for who, one in seen]) for name in self._columns
+                name: np.array([_number(one, name, who, float("nan")) for who, one in seen]) for name in columns
             },
             places=places,
         )  # fmt: skip
@@ -105,8 +130,13 @@ class Pipe:
     def _places(self, seen: list[tuple[str, Mapping[str, Any]]]) -> Places:
         assert self.network is not None
         roads = {name: index for index, name in enumerate(self.network.road_ids)}
+        for who, one in seen:
+            if isinstance(one["road"], bool) or not isinstance(one["road"], str | int):
+                raise SimulationError(f"{who}: road is {json.dumps(one['road'])[:40]}, expected an id")
+            if not _number(one, "lane", who).is_integer():
+                raise SimulationError(f"{who}: lane is {one['lane']}, expected a whole number")
         road = np.array([roads.get(str(one["road"]), -1) for _, one in seen], dtype=np.int64)
-        lane = np.array([int(_number(one, "lane", who)) for who, one in seen], dtype=np.int64)
+        lane = np.array([int(one["lane"]) for _, one in seen], dtype=np.int64)
         s, offset = (np.array([_number(one, key, who, 0.0) for who, one in seen]) for key in ("s", "offset"))
         for row in range(len(seen)):
             if road[row] >= 0 and not self.network.has_lane_at(int(road[row]), int(lane[row]), float(s[row])):
@@ -126,5 +156,18 @@ def _number(one: Mapping[str, Any], name: str, who: str, missing: float | None =
     if value is None and name in one and name in CONTEXT_UNITS and name not in ("speed", "lane_width"):
         return float("nan")  # JSON's way to say that there is none
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise SimulationError(f"{who}: {name} is {json.dumps(value)}, expected a number")
-    return float(value)
+        raise SimulationError(f"{who}: {name} is {json.dumps(value)[:40]}, expected a number")
+    believed = LIVE_RANGES.get(name)
+    if believed is not None and not believed.low <= value <= believed.high:
+        raise SimulationError(f"{who}: {name} {value!s:.40} is not within [{believed.low:g}, {believed.high:g}]")
+    try:
+        return float(value)
+    except OverflowError as error:
+        raise SimulationError(f"{who}: {name} is a number of {len(str(value))} digits") from error
+
+
+def _flag(one: Mapping[str, Any], name: str, who: str, usual: bool) -> bool:
+    value = one.get(name, usual)
+    if not isinstance(value, bool):
+        raise SimulationError(f"{who}: {name} is {json.dumps(value)[:40]}, expected true or false")
+    return value

@@ -1,7 +1,7 @@
 """What every driver sees at one moment: the road, the vehicles around from where they are, and whom to give way to.
 
-Gaps, sides and the law of giving way are those of a conversion (`motion.around`, `enrich.give_way`), there for one
-vehicle at many moments, here for many vehicles at one.
+Gaps, sides and the law of giving way are those of a conversion (`surroundings.around`, `conversion.give_way`), there
+for one vehicle at many moments, here for many vehicles at one.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class Roads(Protocol):
     """The roads of a simulation: as an OpenDRIVE file or the simulation itself has them."""
 
     def columns(self, road: IntArray, lane: IntArray, s: FloatArray) -> dict[str, FloatArray]:
-        """Context columns of places on lanes, shape (n,) each, as `motion.context.road_columns` has them."""
+        """Context columns of places on lanes, shape (n,) each, as `surroundings.context.road_columns` has them."""
         ...
 
     def section(self, road: int, lane: int, s: float) -> float:
@@ -111,7 +111,7 @@ def look_around(roads: Roads, places: Places, offset: FloatArray, is_truck: Bool
     direction, t = np.ones(n, dtype=np.int64), spread_out(roads.across(*where, offset[on]), there)
     direction[on] = roads.directions(*where[:2])
     width = np.maximum(np.fmax(road["lane_width"], places.width), 0.1)
-    around = Around.nobody(n)
+    around = Around.with_no_one(n)
     for path, u, i, j in _along_paths(roads, places, on):
         seen = see_along(path, u[i], offset[i], places.road[j], places.s[j], t[j], direction[j], roads.centre)
         extents = (Extent(places.length[k], places.center_x[k]) for k in (i, j))
@@ -157,7 +157,7 @@ def give_way_now(
 
     Of each, shape (n,), `lateral` and `deviation` from its lane's centre, as it is and without what it has moved aside,
     0 in a maneuver [m]; whether it has a driver that follows the road (`can_move`); and what is `known` of that driver:
-    ``responds_left``, ``responds_right``, ``alone_left``, ``alone_right``, see `enrich.give_way.SampledVehicle`.
+    ``responds_left``, ``responds_right``, ``alone_left``, ``alone_right``, see `give_way.SampledVehicle`.
     """
     n = len(places.x)
     cos, sin = np.cos(places.heading), np.sin(places.heading)

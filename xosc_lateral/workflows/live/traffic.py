@@ -1,7 +1,7 @@
 """Drivers of the vehicles of a running simulation: once per step they get what it knows, and say where they are.
 
 A driver goes on at the model's step (5 Hz), on what he sees at that moment; in between he follows the curve of
-`driver.upsampling`. What he sees he responds to a little later than in a conversion, which knows what comes
+`model.upsampling`. What he sees he responds to a little later than in a conversion, which knows what comes
 (`OffsetStream.preview`). Where a maneuver has moved a vehicle, its path leads over from there to the driver's.
 """
 
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -16,10 +17,12 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
-from xosc_lateral.base.errors import SimulationError
+from xosc_lateral.base.errors import SimulationError, XoscLateralError
+from xosc_lateral.base.limits import LIVE_PAUSE, LIVE_RANGES, TIME
 from xosc_lateral.drivers.model.group import OffsetGroup
 from xosc_lateral.drivers.model.plausibility import first_implausible, implausible
 from xosc_lateral.drivers.model.profile import Basis, DriverProfile, sampling_hash
+from xosc_lateral.drivers.model.stream import sealed, unsealed
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.conversion.seen import mirrored_context, sides_known
 from xosc_lateral.workflows.live.paths import DRIVER, SPEEDS, Moves, drive_on
@@ -87,7 +90,7 @@ class Traffic:
     roads : Roads, optional
         Of the simulation; without, `Moment.places` serve for giving way alone.
     neighbours : Neighbours
-        See `enrich.enrich`.
+        See `conversion.enrich`.
     left_hand : bool
         One keeps left here.
 
@@ -129,8 +132,8 @@ class Traffic:
         """Where everybody is at a time of the simulation, not earlier than the last one [s].
 
         From what is known then: how the last step of the simulation has left everybody. Raises `SimulationError` if a
-        number is NaN or none that a road has, time runs backwards, or a context column is missing that was there.
-        Nothing has changed then: the next good moment goes on.
+        number is NaN or none that a road has, time runs backwards or leaps, or a context column is missing that was
+        there. Nothing has changed then: the next good moment goes on.
         """
         _check(time, self._time, moment)
         context = self._context(moment) if self.is_due(time) else None
@@ -156,19 +159,19 @@ class Traffic:
         if names != self._names:
             gone = self._index.keys() - set(names)
             if gone:
-                self._keep(gone)
+                self._keep_vehicles(gone)
             new = [name for name in names if name not in self._index]
             self._names += new
             self._index.update({name: k for k, name in enumerate(self._names)})
             self._state = np.concatenate([self._state, np.zeros(len(new), dtype=DRIVER)])
         return np.array([self._index[name] for name in names], dtype=np.int64)
 
-    def _keep(self, gone: set[str]) -> None:
+    def _keep_vehicles(self, gone: set[str]) -> None:
         self._state = self._state[[name not in gone for name in self._names]]
         self._names = [name for name in self._names if name not in gone]
         self._index = {name: k for k, name in enumerate(self._names)}
         for key, (group, members) in self._groups.items():
-            group.keep(np.array([name not in gone for name in members], dtype=np.bool_))
+            group.keep_present(np.array([name not in gone for name in members], dtype=np.bool_))
             self._groups[key] = (group, [name for name in members if name not in gone])
 
     def seed_of(self, name: str) -> np.random.SeedSequence:
@@ -218,14 +221,14 @@ class Traffic:
         due = int(np.floor(time / self._step + 1e-9)) + 1 - self._knots
         self._knots += due
         row, width = {moment.names[k]: k for k in there.tolist()}, context["lane_width"]
-        for name in row:
-            key = self._profile_key(name)
+        known = {name for _, members in self._groups.values() for name in members}
+        for key in dict.fromkeys(self._profile_key(name) for name in row):
             if key not in self._groups:
                 self._groups[key] = (OffsetGroup(self._profiles[key], self._columns), [])
-            if not self._state["begun"][self._index[name]] and name not in self._groups[key][1]:
-                group, members = self._groups[key]
-                group.add([self.seed_of(name)])
-                members.append(name)
+            group, members = self._groups[key]
+            new = [name for name in row if name not in known and self._profile_key(name) == key]
+            group.add([self.seed_of(name) for name in new])
+            members += new
         for key, (group, members) in self._groups.items():
             if not members:
                 continue
@@ -272,9 +275,7 @@ class Traffic:
     # ---- state -------------------------------------------------------------------------------------------------------
     def to_dict(self) -> dict[str, Any]:
         """All that changes while driving, as plain JSON values."""
-        return {
-            "format": FORMAT,
-            "version": 1,
+        return sealed({
             "seed": self.seed,
             "profiles": {key: sampling_hash(profile) for key, profile in self._profiles.items()},
             "time": self._time,
@@ -285,15 +286,50 @@ class Traffic:
                 for name, own in zip(self._names, self._state.tolist(), strict=True)
             },
             "groups": {key: {"members": members, **group.to_dict()} for key, (group, members) in self._groups.items()},
-        }
+        }, FORMAT)  # fmt: skip
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Go on from what `to_dict` gave; the same profiles, settings and roads were given at the start.
 
-        Raises `SimulationError` if it is no such state, or one of other profiles.
+        Raises `SimulationError` if it is no such state, a damaged one, or one of other profiles; nothing has changed
+        then.
         """
-        if not isinstance(state, Mapping) or state.get("format") != FORMAT or state.get("version") != 1:
-            raise SimulationError(f'not a state of live traffic: "format" is not "{FORMAT}", or its version is not 1')
+        trial, restored = copy(self), copy(self)
+        try:
+            values = unsealed(state, FORMAT)
+            for one in (trial, restored):
+                one._go_on_from(values)
+            trial._try()
+        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+            if isinstance(error, XoscLateralError):
+                raise SimulationError(str(error)) from error
+            raise SimulationError(f"the state of live traffic is damaged: {error!r}") from error  # and sealed anew
+        self.__dict__ = restored.__dict__
+
+    def _try(self) -> None:
+        """One step more, with nothing around, as a check of a state."""
+        if not all((np.abs(self._state[name]) <= LIVE_RANGES["offset"].high).all() for name in DRIVER.names or ()):
+            raise ValueError("a driver's number that none has")
+        begun = [name for name, own in zip(self._names, self._state, strict=True) if own["begun"]]
+        if sorted(begun) != sorted(name for _, members in self._groups.values() for name in members):
+            raise ValueError("drivers and groups name others")
+        if self._time is None and self._columns is None:
+            return
+        if self._time is None or self._columns is None:
+            raise ValueError("it says only one of time and columns")
+        if not abs(self._time / self._step - self._knots) < 2.0:
+            raise ValueError(f"its time is {self._time} s, after {self._knots} steps of its model")
+        for group, _ in self._groups.values():
+            group.try_next()
+        n = len(self._names)
+        even, on = np.full(n, 3.5), np.ones(n, dtype=np.bool_)
+        seen = {name: np.full(n, np.nan) for name in self._columns if name not in ("lane_width", "speed")}
+        moment = Moment(tuple(self._names), 10.0 * even, even, 0.0 * even, on, on, ~on, context=seen)
+        moves = self.step(max(self._time, self._step * self._knots), moment)
+        if not (np.abs(moves.offset) <= LIVE_RANGES["offset"].high).all():
+            raise ValueError("a driver's place is none")
+
+    def _go_on_from(self, state: Mapping[str, Any]) -> None:
         if state["profiles"] != {key: sampling_hash(profile) for key, profile in self._profiles.items()}:
             raise SimulationError("the state of live traffic belongs to other profiles")
         self.seed, self._time, self._knots = int(state["seed"]), state["time"], int(state["knots"])
@@ -310,19 +346,27 @@ class Traffic:
 
 
 def _check(time: float, before: float | None, moment: Moment) -> None:
-    if not np.isfinite(time) or (before is not None and time < before):
+    if not abs(time) <= TIME.value or (before is not None and time < before):
         raise SimulationError(
             f"the simulation's time is {time:g} s" + ("" if before is None else f" after {before:g} s")
         )
+    if before is not None and time - before > LIVE_PAUSE.value:
+        raise SimulationError(LIVE_PAUSE.refusal(time - before))
     columns = {"speed": moment.speed, "lane width": moment.lane_width, "offset": moment.offset, "base": moment.nominal}
     if moment.places is not None:
         columns |= {name: getattr(moment.places, name) for name in ("x", "y", "heading", "s")}
-    for what, values in columns.items():
+    others = {name: getattr(moment, name) for name in ("following", "driven", "is_truck")} | dict(moment.context)
+    for what, values in {**columns, **others}.items():
         if len(values) != len(moment.names):
             raise ValueError(f"{what}: {len(values)} rows for {len(moment.names)} vehicles")
+    if len(set(moment.names)) < len(moment.names):
+        raise ValueError("a vehicle is named twice")
+    for what, values in columns.items():
         bad = ~np.isfinite(values)
         if what == "lane width":
             bad |= ~(values > 0.0)
+        elif what in LIVE_RANGES:
+            bad |= ~(np.abs(values) <= LIVE_RANGES[what].high)
         if bad.any():
             row = int(np.flatnonzero(bad)[0])
             raise SimulationError(f"vehicle {moment.names[row]!r} at {time:g} s: {what} is {values[row]}")

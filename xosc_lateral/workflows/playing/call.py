@@ -181,10 +181,12 @@ class Playback(Result):
 
     def page(self) -> str:
         """A self-contained HTML page that plays the scenario."""
+        from xosc_lateral.files.openscenario.provenance import facts_in
         from xosc_lateral.workflows.playing.page import view_page
 
         motion, network = self._played.motion, self._played.network
-        return view_page(motion, network, source=self.scenario.name, provenance=self._provenance())
+        converted = facts_in(self.scenario.read_bytes())
+        return view_page(motion, network, source=self.scenario.name, provenance=self._provenance(), converted=converted)
 
     def write_page(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the page that plays the scenario; into a folder as ``NAME_view.html``."""

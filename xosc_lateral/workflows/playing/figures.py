@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.files.pages.chart import DASHED, ENRICHED, GRID, INK, MUTED, NOMINAL, SHADE, Panel, color_of, label_of
+from xosc_lateral.files.pages.chart import DASHED, GRID, MUTED, NOMINAL, SHADE, Panel, color_of, label_of
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.workflows.conversion.result import Enriched, EntityResult
 from xosc_lateral.workflows.playing.road_lines import lane_surfaces, markings
@@ -85,8 +85,8 @@ def paths_stretched(enriched: Enriched) -> Figure | None:
         for number in range(len(enriched.entities)):
             _draw_path(panel, enriched, number, road)
         panel.x.grid = panel.y.grid = False
-        panel.title, panel.y.label = f"Road {enriched.network.road_ids[road]}", "t [m]"
-        panel.x.label = "s along the road [m]"
+        panel.title, panel.y.label = f"Road {enriched.network.road_ids[road]}", "across the road, t [m]"
+        panel.x.label = "along the road, s [m]"
     return figure
 
 
@@ -101,7 +101,7 @@ def _draw_path(panel: Panel, enriched: Enriched, number: int, road: int) -> None
     kept = rows[here]
     breaks = _breaks(motion, rows)[here] | (np.diff(kept, prepend=kept[0] - 1) > 2 * (rows[-1] - rows[0]) / len(rows))
     breaks[0] = False
-    color = color_of(number) if entity.is_enriched else INK
+    color = color_of(number)
     sign = np.where(np.cos(motion.heading_relative[kept]) >= 0.0, 1.0, -1.0)
     nominal, shifted = (
         enriched.network.offset_to_t(road, motion.lane[kept], motion.s[kept], motion.offset[kept] + added)
@@ -145,21 +145,33 @@ def thumbnail(enriched: Enriched) -> str:
 
 
 # ---- over time -------------------------------------------------------------------------------------------------------
+def _figure_of_each(entities: Sequence[EntityResult], label: str) -> Figure:
+    """A panel for each entity over time; grey: where it does not simply follow its road."""
+    figure = Figure(len(entities), height=max(54.0, 120.0 / len(entities)), share_x="all", share_y="all")
+    for panel, entity in zip(figure.panels, entities, strict=True):
+        for span in entity.spans:
+            if not span.is_road_following:
+                panel.across(span.start, span.end, GRID, opacity=0.7)
+        panel.title, panel.x.label = label_of(entity.name), "time [s]"
+    figure.panels[len(entities) // 2].y.label = label
+    return figure
+
+
+def _number_of(enriched: Enriched, entity: EntityResult) -> int:
+    """Its place among all entities, which decides on its colour in every figure."""
+    return [each.name for each in enriched.entities].index(entity.name)
+
+
 def offsets_over_time(enriched: Enriched, entities: Sequence[EntityResult]) -> Figure:
-    """What was added to each entity's nominal offset, road-following segments shaded."""
-    figure = Figure(len(entities), height=54.0, share_x="all", share_y="all")
+    """What was added to each entity's nominal offset."""
+    figure = _figure_of_each(entities, "added offset [m]")
     reach = max(0.5, 1.1 * max(float(np.abs(entity.deviation).max()) for entity in entities))
     for panel, entity in zip(figure.panels, entities, strict=True):
         rows = shown_rows(entity.motion)
-        for span in entity.spans:
-            if span.is_road_following:
-                panel.across(span.start, span.end, GRID, opacity=0.5)
         panel.level(color=NOMINAL, dashes=DASHED)
-        number = [each.name for each in enriched.entities].index(entity.name)
-        name = label_of(entity.name)
-        panel.line(entity.motion.time[rows], entity.deviation[rows], color_of(number), label=name)
-        panel.title, panel.x.label, panel.y.limits = name, "time [s]", (-reach, reach)
-    figure.panels[len(entities) // 2].y.label = "offset [m]"
+        color = color_of(_number_of(enriched, entity))
+        panel.line(entity.motion.time[rows], entity.deviation[rows], color, label=panel.title)
+        panel.y.limits = (-reach, reach)
     return figure
 
 
@@ -180,16 +192,15 @@ def speeds_over_time(motion: NominalMotion, entities: Sequence[EntityResult] = (
     return figure
 
 
-def accelerations_over_time(entities: Sequence[EntityResult]) -> Figure:
-    """Lateral acceleration that was added to each entity's motion, over a band that real drivers keep to."""
-    figure = Figure(len(entities), height=54.0, share_x="all", share_y="all")
+def accelerations_over_time(enriched: Enriched, entities: Sequence[EntityResult]) -> Figure:
+    """Lateral acceleration that was added to each entity's motion, between lines that real drivers keep to."""
+    figure = _figure_of_each(entities, "added [m/s²]")
     for panel, entity in zip(figure.panels, entities, strict=True):
         rows = shown_rows(entity.motion)
         time, added = entity.motion.time[rows], entity.lateral_acceleration()[rows]
-        panel.band(time[[0, -1]], -COMFORTABLE, COMFORTABLE, GRID, opacity=0.5)
-        panel.line(time, added, ENRICHED, label="added")
-        panel.title, panel.x.label = label_of(entity.name), "time [s]"
-    figure.panels[len(entities) // 2].y.label = "[m/s²]"
+        for bound in (-COMFORTABLE, COMFORTABLE):
+            panel.level(bound, color=NOMINAL, dashes=DASHED)
+        panel.line(time, added, color_of(_number_of(enriched, entity)), label="added")
     return figure
 
 

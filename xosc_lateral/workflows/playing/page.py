@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from xosc_lateral.files.pages.page import Page
 from xosc_lateral.workflows.playing.figures import speeds_over_time
@@ -12,7 +13,14 @@ from xosc_lateral.world.motion.nominal import NominalMotion, Note
 from xosc_lateral.world.road import RoadNetwork
 
 
-def view_page(motion: NominalMotion, network: RoadNetwork, *, source: str, provenance: Mapping[str, object]) -> str:
+def view_page(
+    motion: NominalMotion,
+    network: RoadNetwork,
+    *,
+    source: str,
+    provenance: Mapping[str, object],
+    converted: Mapping[str, Any] | None = None,
+) -> str:
     """HTML page with the player, self-contained; same input, same bytes.
 
     Parameters
@@ -25,12 +33,14 @@ def view_page(motion: NominalMotion, network: RoadNetwork, *, source: str, prove
         File name, for the reader.
     provenance : mapping
         Shown in the footer.
+    converted : mapping, optional
+        What the file says of its conversion, if it was converted.
     """
     page = Page(Path(source).name)
     count = len(motion.entities)
     page.lead(
         f"{count} {'entity' if count == 1 else 'entities'}, {motion.end_time:.1f} s (ended by the {motion.ended_by}). "
-        "The maneuvers are played as the scenario states them, without added lateral movement."
+        + (NOT_CONVERTED if converted is None else _conversion_in_words(converted))
     )
     page.section(
         "Player",
@@ -47,6 +57,16 @@ def view_page(motion: NominalMotion, network: RoadNetwork, *, source: str, prove
     )
     add_notes(page, motion.notes)
     return page.html(provenance)
+
+
+NOT_CONVERTED = "The maneuvers are played as the scenario states them; no lateral movement was added to them."
+
+
+def _conversion_in_words(facts: Mapping[str, Any]) -> str:
+    """Whose lateral movement a converted scenario has."""
+    profiles = facts.get("profiles")
+    vehicles = ", ".join(sorted(profiles)) if isinstance(profiles, Mapping) else ""
+    return "Converted by xosc-lateral, with lateral movement " + (f"of {vehicles}." if vehicles else "of nobody.")
 
 
 def add_notes(page: Page, notes: Sequence[Note]) -> None:

@@ -31,8 +31,14 @@ MOST_FRAMES = 60_000
 MILLI, ANGLE, LINE = 1e-3, 1e-4, 5e-3
 """Resolution of positions [m] and speeds [m/s]; of headings, 0.5 mm at the end of a car of 5 m [rad]; of lines [m]."""
 
-REACH = 250.0
+ROAD_REACH = 250.0
 """Roads are shown as far as this around every place where a vehicle was. [m]"""
+
+ROAD_WIDTH = 7.0
+"""Shown where there is no road. [m]"""
+
+PLACES = 20
+"""At which it is looked how wide the road is. [-]"""
 
 PIECE = 200.0
 """Length of one piece of a lane or marking: pieces out of sight are not drawn. [m]"""
@@ -53,11 +59,30 @@ def scene_of(motion: NominalMotion, network: RoadNetwork, results: Sequence[Enti
     scene = {
         "step": round(float(rows[1] - rows[0]) * motion.step if len(rows) > 1 else FRAME, 9),
         "frames": len(rows),
+        "across": round(_across(network, shown), 2),
         "entities": [_entity(network, number, each, result, rows, origin) for number, each, result in shown],
         **_roads(network, np.concatenate(places) if places else np.empty((0, 2)), origin),
     }
     # "<" would end the script element that holds this
     return json.dumps(scene, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c")
+
+
+def _across(network: RoadNetwork, shown: Sequence[tuple[int, EntityMotion, EntityResult | None]]) -> float:
+    """How far the player looks to either side of the vehicle that it follows first: driving lanes, one beside its own.
+
+    In m.
+    """
+    first = next((motion for _, motion, result in shown if result is None or result.is_enriched), None)
+    if first is None:
+        return ROAD_WIDTH
+    there = np.flatnonzero(_present(first) & (first.road >= 0))
+    reach = [ROAD_WIDTH / 2]
+    for row in there[:: max(1, len(there) // PLACES)].tolist():
+        road, s = int(first.road[row]), float(first.s[row])
+        t = float(network.offset_to_t(road, int(first.lane[row]), s, float(first.offset[row])))
+        lanes = [lane for lane in network.lanes_at(road, s) if lane.type in DRIVING]
+        reach += [min(abs(lane.centre_t - t) + 0.5 * lane.width, 1.6 * lane.width) for lane in lanes]
+    return max(reach)
 
 
 def packed(values: ArrayLike, resolution: float) -> dict[str, Any]:
@@ -146,7 +171,7 @@ def _roads(network: RoadNetwork, places: FloatArray, origin: FloatArray) -> dict
     dashes go on from piece to piece) [m].
     """
     lanes, marks = [], []
-    cells = {(int(i), int(k)) for i, k in np.unique(np.floor(places / REACH), axis=0)}
+    cells = {(int(i), int(k)) for i, k in np.unique(np.floor(places / ROAD_REACH), axis=0)}
     near = {(i + a, k + b) for i, k in cells for a in (-1, 0, 1) for b in (-1, 0, 1)}
 
     def line(road: int, s: FloatArray, t: FloatArray) -> FloatArray:
@@ -175,6 +200,6 @@ def _pieces_near(network: RoadNetwork, road: int, near: set[tuple[int, int]]) ->
     edges = np.linspace(0.0, length, max(1, int(np.ceil(length / PIECE))) + 1).tolist()
     for first, last in pairwise(edges):
         poses = network.road_to_world(road, np.linspace(first, last, 5))
-        cells = np.floor(np.column_stack([poses.x, poses.y]) / REACH)
+        cells = np.floor(np.column_stack([poses.x, poses.y]) / ROAD_REACH)
         if last > first and any((int(i), int(k)) in near for i, k in cells):
             yield first, last

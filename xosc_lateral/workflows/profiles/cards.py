@@ -14,7 +14,7 @@ from xosc_lateral.base.normal import NORMAL_95
 from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, keeping_of
 from xosc_lateral.drivers.evaluation.metrics import DURATION, MovementSummary, free_runs, summarise, summary_of
 from xosc_lateral.drivers.evaluation.spectra import spectrum
-from xosc_lateral.drivers.fitting.answers import basis_of, beside_line
+from xosc_lateral.drivers.fitting.answers import basis_of, responses_in_words
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.drivers.model.profile import SIDES, DriverProfile, Provenance
 from xosc_lateral.files.pages.chart import SAMPLED
@@ -30,13 +30,13 @@ CHANGED: Mapping[Acts, str] = {
 }
 """What a column effect changes, in words."""
 
-FEW = 10
+SINGLE_DRIVER_DRIVES = 10
 """Drives below which a profile is taken to be of one driver."""
 
 SHOWN_DRIVERS, SHOWN_S = 4, 120.0
 """Sample paths that are drawn, and their length. [s]"""
 
-PROSE = ("", "lane", "sure", "source", "licence")
+WRAPPED_ROWS = ("", "lane", "known to", "source", "licence")
 """Rows of a card that are wrapped in the terminal."""
 
 
@@ -127,7 +127,7 @@ def card_text(profile: DriverProfile) -> str:
     """The card for the terminal."""
     lines = [profile.name]
     for label, value in [("", profile.provenance.notes), *card_rows(profile, summary_of(profile))]:
-        parts = textwrap.wrap(value, 100) if label in PROSE else [value]
+        parts = textwrap.wrap(value, 100) if label in WRAPPED_ROWS else [value]
         lines += [f"  {label if k == 0 else '':10s} {part}" for k, part in enumerate(parts)]
     return "\n".join([*lines, f"  {'sha256':10s} {profile_hash(profile)}"])
 
@@ -141,12 +141,12 @@ def card_rows(profile: DriverProfile, summary: MovementSummary) -> list[tuple[st
     rows = [
         ("model", f"{profile.model.kind}, {effects}, lane width {profile.lane_width:.2f} m"),
         *(("effect", effect_line(effect)) for effect in profile.effects),
-        ("neighbours", "; ".join(beside_line(profile, side) for side in SIDES)),
+        ("neighbours", responses_in_words(profile)),
         ("mean", f"{abs(summary.mean_offset):.2f} m to the {side} of the lane centre"),
         ("spread", f"{_spread(known, summary)}; 90 % within {summary.low:+.2f} to {summary.high:+.2f} m"),
         ("speed", f"{summary.lateral_speed:.3f} m/s lateral (rms)"),
         ("lane", keeping.words),
-        ("sure", _sureness(known, keeping)),
+        ("known to", _sureness(known, keeping)),
         ("fitted on", _amount(known)),
         ("source", known.source),
         ("licence", known.licence),
@@ -176,13 +176,13 @@ def _spread(known: Provenance, summary: MovementSummary) -> str:
 def _sureness(known: Provenance, keeping: LaneKeeping) -> str:
     """How well one driver's mean and spread are known from so much driving; empty where it is of many or unknown."""
     independent = 3600.0 * known.hours / (2.0 * keeping.memory) if keeping.memory else 0.0
-    if "derived_from" in known.fit or not 0.0 < known.drives < FEW or independent < 1.0:
+    if "derived_from" in known.fit or not 0.0 < known.drives < SINGLE_DRIVER_DRIVES or independent < 1.0:
         return ""
     mean = NORMAL_95 * keeping.sdlp / independent**0.5
     spread = NORMAL_95 * keeping.sdlp / (2.0 * independent) ** 0.5
     return (
-        f"from {60 * known.hours:.3g} min his mean is known to +- {mean:.2f} m, his SDLP to +- {spread:.2f} m (95 %), "
-        "other days apart"
+        f"mean within {mean:.2f} m, SDLP within {spread:.2f} m (95 %, from {60 * known.hours:.3g} min of driving; on "
+        "another day the same driver may differ by more)"
     )
 
 

@@ -25,7 +25,7 @@ SHOWN_S = 120.0
 SPACING = 0.8
 """Between the zero lines of two sample paths. [m]"""
 
-SHOWN = 12
+MAXIMUM_DRAWN = 12
 """So many profiles are drawn at most; the distances are of all."""
 
 
@@ -105,7 +105,7 @@ def comparison_figure(compared: Compared) -> Figure:
     """Where in the lane, how fast (spectrum), and sample paths, a colour per profile."""
     figure = Figure(1, 3, height=180.0, legend=True)
     place, power, paths = figure.panels
-    shown = compared.profiles[:SHOWN]
+    shown = compared.profiles[:MAXIMUM_DRAWN]
     for number, one in enumerate(shown):
         color, name, step = color_of(number), one.profile.name, one.profile.model.step
         heights, edges = np.histogram(one.runs, np.linspace(-1.0, 1.0, 81), density=True)
@@ -137,7 +137,7 @@ def comparison_page(compared: Compared) -> str:
             for one in compared.profiles
         ]
     )
-    more = f"; {len(names) - SHOWN} more are left out of the figure" if len(names) > SHOWN else ""
+    more = f"; {len(names) - MAXIMUM_DRAWN} more are left out of the figure" if len(names) > MAXIMUM_DRAWN else ""
     page.figure(
         comparison_figure(compared),
         f"Distribution of the offset, power spectral density and a sample path of each profile{more}.",

@@ -61,7 +61,7 @@ def spectrum_figure(scores: ProfileScores) -> Figure:
     return figure
 
 
-CLOSE, FAR = 1.2, 2.0
+GOOD_RATIO, BAD_RATIO = 1.2, 2.0
 """Ratios to the distance between real drivers up to which a metric is marked good, and from which it is marked bad."""
 
 
@@ -285,7 +285,7 @@ def worst_block(scores: ProfileScores) -> tuple[str, float]:
 
 
 def _tone(ratio: float) -> Tone:
-    return "good" if ratio <= CLOSE else "bad" if ratio >= FAR else ""
+    return "good" if ratio <= GOOD_RATIO else "bad" if ratio >= BAD_RATIO else ""
 
 
 def _fitted_on(profile: DriverProfile, inputs: Mapping[str, str]) -> bool:

@@ -87,6 +87,7 @@ def close_loop(
             given.drives,
             base,
             seed=seed,
+            in_sample=base is not None and _is_of(base, given),
             name=name,
             provenance=Provenance(source=", ".join(given.inputs), inputs=dict(given.inputs)),
             excluded=list(leave_out),
@@ -96,6 +97,12 @@ def close_loop(
     if base is not None:
         result = replace(result, refined=with_fields(result.refined, left_hand=base.left_hand))
     return ClosedLoop(result, given)
+
+
+def _is_of(base: DriverProfile, given: GivenDrives) -> bool:
+    """Whether a profile was fitted on these very drives, and on no others."""
+    fitted = set(base.provenance.inputs.values())
+    return bool(fitted) and fitted <= set(given.inputs.values())
 
 
 class ClosedLoop(Result):

@@ -164,7 +164,7 @@ def moving_spread(result: LoopResult, seconds: float) -> MovingStatistic:
 
 def _moving(result: LoopResult, statistic: Callable[[FloatArray], FloatArray]) -> MovingStatistic:
     """A statistic of runs, shape (runs, n), of the measured drives and of both profiles."""
-    timeline, scored, shown = result.coarse.timeline, result.scored, _longest(result)
+    timeline, scored, shown = result.coarse.timeline, result.scored, _longest_run(result)
     runs = (timeline.offset[None], scored.runs_before, scored.runs_after)
     time = coarse_middle(timeline.time)[: len(result.coarse)]
     return MovingStatistic(time[shown], *(coarse_mean(statistic(own))[shown] for own in runs))
@@ -175,17 +175,17 @@ def hidden_mean(result: LoopResult) -> FloatArray:
     coarse, fitted = result.coarse, result.final
     own = [latent_path(term, fitted) for term in fitted.terms if not term.columns]
     hidden = np.sum([np.zeros(len(coarse)), *own], axis=0)
-    return np.asarray((hidden - hidden[coarse.valid].mean())[_longest(result)])
+    return np.asarray((hidden - hidden[coarse.valid].mean())[_longest_run(result)])
 
 
 def regime_probability(result: LoopResult) -> FloatArray:
     """Probability, 0 to 1, of the regime of large spread. [-] Shape as a `MovingStatistic`'s times."""
     fits = [term.fit.on for term in result.final.terms if isinstance(term, RegimesTerm)]
     on = fits[0] if fits else np.zeros(len(result.coarse))
-    return np.asarray(on[_longest(result)])
+    return np.asarray(on[_longest_run(result)])
 
 
-def _longest(result: LoopResult) -> BoolArray:
+def _longest_run(result: LoopResult) -> BoolArray:
     """Valid seconds of the drive that has most of them."""
     coarse = result.coarse
     seconds = np.bincount(coarse.drive, coarse.valid.astype(np.float64))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -29,7 +30,7 @@ def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
     error = {"before": result.error_before, "after": result.error_after, "floor": result.floor}
     return {
         "drives": list(result.names),
-        "base_profile": _profile(result.base) | {"given": result.given},
+        "base_profile": _profile(result.base) | {"given": result.given, "in_sample": result.in_sample},
         "refined_profile": _profile(result.refined),
         "held_out": result.held_out,
         "columns": [column_record(column, result) for column in sorted(result.identified.usable.roles)],
@@ -85,9 +86,10 @@ def _unexplained(result: LoopResult) -> dict[str, Any]:
         "measure": "root of error after squared minus floor squared, m",
         "size_m": result.lack_of_fit.unexplained,
         "p_value": result.lack_of_fit.p_value,
-        "clear": result.lack_of_fit.clear,
-        "where": [group.name for group in result.lack_of_fit.where] if result.lack_of_fit.clear else [],
+        "clear": result.lack_of_fit.is_clear,
+        "where": [group.name for group in result.lack_of_fit.where] if result.lack_of_fit.is_clear else [],
         "sentence": lack_of_fit_words(result),
+        "omnibus": asdict(result.remainder) | {"within_chance": result.remainder.silent},
     }
 
 

@@ -37,7 +37,7 @@ from xosc_lateral.workflows.profiles.violins import LABELS, violin_figure
 
 NAMED_DRIVES = 3  # So many drives are named in the title; more are counted.
 LEFT_ROWS = 8  # Rows of the table of what is left.
-FAR, CLOSE = (
+BAD_RATIO, GOOD_RATIO = (
     2.0,
     1.2,
 )  # Ratios to halves of the drives from which a number is marked bad, and up to which it is marked good. [-]
@@ -47,7 +47,7 @@ def loop_text(result: LoopResult) -> str:
     """The outcome in a few lines; what is left is worked out unless it is given."""
     lines = [f"{finding_sentence(finding)} (p = {finding.p_value:.1e})" for finding in result.findings]
     lines = lines or ["no effect added"]
-    lines += [f"{taken_back_words(item)}: {item.why}" for item in result.identified.taken_back]
+    lines += [f"{taken_back_words(one)}, p = {one.p_value:.1e}: {one.why}" for one in result.identified.taken_back]
     for item in result.identified.usable.feedback:
         sure = "possibly a" if item.doubtful else "a"
         lines.append(f"{item.column}: {sure} consequence of the car's movement, not used as a cause")
@@ -207,7 +207,7 @@ def _add_residuals(page: Page, result: LoopResult) -> None:
         f"The {len(groups)} of {len(result.lack_of_fit.groups)} groups of statistics with the largest residual above "
         "that between halves: root mean square of measured minus expected [mm]. All groups are in report.json.",
         formats={"before": ".1f", "after": ".1f", "between halves": ".1f", "ratio": ".2f"},
-        tones={k: "bad" for k, group in enumerate(groups) if group.after > FAR * group.floor},
+        tones={k: "bad" for k, group in enumerate(groups) if group.after > BAD_RATIO * group.floor},
     )
 
 
@@ -249,7 +249,7 @@ def _add_movement(page: Page, result: LoopResult) -> None:
 
 
 def _numbers(result: LoopResult) -> list[KeyFigure]:
-    tone: Tone = "bad" if result.lack_of_fit.clear else "good" if result.findings else ""
+    tone: Tone = "bad" if result.lack_of_fit.is_clear else "good" if result.findings else ""
     return [
         KeyFigure(f"{1000 * result.error_before:.1f} mm", "error before", "of the base profile"),
         KeyFigure(f"{1000 * result.error_after:.1f} mm", "error after", "of the refined profile", tone=tone),
@@ -282,7 +282,7 @@ def _group_row(group: GroupError, result: LoopResult) -> dict[str, object]:
 
 
 def _tone(value: float, floor: float) -> Tone:
-    return "bad" if value > FAR * floor else "good" if value <= CLOSE * floor else ""
+    return "bad" if value > BAD_RATIO * floor else "good" if value <= GOOD_RATIO * floor else ""
 
 
 def _capital(words: str) -> str:

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.drivers.loop.close import Finding, LoopResult
 from xosc_lateral.drivers.loop.feedback import BAND, FUNCTION, Feedback
+from xosc_lateral.drivers.loop.omnibus import DELAYS
+from xosc_lateral.drivers.loop.residual import LackOfFit
 from xosc_lateral.drivers.loop.selection import Rejected
 from xosc_lateral.drivers.loop.timeline import LOCAL_S
 from xosc_lateral.drivers.model.effects import Acts, Angular, ColumnEffect, Levels, Magnitude, Product
@@ -189,7 +191,7 @@ def outcome(result: LoopResult) -> str:
     elif not back:
         words.append("No significant effect was found, and none was added.")
     if back:
-        names = "; ".join(f"{taken_back_words(item)}: {item.why}" for item in back)
+        names = "; ".join(f"{taken_back_words(item)}, p = {item.p_value:.1e}: {item.why}" for item in back)
         number = f"{len(back)} {'more ' * bool(found)}" + ("effects were" if len(back) > 1 else "effect was")
         words.append(f"{number} found and taken back ({names}).")
         words += [] if found else ["Nothing was added: the base profile is returned."]
@@ -205,16 +207,8 @@ def taken_back_words(item: Rejected) -> str:
 def lack_of_fit_words(result: LoopResult) -> str:
     """What is left unexplained, in a sentence."""
     left = result.lack_of_fit
-    if left.unexplained == 0.0:
-        return (
-            "Taken together, the residuals do not exceed the difference between halves of the drives: what the profile "
-            "still misses is within chance."
-        )
-    if not left.clear:
-        return (
-            "The remaining residual is not significant: the error after is above that between halves, but "
-            f"{100 * left.p_value:.0f}{GAP}% of random halves of these drives differ as much from the whole."
-        )
+    if not left.is_clear:
+        return f"{_total_words(left)} {_remainder_words(result)}"
     where = ", ".join(
         f"{group_words(group.name, result)} ({_mm(group.after)}, between halves {_mm(group.floor)})"
         for group in left.where[:NAMED_GROUPS]
@@ -223,6 +217,36 @@ def lack_of_fit_words(result: LoopResult) -> str:
         f"Unexplained residual of {_mm(left.unexplained)}: the error after ({_mm(result.error_after)}) lies "
         f"clearly above that between halves ({_mm(result.floor)}), and no effect was found that explains the rest."
         + (f" It stands out in: {where}." if where else "")
+        + ("" if result.remainder.silent else f" {_remainder_words(result)}")
+    )
+
+
+def _total_words(left: LackOfFit) -> str:
+    """What the summary statistics say where they say nothing clear."""
+    if left.unexplained == 0.0:
+        return "Taken together, the residuals do not exceed the difference between halves of the drives."
+    return (
+        "The error after is above that between halves, but "
+        f"{100 * left.p_value:.0f}{GAP}% of random halves of these drives differ as much from the whole."
+    )
+
+
+def _remainder_words(result: LoopResult) -> str:
+    """Whether any column predicts what is left, at whichever delay."""
+    left, back = result.remainder, result.identified.taken_back
+    delays = f"from {-DELAYS[0]:g} s ahead to {DELAYS[-1]:g} s behind"
+    if not left.silent:
+        return (
+            f"More is left than chance: `{' and '.join(left.columns)}`, at delays {delays}, explains "
+            f"{100 * left.share:.1f}{GAP}% of the movement's innovations (p = {left.p_value:.1e})."
+        )
+    if back:
+        return "What was found and taken back is not explained otherwise."
+    if not left.columns:
+        return "What the profile still misses is within chance; there is no column that could explain it."
+    return (
+        f"No column, at any delay {delays}, predicts what is left (p = {left.p_value:.2f}): what the profile still "
+        "misses is within chance."
     )
 
 
@@ -242,7 +266,7 @@ def _hidden_sentence(finding: Finding) -> str:
 
 
 # Where a driver is, by the column that says so.
-OTHERS: Mapping[str, str] = MappingProxyType(
+PLACES_BY_COLUMN: Mapping[str, str] = MappingProxyType(
     {
         "left_distance": "beside vehicles on his left",
         "right_distance": "beside vehicles on his right",
@@ -258,7 +282,7 @@ OTHERS: Mapping[str, str] = MappingProxyType(
     }
 )
 
-FAR = 200.0  # Free space at which others count as far away. [m]
+FAR_DISTANCE = 200.0  # Free space at which others count as far away. [m]
 
 
 def beside_words(effect: ColumnEffect, error: float = 0.0) -> str:
@@ -268,19 +292,19 @@ def beside_words(effect: ColumnEffect, error: float = 0.0) -> str:
     By where the effect puts him, whatever the sign of a distance: with somebody alongside, less with nobody near. The
     range is where 1/e of the shift is left.
     """
-    if effect.acts is not Acts.LOCATION or len(effect.columns) != 1 or effect.columns[0] not in OTHERS:
+    if effect.acts is not Acts.LOCATION or len(effect.columns) != 1 or effect.columns[0] not in PLACES_BY_COLUMN:
         return ""
     column = effect.columns[0]
     if not column.endswith("distance"):
         off, on = effect.weighed(effect.quantity({column: np.array([0.0, 1.0])}))
-        return _moves(float(on - off), error, OTHERS[column], "")
-    free = np.linspace(0.0, FAR, 2001)
+        return _moves(float(on - off), error, PLACES_BY_COLUMN[column], "")
+    free = np.linspace(0.0, FAR_DISTANCE, 2001)
     place = effect.weighed(effect.quantity({column: free}))
     shift = place - place[-1]
     largest = int(np.argmax(np.abs(shift)))
     near = np.flatnonzero(np.abs(shift) >= np.abs(shift[largest]) * np.exp(-1.0))
-    begins = f", from {free[near[-1]]:.0f}{GAP}m on" if near[-1] > 0 and free[near[-1]] < FAR - 1.0 else ""
-    return _moves(float(shift[largest]), error, OTHERS[column], begins)
+    begins = f", from {free[near[-1]]:.0f}{GAP}m on" if near[-1] > 0 and free[near[-1]] < FAR_DISTANCE - 1.0 else ""
+    return _moves(float(shift[largest]), error, PLACES_BY_COLUMN[column], begins)
 
 
 def _moves(shift: float, error: float, where: str, begins: str) -> str:

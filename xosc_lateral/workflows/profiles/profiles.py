@@ -82,11 +82,11 @@ def derive_profile(
     name : str
         Id of the new profile; else the preset's or the base's name with ``-derived``.
     preset : str, optional
-        One of `identification.stated_figures.PRESETS`: figures with a source.
+        One of `fitting.stated_figures.PRESETS`: figures with a source.
     library : path or paths
         Folders with further profiles.
     **asked
-        Fields of `identification.stated_figures.Asked`: ``sdlp=0.25``.
+        Fields of `fitting.stated_figures.Asked`: ``sdlp=0.25``.
 
     Raises
     ------

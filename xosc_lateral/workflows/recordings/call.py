@@ -48,7 +48,7 @@ def reconstruct(
     force : bool
         Replace files that this package did not write.
     options
-        `pipeline.reconstruct.ReconstructSettings`: which part and which vehicles, and what is written of them.
+        `recordings.reconstruct.ReconstructSettings`: which part and which vehicles, and what is written of them.
 
     Raises
     ------

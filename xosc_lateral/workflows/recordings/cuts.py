@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.drivers.drives.cleaning import RUN
+from xosc_lateral.drivers.drives.cuts import MAX_GAP
 
 RATE_WINDOW = 0.5  # [s]; the lateral speed is a central difference over this
-KEPT = "kept"
+KEPT_ROWS = "kept"
 
 
 @dataclass(frozen=True)
@@ -84,25 +85,25 @@ def name_states(
     reasons: dict[str, BoolArray],
     lane: IntArray,
     vehicle: IntArray,
-    frame: IntArray,
+    time: FloatArray,
     step: float,
     settings: CutSettings,
 ) -> NDArray[np.str_]:
-    """Per row `KEPT`, or the first reason that cuts it; "edge" at the ends of what is left, "short" for crumbs."""
-    state = np.select(list(reasons.values()), list(reasons), default=KEPT)
-    run = _kept_runs(state, lane, vehicle, frame)
+    """Per row `KEPT_ROWS`, or the first reason that cuts it; "edge" at the ends of what is left, "short" for crumbs."""
+    state = np.select(list(reasons.values()), list(reasons), default=KEPT_ROWS)
+    run = _kept_runs(state, lane, vehicle, time)
     count = np.bincount(run)
     place = np.arange(len(run)) - (np.cumsum(count) - count)[run]
     edge = round(settings.edge / step)
     at_edge = (place < edge) | (place >= count[run] - edge)
     short = (count[run] - 2 * edge) * step < settings.shortest
-    return np.where(state == KEPT, np.where(short, "short", np.where(at_edge, "edge", KEPT)), state)
+    return np.where(state == KEPT_ROWS, np.where(short, "short", np.where(at_edge, "edge", KEPT_ROWS)), state)
 
 
-def number_runs(state: NDArray[np.str_], lane: IntArray, vehicle: IntArray, frame: IntArray) -> IntArray:
+def number_runs(state: NDArray[np.str_], lane: IntArray, vehicle: IntArray, time: FloatArray) -> IntArray:
     """Number of the kept stretch of each row, counted from 0 in every vehicle; -1 for rows that are cut."""
-    run = _kept_runs(state, lane, vehicle, frame)
-    kept = state == KEPT
+    run = _kept_runs(state, lane, vehicle, time)
+    kept = state == KEPT_ROWS
     begins = kept & np.r_[True, (run[1:] != run[:-1])]
     counted = np.cumsum(begins)
     start = np.searchsorted(vehicle, vehicle, side="left")
@@ -110,12 +111,12 @@ def number_runs(state: NDArray[np.str_], lane: IntArray, vehicle: IntArray, fram
 
 
 class Rows(NamedTuple):
-    """Whose rows they are, when and where; sorted by vehicle and frame, shape (n,)."""
+    """Whose rows they are, when and where; sorted by vehicle and time, shape (n,)."""
 
     vehicle: IntArray
-    frame: IntArray
+    time: FloatArray  # [s]
     lane: IntArray  # a number that changes with the lane
-    step: float  # between two frames [s]
+    step: float  # between two rows, usually [s]
 
 
 def cut_table(
@@ -132,18 +133,19 @@ def cut_table(
 
     `sideways`: lateral position, continuous through lane changes. [m] `reasons`: for cuts besides lane changes.
     """
-    vehicle, frame, lane, step = rows
+    vehicle, time, lane, step = rows
     changing = lane_changes(sideways, columns["offset"], lane, vehicle, step, settings)
-    state = name_states({**reasons, "lane change": changing}, lane, vehicle, frame, step, settings)
-    runs = number_runs(state, lane, vehicle, frame)
+    state = name_states({**reasons, "lane change": changing}, lane, vehicle, time, step, settings)
+    runs = number_runs(state, lane, vehicle, time)
     more = {"vehicle_class": kind, "is_truck": is_truck.astype(np.float64), RUN: runs, "state": state}
     return pd.DataFrame({**columns, **more})
 
 
-def _kept_runs(state: NDArray[np.str_], lane: IntArray, vehicle: IntArray, frame: IntArray) -> IntArray:
-    """Number of each row's stretch of equal fate, in one lane and without a gap."""
-    kept = state == KEPT
-    new = (kept[1:] != kept[:-1]) | (vehicle[1:] != vehicle[:-1]) | (lane[1:] != lane[:-1]) | (np.diff(frame) != 1)
+def _kept_runs(state: NDArray[np.str_], lane: IntArray, vehicle: IntArray, time: FloatArray) -> IntArray:
+    """Number of each row's stretch of equal fate, in one lane and without a gap that `fit` would not bridge."""
+    kept = state == KEPT_ROWS
+    other = (kept[1:] != kept[:-1]) | (vehicle[1:] != vehicle[:-1]) | (lane[1:] != lane[:-1])
+    new = other | (np.diff(time) > MAX_GAP + 1e-9)
     return _runs(new)
 
 

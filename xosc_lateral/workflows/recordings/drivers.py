@@ -25,7 +25,7 @@ from xosc_lateral.workflows.recordings.plan import Residuals, VehiclePlan
 
 WINDOW, STEP = 10.0, 0.2
 """Of movement that is summed up, as long as the evaluation's snippets; between rows, as profiles have it. [s]"""
-SURELY = 2.0
+MINIMUM_LOG_ODDS = 2.0
 """Another profile than the population's has to be likelier by this: weights of 7 to 1. [nat]"""
 FREE_RUNS = 40
 """Of each profile, five minutes each: 30 windows of 40 drivers."""
@@ -70,7 +70,7 @@ def choose_driver(stretches: Sequence[FloatArray], models: Mapping[str, WindowMo
         for name, model in models.items()
     }
     best = max(gains, key=lambda name: gains[name])
-    if best != population and gains[best] > SURELY:
+    if best != population and gains[best] > MINIMUM_LOG_ODDS:
         return ChosenDriver(best, seconds, gains[best], "likeliest of the library")
     return ChosenDriver(population, seconds, 0.0, "the population's: no other is clearly likelier")
 

@@ -103,7 +103,7 @@ def fit_lane_centre(
 def _sure_part(lane: LaneCentreLine) -> LaneCentreLine:
     """The lane's longest part in which the centre is known to `MAX_ERROR`."""
     s = np.arange(lane.start, lane.end, 10.0)
-    first, last = _longest(lane.standard_error(s) <= MAX_ERROR)
+    first, last = _longest_run(lane.standard_error(s) <= MAX_ERROR)
     if last <= first:
         raise NotEnoughDataError(f"no lane centre is known anywhere to within {MAX_ERROR:g} m (standard error)")
     return replace(lane, start=float(s[first]), end=float(s[last - 1]))
@@ -159,7 +159,7 @@ def _covered(s: FloatArray, passage: IntArray, window: float = 100.0) -> tuple[f
     if len(pairs) == 0:
         raise NotEnoughDataError("no vehicle keeps to this lane")
     count = np.bincount(pairs[:, 0] - pairs[0, 0])
-    first, last = _longest(count >= MIN_PASSAGES)
+    first, last = _longest_run(count >= MIN_PASSAGES)
     if last <= first:
         raise NotEnoughDataError(
             f"at most {count.max()} drives share {window:.0f} m of a lane; {MIN_PASSAGES} are needed"
@@ -167,7 +167,7 @@ def _covered(s: FloatArray, passage: IntArray, window: float = 100.0) -> tuple[f
     return float((pairs[0, 0] + first + 0.5) * window), float((pairs[0, 0] + last - 0.5) * window)
 
 
-def _longest(good: NDArray[np.bool_]) -> tuple[int, int]:
+def _longest_run(good: NDArray[np.bool_]) -> tuple[int, int]:
     """First index and one past the last of the longest slice of True; (0, 0) if there is none."""
     longest = max(true_slices(good), key=lambda part: part.stop - part.start, default=slice(0, 0))
     return longest.start, longest.stop

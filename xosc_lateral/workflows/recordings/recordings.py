@@ -24,9 +24,9 @@ STEP = 0.1
 """Rows are thinned to this: lane changes and braking last seconds. [s]"""
 REAR_AXLE = 0.3
 """Middle of a vehicle ahead of its rear axle, as a share of its length: 1.4 m of a car of 4.6 m. [-]"""
-LONGEST = 60.0
+MAXIMUM_LENGTH = 60.0
 """Of vehicles with all that they pull: road trains have 53.5 m. [m]"""
-WIDEST = 6.0
+MAXIMUM_WIDTH = 6.0
 """Of what drives on roads, heavy transports included. [m]"""
 AROUND = 50.0
 """A made road goes on so far beyond its traffic. [m]"""
@@ -47,6 +47,7 @@ class RecordedTraffic:
     road_name: str  # of the file
     sources: tuple[Path, ...]  # what was read
     notes: tuple[str, ...] = field(default=())
+    host: str | None = None  # vehicle that the recording calls its host
 
     @property
     def span(self) -> tuple[float, float]:
@@ -93,7 +94,8 @@ def _osi(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraf
 
     recorded = read_osi(source)
     traffic = _on_road(recorded.tracks, source, road)
-    return replace(traffic, notes=(*recorded.notes, *traffic.notes))
+    host = recorded.hosts[0] if len(recorded.hosts) == 1 else None
+    return replace(traffic, notes=(*recorded.notes, *traffic.notes), host=host)
 
 
 def _commonroad(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
@@ -116,7 +118,7 @@ def _on_road(tracks: Tracks, source: Path, road: Path | None) -> RecordedTraffic
         name, kind = tracks.names[k], str(tracks.kind[rows[0]])
         length, width = float(tracks.length[rows[0]]), USUAL_WIDTH.get(kind, 1.8)
         given = width if tracks.width is None else float(tracks.width[rows[0]])
-        if 0.0 < length <= LONGEST and 0.0 < given <= WIDEST:
+        if 0.0 < length <= MAXIMUM_LENGTH and 0.0 < given <= MAXIMUM_WIDTH:
             width = given
         else:
             usual = USUAL_LENGTH.get(kind, 4.6)

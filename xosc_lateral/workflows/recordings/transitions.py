@@ -19,7 +19,7 @@ SHAPES = {
     DynamicsShape.CUBIC: lambda u: u * u * (3.0 - 2.0 * u),
     DynamicsShape.LINEAR: lambda u: u,
 }
-"""Share of the way over share of the duration, as in `playback.transition`."""
+"""Share of the way over share of the duration, as in `player.transition`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ class Rough:
 def peak_acceleration(shape: DynamicsShape, change: float, duration: float) -> float:
     """Largest lateral acceleration of a transition, by which a lane offset states its duration. [m/s2]
 
-    A linear one is given that of the cubic, as in `playback.transition`.
+    A linear one is given that of the cubic, as in `player.transition`.
     """
     factor = 0.5 * np.pi**2 if shape is DynamicsShape.SINUSOIDAL else 6.0
     return float(factor * abs(change) / duration**2)

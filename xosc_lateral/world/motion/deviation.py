@@ -124,7 +124,7 @@ class Deviation(Struct, frozen=True, eq=False):
         here = before.end() if before else None
         there = behind.start() if behind else None
         gap = behind.knots[0] - before.knots[-1] if before and behind else np.inf
-        if before and behind and gap < _TOUCHING:
+        if before and behind and gap < _CONTACT_TOLERANCE:
             return np.full_like(distance, 0.5 * (before.end()[0] + behind.start()[0]))
         if here is None or there is None:
             level = np.full_like(distance, (here or there)[0])  # type: ignore[index]
@@ -140,7 +140,7 @@ class Deviation(Struct, frozen=True, eq=False):
         return np.asarray(level)
 
 
-_TOUCHING = 1e-6
+_CONTACT_TOLERANCE = 1e-6
 """Two segments less than this apart meet in a point (the entity was placed anew). [m]"""
 
 

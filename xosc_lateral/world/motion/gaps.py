@@ -18,14 +18,14 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.rows import BLOCK, give_back
 from xosc_lateral.world.surroundings.nearby import stretches_within
 
-REACH = 30.0
+MAXIMUM_GAP = 30.0
 """Boxes farther apart than this at all times are no pair worth naming. [m]"""
 
 
 LEAST_SIZE = 1e-9
 """A box is at least this long and wide: sides without a length have no direction. [m]"""
 
-TOGETHER = 256
+PAIRS_PER_CALL = 256
 """Pairs whose boxes are compared at once: a numpy call costs as much as some hundred boxes. [-]"""
 
 
@@ -59,7 +59,7 @@ class Gap(Struct, frozen=True):
         return self.distance <= 0.0
 
 
-def smallest_gaps(time: FloatArray, paths: Sequence[BoxPath], *, reach: float = REACH) -> tuple[Gap, ...]:
+def smallest_gaps(time: FloatArray, paths: Sequence[BoxPath], *, reach: float = MAXIMUM_GAP) -> tuple[Gap, ...]:
     """Smallest gap of each pair of vehicles that come within `reach` [m] of each other, on one time grid [s]."""
     smallest: dict[tuple[int, int], Gap] = {}
     for part in _together(_near_pairs(paths, reach)):
@@ -102,7 +102,7 @@ def _together(pairs: Iterator[_NearPair]) -> Iterator[list[_NearPair]]:
     for pair in pairs:
         part.append(pair)
         rows += len(pair[1])
-        if len(part) == TOGETHER or rows >= BLOCK:
+        if len(part) == PAIRS_PER_CALL or rows >= BLOCK:
             yield part
             part, rows = [], 0
     if part:

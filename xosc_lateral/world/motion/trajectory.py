@@ -24,10 +24,10 @@ from xosc_lateral.world.road.network import RoadNetwork
 _STANDSTILL = 1e-3
 """Displacement per step under which a direction of motion can't be read from it. [m]"""
 
-_LEAP = 0.3
-"""Further than what is driven in a step, and slid sideways at `_ASIDE`, by this much is no driving. [m]"""
+_LEAP_DISTANCE = 0.3
+"""Further than what is driven in a step, and slid sideways at `_MAXIMUM_LATERAL_SPEED`, by this much: a leap. [m]"""
 
-_ASIDE = 10.0
+_MAXIMUM_LATERAL_SPEED = 10.0
 """No lateral action is faster. [m/s]"""
 
 
@@ -77,7 +77,7 @@ def leaps(motion: EntityMotion) -> list[tuple[float, float]]:
         active = (activity & Activity.ACTIVE) != 0
         whole = active[1:] & active[:-1] & ((activity[1:] & Activity.TELEPORTED) == 0)
         driven = np.maximum(speed[1:], speed[:-1]) * step
-        return np.asarray(whole & (moved(around) > driven + _LEAP + _ASIDE * step))
+        return np.asarray(whole & (moved(around) > driven + _LEAP_DISTANCE + _MAXIMUM_LATERAL_SPEED * step))
 
     found = rows_where(len(motion.time), leaps_there, 1)
     return [(float(motion.time[k]), float(moved(slice(k - 1, k + 1))[0])) for k in found]

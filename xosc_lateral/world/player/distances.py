@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from xosc_lateral.world.player import boxes
 from xosc_lateral.world.player.paths.base import nearest_s
-from xosc_lateral.world.player.state import NOWHERE, EntityState
+from xosc_lateral.world.player.state import NO_ROAD, EntityState
 from xosc_lateral.world.player.trailers import drawn_by
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.road.positions import RoadPath
@@ -22,7 +22,7 @@ from xosc_lateral.world.scenario.enums import CoordinateSystem, RelativeDistance
 
 _ALONG_ROADS = (CoordinateSystem.ROAD, CoordinateSystem.LANE)
 
-FAR = 1e10
+UNREACHABLE_DISTANCE = 1e10
 """Distance where there is no way from one to the other. [m]"""
 
 
@@ -31,7 +31,7 @@ class Spot(Struct, frozen=True):
 
     x: float
     y: float
-    road: int = NOWHERE
+    road: int = NO_ROAD
     lane: int = 0
     s: float = 0.0
     t: float = 0.0
@@ -75,17 +75,17 @@ def spot_of(state: EntityState) -> Spot:
     """Where an entity is."""
     state.locate()
     pose = state.pose
-    if state.road == NOWHERE:
+    if state.road == NO_ROAD:
         return Spot(pose.x, pose.y)
     return Spot(pose.x, pose.y, state.road, state.lane, state.s, state.t)
 
 
-def road_gap(state: EntityState, spot: Spot, *, limit: float = FAR) -> RoadGap | None:
+def road_gap(state: EntityState, spot: Spot, *, limit: float = UNREACHABLE_DISTANCE) -> RoadGap | None:
     """Way from an entity to a spot along the roads; None: there is none."""
     return _gap_between(state, spot_of(state), spot, limit)
 
 
-def free_road_gap(state: EntityState, other: EntityState, *, limit: float = FAR) -> RoadGap | None:
+def free_road_gap(state: EntityState, other: EntityState, *, limit: float = UNREACHABLE_DISTANCE) -> RoadGap | None:
     """Free space along the roads to another entity, and the lanes between their front right corners; None: no way.
 
     A box may lie in two lanes, and the standard does not say which counts: the corner as in the reference player,
@@ -101,6 +101,14 @@ def free_road_gap(state: EntityState, other: EntityState, *, limit: float = FAR)
     return gap and replace(gap, ds=ds)
 
 
+def is_turned(state: EntityState, other: EntityState) -> bool:
+    """Whether s runs the other way on the road of another entity: +t is on the other side there."""
+    if state.road == other.road:
+        return False
+    gap = road_gap(state, spot_of(other))
+    return gap is not None and gap.is_turned
+
+
 def _gap_between(state: EntityState, own: Spot, spot: Spot, limit: float) -> RoadGap | None:
     path = _path_between(state, own, spot, limit)
     if path is None:
@@ -113,9 +121,9 @@ def _gap_between(state: EntityState, own: Spot, spot: Spot, limit: float) -> Roa
     return RoadGap(path.ds, _across(own, spot, path), lanes, opposite, path.is_turned)
 
 
-def _path_between(state: EntityState, own: Spot, spot: Spot, limit: float = FAR) -> RoadPath | None:
+def _path_between(state: EntityState, own: Spot, spot: Spot, limit: float = UNREACHABLE_DISTANCE) -> RoadPath | None:
     """The way that an entity would drive from one place to another; None: there is none."""
-    if own.road == NOWHERE or spot.road == NOWHERE:
+    if own.road == NO_ROAD or spot.road == NO_ROAD:
         return None
     direction = 1 if state.is_forward else -1
     return state.network.path_between((own.road, own.s), (spot.road, spot.s), direction=direction, limit=limit)
@@ -142,9 +150,9 @@ class Measure(Struct, frozen=True):
         return self.kind is not RelativeDistanceType.EUCLIDIAN and self.system in _ALONG_ROADS
 
     def between(self, state: EntityState, target: Spot | EntityState) -> float:
-        """From an entity to a spot, or to another entity with all trailers that both draw; `FAR` without a way. [m]"""
+        """From an entity to a spot, or to another entity, all trailers included; `UNREACHABLE_DISTANCE` if none. [m]"""
         found = self.to_spot(state, target) if isinstance(target, Spot) else self._to_train(state, target)
-        return FAR if found is None else found
+        return UNREACHABLE_DISTANCE if found is None else found
 
     def _to_train(self, state: EntityState, target: EntityState) -> float | None:
         """Free space is that of the nearest two."""
@@ -237,7 +245,7 @@ def _along_trajectory(state: EntityState, spot: Spot, *, lateral: bool) -> float
 
 def _project(state: EntityState, x: float, y: float) -> Spot:
     """Road coordinates of a point near an entity."""
-    if state.road == NOWHERE:
+    if state.road == NO_ROAD:
         return Spot(x, y)
     found = state.network.world_to_lane_at(x, y, near=(state.road, state.s), lane_types=None)
     return Spot(x, y, found.road, found.lane, found.s, found.t)

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import inf, pi
 
-from xosc_lateral.world.player.state import NOWHERE, EntityState
+from xosc_lateral.world.player.state import NO_ROAD, EntityState
 from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.road import LaneLink
 from xosc_lateral.world.road.moving import most_turning
-from xosc_lateral.world.road.network import DRIVING
 
 _TIGHT = 1e-3
 """Beyond this share of the radius, the centre of a curve is so near that lengths beside the line say nothing. [-]"""
@@ -21,7 +20,7 @@ def drive(state: EntityState, distance: float) -> None:
     Without a road there is no lane to follow: the entity stops.
     """
     state.follow_lane()
-    if state.road == NOWHERE:
+    if state.road == NO_ROAD:
         state.set_speed(0.0)
         return
     move_along_lane(state, distance)
@@ -147,7 +146,7 @@ def _bridge_gap(state: EntityState, way: int) -> int | None:
     t = state.t
     if not at_end:
         beyond = state.s + way * EPSILON
-        found = network.lane_at(state.road, beyond, t - state.offset_t)
+        found = network.lane_at(state.road, beyond, t - state.offset_t, lane_types=state.lane_types)
         if not found.lane or found.lane == state.lane:
             return None
         state.move_to(state.road, found.lane, beyond, state.offset_t)
@@ -161,7 +160,7 @@ def _bridge_gap(state: EntityState, way: int) -> int | None:
         t = -t
         _turn_round(state)
     s = 0.0 if entry > 0 else network.roads[index].length
-    found = network.lane_at(index, s, t)
+    found = network.lane_at(index, s, t, lane_types=state.lane_types)
     if not found.lane:
         return None
     state.move_to(index, found.lane, s, 0.0)
@@ -177,7 +176,7 @@ def _leave_narrow_lane(state: EntityState) -> None:
     nearest, found = inf, 0
     for lane in network.lanes_at(state.road, state.s):
         away = abs(lane.centre_t - t) - 0.5 * lane.width
-        if lane.width >= EPSILON and lane.type in DRIVING and lane.id * state.lane > 0 and away < nearest:
+        if lane.width >= EPSILON and lane.type in state.lane_types and lane.id * state.lane > 0 and away < nearest:
             nearest, found = away, lane.id
     if found:
         state.move_to(state.road, found, state.s, 0.0)

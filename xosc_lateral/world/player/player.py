@@ -15,12 +15,12 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import PlaybackError
-from xosc_lateral.base.rows import BLOCK, columns, give_back, kept
+from xosc_lateral.base.rows import BLOCK, columns, give_back, stored
 from xosc_lateral.world.motion.nominal import CUT_OFF, Activity, NominalMotion, Note
 from xosc_lateral.world.player.drive import drive, halt_at_road_end
 from xosc_lateral.world.player.recorder import NO_LANE
 from xosc_lateral.world.player.simulation import Simulation
-from xosc_lateral.world.player.state import NOWHERE, EntityState
+from xosc_lateral.world.player.state import NO_ROAD, EntityState
 from xosc_lateral.world.player.storyboard_builder import build_storyboard, init_actions
 from xosc_lateral.world.player.trailers import align_trailers, connect, pull_trailers
 from xosc_lateral.world.player.transition import EPSILON
@@ -38,7 +38,7 @@ STANDING = 1e-3
 """Below this speed an entity stands. [m/s]"""
 
 
-TIME_LIMIT, LONGEST = 60.0, 3600.0
+TIME_LIMIT, RUN_TIME_LIMITS = 60.0, 3600.0
 """Where runs end unless told otherwise: of scenarios that never end, and of those with an end of their own. [s]"""
 
 
@@ -48,14 +48,14 @@ def play(
     """Play a scenario to its stop trigger, or to the time limit.
 
     `network`: its roads; one without roads where the scenario has none; `step`: length of a frame. [s]; `time_limit`:
-    where runs end that don't stop before; None: `TIME_LIMIT`, or `LONGEST` with a stop trigger that can hold. [s]
+    where runs end that don't stop before; None: `TIME_LIMIT`, or `RUN_TIME_LIMITS` with a stop trigger. [s]
     What was not played, or not as written, is in the notes of the motion.
 
     Raises `PlaybackError`: if the scenario makes no sense on these roads (a lane or road that is not there);
     `UnsupportedElementError`: if it needs something that can't be played and that motion depends on.
     """
     if time_limit is None:
-        time_limit = LONGEST if _has_end(scenario) else TIME_LIMIT
+        time_limit = RUN_TIME_LIMITS if _has_end(scenario) else TIME_LIMIT
     if not step > 0.0 or not time_limit >= 0.0:
         raise ValueError(f"step {step!r} s must be above 0, time limit {time_limit!r} s not below")
     return _Player(scenario, network, step).play(time_limit)
@@ -208,7 +208,7 @@ class _Player:
         for rows in self.rows:
             rows.put_away()
         if self.times:
-            self._times_put_away.append(kept(np.array(self.times)))
+            self._times_put_away.append(stored(np.array(self.times)))
             del self.times[:]
         give_back()
 
@@ -262,7 +262,7 @@ def _since(since: float | None, holds: bool, now: float) -> float | None:
 def _is_off_road(state: EntityState) -> bool:
     """Beside all lanes of its road; lanes of type `none` are no part of it."""
     state.locate()
-    if state.road == NOWHERE:
+    if state.road == NO_ROAD:
         return False
     lanes = state.network.lanes_at(state.road, state.s)
     t = state.t

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from xosc_lateral.base.errors import PlaybackError
-from xosc_lateral.base.rows import BLOCK, columns, kept
+from xosc_lateral.base.rows import BLOCK, columns, stored
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
-from xosc_lateral.world.player.state import NOWHERE, EntityState
+from xosc_lateral.world.player.state import NO_ROAD, EntityState
 from xosc_lateral.world.road import RoadNetwork
 from xosc_lateral.world.road.tables import turned_in_surface
 
@@ -25,10 +25,10 @@ _UNKNOWN = -2
 """Road of a row whose world pose is known, but whose road coordinates nobody has asked for yet."""
 
 
-FARTHEST = 1e8
+MAXIMUM_COORDINATE = 1e8
 """No entity is further from the origin: UTM coordinates stay below 1e7. [m]"""
 
-FASTEST = 1000.0
+MAXIMUM_SPEED = 1000.0
 """No entity is faster. [m/s]"""
 
 FARTHEST_IN_A_FRAME = 1000.0
@@ -67,7 +67,9 @@ class Rows:
         free = state.free_pose
         x, y = (state.s, state.offset_t) if free is None else (free.x, free.y)
         speed = 0.0 if state.activity & _TELEPORTED else state.speed  # that of a leap is none
-        if state.active and not (abs(x) <= FARTHEST and abs(y) <= FARTHEST and abs(speed) <= FASTEST):
+        if state.active and not (
+            abs(x) <= MAXIMUM_COORDINATE and abs(y) <= MAXIMUM_COORDINATE and abs(speed) <= MAXIMUM_SPEED
+        ):
             words = ("s", "offset") if free is None else ("x", "y")
             raise self._implausible(time, f"{words[0]} = {x:g} m, {words[1]} = {y:g} m, speed = {state.speed:g} m/s")
         if free is not None:
@@ -98,8 +100,8 @@ class Rows:
     def _implausible(self, time: float, what: str) -> PlaybackError:
         place = self.state.entity.place
         return PlaybackError(
-            f"'{self.state.name}' leaves every plausible bound at {time:.2f} s ({what}; limits {FARTHEST:g} m and "
-            f"{FASTEST:g} m/s): the scenario can't be played",
+            f"'{self.state.name}' leaves every plausible bound at {time:.2f} s ({what}; limits "
+            f"{MAXIMUM_COORDINATE:g} m and {MAXIMUM_SPEED:g} m/s): the scenario can't be played",
             path=place.path,
             line=place.line,
             element=place.element,
@@ -113,9 +115,9 @@ class Rows:
             rows, free = np.array(self._free_rows), np.array(self._free).reshape(-1, 6)
             unknown = np.array(self._road)[rows - self._rows_put_away] == _UNKNOWN
             self._knows_height &= not np.isnan(free[unknown, 2]).any()
-            self._free_put_away.append((kept(rows), kept(free.ravel()).reshape(-1, 6)))
+            self._free_put_away.append((stored(rows), stored(free.ravel()).reshape(-1, 6)))
         self._rows_put_away += len(self._road)
-        self._put_away.append(kept(np.frombuffer(b"".join(self._columns), dtype=np.uint8)))
+        self._put_away.append(stored(np.frombuffer(b"".join(self._columns), dtype=np.uint8)))
         for column in (*self._columns, self._free_rows, self._free):
             del column[:]
 
@@ -144,7 +146,7 @@ class Rows:
             offset *= direction
             if len(looked_up):
                 height = free[unknown, 2] if self._knows_height else None
-                _look_up(network, looked_up, free[unknown], height, where, direction)
+                _look_up(network, looked_up, free[unknown], height, where, direction, self.state.lane_types)
             to_lane = along - np.where(direction > 0, 0.0, pi)
             on_road = road >= 0
             pose = _poses(network, where, to_lane)
@@ -157,7 +159,7 @@ class Rows:
             before = tuple(values[-1:].copy() for values in checked)
             beside = _beside_road(network, where, pose)
             activity[beside & (activity & np.uint8(Activity.ACTIVE) > 0)] |= np.uint8(Activity.OFF_ROAD)
-            road[~on_road], lane[~on_road], s[~on_road], offset[~on_road] = NOWHERE, 0, 0.0, 0.0
+            road[~on_road], lane[~on_road], s[~on_road], offset[~on_road] = NO_ROAD, 0, 0.0, 0.0
             heading = np.mod(pose[:, 3], 2.0 * pi, out=pose[:, 3])
             relative = (to_lane + pi) % (2.0 * pi) - pi
             yield (*pose[:, :3].T, heading, *pose[:, 4:].T, speed, road, lane, s, offset, relative, activity)
@@ -235,12 +237,13 @@ def _look_up(
     height: FloatArray | None,
     where: _Where,
     direction: FloatArray,
+    lane_types: frozenset[str],
 ) -> None:
     """Road coordinates of rows that only have a world pose."""
     if not network.road_ids:
-        where.road[rows] = NOWHERE
+        where.road[rows] = NO_ROAD
         return
-    found = network.world_to_lane(free[:, 0], free[:, 1], height)
+    found = network.world_to_lane(free[:, 0], free[:, 1], height, lane_types=lane_types)
     where.road[rows], where.lane[rows], where.s[rows], where.offset[rows] = (
         found.road,
         found.lane,
@@ -257,13 +260,13 @@ def _beside_road(network: RoadNetwork, where: _Where, pose: FloatArray) -> BoolA
     if not len(rows):
         return beside
     road, lane, s, offset = where.at(rows)
-    suspects = rows[np.abs(offset) > 0.5 * network.lane_width(road, lane, s) + _TOUCH]  # beyond their own lane
+    suspects = rows[np.abs(offset) > 0.5 * network.lane_width(road, lane, s) + _LANE_TOLERANCE]  # beyond their own lane
     if len(suspects):
         types = {lane.type for r in network.roads for section in r.sections for lane in section.lanes} - {NO_LANE}
         found = network.world_to_lane(pose[suspects, 0], pose[suspects, 1], lane_types=types)
-        beside[suspects] = ~(found.distance <= _TOUCH)
+        beside[suspects] = ~(found.distance <= _LANE_TOLERANCE)
     return beside
 
 
-_TOUCH = 1e-3
+_LANE_TOLERANCE = 1e-3
 """So near to a lane, a point counts as on it. [m]"""

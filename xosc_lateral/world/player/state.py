@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from math import cos, nan, pi, sin
 from typing import NamedTuple, Protocol
@@ -11,10 +11,12 @@ from xosc_lateral.world.motion.nominal import Activity
 from xosc_lateral.world.player.angles import difference, is_forward, wrap
 from xosc_lateral.world.player.paths.base import PathProgress
 from xosc_lateral.world.road import LaneLink, Pose, RoadNetwork, RouteStep
+from xosc_lateral.world.road.lanes import DRIVING, WALKED
 from xosc_lateral.world.road.places import turn_for_heading, turned_in_surface
 from xosc_lateral.world.scenario import Entity
+from xosc_lateral.world.scenario.enums import EntityCategory
 
-NOWHERE = -1
+NO_ROAD = -1
 """Road of what is on none."""
 
 
@@ -75,7 +77,7 @@ class RouteGuide:
 
 def guide(network: RoadNetwork, stops: Sequence[Placement]) -> RouteGuide | None:
     """The shortest way over the stops; None: there is none."""
-    if len(stops) < 2 or any(stop.road == NOWHERE for stop in stops):
+    if len(stops) < 2 or any(stop.road == NO_ROAD for stop in stops):
         return None
     first, *via, last = [(stop.road, stop.lane, stop.s) for stop in stops]
     ways = [1 if is_forward(stop.relative_heading) else -1 for stop in stops]
@@ -118,7 +120,7 @@ class EntityState:
     network: RoadNetwork
     active: bool = True
     speed: float = 0.0
-    road: int = NOWHERE
+    road: int = NO_ROAD
     lane: int = 0
     s: float = 0.0
     offset_t: float = 0.0
@@ -161,6 +163,11 @@ class EntityState:
     def name(self) -> str:
         """The entity's name in the scenario."""
         return self.entity.name
+
+    @property
+    def lane_types(self) -> frozenset[str]:
+        """Types of the lanes that it is placed in."""
+        return WALKED if self.entity.category is EntityCategory.PEDESTRIAN else DRIVING
 
     @property
     def place(self) -> Placement:
@@ -215,7 +222,7 @@ class EntityState:
     def follow_lane(self) -> None:
         """From now on, the road coordinates say where the entity is."""
         self.locate()
-        if self.road != NOWHERE:
+        if self.road != NO_ROAD:
             self.free_pose = None
             self._pose = None
 
@@ -235,8 +242,8 @@ class EntityState:
         """Look up the road coordinates of a free pose."""
         if self._located or self.free_pose is None:
             return
-        near = (self.road, self.s) if self.road != NOWHERE else None
-        self.put(locate(self.network, self.free_pose, near=near))
+        near = (self.road, self.s) if self.road != NO_ROAD else None
+        self.put(locate(self.network, self.free_pose, near=near, lane_types=self.lane_types))
 
     def road_heading(self) -> float:
         """Heading of the road's s-direction where the entity is; its own without a road. [rad]"""
@@ -277,7 +284,7 @@ def world_pose(network: RoadNetwork, place: Placement) -> Pose:
     free = place.pose
     if free is not None and _is_whole(free):
         return free
-    road = _ORIGIN if place.road == NOWHERE else _pose_on_road(network, *place[:4], wrap(place.relative_heading))
+    road = _ORIGIN if place.road == NO_ROAD else _pose_on_road(network, *place[:4], wrap(place.relative_heading))
     if free is None:
         return road
     z, pitch, roll = (
@@ -304,11 +311,19 @@ def _is_whole(free: Pose) -> bool:
     return free.z == free.z and free.pitch == free.pitch and free.roll == free.roll
 
 
-def locate(network: RoadNetwork, pose: Pose, *, near: tuple[int, float] | None = None) -> Placement:
+def locate(
+    network: RoadNetwork,
+    pose: Pose,
+    *,
+    near: tuple[int, float] | None = None,
+    lane_types: Collection[str] = DRIVING,
+) -> Placement:
     """Road coordinates under a world pose, which is kept; road -1 where the network has no roads."""
     if not network.road_ids:
-        return Placement(NOWHERE, 0, 0.0, 0.0, pose.heading, pose)
-    found = network.world_to_lane_at(pose.x, pose.y, pose.z if pose.z == pose.z else None, near=near)
+        return Placement(NO_ROAD, 0, 0.0, 0.0, pose.heading, pose)
+    found = network.world_to_lane_at(
+        pose.x, pose.y, pose.z if pose.z == pose.z else None, near=near, lane_types=lane_types
+    )
     lane_pose = network.pose_at(found.road, found.lane, found.s, found.offset)
     heading = difference(pose.heading, lane_pose.heading)
     if lane_pose.pitch or lane_pose.roll:

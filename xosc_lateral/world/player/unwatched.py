@@ -14,12 +14,12 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.world.motion.nominal import Activity
 from xosc_lateral.world.player.drive import along_reference, beside_line
-from xosc_lateral.world.player.recorder import FARTHEST, FASTEST, Rows
+from xosc_lateral.world.player.recorder import MAXIMUM_COORDINATE, MAXIMUM_SPEED, Rows
 from xosc_lateral.world.player.state import EntityState
 from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.road.geometry import Arc, Line
 
-MOST, LEAST = 1000, 5
+MAXIMUM_FRAMES, MINIMUM_FRAMES = 1000, 5
 """Frames that are worked out at once: more would often be for nothing, and fewer are not worth it."""
 
 _ACTIVE = int(Activity.ACTIVE)
@@ -40,7 +40,11 @@ class Unwatched:
         """Move everybody ahead who can be, after a frame of `step` [s] is written."""
         for state in [state for state in self.awake if _follows_its_lane(state)]:
             values = _way_ahead(state, state.speed * step)
-            if len(values) >= LEAST and abs(values[-1]) <= FARTHEST and abs(state.speed) <= FASTEST:
+            if (
+                len(values) >= MINIMUM_FRAMES
+                and abs(values[-1]) <= MAXIMUM_COORDINATE
+                and abs(state.speed) <= MAXIMUM_SPEED
+            ):
                 self._ahead[state] = self.frames, values, self.awake.pop(state)
                 self._due.setdefault(self.frames + len(values), []).append(state)
 
@@ -86,11 +90,11 @@ def _way_ahead(state: EntityState, distance: float) -> FloatArray:
     """s after each of the next frames in this lane section, as `drive` would have it, shape (n,). [m]"""
     s = state.s
     if abs(state.speed) <= EPSILON:
-        return np.full(MOST, s)
+        return np.full(MAXIMUM_FRAMES, s)
     way = 1 if state.is_forward else -1
     road, (start, end) = state.network.roads[state.road], state.section
     found = [s]
-    while start < s < end and len(found) <= MOST:
+    while start < s < end and len(found) <= MAXIMUM_FRAMES:
         low, high, element, begin, centre = road.stretch_of(state.lane, s)
         if isnan(centre):
             s += way * along_reference(state, s, distance)
@@ -98,13 +102,13 @@ def _way_ahead(state: EntityState, distance: float) -> FloatArray:
         elif isinstance(element, Line | Arc):
             move = way * beside_line(element.curvature_at(s - begin), centre + state.offset_t, distance)
             room = (min(high, end) - s if move > 0.0 else s - max(low, start)) / abs(move)
-            count = 1 + int(min(room, MOST - len(found)))
+            count = 1 + int(min(room, MAXIMUM_FRAMES - len(found)))
             ways = np.add.accumulate(np.array([s] + [move] * count))  # one after the other: the same last bits
             ways = ways[1 : 2 + int(np.count_nonzero((ways[1:-1] >= low) & (ways[1:-1] < high)))]
             found.extend(ways.tolist())
             s = found[-1]
         else:
-            while low <= s < high and len(found) <= MOST:
+            while low <= s < high and len(found) <= MAXIMUM_FRAMES:
                 s += way * beside_line(element.curvature_at(s - begin), centre + state.offset_t, distance)
                 found.append(s)
     values = np.array(found[1:])

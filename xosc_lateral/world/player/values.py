@@ -12,7 +12,7 @@ from xosc_lateral.world.scenario.global_actions import ModifyOperation
 
 Value = bool | float | int | str
 
-_EXACT = {
+_EXACT_COMPARISONS = {
     Rule.EQUAL_TO: eq,
     Rule.GREATER_THAN: gt,
     Rule.LESS_THAN: lt,
@@ -20,7 +20,7 @@ _EXACT = {
     Rule.LESS_OR_EQUAL: le,
     Rule.NOT_EQUAL_TO: ne,
 }
-_WHOLE = frozenset({ParameterType.INT, ParameterType.UNSIGNED_INT, ParameterType.UNSIGNED_SHORT})
+_INTEGER_TYPES = frozenset({ParameterType.INT, ParameterType.UNSIGNED_INT, ParameterType.UNSIGNED_SHORT})
 
 
 def holds(left: float, rule: Rule, right: float) -> bool:
@@ -41,7 +41,7 @@ def holds(left: float, rule: Rule, right: float) -> bool:
 
 def holds_exactly(left: Value, rule: Rule, right: Value) -> bool:
     """Compare whole numbers, truth values and texts."""
-    return bool(_EXACT[rule](left, right))
+    return bool(_EXACT_COMPARISONS[rule](left, right))
 
 
 class Values:
@@ -69,7 +69,7 @@ class Values:
         if isinstance(value, str | bool):
             return False
         result = value + by if operation is ModifyOperation.ADD else value * by
-        self._values[name] = int(result) if self._types[name] in _WHOLE else result
+        self._values[name] = int(result) if self._types[name] in _INTEGER_TYPES else result
         return True
 
     def compare(self, name: str, rule: Rule, text: str) -> bool:
@@ -88,7 +88,7 @@ def _read(text: str, kind: ParameterType) -> Value:
     try:
         if kind is ParameterType.DOUBLE:
             return float(text)
-        if kind in _WHOLE:
+        if kind in _INTEGER_TYPES:
             return int(float(text))
     except (ValueError, OverflowError):
         return text

@@ -21,7 +21,7 @@ WRONG_WAY = 2.0
 SAME_LEVEL = 1.0
 """Height differences below this mean nothing when z is known. [m]"""
 
-TOUCHING = 1e-6
+LANE_TOLERANCE = 1e-6
 """A point no further off than this is on the lane that it was expected on. [m]"""
 
 
@@ -61,7 +61,7 @@ class SurfaceIndex:
     def _candidates(self, x: FloatArray, y: FloatArray, types: frozenset[str] | None) -> Candidates:
         if types not in self._samples:
             self._samples[types] = Samples(self._tables, types)
-        return self._samples[types].near(x, y)
+        return self._samples[types].near_pieces(x, y)
 
     def path_to_lane(
         self, x: ArrayLike, y: ArrayLike, road: ArrayLike, s: ArrayLike, *, lane_types: Collection[str] | None
@@ -76,7 +76,7 @@ class SurfaceIndex:
         known = np.flatnonzero(roads >= 0)
         self._score(best, Candidates(known, roads[known], flat[2][known]), flat[0], flat[1], None, None, types)
         # Driven off the road that it was on, onto the next one: look again, without prejudice.
-        lost = np.flatnonzero(best.distance > TOUCHING)
+        lost = np.flatnonzero(best.distance > LANE_TOLERANCE)
         if len(lost):
             found = self._candidates(flat[0][lost], flat[1][lost], types)
             self._score(best, found._replace(point=lost[found.point]), flat[0], flat[1], None, None, types)
@@ -97,7 +97,7 @@ class SurfaceIndex:
             road = self._tables.roads[near[0]]
             s, t, ahead = project_at(road, x, y, near[1])
             here = lane_at(road, near[0], s, t, lane_types)
-            if abs(ahead) <= TOUCHING and here.distance <= TOUCHING and here.lane != 0:
+            if abs(ahead) <= LANE_TOLERANCE and here.distance <= LANE_TOLERANCE and here.lane != 0:
                 return here
         best = self.world_to_lane(x, y, z, heading, lane_types=lane_types)
         return LaneCoordinates(int(best.road), int(best.lane), *(float(values) for values in best[2:]))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from xosc_lateral.base.arrays import FloatArray, Int32Array
-from xosc_lateral.world.road.lanes import DRIVING, NARROW, Lane
+from xosc_lateral.world.road.lanes import DRIVING, MINIMUM_LANE_WIDTH, Lane
 from xosc_lateral.world.road.piecewise import IndexLike, Lookup
 from xosc_lateral.world.road.places import find_lane, limit_at
 from xosc_lateral.world.road.road import Road
@@ -148,7 +148,9 @@ class LaneTables:
                 continue
             itself = own == row
             is_driving |= itself
-            there = ((self.profile_of(row, s).width > NARROW) | itself) & (self.directions[row] == direction)
+            there = ((self.profile_of(row, s).width > MINIMUM_LANE_WIDTH) | itself) & (
+                self.directions[row] == direction
+            )
             count += there
             # rows run from left to right looking along s
             index += there & (np.where(direction > 0, row > own, row < own))

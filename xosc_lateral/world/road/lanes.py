@@ -24,7 +24,10 @@ DRIVING: frozenset[str] = frozenset(
 )
 """Lane types that vehicles follow, and that world positions snap to."""
 
-NARROW = 0.1
+WALKED: frozenset[str] = DRIVING | {"sidewalk", "walking"}
+"""Lane types that pedestrians follow, as in the reference player; OpenDRIVE 1.8 calls a sidewalk "walking"."""
+
+MINIMUM_LANE_WIDTH = 0.1
 """A lane narrower than this at some s does not count as one there (it opens or closes). [m]"""
 
 

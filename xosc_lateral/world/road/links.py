@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from math import hypot
 
 from xosc_lateral.world.road.lanes import Lane, LaneSection
+from xosc_lateral.world.road.places import lane_pose
 from xosc_lateral.world.road.positions import LaneLink
 from xosc_lateral.world.road.road import Connection, Junction, Road, RoadLink
 
@@ -37,7 +39,7 @@ class Links:
             return
         if link.element_type == "junction":
             onward = [
-                *self._through_junction(here, found, link),
+                *self._through_junction(here, found, link, direction),
                 *self._back_through_direct_junction(here, found, link, direction),
             ]
             yield from onward or self._against_traffic(here, found, link, direction)
@@ -46,24 +48,24 @@ class Links:
         if other is None:
             return
         contact = link.contact or self._contact_of(road, direction, other)
-        for target in self._linked_ids(found, direction, self.roads[other], contact):
+        for target in self._linked_ids(here, found, direction, self.roads[other], contact):
             yield self._enter(other, target, contact)
 
-    def _through_junction(self, here: Road, lane: Lane, link: RoadLink) -> Iterator[LaneLink]:
+    def _through_junction(self, here: Road, lane: Lane, link: RoadLink, direction: int) -> Iterator[LaneLink]:
         junction = self._junctions.get(link.element_id)
         for connection in junction.connections if junction else ():
             other = self._index.get(connection.connecting_road)
             if connection.incoming_road != here.id or other is None:
                 continue
             contact = connection.contact or "start"
-            for target in self._connected_ids(connection, lane, self.roads[other], contact):
+            for target in self._connected_ids(connection, here, lane, direction, self.roads[other], contact):
                 if target in _end_section(self.roads[other], contact).by_id:
                     yield self._enter(other, target, contact)
 
     def _against_traffic(self, here: Road, lane: Lane, link: RoadLink, direction: int) -> Iterator[LaneLink]:
         """Into a junction on a lane that leads out of it: connections hold the other way, lanes name their links."""
         for other, contact in self._roads_back(here, link.element_id, direction):
-            for candidate in _lanes_linked_to(lane, self.roads[other], contact):
+            for candidate in _lanes_linked_to(here, lane, direction, self.roads[other], contact):
                 yield self._enter(other, candidate, contact)
 
     def _back_through_direct_junction(
@@ -89,18 +91,20 @@ class Links:
                 if back and back.element_type == "junction" and back.element_id == link.element_id:
                     yield connection, other, contact
 
-    def _connected_ids(self, connection: Connection, lane: Lane, other: Road, contact: str) -> list[int]:
+    def _connected_ids(
+        self, connection: Connection, here: Road, lane: Lane, direction: int, other: Road, contact: str
+    ) -> list[int]:
         """Lanes of the connecting road; without any laneLink, those that name the lane as their own link."""
         if connection.lanes:
             return [to for source, to in connection.lanes if source == lane.id]
-        return _lanes_linked_to(lane, other, contact)
+        return _lanes_linked_to(here, lane, direction, other, contact)
 
-    def _linked_ids(self, lane: Lane, direction: int, other: Road, contact: str) -> list[int]:
+    def _linked_ids(self, here: Road, lane: Lane, direction: int, other: Road, contact: str) -> list[int]:
         """Lanes of the linked road: as the lane says, else as the other side says."""
         ids = lane.successors if direction > 0 else lane.predecessors
         if ids:
             return [i for i in ids if i in _end_section(other, contact).by_id and i != 0]
-        return _lanes_linked_to(lane, other, contact)
+        return _lanes_linked_to(here, lane, direction, other, contact)
 
     def _contact_of(self, road: int, direction: int, other: int) -> str:
         """Contact point that a file leaves out: the end of the other road that is nearer."""
@@ -152,10 +156,15 @@ class Links:
                 yield from ((index, contact) for back, contact in ends if back == touches)
 
 
-def _lanes_linked_to(lane: Lane, other: Road, contact: str) -> list[int]:
-    """Lanes at an end of another road that name this lane as their own link."""
+def _lanes_linked_to(here: Road, lane: Lane, direction: int, other: Road, contact: str) -> list[int]:
+    """Lanes at an end of another road that name this lane as their own link, the one that it touches first."""
     lanes = _end_section(other, contact).lanes
-    return [one.id for one in lanes if lane.id in (one.predecessors if contact == "start" else one.successors)]
+    linked = [one.id for one in lanes if lane.id in (one.predecessors if contact == "start" else one.successors)]
+    if len(linked) < 2:
+        return linked
+    x, y = lane_pose(here, lane.id, here.length if direction > 0 else 0.0, 0.0)[:2]
+    ends = {one: lane_pose(other, one, 0.0 if contact == "start" else other.length, 0.0) for one in linked}
+    return sorted(linked, key=lambda one: round(hypot(ends[one].x - x, ends[one].y - y), 6))
 
 
 def _end_section(road: Road, contact: str) -> LaneSection:

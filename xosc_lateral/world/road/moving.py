@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from math import inf, nextafter
 
-from xosc_lateral.world.road.index import TOUCHING
+from xosc_lateral.world.road.index import LANE_TOLERANCE
 from xosc_lateral.world.road.lanes import LaneSection
 from xosc_lateral.world.road.links import Links
 from xosc_lateral.world.road.places import find_lane, lane_at, normal_angle
@@ -16,7 +16,7 @@ from xosc_lateral.world.road.road import Road
 Chooser = Callable[[Sequence[LaneLink]], LaneLink]
 """Picks one of several ways on; gets at least one."""
 
-_TOUCHING = 1e-3
+_JOINT_TOLERANCE = 1e-3
 """Lanes of two sections touch with a gap of no more, such as one that has closed and one that opens beside it. [m]"""
 
 
@@ -95,7 +95,7 @@ def follow_section(road: Road, section: LaneSection, beyond: LaneSection, lane: 
     if same is None:
         return None
     (centre, _, width), (other, _, other_width) = here.state_at(at), same.state_at(at)
-    return lane if abs(centre - other) <= 0.5 * max(width, other_width) + _TOUCHING else None
+    return lane if abs(centre - other) <= 0.5 * max(width, other_width) + _JOINT_TOLERANCE else None
 
 
 def _just_before(s: float) -> float:
@@ -120,7 +120,7 @@ def gone_on(
     `lane_types`: those that count.
     """
     before, s = near
-    if found.road == before or found.distance > TOUCHING:
+    if found.road == before or found.distance > LANE_TOLERANCE:
         return found
     road = links.roads[before]
     s, t, _ = project_at(road, *point, s)
@@ -130,6 +130,6 @@ def gone_on(
         other = links.roads[link.road]
         s, t, ahead = project_at(other, *point, link.s)
         onward = lane_at(other, link.road, s, t, lane_types)
-        if abs(ahead) <= TOUCHING and onward.distance <= TOUCHING and onward.lane != 0:
+        if abs(ahead) <= LANE_TOLERANCE and onward.distance <= LANE_TOLERANCE and onward.lane != 0:
             return onward
     return found

@@ -23,7 +23,7 @@ ITERATIONS = 40
 MAX_STEP = 25.0
 """Longest step: a guess is never much further off. [m]"""
 
-DONE = 1e-11
+CONVERGED_STEP = 1e-11
 """A step this short is the last. [m]"""
 
 
@@ -68,11 +68,11 @@ def _project(tables: NetworkTables, road: Int32Array, x: FloatArray, y: FloatArr
         rate = np.maximum(1.0 - frame.curvature * across, 0.2) * np.maximum(frame.speed, 1e-3)
         step = np.clip(ahead / rate, -MAX_STEP, MAX_STEP)
         moved = at + step
-        outside = ((moved <= lo) | (moved >= hi)) & (np.abs(step) > DONE)
+        outside = ((moved <= lo) | (moved >= hi)) & (np.abs(step) > CONVERGED_STEP)
         moved = np.where(outside, 0.5 * (lo + hi), moved)
         moved = np.minimum(np.maximum(moved, 0.0), length[active])
         s[active], low[active], high[active] = moved, lo, hi
-        active = active[np.abs(moved - at) > DONE]
+        active = active[np.abs(moved - at) > CONVERGED_STEP]
         if not len(active):
             break
     return _feet(tables, road, x, y, s)
@@ -106,10 +106,10 @@ def project_at(road: Road, x: float, y: float, guess: float) -> tuple[float, flo
             high = s
         step = min(max(ahead / max(1.0 - road.curvature_at(s) * across, 0.2), -MAX_STEP), MAX_STEP)
         moved = s + step
-        if abs(step) > DONE and (moved <= low or moved >= high):
+        if abs(step) > CONVERGED_STEP and (moved <= low or moved >= high):
             moved = 0.5 * (low + high)
         moved = min(max(moved, 0.0), length)
-        done = abs(moved - s) <= DONE
+        done = abs(moved - s) <= CONVERGED_STEP
         s = moved
         if done:
             break

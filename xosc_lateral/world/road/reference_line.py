@@ -101,7 +101,7 @@ class ReferenceLines:
         turned = heading + ds * (curvature + (0.5 * ds) * sharpness)
         x, y = (_polynomial(series[: self._powers + 1], row, ds) for series in (self._x_series, self._y_series))
         if not derivatives:
-            return Frame(x, y, np.cos(turned), np.sin(turned), turned, _NONE, _NONE)
+            return Frame(x, y, np.cos(turned), np.sin(turned), turned, _EMPTY, _EMPTY)
         return Frame(x, y, np.cos(turned), np.sin(turned), turned, curvature + ds * sharpness, np.ones_like(ds))
 
     def _cubic_frame(self, row: NDArray[np.intp], ds: FloatArray, derivatives: bool) -> Frame:
@@ -115,14 +115,14 @@ class ReferenceLines:
         y = y0 + p * (y1 + p * (y2 + p * y3))
         heading = np.arctan2(dy, dx)
         if not derivatives:
-            return Frame(x, y, dx / norm, dy / norm, heading, _NONE, _NONE)
+            return Frame(x, y, dx / norm, dy / norm, heading, _EMPTY, _EMPTY)
         ddx, ddy = 2.0 * x2 + 6.0 * p * x3, 2.0 * y2 + 6.0 * p * y3
         curvature = (dx * ddy - dy * ddx) / norm**3
         speed = norm * (p1 + ds * (2.0 * p2 + 3.0 * ds * p3))
         return Frame(x, y, dx / norm, dy / norm, heading, curvature, speed)
 
 
-_NONE: NDArray[np.float64] = np.empty(0)
+_EMPTY: NDArray[np.float64] = np.empty(0)
 
 
 def _polynomial(coefficients: FloatArray, row: NDArray[np.intp], at: FloatArray) -> FloatArray:

@@ -93,7 +93,7 @@ def _leg(
     if road == target and (target_s - s) * way >= 0.0:
         return (RouteStep(road, way, s, target_s),)
     for own_lane in (lane, None):
-        path = _shortest(links, (road, way), own_lane, target, s)
+        path = _shortest_way(links, (road, way), own_lane, target, s)
         if path is not None:
             steps = [RouteStep(road, way, s, links.roads[road].length if way > 0 else 0.0)]
             for index, entry in path:
@@ -104,7 +104,7 @@ def _leg(
     return None
 
 
-def _shortest(links: Links, start: End, lane: int | None, target: int, s: float) -> tuple[End, ...] | None:
+def _shortest_way(links: Links, start: End, lane: int | None, target: int, s: float) -> tuple[End, ...] | None:
     """Roads from a place to another road, on a lane and those it leads into; None: lanes may be changed."""
     road, way = start
     room = links.roads[road].length - s if way > 0 else s

@@ -21,7 +21,7 @@ from xosc_lateral.world.road.tables import NetworkTables
 SPACING = 8.0
 """Distance of the samples laid over the lanes. [m]"""
 
-REACH = 0.5 * float(np.hypot(SPACING, SPACING)) + 1.0
+SAMPLE_REACH = 0.5 * float(np.hypot(SPACING, SPACING)) + 1.0
 """No place on a lane is further from its nearest sample (1 m for what curves bulge between samples). [m]"""
 
 CELL = 2.0 * SPACING
@@ -67,7 +67,7 @@ class Samples:
     def _cell(self, x: FloatArray, y: FloatArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         return ((x - self._x0) // CELL).astype(np.int64), ((y - self._y0) // CELL).astype(np.int64)
 
-    def near(self, x: FloatArray, y: FloatArray) -> Candidates:
+    def near_pieces(self, x: FloatArray, y: FloatArray) -> Candidates:
         """Every piece of road that may be the nearest one, once per point; at least one for every point.
 
         `x`, `y` of shape (n,). [m]
@@ -126,7 +126,7 @@ class Samples:
         chosen = at_minimum[np.append(True, np.diff(group[at_minimum]) > 0)]
         nearest = np.minimum.reduceat(distance, np.flatnonzero(new_point))
         point_number = np.cumsum(new_point) - 1
-        keep = chosen[distance[chosen] <= nearest[point_number[chosen]] + REACH]
+        keep = chosen[distance[chosen] <= nearest[point_number[chosen]] + SAMPLE_REACH]
         return Candidates(point[keep], self.road[sample[keep]], self.s[sample[keep]])
 
 

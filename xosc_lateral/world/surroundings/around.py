@@ -18,18 +18,18 @@ from xosc_lateral.base.segment import FADES
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario import BoundingBox
 
-REACH = 200.0
+SIGHT_DISTANCE = 200.0
 """How far a driver looks for others [m]; beyond it there is none (about what a series radar sees)."""
 
-IN_SIGHT = 2.0 * REACH + 100.0
+IN_SIGHT = 2.0 * SIGHT_DISTANCE + 100.0
 """Vehicles never nearer than this in a straight line are not searched along the lane. Free space is counted along the
 reference line, which on the tightest ramp is half as long as its outer lane; the rest is for two road trains. [m]"""
 
 ALONGSIDE = 10.0
 """A vehicle in the next lane counts half as alongside at this free space lengthwise, wholly at half of it. [m]"""
 
-NEAR = 40.0
-"""Free space over which the influence of others fades to 37 %, as in `driver.neighbours`: with so much more free space
+INFLUENCE_DISTANCE = 40.0
+"""Free space over which the influence of others fades to 37 %, as in `fitting.answers`: with so much more free space
 for each factor e that less of a body lies in the lane, its influence is the product of both. [m]"""
 
 
@@ -46,12 +46,12 @@ class Reach(NamedTuple):
 
 
 def lane_path(network: RoadNetwork, road: int, lane: int, s: float, forward: int) -> list[Reach]:
-    """Sections along a lane within `REACH` both ways, in a coordinate u that is 0 at `s` and grows along travel."""
+    """Sections along a lane within `SIGHT_DISTANCE` both ways; their coordinate u is 0 at `s`, growing along travel."""
     low, high = network.section_at(road, s)
     path = [Reach(road, low, high, lane, 0.0, s, forward)]
     for way in (1, -1):
         here, direction, done = (road, lane, s), way * forward, 0.0
-        while done < REACH + (high - low):
+        while done < SIGHT_DISTANCE + (high - low):
             section = network.section_at(here[0], here[2])
             left = (section[1] - here[2]) if direction > 0 else (here[2] - section[0])
             step = network.advance(*here, left + _INTO_NEXT, direction=direction)
@@ -69,7 +69,7 @@ _INTO_NEXT = 1e-6
 """Step beyond a section's end that brings one into the next. [m]"""
 
 
-class Others(NamedTuple):
+class OtherVehicles(NamedTuple):
     """Where another vehicle is, seen along the own lane: u ahead [m], from the own path to the left [m], which way."""
 
     ahead: FloatArray
@@ -90,7 +90,7 @@ def see_along(
     t: FloatArray,
     direction: NDArray[np.integer],
     centre_t: Callable[[int, int, FloatArray], FloatArray],
-) -> Others:
+) -> OtherVehicles:
     """Where others are along one's lane path, row by row: other moments, or other vehicles. Shape (n,) each.
 
     From where one is on the path (`lane_path`) and from its lane's centre, positive left [m]; where the other is, road,
@@ -98,7 +98,7 @@ def see_along(
     Others elsewhere are not seen (NaN).
     """
     n = len(own_u)
-    seen = Others(np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool))
+    seen = OtherVehicles(np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool))
     for part in path:
         on = (direction != 0) & (road == part.road) & (s >= part.s_low - 1e-9) & (s <= part.s_high + 1e-9)
         k = np.flatnonzero(on)
@@ -121,7 +121,7 @@ class Extent(NamedTuple):
     center_x: FloatArray
 
 
-def free_space(seen: Others, own: BoundingBox | Extent, other: BoundingBox | Extent) -> FloatArray:
+def free_space(seen: OtherVehicles, own: BoundingBox | Extent, other: BoundingBox | Extent) -> FloatArray:
     """Bumper to bumper, 0 while overlapping lengthwise. [m]"""
     turned = np.where(seen.oncoming, -1.0, 1.0)
     between_centres = seen.ahead + turned * other.center_x - own.center_x
@@ -140,14 +140,14 @@ class Around:
     oncoming_there: FloatArray
 
     @classmethod
-    def nobody(cls, n: int) -> Around:
+    def with_no_one(cls, n: int) -> Around:
         """Nobody around anybody."""
-        return cls({side: _Side.nobody(n) for side in ZONES}, np.full(n, np.nan), np.zeros(n))
+        return cls({side: _Side.with_no_one(n) for side in ZONES}, np.full(n, np.nan), np.zeros(n))
 
     def add(
         self,
         rows: IntArray,
-        seen: Others,
+        seen: OtherVehicles,
         gap: FloatArray,
         width: FloatArray,
         other_width: float | FloatArray,
@@ -158,12 +158,14 @@ class Around:
         Shape (m,) each.
         """
         with np.errstate(invalid="ignore"):
-            there = (gap <= REACH) & ~np.isnan(seen.left)
-            # he comes into sight in the last quarter of the reach, and is gone within `NEAR` once he has passed
-            share = 1.0 - smooth_step(np.where(seen.ahead > 0, 4.0 * gap / REACH - 3.0, gap / NEAR))
+            there = (gap <= SIGHT_DISTANCE) & ~np.isnan(seen.left)
+            # he comes into sight in the last quarter of it, and is gone within `INFLUENCE_DISTANCE` once he has passed
+            share = 1.0 - smooth_step(
+                np.where(seen.ahead > 0, 4.0 * gap / SIGHT_DISTANCE - 3.0, gap / INFLUENCE_DISTANCE)
+            )
             k = np.flatnonzero(there & seen.oncoming & (share > 0))
             there &= ~seen.oncoming
-        np.fmin.at(self.oncoming, rows[k], gap[k] - NEAR * np.log(share[k]))
+        np.fmin.at(self.oncoming, rows[k], gap[k] - INFLUENCE_DISTANCE * np.log(share[k]))
         np.maximum.at(self.oncoming_there, rows[k], share[k])
         for side, middle in ZONES.items():
             share = _share_inside(seen.left / width - middle, other_width / width)
@@ -199,17 +201,17 @@ class _Side:
     car_alongside: FloatArray
 
     @classmethod
-    def nobody(cls, n: int) -> _Side:
+    def with_no_one(cls, n: int) -> _Side:
         return cls(np.full(n, np.nan), *np.zeros((4, n)))
 
     def add(self, rows: IntArray, gap: FloatArray, share: FloatArray, is_truck: BoolArray) -> None:
         """More vehicles, each seen from a row, with free space `gap` [m], of which so much lies in the lane [-]."""
-        np.fmin.at(self.distance, rows, gap - NEAR * np.log(share))
-        influence = share * np.exp(-gap / NEAR)
+        np.fmin.at(self.distance, rows, gap - INFLUENCE_DISTANCE * np.log(share))
+        influence = share * np.exp(-gap / INFLUENCE_DISTANCE)
         np.add.at(self.influence, rows, influence)
         alongside = share * (1.0 - smooth_step(gap / ALONGSIDE - 0.5))
         # a truck comes into sight in the last quarter of the reach
-        np.add.at(self.of_trucks, rows, is_truck * influence * (1.0 - smooth_step(4.0 * gap / REACH - 3.0)))
+        np.add.at(self.of_trucks, rows, is_truck * influence * (1.0 - smooth_step(4.0 * gap / SIGHT_DISTANCE - 3.0)))
         np.maximum.at(self.truck_alongside, rows, is_truck * alongside)
         np.maximum.at(self.car_alongside, rows, ~is_truck * alongside)
 

@@ -26,10 +26,10 @@ from xosc_lateral.world.scenario.environment import Environment, Weather
 from xosc_lateral.world.scenario.global_actions import EnvironmentAction
 from xosc_lateral.world.surroundings.around import (
     IN_SIGHT,
-    REACH,
+    SIGHT_DISTANCE,
     Around,
     Extent,
-    Others,
+    OtherVehicles,
     Reach,
     free_space,
     lane_path,
@@ -129,11 +129,17 @@ def _neighbours(
     every = int(steps[0]) if len(steps) and (steps == steps[0]).all() else 1
     traffic = _traffic(motion, network, int(grid[0]) % every, every)
     columns = grid // every
-    around = Around.nobody(len(grid))
+    around = Around.with_no_one(len(grid))
     groups = _own_lane_groups(own, network, grid, traffic.direction[index, columns])
     width = _own_lane_width(own, network, grid)
     extent, box = traffic.extent, own.entity.bounding_box
-    far = REACH + 0.5 * box.length + abs(box.center_x) + np.max(0.5 * extent.length + np.abs(extent.center_x)) + 1.0
+    far = (
+        SIGHT_DISTANCE
+        + 0.5 * box.length
+        + abs(box.center_x)
+        + np.max(0.5 * extent.length + np.abs(extent.center_x))
+        + 1.0
+    )
     for stretch, in_sight in _in_sight(motion):
         numbers = np.array([k for k in in_sight[index] if motion.entities[k].entity.is_vehicle], dtype=np.int64)
         inside = [slice(*np.searchsorted(grid[rows], (stretch.start, stretch.stop))) for rows, _, _ in groups]
@@ -148,7 +154,7 @@ def _neighbours(
                 road, s, t, direction = traffic.of(others, columns[members])
                 seen = see_along(path, u, offset, road, s, t, direction, network.lane_centre_t)
                 k = np.flatnonzero(np.abs(seen.ahead) <= far)
-                seen = Others(seen.ahead[k], seen.left[k], seen.oncoming[k])
+                seen = OtherVehicles(seen.ahead[k], seen.left[k], seen.oncoming[k])
                 who, rows = others[k // len(members)], members[k % len(members)]
                 gap = free_space(seen, box, Extent(*(values[who] for values in extent)))
                 around.add(rows, seen, gap, width[rows], traffic.width[who], traffic.is_truck[who])
@@ -214,7 +220,10 @@ def _own_lane_width(own: EntityMotion, network: RoadNetwork, grid: IntArray) -> 
 def _lanes_there(road: Mapping[str, FloatArray], step: float) -> dict[str, FloatArray]:
     """How far there is a lane on each side of the way around, shape (n,) each. [-]"""
     shares = {side: _around(one.astype(np.float64), step) for side, one in lanes_beside(road).items()}
-    return {side: np.clip((share - _NONE) / (1.0 - 2.0 * _NONE), 0.0, 1.0) for side, share in shares.items()}
+    return {
+        side: np.clip((share - _NEGLIGIBLE_SHARE) / (1.0 - 2.0 * _NEGLIGIBLE_SHARE), 0.0, 1.0)
+        for side, share in shares.items()
+    }
 
 
 def lanes_beside(road: Mapping[str, FloatArray]) -> dict[str, BoolArray]:
@@ -223,7 +232,7 @@ def lanes_beside(road: Mapping[str, FloatArray]) -> dict[str, BoolArray]:
     return {"lead": index >= 0, "right": index > 0, "left": index < count - 1}
 
 
-_NONE = 1e-3
+_NEGLIGIBLE_SHARE = 1e-3
 """A share of a lane that is none. [-]"""
 
 

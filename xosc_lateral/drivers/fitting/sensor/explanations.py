@@ -21,7 +21,7 @@ from xosc_lateral.drivers.fitting.sensor.likelihood import Colour, Measured, Sol
 from xosc_lateral.drivers.fitting.sensor.second_view import SecondView
 
 ORDERS = (1, 2, 4)
-SLOWEST, FASTEST, GRID = 0.05, 1.4, 1.3
+LOWEST_CORNER, HIGHEST_CORNER, GRID = 0.05, 1.4, 1.3
 """Corners of the sensor's low-passed part from which the climb begins [Hz], and the factor from one to the next [-].
 Slower ones lie where a driver's spectrum is free: nothing would separate them from him."""
 
@@ -58,8 +58,8 @@ def _of_family(measured: Measured, order: int, alone: bool) -> Iterator[Explanat
     """Over a grid of corners, and between the neighbours of the best."""
     from scipy.optimize import minimize_scalar
 
-    count = int(np.ceil(np.log(FASTEST / SLOWEST) / np.log(GRID))) + 1
-    corners = [_in_digits(c) for c in np.geomspace(SLOWEST, FASTEST, count) if c >= LEAST_CORNER[order]]
+    count = int(np.ceil(np.log(HIGHEST_CORNER / LOWEST_CORNER) / np.log(GRID))) + 1
+    corners = [_in_digits(c) for c in np.geomspace(LOWEST_CORNER, HIGHEST_CORNER, count) if c >= LEAST_CORNER[order]]
     grid = [_explanation(measured, Colour(order, corner, alone)) for corner in corners]
     yield from grid
     at = int(np.argmin([one.criterion for one in grid]))

@@ -20,9 +20,9 @@ from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.drives.periodogram import Detrend, periodograms
 
 WINDOWS = (102.4, 51.2, 25.6, 12.8)
-"""Lengths of window, the first of which there are at least `ENOUGH`; a longer one sees slower movement. [s]"""
+"""Lengths of window, the first of which there are at least `MINIMUM_PIECES`; a longer one sees slower movement. [s]"""
 
-ENOUGH = 16
+MINIMUM_PIECES = 16
 
 INDEPENDENT = 0.53
 """Independent windows per Hann window at half overlap (Welch 1967, eq. for the variance at 50 % overlap). [-]"""
@@ -62,7 +62,7 @@ def windows_of(runs: Sequence[FloatArray], step: float) -> tuple[FloatArray, Flo
     size = 0
     for seconds in WINDOWS:
         size = round(seconds / step)
-        if sum((len(run) - size) // (size // 2) + 1 for run in runs if len(run) >= size) >= ENOUGH:
+        if sum((len(run) - size) // (size // 2) + 1 for run in runs if len(run) >= size) >= MINIMUM_PIECES:
             break
     longest = max(map(len, runs), default=0)
     if longest < size:

@@ -7,8 +7,8 @@ says what the offset's error looks like, down to frequencies where nothing else 
 
 Errors of both markings alike are not in the width, a camera that pitches scales the width and hardly the offset, and
 where one marking was misjudged the offset has been corrected (`drives.markings`), as far as that is seen: the level is
-a number of its own, about 1 (`LEVEL_SD`). Slower than `SLOWEST`, lanes themselves widen, and the density is taken to go
-on as it is there; that it is the camera's all the way down is the other end of the interval.
+a number of its own, about 1 (`LEVEL_SD`). Slower than `LOWEST_FREQUENCY`, lanes themselves widen, and the density is
+taken to go on as it is there; that it is the camera's all the way down is the other end of the interval.
 
 References
 ----------
@@ -29,10 +29,10 @@ LEVEL_SD = 0.5
 """Of the logarithm of the offset's error's power over the half width's, about 0 (docs/design/markings.md shows how
 little hangs on it). [-]"""
 
-SLOWEST = 0.05
+LOWEST_FREQUENCY = 0.05
 """[Hz]"""
 
-KNOTS = np.array([0.01, 0.02, 0.035, SLOWEST, 0.07, 0.1, 0.14, 0.2, 0.27, 0.35, 0.45, 0.6, 0.8, 1.0, 1.2, 1.5])
+KNOTS = np.array([0.01, 0.02, 0.035, LOWEST_FREQUENCY, 0.07, 0.1, 0.14, 0.2, 0.27, 0.35, 0.45, 0.6, 0.8, 1.0, 1.2, 1.5])
 """Of the logarithm of the half width's density, over the logarithm of frequency. [Hz]"""
 
 BEND_SD = 1.0
@@ -51,7 +51,7 @@ class SecondView:
 
     frequencies: tuple[float, ...]
     knots: tuple[float, ...]
-    slowest: float = SLOWEST
+    slowest: float = LOWEST_FREQUENCY
 
     def density(self, frequency: FloatArray) -> FloatArray:
         """One-sided. [m2/Hz] Shape as `frequency` [Hz]."""

@@ -16,7 +16,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage, Term
 from xosc_lateral.drivers.loop.residual import OSCILLATION
 from xosc_lateral.drivers.loop.search import Search
-from xosc_lateral.drivers.loop.significance import LEAST
+from xosc_lateral.drivers.loop.significance import MINIMUM_P
 from xosc_lateral.drivers.loop.timeline import MIN_DRIFT_S, Coarse
 from xosc_lateral.drivers.model.effects import Cycle, Effect
 
@@ -98,4 +98,4 @@ def _line(rows: FloatArray, width: int) -> tuple[float, float, int]:
     ratio = np.where(band, np.convolve(power, own, "same") / np.maximum(around / others, 1e-12), 0.0)
     at = int(np.argmax(ratio))
     single = float(f.sf(ratio[at] / width, 2 * width, 2 * others))
-    return max(single * int(band.sum()), LEAST), float(frequency[at]), width
+    return max(single * int(band.sum()), MINIMUM_P), float(frequency[at]), width

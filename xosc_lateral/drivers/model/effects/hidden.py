@@ -64,7 +64,7 @@ class HiddenEffect(Effect, frozen=True, kw_only=True):
 
 
 class Adapted(HiddenEffect, frozen=True, kw_only=True):
-    """What makes another driver of a profile's (`identification.derive`).
+    """What makes another driver of a profile's (`fitting.derive`).
 
     `shift` of the mean offset, positive left [m]; factors of `EffectTerms`, 1/5 to 5 [-].
     """

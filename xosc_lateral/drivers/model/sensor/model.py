@@ -18,7 +18,7 @@ from xosc_lateral.drivers.drives.filters import scale_frequencies
 from xosc_lateral.drivers.fitting.sensor.likelihood import Colour
 from xosc_lateral.drivers.model.records import Record
 
-HIGHEST = 1.5
+PASS_FREQUENCY = 1.5
 """Runs are low-passed here on being resampled to 5 Hz, and so is what is sampled. [Hz]"""
 
 
@@ -89,4 +89,4 @@ class SensorModel(Record, frozen=True):
 
     def in_runs(self, frequency: FloatArray) -> FloatArray:
         """One-sided power density of the noise in runs at 5 Hz. [m2/Hz] Shape as `frequency` [Hz]."""
-        return np.asarray(self.density(frequency) * (frequency <= HIGHEST))
+        return np.asarray(self.density(frequency) * (frequency <= PASS_FREQUENCY))

@@ -45,7 +45,7 @@ CONTROL = "vehicle_velocity_control"
 """Its only control that keeps to the times of waypoints and does not move them to the lane (since 0.9.16)."""
 FRAME = 0.05
 """Its default frame. [s]"""
-HOLD = 3600.0
+HOLD_DURATION = 3600.0
 """How long after a drive its last waypoint is due. [s]"""
 VERSION = (1, 0)
 
@@ -111,7 +111,7 @@ def _vertices(item: Moving, pieces: Sequence[PathPiece], begin: float) -> tuple[
     columns = item.poses_at(moments, slice(pieces[0].first if pieces[0].placed else 0, last + 1))
     onward = float(path.speed[last]) * over if not pieces[-1].stops else 0.0
     heading = float(path.heading[last])
-    moments = np.append(moments, moments[-1] + HOLD)
+    moments = np.append(moments, moments[-1] + HOLD_DURATION)
     columns = [np.append(values, values[-1]) for values in columns]
     for values, direction in zip(columns[:2], (cos(heading), sin(heading)), strict=True):
         values[-2] += onward * direction

@@ -1,58 +1,71 @@
-"""Lateral actions of a storyboard, and how a condition refers to them."""
+"""What moves entities sideways in a storyboard or puts them there, and how a condition refers to it."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping
-from math import inf
+from collections.abc import Iterator, Mapping
 
 from msgspec import Struct
 
-from xosc_lateral.world.motion.nominal import NominalMotion
-from xosc_lateral.world.scenario import Scenario
-from xosc_lateral.world.scenario.dependence import Dependence
-from xosc_lateral.world.scenario.private_actions import LATERAL
+from xosc_lateral.world.scenario import Action, Scenario
+from xosc_lateral.world.scenario.dependence import actors_of
+from xosc_lateral.world.scenario.global_actions import AddEntityAction
+from xosc_lateral.world.scenario.private_actions import LATERAL, LONGITUDINAL, TeleportAction
 
 
 class LateralAction(Struct, frozen=True):
-    """A lateral action: its names from the story down, and the type and name that a condition refers to it by.
+    """A lateral action, a teleport or the adding of an entity.
 
-    `repeats`: it may run more than once.
+    Parameters
+    ----------
+    path : tuple of str
+        Its names from the story down.
+    kind, reference : str
+        The type and name that a condition refers to it by.
+    repeats : bool
+        It may run more than once.
+    adds : bool
+        It adds the entity.
     """
 
     path: tuple[str, ...]
     kind: str
     reference: str
     repeats: bool = False
+    adds: bool = False
 
 
 def lateral_actions(scenario: Scenario) -> dict[str, tuple[LateralAction, ...]]:
     """Lateral actions of events, by entity, in file order."""
     names = Counter(_names(scenario))
     by_entity: dict[str, dict[LateralAction, None]] = {}
+    for path, actors, action, repeats, is_alone in _actions(scenario):
+        adds = isinstance(action.content, AddEntityAction)
+        if adds or isinstance(action.content, (*LATERAL, TeleportAction)):
+            found = LateralAction(path, *_reference(path, is_alone, names), repeats, adds)
+            for actor in (action.content.entity_ref,) if isinstance(action.content, AddEntityAction) else actors:
+                by_entity.setdefault(actor, {})[found] = None
+    return {entity: tuple(actions) for entity, actions in by_entity.items()}
+
+
+def changing_speed(scenario: Scenario) -> set[str]:
+    """Entities that have longitudinal actions in events."""
+    return {
+        actor
+        for _, actors, action, *_ in _actions(scenario)
+        if isinstance(action.content, LONGITUDINAL)
+        for actor in actors
+    }
+
+
+def _actions(scenario: Scenario) -> Iterator[tuple[tuple[str, ...], tuple[str, ...], Action, bool, bool]]:
+    """Path and actors of each action of an event, whether it may run again, and whether it is alone in its event."""
     for story, act, group in scenario.storyboard.groups():
         for maneuver, event in group.events():
             repeats = group.maximum_execution_count > 1 or event.maximum_execution_count > 1
             for action in event.actions:
-                if isinstance(action.content, LATERAL):
-                    path = (story.name, act.name, group.name, maneuver.name, event.name, action.name)
-                    found = LateralAction(path, *_reference(path, len(event.actions) == 1, names), repeats)
-                    for actor in group.actors.entity_refs:
-                        by_entity.setdefault(actor, {})[found] = None
-    return {entity: tuple(actions) for entity, actions in by_entity.items()}
-
-
-def awaited(items: Collection[LateralAction], depends: Dependence) -> list[LateralAction]:
-    """Those whose start depends on a vehicle under test."""
-    return [item for item in items if item.path in depends.begins]
-
-
-def overruled_until(items: Collection[LateralAction], motion: NominalMotion) -> float:
-    """Until when one of them may still come: its last start, for ever if it may run again or never did. [s]"""
-    last = dict[tuple[str, ...], float]()
-    for played in motion.actions:
-        last[played.path] = max(played.start, last.get(played.path, played.start))
-    return max((inf if item.repeats else last.get(item.path, inf) for item in items), default=-inf)
+                path = (story.name, act.name, group.name, maneuver.name, event.name, action.name)
+                yield path, actors_of(act, group, event), action, repeats, len(event.actions) == 1
 
 
 def _reference(path: tuple[str, ...], is_alone: bool, names: Mapping[str, int]) -> tuple[str, str]:

@@ -19,9 +19,9 @@ from xosc_lateral.world.scenario import Scenario
 from xosc_lateral.world.scenario.expressions import ExpressionError
 from xosc_lateral.world.scenario.parameters import Scope
 
-_NAMED = frozenset({"Story", "Act", "ManeuverGroup", "Maneuver", "Event", "Action"})
+_REFERENCED_ELEMENTS = frozenset({"Story", "Act", "ManeuverGroup", "Maneuver", "Event", "Action"})
 """Elements that conditions refer to by name."""
-_DEEPEST = 20
+_MAXIMUM_CATALOG_DEPTH = 20
 """Catalog entries that refer to catalog entries."""
 
 
@@ -61,7 +61,7 @@ def name_literally(root: etree._Element, path: Path, scope: Scope, wanted: Colle
         for item, within in in_scope(storyboard, path, scope):
             for attribute in ("name", "storyboardElementRef"):
                 text = item.get(attribute) or ""
-                if text.startswith("$") and (attribute != "name" or local_name(item) in _NAMED):
+                if text.startswith("$") and (attribute != "name" or local_name(item) in _REFERENCED_ELEMENTS):
                     with suppress(ExpressionError):  # then nobody can refer to it
                         found.append((item, attribute, within.fill(text)))
     if any(attribute == "name" and value in wanted for _, attribute, value in found):
@@ -75,7 +75,7 @@ def inline_catalogs(losses: Losses, draft: Draft) -> None:
     Only catalogs that the reader took something from are looked at. What can't be found stays, and is noted.
     """
     missing = set()
-    for _ in range(_DEEPEST):
+    for _ in range(_MAXIMUM_CATALOG_DEPTH):
         references = [reference for reference in _references(draft) if reference.xml not in missing]
         if not references:
             break

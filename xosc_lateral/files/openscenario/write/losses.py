@@ -17,8 +17,8 @@ MOTION = frozenset({"LongitudinalAction", "LateralAction", "SynchronizeAction", 
 
 _TRAJECTORIES = {"Clothoid", "ClothoidSpline", "ClothoidSplineSegment", "Polyline", "Vertex"}
 _HEADERS = {"Catalog", "CatalogLocations", "FileHeader", "OpenSCENARIO", "ParameterDeclaration", "RoadNetwork"}
-_OTHERS = {"Phase", "Properties", "TrafficDefinition", "Vehicle", "VisibilityAction", "Weather"}
-_DISPENSABLE = frozenset({*_TRAJECTORIES, *_HEADERS, *_OTHERS, "AbsoluteSpeed", "RelativeSpeedToMaster"})
+_OTHER_ELEMENTS = {"Phase", "Properties", "TrafficDefinition", "Vehicle", "VisibilityAction", "Weather"}
+_DISPENSABLE = frozenset({*_TRAJECTORIES, *_HEADERS, *_OTHER_ELEMENTS, "AbsoluteSpeed", "RelativeSpeedToMaster"})
 """Elements that are complete without what newer versions add to them; the others are a choice of one."""
 
 _MEANINGLESS = frozenset(

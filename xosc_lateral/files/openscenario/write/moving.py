@@ -11,7 +11,7 @@ from lxml import etree
 from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.rows import blocks, columns, give_back, kept
+from xosc_lateral.base.rows import blocks, columns, give_back, stored
 from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.build import Pose
 from xosc_lateral.files.openscenario.write.draft import Draft
@@ -179,7 +179,7 @@ def _columns_of(path: WorldTrajectory, rows: slice, times: FloatArray, version: 
     """Columns of the vertices at some times, which have the headings of a little later."""
     time, speed, heading = path.time[rows], path.speed[rows], _unwrapped(path.heading[rows])
     arrays = [values[rows] for values in (path.x, path.y, path.z, path.pitch, path.roll)]
-    times, later = kept(times), kept(_heading_times(times))
+    times, later = stored(times), stored(_heading_times(times))
 
     def columns_of(part: slice) -> list[FloatArray]:
         around = _around(time, times[part])

@@ -16,7 +16,7 @@ from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.losses import Losses, remove, tidy
 
 _OKTAS = {"zero": "free", "one": "free", "two": "free", "three": "cloudy", "four": "cloudy", "five": "cloudy"}
-_CLEAR = {
+_CLEAR_NOON = {
     "TimeOfDay": {"animation": "false", "dateTime": "2020-06-21T12:00:00"},
     "RoadCondition": {"frictionScaleFactor": "1"},
     "Sun": {"intensity": "100000", "azimuth": "0", "elevation": "1.05"},
@@ -26,7 +26,7 @@ _CLEAR = {
 """A clear summer noon: direct sunlight of about 100,000 lx (standard, class Sun)."""
 _HEAVY_RAIN = 50.0
 """Violent rain: the full intensity of version 1.0. [mm/h] (WMO-No. 8, 2018, table 14.A)"""
-_BOTH = {
+_SEQUENCES_MEANT_AS_CHOICES = {
     "AppearanceAction": ("LightStateAction", "AnimationAction"),
     "LightType": ("VehicleLight", "UserDefinedLight"),
     "ComponentAnimation": ("VehicleComponent", "UserDefinedComponent"),
@@ -59,9 +59,9 @@ def complete(losses: Losses, minor: int, attributes: Mapping[str, str]) -> None:
 
 def complete_choices(losses: Losses) -> None:
     """Take out what is valid in no version but those that came after 1.2, whose schema asks for two at once."""
-    for item in elements(losses.root, *_BOTH):
+    for item in elements(losses.root, *_SEQUENCES_MEANT_AS_CHOICES):
         if len({local_name(child) for child in children_of(item)}) < 2:
-            both = " and ".join(_BOTH[local_name(item)])
+            both = " and ".join(_SEQUENCES_MEANT_AS_CHOICES[local_name(item)])
             losses.action(item, f"the schema of {losses.target} asks for {both} at once")
 
 
@@ -228,7 +228,7 @@ def _fill(losses: Losses, owner: etree._Element, tags: Sequence[str]) -> None:
     """What version 1.0 wants to be stated of the weather."""
     for tag in tags:
         if child_of(owner, tag) is None:
-            build.insert_indented(owner, len(owner), etree.Element(tag, _CLEAR.get(tag, {})))
+            build.insert_indented(owner, len(owner), etree.Element(tag, _CLEAR_NOON.get(tag, {})))
             if tag != "Weather":
                 losses.note(f"{tag}: that of a clear noon ({losses.target} asks for one)")
 

@@ -34,11 +34,11 @@ from xosc_lateral.world.scenario.private_actions import ConnectTrailerAction
 from xosc_lateral.world.scenario.storyboard import Condition
 
 STORY = "xosc-lateral trajectories"
-NEVER = 1e9
+UNREACHED_TIME = 1e9
 """Simulation time in place of a state that the run did not reach. [s]"""
 
-_STARTS = (StoryboardElementState.START_TRANSITION, StoryboardElementState.RUNNING)
-_ENDS = (StoryboardElementState.END_TRANSITION, StoryboardElementState.COMPLETE)
+_START_STATES = (StoryboardElementState.START_TRANSITION, StoryboardElementState.RUNNING)
+_END_STATES = (StoryboardElementState.END_TRANSITION, StoryboardElementState.COMPLETE)
 
 Path = tuple[str, ...]
 
@@ -195,16 +195,16 @@ class ReplacedManeuvers:
         moment = self._reached(content, path)
         owner.remove(element)
         build.sub(owner, "SimulationTimeCondition", value=build.decimal(moment, 6), rule="greaterThan")
-        when = "never" if moment >= NEVER else f"at {moment:.2f} s"
+        when = "never" if moment >= UNREACHED_TIME else f"at {moment:.2f} s"
         what = f"waited for '{content.element_ref}', which a trajectory stands for: now {when}, as in the nominal run"
         return locate(what, path=content.place.path, line=content.place.line, element=content.place.element)
 
     def _reached(self, content: StoryboardElementStateCondition, path: Path) -> float:
         played = [item for item in self._draft.motion.actions if item.path[: len(path)] == path]
-        if content.state in _STARTS:
-            return min((item.start for item in played), default=NEVER)
-        ends = [NEVER if item.end is None else item.end for item in played if content.state in _ENDS]
-        return max(ends, default=NEVER)
+        if content.state in _START_STATES:
+            return min((item.start for item in played), default=UNREACHED_TIME)
+        ends = [UNREACHED_TIME if item.end is None else item.end for item in played if content.state in _END_STATES]
+        return max(ends, default=UNREACHED_TIME)
 
     def _take_out(self) -> None:
         for actors, names in self._shared:

@@ -45,7 +45,7 @@ class TargetPlayer(Struct, frozen=True):
 
     def __post_init__(self) -> None:
         if self.version is not None and self.version not in VERSIONS:
-            raise ValueError(f"version {named(self.version)} can't be written; {_ALL} can")
+            raise ValueError(f"version {named(self.version)} can't be written; {_VERSION_LIST} can")
         if self.player is Player.CARLA and self.version not in (None, (1, 0)):
             raise ValueError("CARLA's ScenarioRunner reads version 1.0 alone")
 
@@ -80,8 +80,8 @@ def target(player: str = Player.STANDARD.value, version: str | None = None) -> T
         return TargetPlayer(Player(player))
     known = {named(one): one for one in VERSIONS}
     if version not in known:
-        raise ValueError(f"version {version!r} can't be written; {_ALL} can")
+        raise ValueError(f"version {version!r} can't be written; {_VERSION_LIST} can")
     return TargetPlayer(Player(player), known[version])
 
 
-_ALL = ", ".join(named(one) for one in VERSIONS)
+_VERSION_LIST = ", ".join(named(one) for one in VERSIONS)

@@ -20,11 +20,11 @@ from xosc_lateral.files.openscenario.write import build, older
 from xosc_lateral.files.openscenario.write.build import Version
 from xosc_lateral.files.openscenario.write.losses import Losses, remove
 
-_FACTS = Path(__file__).resolve().parents[3] / "resources" / "openscenario_versions.toml"
+_VERSIONS_FILE = Path(__file__).resolve().parents[3] / "resources" / "openscenario_versions.toml"
 
-NEWEST = 4
+NEWEST_MINOR = 4
 
-_STRICT = 3
+_STRICT_SINCE_MINOR = 3
 """From this version on, choices hold exactly one element, and an orientation without a type is relative."""
 
 
@@ -33,7 +33,7 @@ def version_facts() -> Mapping[str, Any]:
     """What each version has that the one before lacks, by ``version_1_MINOR``, and former words for values."""
     import tomllib
 
-    return tomllib.loads(_FACTS.read_text(encoding="utf-8"))
+    return tomllib.loads(_VERSIONS_FILE.read_text(encoding="utf-8"))
 
 
 def additions(minor: int, kind: str) -> Mapping[str, Any]:
@@ -57,9 +57,9 @@ def fit_version(losses: Losses, source: Version, version: Version) -> None:
         A condition or, if the scenario is reactive, a maneuver that the version does not know.
     """
     _orientations(losses.root, source, version)
-    if version[1] >= _STRICT:
+    if version[1] >= _STRICT_SINCE_MINOR:
         _be_strict(losses)
-    for minor in range(NEWEST, version[1], -1):
+    for minor in range(NEWEST_MINOR, version[1], -1):
         _take_back(losses, minor)
     if version[1] == 2:
         older.complete_choices(losses)
@@ -71,7 +71,7 @@ def fit_version(losses: Losses, source: Version, version: Version) -> None:
 
 def newer_than(element: etree._Element, version: Version) -> str | None:
     """Name of something inside an element that a version does not know; None if it knows everything."""
-    for minor in range(NEWEST, version[1], -1):
+    for minor in range(NEWEST_MINOR, version[1], -1):
         news = additions(minor, "elements")
         for item in elements(element):
             parent, tag = item.getparent(), local_name(item)
@@ -119,9 +119,9 @@ def _write_older_value(losses: Losses, item: etree._Element, name: str) -> None:
 
 def _orientations(root: etree._Element, source: Version, version: Version) -> None:
     """Say what an orientation without a type meant, where that changes."""
-    if (source[1] >= _STRICT) == (version[1] >= _STRICT):
+    if (source[1] >= _STRICT_SINCE_MINOR) == (version[1] >= _STRICT_SINCE_MINOR):
         return
-    meant = "relative" if source[1] >= _STRICT else "absolute"
+    meant = "relative" if source[1] >= _STRICT_SINCE_MINOR else "absolute"
     for item in elements(root, "Orientation"):
         item.set("type", item.get("type") or meant)
 

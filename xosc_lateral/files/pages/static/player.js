@@ -1,4 +1,4 @@
-/* The player: a scenario from above, on a canvas. Data: the JSON of `report.scene`. No dependencies. */
+/* The player: a scenario from above, on a canvas. Data: the JSON of `scene_of`. No dependencies. */
 (() => {
   "use strict";
   const shared = (window.xoscLateral ??= {});
@@ -74,14 +74,16 @@
 
   class Player {
     constructor(root) {
-      const scene = JSON.parse(document.getElementById("scene").textContent);
+      const scene = JSON.parse(root.nextElementSibling.textContent);
       this.root = root;
       this.vehicles = scene.entities.map((each) => new Vehicle(each, scene.step));
       this.lanes = scene.lanes.map((each) => shape(each, true));
       this.marks = scene.marks.map((each) => shape(each, false));
       this.followed = this.vehicles.find((each) => each.enriched) ?? this.vehicles[0] ?? null;
       Object.assign(this, { stretch: 1, scale: 0, center: [0, 0], course: 0, playing: false, speed: 1, showGhosts: true, boxes: [] });
-      clock.end = (scene.frames - 1) * scene.step;
+      this.across = scene.across;
+      this.sideBySide = this.vehicles.some((each) => each.enriched);
+      clock.end = Math.max(clock.end, (scene.frames - 1) * scene.step);
       this.build();
       this.readColors();
       this.listen();
@@ -115,7 +117,11 @@
         this.showGhosts = box.checked;
         this.changed();
       });
-      const isEnriched = this.vehicles.some((each) => each.enriched);
+      const pair = on(make("input", { type: "checkbox", checked: "" }), "change", (box) => {
+        this.sideBySide = box.checked;
+        this.setStretch(this.fittingStretch());
+      });
+      const compared = this.sideBySide ? [labelled("Side by side", pair), labelled("Outlines as written", ghosts)] : [];
       this.chips = this.vehicles.map((each) => {
         const chip = button("", `Follow ${each.name}`, () => this.follow(this.followed === each ? null : each));
         chip.append(make("i", { style: `background:var(--series-${(each.number % 12) + 1})` }), each.name);
@@ -125,7 +131,7 @@
         make("div", { class: "stage" }, this.canvas, this.tip),
         make("div", { class: "controls" }, this.playButton, this.scrub, this.clockFace, labelled("Speed", speed)),
         make("div", { class: "controls" },
-          labelled("Lateral stretch", this.stretchBar, this.stretchFace), ...(isEnriched ? [labelled("Nominal", ghosts)] : []),
+          labelled("Lateral stretch", this.stretchBar, this.stretchFace), ...compared,
           make("span", { class: "group" }, button("−", "Zoom out (-)", () => this.zoom(1 / 1.3)),
             button("+", "Zoom in (+)", () => this.zoom(1.3)), button("Whole", "Show everything (0)", () => this.showAll()))),
         make("div", { class: "chips" }, ...this.chips));
@@ -143,8 +149,21 @@
       this.ratio = window.devicePixelRatio || 1;
       [this.width, this.height] = [this.canvas.clientWidth || 300, this.canvas.clientHeight || 200];
       [this.canvas.width, this.canvas.height] = [this.width, this.height].map((side) => Math.round(side * this.ratio));
-      this.scale ||= this.width / clamp(this.width / 8, 55, 110);
+      if (!this.scale) {
+        this.scale = this.width / clamp(this.width / 8, 55, 110);
+        this.setStretch(this.fittingStretch());
+      }
       this.changed();
+    }
+
+    get views() {
+      return this.sideBySide ? 2 : 1;
+    }
+
+    /* So wide that the driving lanes fill the view: what was added is seen, and little grass. */
+    fittingStretch() {
+      const room = (0.92 * this.height) / this.views / 2;
+      return clamp(Math.round((2 * room) / (this.scale * this.across)) / 2, 1, 8);
     }
 
     aim() {
@@ -155,7 +174,7 @@
       }
       const cos = Math.cos(this.course), sin = Math.sin(this.course), along = this.scale, across = this.scale * this.stretch;
       const [a, b, c, d] = [along * cos, across * sin, along * sin, -across * cos], [x, y] = this.center;
-      this.view = new DOMMatrix([a, b, c, d, this.width / 2 - a * x - c * y, this.height / 2 - b * x - d * y]);
+      this.view = new DOMMatrix([a, b, c, d, this.width / 2 - a * x - c * y, this.middle - b * x - d * y]);
     }
 
     toScreen([x, y]) {
@@ -165,7 +184,7 @@
 
     pan(dx, dy) {
       if (this.followed) this.follow(null);
-      const place = this.view.inverse().transformPoint(new DOMPoint(this.width / 2 - dx, this.height / 2 - dy));
+      const place = this.view.inverse().transformPoint(new DOMPoint(this.width / 2 - dx, this.middle - dy));
       this.center = [place.x, place.y];
       this.changed();
     }
@@ -200,7 +219,7 @@
       const along = range(places.map(([x, y]) => x * cos + y * sin)), left = range(places.map(([x, y]) => y * cos - x * sin));
       const [a, b] = [(along[0] + along[1]) / 2, (left[0] + left[1]) / 2];
       this.center = [a * cos - b * sin, a * sin + b * cos];
-      this.scale = clamp(Math.min(this.width / (along[1] - along[0] + 30), this.height / (left[1] - left[0] + 30)), 0.02, 200);
+      this.scale = clamp(Math.min(this.width / (along[1] - along[0] + 30), this.height / this.views / (left[1] - left[0] + 30)), 0.02, 200);
       this.changed();
     }
 
@@ -213,7 +232,6 @@
 
     draw() {
       if ((window.devicePixelRatio || 1) !== this.ratio) return this.resize(); // the window moved to another screen
-      this.aim();
       if (document.activeElement !== this.scrub || this.playing) this.scrub.value = clock.time;
       this.clockFace.textContent = `${clock.time.toFixed(1)} s`;
       this.chips.forEach((chip, i) => chip.setAttribute("aria-pressed", String(this.vehicles[i] === this.followed)));
@@ -221,9 +239,23 @@
       context.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
       context.fillStyle = this.colors.verge;
       context.fillRect(0, 0, this.width, this.height);
-      this.drawRoads(context);
-      this.drawVehicles(context);
-      this.drawNames(context);
+      this.boxes = [];
+      const high = this.height / this.views;
+      const views = this.sideBySide ? [["As written", "nominal"], ["Lifelike", "drawn"]] : [["", "drawn"]];
+      views.forEach(([title, path], k) => {
+        this.middle = (k + 0.5) * high;
+        this.aim();
+        context.save();
+        context.beginPath();
+        context.rect(0, k * high, this.width, high);
+        context.clip();
+        this.drawRoads(context);
+        const boxes = this.drawVehicles(context, path);
+        this.drawNames(context, boxes);
+        this.boxes.push(...boxes);
+        if (title) this.writeTitle(context, title, k * high);
+        context.restore();
+      });
       this.drawScale(context);
       if (this.pointer) this.showTip();
     }
@@ -260,8 +292,8 @@
       context.setLineDash([]);
     }
 
-    drawVehicles(context) {
-      this.boxes = [];
+    drawVehicles(context, drawn) {
+      const boxes = [];
       const trace = (points) => {
         context.beginPath();
         points.forEach(([x, y], i) => (i ? context.lineTo(x, y) : context.moveTo(x, y)));
@@ -271,8 +303,9 @@
         const frame = vehicle.frame(clock.time);
         if (!frame) continue;
         const onScreen = (path) => vehicle.corners(path, frame).map((point) => this.toScreen(point));
-        const outline = onScreen(vehicle.drawn), ghost = vehicle.enriched && this.showGhosts ? onScreen(vehicle.nominal) : null;
-        this.boxes.push({ vehicle, frame, outline, top: Math.min(...[...outline, ...(ghost ?? [])].map(([, y]) => y)) });
+        const isGhosted = vehicle.enriched && this.showGhosts && drawn === "drawn";
+        const outline = onScreen(vehicle[drawn]), ghost = isGhosted ? onScreen(vehicle.nominal) : null;
+        boxes.push({ vehicle, frame, outline, top: Math.min(...[...outline, ...(ghost ?? [])].map(([, y]) => y)) });
         trace(outline);
         context.fillStyle = this.series[vehicle.number % 12];
         context.strokeStyle = this.colors.paper;
@@ -299,6 +332,15 @@
           context.setLineDash([]);
         }
       }
+      return boxes;
+    }
+
+    writeTitle(context, text, top) {
+      context.font = `600 13px ${this.colors.sans}`;
+      context.textAlign = "left";
+      this.write(context, text, 12, top + 22);
+      context.fillStyle = this.colors.paper;
+      if (top > 0) context.fillRect(0, top - 1, this.width, 2);
     }
 
     write(context, text, x, y) {
@@ -311,11 +353,11 @@
       context.fillText(text, x, y);
     }
 
-    drawNames(context) {
+    drawNames(context, boxes) {
       context.font = `600 12px ${this.colors.sans}`;
       context.textAlign = "center";
       const taken = [];
-      for (const { vehicle, outline, top } of this.boxes) {
+      for (const { vehicle, outline, top } of boxes) {
         const [x] = middle(outline), width = context.measureText(vehicle.name).width / 2 + 2;
         let y = top - 4;
         while (taken.some(([left, right, base]) => x + width > left && x - width < right && Math.abs(base - y) < 14)) y -= 14;

@@ -92,9 +92,9 @@ def import_dlr_ht(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cu
     table = table.round({"curvature": 7, **dict.fromkeys(table.columns.drop(["curvature", "drive", "time"]), 4)})
     table[VALID_BELOW], table[RESOLUTION] = HIGHEST, GRAIN
     reasons = {"no lane": placed.lane < 0, "lane change": placed.changing, "gap": gap}
-    vehicle, frame = tracks["vehicle"].to_numpy(), np.round(tracks["time"].to_numpy() / STEP).astype(np.int64)
-    table["state"] = name_states(reasons, placed.lane, vehicle, frame, STEP, settings)
-    table[RUN] = number_runs(table["state"].to_numpy(), placed.lane, vehicle, frame)
+    vehicle, time = tracks["vehicle"].to_numpy(), tracks["time"].to_numpy()
+    table["state"] = name_states(reasons, placed.lane, vehicle, time, STEP, settings)
+    table[RUN] = number_runs(table["state"].to_numpy(), placed.lane, vehicle, time)
     described = [_describe(name, k, lane) for name, both in lanes.items() for k, lane in enumerate(both)]
     about = {"format": "dlr-ht", "version": _version(source), "licence": LICENCE, "lanes": described}
     return finished(table, keep_cut=keep_cut, sources=[source], settings=asdict(settings), step=STEP, **about)

@@ -32,7 +32,7 @@ from xosc_lateral.base.lazy import pd
 from xosc_lateral.drivers.drives.cleaning import RESOLUTION, RUN, VALID_BELOW
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import unpacked_text
-from xosc_lateral.workflows.recordings.cuts import KEPT
+from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
 from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
 
 LICENCE = (
@@ -312,7 +312,7 @@ def _placed(cars: Sequence[_Car], loop: _Loop, lane_width: float) -> list[pd.Dat
                     VALID_BELOW: HIGHEST,
                     RESOLUTION: GRAIN,
                     RUN: np.cumsum(new),
-                    "state": np.where(inside, KEPT, "outside the lane"),
+                    "state": np.where(inside, KEPT_ROWS, "outside the lane"),
                 }
             )
         )

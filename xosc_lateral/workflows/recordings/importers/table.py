@@ -18,9 +18,10 @@ from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.drives.cleaning import LANE_WIDTHS, MAX_OUTSIDE
 from xosc_lateral.drivers.model.plausibility import implausible_rows
 from xosc_lateral.files.hashes import parsed_hash
+from xosc_lateral.files.labels import file_label
 from xosc_lateral.files.output_tables import harmless_frame, write_table
 from xosc_lateral.files.tables import foreign_errors
-from xosc_lateral.workflows.recordings.cuts import KEPT
+from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +60,7 @@ def make_provenance(table: pd.DataFrame, *, sources: Sequence[Path], step: float
         sha256=hash_files(sources),
         rows={str(state): int(count) for state, count in table["state"].value_counts().sort_index().items()},
         vehicles=int(table["drive"].nunique()),
-        hours=round(float((table["state"] == KEPT).sum()) * step / 3600.0, 3),
+        hours=round(float((table["state"] == KEPT_ROWS).sum()) * step / 3600.0, 3),
         **about,
     )
 
@@ -78,7 +79,7 @@ def without_cut(table: pd.DataFrame, record: ImportRecord, keep_cut: bool, sourc
 
     Raises `NotEnoughDataError` if nothing is left.
     """
-    kept = table if keep_cut else table[table["state"] == KEPT].drop(columns="state")
+    kept = table if keep_cut else table[table["state"] == KEPT_ROWS].drop(columns="state")
     if kept.empty:
         raise NotEnoughDataError(f"{source}: nothing is left of {len(table)} rows ({dict(record.rows)})")
     return Imported(kept.reset_index(drop=True), record)
@@ -112,7 +113,7 @@ def guarded(read: Importer) -> Importer:
 
 def _refuse_nonsense(table: pd.DataFrame, path: Path) -> None:
     """Single glitches of a context column become missing values; more than that is no such column."""
-    kept = (table["state"] == KEPT).to_numpy() if "state" in table else np.ones(len(table), dtype=np.bool_)
+    kept = (table["state"] == KEPT_ROWS).to_numpy() if "state" in table else np.ones(len(table), dtype=np.bool_)
     if not kept.any():
         return
     for name in table.columns:
@@ -150,13 +151,13 @@ def as_imported(
     """What an importer gave: all of it, or a drive table alone, which gets its record here."""
     if isinstance(made, Imported):
         return made
-    table = made if "drive" in made.columns else made.assign(drive=sources[0].name.split(".")[0])
+    table = made if "drive" in made.columns else made.assign(drive=file_label(sources[0]))
     record = make_provenance(
-        table.assign(state=KEPT),
+        table.assign(state=KEPT_ROWS),
         format=format,
         sources=[source for source in sources if source.is_file()],
         licence=str(options.get("licence", "your own recording")),
-        settings=options,
+        settings={name: str(value) if isinstance(value, Path) else value for name, value in options.items()},
         step=float(table.groupby("drive", sort=False)["time"].diff().median()),
     )
     return Imported(table, record)

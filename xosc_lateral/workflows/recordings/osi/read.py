@@ -168,8 +168,8 @@ class _Collected:
         _, time, x, y, yaw, speed, length, pitch, roll, *rear = rows.T
         kinds = np.array([self.kinds[int(number)] for number in rows[:, 0]])
         usual = np.array([USUAL_LENGTH.get(kind, 4.6) for kind in kinds])
-        heading = np.where(np.isfinite(yaw), yaw, travel_heading(x, y, vehicle, step))
-        speed = np.where(np.isfinite(speed), speed, ground_speed(x, y, vehicle, step))
+        heading = np.where(np.isfinite(yaw), yaw, travel_heading(x, y, vehicle, time, step))
+        speed = np.where(np.isfinite(speed), speed, ground_speed(x, y, vehicle, time, step))
         arm = sum(part[:, None] * axis for part, axis in zip(rear, axes(heading, pitch, roll), strict=True))
         length, behind = np.where(np.isfinite(length), length, usual), -rear[0] if rear[0].any() else None
         when, place = (time - float(time.min()), step), (x + arm[:, 0], y + arm[:, 1], heading)

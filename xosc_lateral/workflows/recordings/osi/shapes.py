@@ -10,9 +10,9 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.files.osi.extra import osi
-from xosc_lateral.workflows.recordings.lane_shapes import Strip, middle
+from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
+from xosc_lateral.workflows.recordings.lane_shapes import Strip, lane_graph, middle
 from xosc_lateral.workflows.recordings.osi.read import Recorded
-from xosc_lateral.workflows.recordings.placed import LaneGraph
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ def lanes_of(recorded: Recorded) -> tuple[list[Strip], LaneGraph] | None:
             if other in numbers and _way(strips[k]) @ _way(strips[numbers[other]]) > 0.0:
                 left[k] = numbers[other]
     following = [[numbers[one] for one in lane.following if one in numbers] for lane in lanes]
-    return strips, LaneGraph(np.array([strip.length for strip in strips]), left, following)
+    return strips, lane_graph(strips, left, following)
 
 
 def _way(strip: Strip) -> FloatArray:

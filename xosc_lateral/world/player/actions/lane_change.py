@@ -6,9 +6,10 @@ from math import atan, atan2, copysign, inf, pi, sqrt
 
 from xosc_lateral.world.motion.nominal import Activity
 from xosc_lateral.world.player.actions.base import Domain, Maker, RunningPrivateAction
+from xosc_lateral.world.player.distances import is_turned
 from xosc_lateral.world.player.drive import move_along_lane
 from xosc_lateral.world.player.positions.resolve import beside
-from xosc_lateral.world.player.state import NOWHERE, EntityState
+from xosc_lateral.world.player.state import NO_ROAD, EntityState
 from xosc_lateral.world.player.transition import EPSILON, Transition
 from xosc_lateral.world.scenario.enums import DynamicsDimension, DynamicsShape
 from xosc_lateral.world.scenario.private_actions import AbsoluteTargetLane, LaneChangeAction
@@ -31,7 +32,7 @@ class RunningLaneChange(RunningPrivateAction):
     def _begin(self) -> None:
         state = self.actor
         state.locate()
-        if state.road == NOWHERE:
+        if state.road == NO_ROAD:
             self._refuse(f"'{state.name}' is on no road: the lane change is not played")
             return
         lane, network = self._target_lane(), state.network
@@ -55,13 +56,15 @@ class RunningLaneChange(RunningPrivateAction):
         if abs(state.speed) < EPSILON:
             return
         side = copysign(1.0, transition.target - transition.start)
-        flipped = guide.road, guide.lane
+        was_forward = guide.is_forward
         ahead, offset, turn = self._move_of_frame(way, step)
         guide.offset_t = offset
         if transition.is_step:
             ahead = way
         move_along_lane(guide, copysign(ahead, state.speed))
-        self._follow_flip(flipped, offset)
+        if guide.is_forward is not was_forward:  # onto a road whose s runs the other way: +t is the other side
+            transition.start, transition.target = -transition.start, -transition.target
+            side, offset, turn = -side, -offset, -turn
         self._place(guide, turn)
         if transition.is_step:
             self._jumped(transition.target - transition.start)
@@ -77,11 +80,13 @@ class RunningLaneChange(RunningPrivateAction):
         target = self.content.target
         if isinstance(target, AbsoluteTargetLane):
             return target.lane_id
-        assert self._reference is not None
-        self._reference.locate()
-        if self._reference.lane == 0 and target.value == 0:
-            return 1  # nobody drives on lane 0: the lane to its left, as in the reference player
-        return beside(self._reference.lane, target.value if self._reference.is_forward else -target.value)
+        reference = self._reference
+        assert reference is not None
+        reference.locate()
+        if reference.lane == 0 and target.value == 0:
+            return 1  # no entity drives on lane 0: the lane to its left, as in the reference player
+        lane = beside(reference.lane, target.value if reference.is_forward else -target.value)
+        return -lane if is_turned(self.actor, reference) else lane
 
     def _move_of_frame(self, way: float, step: float) -> tuple[float, float, float]:
         """Way ahead [m], new offset [m], and heading relative to the direction of driving, positive to +t [rad]."""
@@ -110,17 +115,11 @@ class RunningLaneChange(RunningPrivateAction):
         transition.advance(way * transition.range / change)
         return 0.0, transition.value(DynamicsShape.LINEAR), copysign(0.5 * pi - EPSILON, rate)
 
-    def _follow_flip(self, before: tuple[int, int], offset: float) -> None:
-        """On a road whose s runs the other way, +t is the other side: the rest of the transition is mirrored."""
-        guide, transition = self._guide, self._transition
-        if guide.offset_t != offset and (guide.road, guide.lane) != before and guide.offset_t == -offset:
-            transition.start, transition.target = -transition.start, -transition.target
-
     def _place(self, guide: EntityState, turn: float) -> None:
         """Put the actor where its guide is, on the lane that is under it."""
         network, state = self.simulation.network, self.actor
         t = guide.t
-        found = network.lane_at(guide.road, guide.s, t)
+        found = network.lane_at(guide.road, guide.s, t, lane_types=state.lane_types)
         lane = found.lane or guide.lane
         under = network.lane_state_at(guide.road, lane, guide.s)
         state.move_to(guide.road, lane, guide.s, t - under.centre_t)

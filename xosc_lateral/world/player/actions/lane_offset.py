@@ -6,7 +6,8 @@ from math import atan, pi
 
 from xosc_lateral.world.motion.nominal import Activity
 from xosc_lateral.world.player.actions.base import Domain, Maker, RunningPrivateAction
-from xosc_lateral.world.player.state import NOWHERE
+from xosc_lateral.world.player.distances import is_turned
+from xosc_lateral.world.player.state import NO_ROAD
 from xosc_lateral.world.player.transition import EPSILON, Transition
 from xosc_lateral.world.scenario.enums import DynamicsDimension, DynamicsShape
 from xosc_lateral.world.scenario.private_actions import LaneOffsetAction
@@ -31,7 +32,7 @@ class RunningLaneOffset(RunningPrivateAction):
     def _begin(self) -> None:
         state = self.actor
         state.locate()
-        if state.road == NOWHERE:
+        if state.road == NO_ROAD:
             self._refuse(f"'{state.name}' is on no road: the lane offset is not played")
             return
         state.follow_lane()
@@ -73,7 +74,8 @@ class RunningLaneOffset(RunningPrivateAction):
         value, state, reference = self.content.target.value, self.actor, self._reference
         if reference is not None:
             reference.locate()
-            return reference.t + (value if reference.is_forward else -value) - (state.t - state.offset_t)
+            t = reference.t + (value if reference.is_forward else -value)
+            return (-t if is_turned(state, reference) else t) - (state.t - state.offset_t)
         if self.simulation.scenario.header.is_left_handed:  # counts from the lane's direction, not the road's
             return value * state.network.travel_direction(state.road, state.lane)
         return value

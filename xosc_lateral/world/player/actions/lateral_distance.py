@@ -13,7 +13,7 @@ from xosc_lateral.world.player.actions.base import Domain, Maker, RunningPrivate
 from xosc_lateral.world.player.angles import difference
 from xosc_lateral.world.player.distances import ahead_and_left, road_gap, spot_of
 from xosc_lateral.world.player.drive import move_along_lane
-from xosc_lateral.world.player.state import NOWHERE, EntityState, free
+from xosc_lateral.world.player.state import NO_ROAD, EntityState, free
 from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.road import Pose
 from xosc_lateral.world.scenario.enums import CoordinateSystem, LateralDisplacement
@@ -71,7 +71,10 @@ class BesideOnRoad:
         ahead = sqrt(max(state.speed * state.speed - across * across, 0.0))
         state.take_control(Activity.LATERAL)
         state.speed_taken = True
+        was_forward = state.is_forward
         move_along_lane(state, copysign(ahead * step, state.speed))
+        if state.is_forward is not was_forward:  # onto a road whose s runs the other way: +t is the other side
+            across, self._speed, self._acceleration = -across, -self._speed, -self._acceleration
         state.move_to(state.road, state.lane, state.s, state.offset_t + across * step)
         if abs(rest) <= abs(across) * step + EPSILON and self._most_acceleration == inf:
             rest = 0.0
@@ -229,7 +232,7 @@ class RunningLateralDistance(RunningPrivateAction):
         on_road = content.coordinate_system in (CoordinateSystem.ROAD, CoordinateSystem.LANE)
         state.locate()
         other.locate()
-        if on_road and (state.road == NOWHERE or other.road == NOWHERE):
+        if on_road and (state.road == NO_ROAD or other.road == NO_ROAD):
             self._refuse(f"'{state.name}' or '{other.name}' is on no road: the lateral distance is not kept")
             return
         limits = content.constraints or DynamicConstraints()

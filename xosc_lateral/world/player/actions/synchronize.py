@@ -12,7 +12,7 @@ from math import copysign, cos, inf, sin, sqrt
 from xosc_lateral.world.player.actions.base import Domain, Maker, RunningPrivateAction
 from xosc_lateral.world.player.actions.speed import relative_to
 from xosc_lateral.world.player.angles import is_forward
-from xosc_lateral.world.player.distances import FAR, Spot, ahead_and_left, apart, road_gap
+from xosc_lateral.world.player.distances import UNREACHABLE_DISTANCE, Spot, ahead_and_left, apart, road_gap
 from xosc_lateral.world.player.paths.base import Path, PathProgress, nearest_s
 from xosc_lateral.world.player.positions.resolve import spot_at
 from xosc_lateral.world.player.state import EntityState
@@ -59,7 +59,7 @@ class RunningSynchronize(RunningPrivateAction):
         self._own_spot = spot_at(self.content.target_position, self.simulation)()
         self._master_spot = spot_at(self.content.target_position_master, self.simulation)()
         self._mode = SpeedPhase.NONE
-        self._last = (FAR, FAR)
+        self._last = (UNREACHABLE_DISTANCE, UNREACHABLE_DISTANCE)
 
     def _act(self, time: float, step: float) -> None:
         state, content = self.actor, self.content
@@ -74,8 +74,8 @@ class RunningSynchronize(RunningPrivateAction):
         master_distance = max(master_distance - master_tolerance, EPSILON)
         # in the frame of no duration nothing has moved yet: every master stands (as in the reference player)
         master_speed = copysign(1.0, master_way) * along_road(self._master) if step > EPSILON else 0.0
-        time_left = master_distance / master_speed if master_speed > EPSILON else FAR
-        if time_left == FAR and self._mode is not SpeedPhase.WAITING:
+        time_left = master_distance / master_speed if master_speed > EPSILON else UNREACHABLE_DISTANCE
+        if time_left == UNREACHABLE_DISTANCE and self._mode is not SpeedPhase.WAITING:
             self._mode = SpeedPhase.WAITING
             state.set_speed(0.0)
         final = self._final_speed()
@@ -87,7 +87,7 @@ class RunningSynchronize(RunningPrivateAction):
         state.speed_taken = True
         if final is not None:
             state.speed = self._speed_towards(final, distance, time_left, step)
-        elif time_left != FAR:
+        elif time_left != UNREACHABLE_DISTANCE:
             self._mode = SpeedPhase.LINE
             mean = distance / time_left
             acceleration = 2.0 * (mean - state.speed) / time_left
@@ -141,7 +141,7 @@ class RunningSynchronize(RunningPrivateAction):
         if self._mode is SpeedPhase.STEADY:
             return final
         if self._mode is SpeedPhase.WAITING:
-            if time_left >= FAR:
+            if time_left >= UNREACHABLE_DISTANCE:
                 return state.speed
             self._mode = SpeedPhase.NONE
         if self._mode is SpeedPhase.STOPPING:
@@ -153,7 +153,11 @@ class RunningSynchronize(RunningPrivateAction):
             if time_left >= 2.0 * distance / max(final, EPSILON):
                 return 0.0
             self._mode = SpeedPhase.LINE
-        if self._mode is SpeedPhase.TO_APEX and time_left < FAR and self._is_on_line(final, distance, time_left):
+        if (
+            self._mode is SpeedPhase.TO_APEX
+            and time_left < UNREACHABLE_DISTANCE
+            and self._is_on_line(final, distance, time_left)
+        ):
             self._mode = SpeedPhase.LINE
             return state.speed
         if self._mode is SpeedPhase.LINE:
@@ -196,7 +200,7 @@ def along_road(state: EntityState) -> float:
 
 def _on_line(final: float, distance: float, time_left: float) -> float:
     """Speed now that a constant acceleration turns into the final speed at the place; 0 while the master stands."""
-    if time_left > FAR - 1.0 or time_left < 0.001 or distance < 0.001:
+    if time_left > UNREACHABLE_DISTANCE - 1.0 or time_left < 0.001 or distance < 0.001:
         return 0.0
     return max(2.0 * distance / time_left - max(final, 0.0), 0.0)
 

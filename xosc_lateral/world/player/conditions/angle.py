@@ -7,7 +7,7 @@ from math import pi
 from xosc_lateral.world.player.angles import difference
 from xosc_lateral.world.player.conditions.base import EntityCheck, EntityChecks
 from xosc_lateral.world.player.simulation import Simulation
-from xosc_lateral.world.player.state import NOWHERE, EntityState
+from xosc_lateral.world.player.state import NO_ROAD, EntityState
 from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.road import Pose
 from xosc_lateral.world.scenario.conditions import AngleCondition, RelativeAngleCondition
@@ -79,7 +79,7 @@ def _reference(state: EntityState, kind: AngleType, system: CoordinateSystem) ->
         against = system is CoordinateSystem.LANE and _is_against(state)
         return state.road_heading() + (pi if against else 0.0)
     state.locate()
-    if state.road == NOWHERE:
+    if state.road == NO_ROAD:
         return 0.0
     road = state.network.road_pose_at(state.road, state.s, state.t)
     sign = -1.0 if system is CoordinateSystem.LANE and _is_against(state) else 1.0
@@ -88,7 +88,7 @@ def _reference(state: EntityState, kind: AngleType, system: CoordinateSystem) ->
 
 def _is_against(state: EntityState) -> bool:
     state.locate()
-    return state.road != NOWHERE and state.network.travel_direction(state.road, state.lane) < 0
+    return state.road != NO_ROAD and state.network.travel_direction(state.road, state.lane) < 0
 
 
 def _of_kind(pose: Pose, kind: AngleType) -> float:

@@ -30,7 +30,7 @@ from xosc_lateral.world.scenario.conditions import (
 )
 from xosc_lateral.world.scenario.enums import CoordinateSystem, RelativeDistanceType, RoutingAlgorithm
 
-_SHORTEST = (None, RoutingAlgorithm.UNDEFINED, RoutingAlgorithm.SHORTEST)
+_SHORTEST_ROUTE_ALGORITHMS = (None, RoutingAlgorithm.UNDEFINED, RoutingAlgorithm.SHORTEST)
 
 
 def measure_of(content: Measured | RelativeDistanceCondition, simulation: Simulation) -> Measure:
@@ -42,7 +42,7 @@ def measure_of(content: Measured | RelativeDistanceCondition, simulation: Simula
     along_route = getattr(content, "along_route", None)
     system = content.coordinate_system or (CoordinateSystem.ROAD if along_route else CoordinateSystem.ENTITY)
     measure = Measure(system, content.distance_type or RelativeDistanceType.EUCLIDIAN, content.freespace)
-    if measure.is_along_roads and content.routing_algorithm not in _SHORTEST:
+    if measure.is_along_roads and content.routing_algorithm not in _SHORTEST_ROUTE_ALGORITHMS:
         simulation.note(
             f"routingAlgorithm '{content.routing_algorithm}': measured along the shortest way instead", content.place
         )

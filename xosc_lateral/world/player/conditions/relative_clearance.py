@@ -5,7 +5,7 @@ from __future__ import annotations
 from xosc_lateral.world.player.conditions.base import EntityCheck, EntityChecks
 from xosc_lateral.world.player.distances import free_road_gap, road_gap, spot_of
 from xosc_lateral.world.player.simulation import Simulation
-from xosc_lateral.world.player.state import NOWHERE, EntityState
+from xosc_lateral.world.player.state import NO_ROAD, EntityState
 from xosc_lateral.world.road.network import DRIVING
 from xosc_lateral.world.scenario.conditions import RelativeClearanceCondition
 
@@ -46,7 +46,7 @@ def prepare(content: RelativeClearanceCondition, simulation: Simulation) -> Enti
 
     def check(state: EntityState) -> bool:
         state.locate()
-        if state.road == NOWHERE:
+        if state.road == NO_ROAD:
             return False
         if any(other is not state and other.active and occupied(state, other) for other in others):
             return False

@@ -86,7 +86,7 @@ def nearest_s(path: Path, x: float, y: float) -> float:
 
     middle = min((i * spacing for i in range(count + 1)), key=away)
     low, high = max(middle - spacing, 0.0), min(middle + spacing, path.length)
-    while high - low > _CLOSE:
+    while high - low > _BISECTION_WIDTH:
         third = (high - low) / 3.0
         if away(low + third) < away(high - third):
             high -= third
@@ -96,7 +96,7 @@ def nearest_s(path: Path, x: float, y: float) -> float:
 
 
 _MOST_SAMPLES = 5000
-_CLOSE = 1e-6
+_BISECTION_WIDTH = 1e-6
 """Where narrowing down ends. [m]"""
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import inf, nan
+from math import hypot, inf, nan
 from typing import Any
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from xosc_lateral.base.errors import FormatError, PlaybackError, UnsupportedElementError
 from xosc_lateral.world.player.paths.base import Path
@@ -39,7 +40,10 @@ VERTEX_RADIUS = 0.1
 
 
 class Layout(Struct, frozen=True):
-    """What laying out a path may depend on, besides the world: who follows it, how, and how fast it comes. [m/s]"""
+    """What laying out a path may depend on, besides the world: who follows it, how, and how fast it comes. [m/s]
+
+    `closes`: it goes on from its end to its start.
+    """
 
     simulation: Simulation
     locate: Callable[[Position, Simulation], Pose]
@@ -47,6 +51,7 @@ class Layout(Struct, frozen=True):
     follower: EntityState | None
     follow: bool
     speed: float
+    closes: bool
 
     def pose_of(self, position: Position) -> Pose:
         """World pose of a position now. [m], [rad]"""
@@ -69,6 +74,9 @@ def _polyline(shape: Polyline, layout: Layout) -> Path:
     if has_gaps_in_time(corners):
         layout.note("vertices without a time get it by their distance from those that have one")
         corners = fill_times(corners)
+    first, last = corners[0], corners[-1]
+    if layout.closes and hypot(last.x - first.x, last.y - first.y) > VERTEX_RADIUS:
+        corners.append(replace(first, time=nan))
     merged = merge_close(corners, VERTEX_RADIUS)
     if len(merged) < len(corners):
         left_out = len(corners) - len(merged)
@@ -178,12 +186,22 @@ def path_of(
     follower: EntityState | None = None,
     follow: bool = False,
     speed: float = 0.0,
+    is_timed: bool = False,
 ) -> Path:
-    """A trajectory laid out in the world as it is now; `pose_of` tells where a position is."""
+    """A trajectory laid out in the world as it is now; `pose_of` tells where a position is.
+
+    A closed one ends where it starts, unless it is followed by its times (`is_timed`), which say nothing of that piece.
+    """
     shape = trajectory.shape
     if isinstance(shape, Unsupported):
         raise shape.place.error(shape.reason or f"a {shape.kind} can't be followed", UnsupportedElementError)
-    return SHAPES[type(shape)](shape, Layout(simulation, pose_of, trajectory.place, follower, follow, speed))
+    closes = trajectory.closed and not is_timed
+    layout = Layout(simulation, pose_of, trajectory.place, follower, follow, speed, closes)
+    path = SHAPES[type(shape)](shape, layout)
+    start, end = path.at(0.0), path.at(path.length)
+    if closes and (gap := hypot(end.x - start.x, end.y - start.y)) > VERTEX_RADIUS:
+        layout.note(f"trajectory '{trajectory.name}' is closed, but ends {gap:.2f} m from its start: there it jumps")
+    return path
 
 
 def duration(shape: Shape) -> float:

@@ -7,7 +7,7 @@ from math import nan, pi
 from xosc_lateral.base.errors import PlaybackError
 from xosc_lateral.world.player.drive import travel
 from xosc_lateral.world.player.simulation import Simulation
-from xosc_lateral.world.player.state import NOWHERE, EntityState, Placement, RouteGuide, world_pose
+from xosc_lateral.world.player.state import NO_ROAD, EntityState, Placement, RouteGuide, world_pose
 from xosc_lateral.world.road import Pose
 from xosc_lateral.world.scenario.enums import ReferenceContext
 from xosc_lateral.world.scenario.position import (
@@ -128,7 +128,7 @@ def on_road(position: RelativeLanePosition | RelativeRoadPosition, simulation: S
     """The entity that it refers to, with its road coordinates; raises `PlaybackError` if it is on no road."""
     state = simulation.entity(position.entity_ref, position.place)
     state.locate()
-    if state.road == NOWHERE:
+    if state.road == NO_ROAD:
         what = f"'{state.name}' is on no road, so there is no place beside it in road coordinates"
         raise position.place.error(what, PlaybackError)
     return state

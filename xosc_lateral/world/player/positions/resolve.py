@@ -6,6 +6,7 @@ from collections.abc import Callable
 from math import cos, nan, pi, sin
 
 from xosc_lateral.base.errors import PlaybackError, UnsupportedElementError
+from xosc_lateral.world.player.angles import is_forward
 from xosc_lateral.world.player.distances import Spot
 from xosc_lateral.world.player.paths.registry import path_of
 from xosc_lateral.world.player.positions.geo import geo_position
@@ -19,7 +20,7 @@ from xosc_lateral.world.player.positions.on_road import (
     tilted_or_road,
 )
 from xosc_lateral.world.player.simulation import Simulation
-from xosc_lateral.world.player.state import NOWHERE, Placement, RouteGuide, free, guide, locate, world_pose
+from xosc_lateral.world.player.state import NO_ROAD, Placement, RouteGuide, free, guide, locate, world_pose
 from xosc_lateral.world.road import Pose
 from xosc_lateral.world.scenario import Unsupported
 from xosc_lateral.world.scenario.position import (
@@ -39,7 +40,7 @@ from xosc_lateral.world.scenario.position import (
     WorldPosition,
 )
 
-_FIXED = (GeoPosition, LanePosition, RoadPosition, WorldPosition)
+_FIXED_POSITIONS = (GeoPosition, LanePosition, RoadPosition, WorldPosition)
 """Positions that no entity has an influence on."""
 
 
@@ -58,7 +59,7 @@ def resolve(position: Position, simulation: Simulation, *, route: RouteGuide | N
 
 def spot_at(position: Position, simulation: Simulation) -> Callable[[], Spot]:
     """A position to measure distances to, found anew each time only if it may move."""
-    if isinstance(position, _FIXED):
+    if isinstance(position, _FIXED_POSITIONS):
         fixed = _spot(resolve(position, simulation), simulation)
         return lambda: fixed
     return lambda: _spot(resolve(position, simulation), simulation)
@@ -79,7 +80,7 @@ def route_guide(route_: Route, simulation: Simulation) -> RouteGuide | None:
 def _spot(place: Placement, simulation: Simulation) -> Spot:
     network = simulation.network
     pose = world_pose(network, place)
-    if place.road == NOWHERE:
+    if place.road == NO_ROAD:
         return Spot(pose.x, pose.y)
     t = network.lane_state_at(place.road, place.lane, place.s).centre_t + place.offset_t
     return Spot(pose.x, pose.y, place.road, place.lane, place.s, t)
@@ -116,14 +117,17 @@ def world_position(position: WorldPosition, simulation: Simulation) -> Placement
 def relative_lane_position(
     position: RelativeLanePosition, simulation: Simulation, route: RouteGuide | None = None
 ) -> Placement:
-    """`ds` goes along the road's s and counts lanes and offset along +t; `dsLane` goes along the lane's direction of
-    travel and counts them to the left of it.
+    """`ds` goes along s of the reference's road and counts lanes and offset along its +t; `dsLane` goes along the
+    direction of travel of the lane and counts them to the left of it.
     """
     state = on_road(position, simulation)
     network = simulation.network
+    along_lane = position.ds_lane is not None
     if position.ds_lane is None:
         there = moved_along(state, position.ds or 0.0, 1, route)
-        side = 1
+        # Beyond a joint with a road whose s runs the other way, the reference's own count of lanes goes on.
+        along_lane = is_forward(there.relative_heading) is not state.is_forward
+        side = -1 if along_lane else 1
     else:
         there = moved_along(state, position.ds_lane, network.travel_direction(state.road, state.lane), route)
         side = network.travel_direction(there.road, there.lane)
@@ -132,7 +136,6 @@ def relative_lane_position(
         offset = position.offset * network.travel_direction(there.road, lane)
     else:
         offset = position.offset * side
-    along_lane = position.ds_lane is not None
     return lane_placement(position, simulation, there.road, lane, there.s, offset, along_lane=along_lane)
 
 
@@ -163,17 +166,17 @@ def relative_object_position(position: RelativeObjectPosition, simulation: Simul
     rise = (left * sin(pose.roll) + up * cos(pose.roll)) * cos(pose.pitch) - ahead * sin(pose.pitch)
     x = pose.x + flat_ahead * c - flat_left * s
     y = pose.y + flat_ahead * s + flat_left * c
-    return _near(position, simulation, pose, x, y, pose.z + rise)
+    return _nearby_place(position, simulation, pose, x, y, pose.z + rise)
 
 
 def relative_world_position(position: RelativeWorldPosition, simulation: Simulation) -> Placement:
     """Along the world's axes."""
     pose = simulation.entity(position.entity_ref, position.place).pose
     dx, dy = simulation.network.header_offset.turned_back(position.dx, position.dy)
-    return _near(position, simulation, pose, pose.x + dx, pose.y + dy, pose.z + (position.dz or 0.0))
+    return _nearby_place(position, simulation, pose, pose.x + dx, pose.y + dy, pose.z + (position.dz or 0.0))
 
 
-def _near(
+def _nearby_place(
     position: RelativeObjectPosition | RelativeWorldPosition,
     simulation: Simulation,
     pose: Pose,
@@ -204,7 +207,7 @@ def route_position(position: RoutePosition, simulation: Simulation) -> Placement
     if isinstance(where, FromCurrentEntity):
         state = simulation.entity(where.entity_ref, position.place)
         state.locate()
-        return state.place._replace(pose=state.pose if state.road == NOWHERE else None)
+        return state.place._replace(pose=state.pose if state.road == NO_ROAD else None)
     route = route_guide(position.route, simulation)
     if route is None:
         raise position.place.error(f"no way leads along route '{position.route.name}'", PlaybackError)

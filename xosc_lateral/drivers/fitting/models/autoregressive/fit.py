@@ -34,7 +34,7 @@ DIGITS = 5
 differs by up to a hundred millionth (linear algebra in another order), so that one number in 10,000 is rounded to
 another last digit there. [-]"""
 
-KEPT = 2e-3
+MAXIMUM_LOG_POWER_CHANGE = 2e-3
 """Largest change of the coarse movement's log power that rounding may make at any frequency: 0.01 dB. Coefficients of
 an autoregression nearly add up to one, and what they lack of it decides how far a driver wanders. [-]"""
 
@@ -67,7 +67,7 @@ def _tidy_coarse(coarse: Autoregression) -> Autoregression:
         if largest_root(coefficients) >= 1.0:
             continue
         short = Autoregression(coefficients, scale)
-        if np.abs(np.log(short.power(FREQUENCIES)) - power).max() <= KEPT:
+        if np.abs(np.log(short.power(FREQUENCIES)) - power).max() <= MAXIMUM_LOG_POWER_CHANGE:
             return short
     return coarse
 

@@ -1,0 +1,80 @@
+"""Names say what they hold: constants are quantities, functions do something, and names in comments exist."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parents[1] / "xosc_lateral"
+
+# fmt: off
+VAGUE = frozenset([
+    "most", "least", "few", "enough", "some", "far", "near", "longest", "shortest", "largest", "smallest",
+    "widest", "narrow", "slowest", "fastest", "highest", "sure", "surely", "clear", "perhaps", "hardly",
+    "seldom", "never", "nothing", "nobody", "others", "ours", "own", "one", "found", "said", "told", "given",
+    "who", "whole", "keep", "kept", "done", "lasting",
+])
+# fmt: on
+"""Words that alone are no name of a constant, a function or a module: an adjective without its noun, a riddle."""
+
+MODULES = sorted(PACKAGE.rglob("*.py"))
+
+
+def _named(tree: ast.Module) -> list[tuple[str, int]]:
+    """Constants, functions and classes of a module, with their lines."""
+    defined = (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.ClassDef))
+    names = [(node.name, node.lineno) for node in defined]
+    for node in tree.body:
+        targets = (
+            node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
+        )
+        for target in targets:
+            each = target.elts if isinstance(target, ast.Tuple) else [target]
+            names += [(item.id, node.lineno) for item in each if isinstance(item, ast.Name)]
+    return names
+
+
+def test_the_list_of_vague_names_stays_short() -> None:
+    assert len(VAGUE) <= 40
+
+
+BEING_REWRITTEN = ("lane_offset_scenario.py", "meaning.py", "offset_chain.py", "path_pieces.py")
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(PACKAGE).as_posix())
+def test_names_are_not_vague(path: Path) -> None:
+    named = [(path.stem, 0), *_named(ast.parse(path.read_text(encoding="utf-8")))]
+    vague = [f"{path.name}:{line}: {name}" for name, line in named if name.strip("_").lower() in VAGUE]
+    assert not vague or path.name in BEING_REWRITTEN
+
+
+# ---- names in docstrings and comments ----
+DOTTED = re.compile(r"`(?:xosc_lateral\.)?((?:[a-z_]+\.)+(?!csv|html|json|toml|xosc)[A-Za-z_]\w*)`")
+"""`a.b` or `a.b.C` in backticks."""
+
+EVERYTHING = [path for path in PACKAGE.rglob("*") if "__pycache__" not in path.parts]
+FORMER = frozenset(
+    ["api", "driver", "enrich", "formats", "identification", "pipeline", "playback", "reconstruction", "report"]
+)
+ROOMS = frozenset(path.stem for path in EVERYTHING if path.suffix in ("", ".py")) | FORMER
+
+
+def _exists(dotted: str) -> bool:
+    """Whether a dotted name ends in a module of the package, or in something that one defines."""
+    *rooms, last = dotted.split(".")
+    tail = "/".join(rooms)
+    if any(path.as_posix().endswith((f"/{tail}/{last}", f"/{tail}/{last}.py")) for path in EVERYTHING):
+        return True
+    homes = [path for path in MODULES if path.as_posix().endswith((f"/{tail}.py", f"/{tail}/__init__.py"))]
+    return any(re.search(rf"\b{re.escape(last)}\b", path.read_text(encoding="utf-8")) for path in homes)
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(PACKAGE).as_posix())
+def test_dotted_names_in_backticks_exist(path: Path) -> None:
+    """Those that begin with a folder or module of the package; others are of other packages, or of a variable."""
+    text = path.read_text(encoding="utf-8")
+    names = {match[1] for match in DOTTED.finditer(text) if match[1].split(".")[0] in ROOMS}
+    assert not {name for name in names if not _exists(name)}

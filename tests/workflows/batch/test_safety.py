@@ -1,0 +1,149 @@
+"""What somebody else put into the folders: modules and links that nothing of ours may run or follow, and signals."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from importlib.metadata import packages_distributions
+from pathlib import Path
+
+import pytest
+
+import xosc_lateral as xl
+from tests.kit.fake_converter import convert
+from tests.workflows.batch.test_batch import ROOT, make_inputs, run
+from xosc_lateral.files.atomic import files_of_run, replace_atomically
+from xosc_lateral.workflows.batch.batch import STATE, BatchStoppedError, JobState, convert_many
+from xosc_lateral.workflows.batch.jobs import plan_batch
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX links and signals")
+
+NOT_YET = sorted({*packages_distributions(), "joblib", "pickle", "numpy", "typer"} - {"xosc_lateral"})
+"""Names of modules that are imported after our own first line."""
+
+
+@pytest.mark.parametrize("how", ["script", "module"])
+def test_modules_in_the_folder_of_scenarios_never_run(tmp_path: Path, how: str) -> None:
+    database, mark, script = tmp_path / "db", tmp_path / "ran", tmp_path / "bin" / "run.py"
+    xl.write_template("cut-in", database)
+    (database / "second.xosc").write_bytes((database / "cut-in.xosc").read_bytes())
+    names = {*NOT_YET, "sitecustomize", *(sys.stdlib_module_names if how == "script" else ())}
+    for name in names:
+        (database / f"{name}.py").write_text(f"open({str(mark)!r}, 'a').write({name!r} + ' ')\n", encoding="utf-8")
+    (database / ".numba_config.yaml").write_text(f"cache_dir: {database}\n")
+    script.parent.mkdir()
+    script.write_text("from xosc_lateral.cli import main\nmain()\n")
+    words = [str(script)] if how == "script" else ["-m", "xosc_lateral"]
+    words += ["convert", ".", "-o", "../out", "--jobs", "2", "--time-limit", "2", "-q"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, *words], cwd=database, env=environment, capture_output=True, text=True)
+    assert not mark.exists(), mark.read_text()
+    assert done.returncode == 0, done.stderr
+    assert len(list((tmp_path / "out").glob("*.xosc"))) == 2
+
+
+@pytest.mark.parametrize("name", [f"{STATE}/lock", f"{STATE}/journal.jsonl", STATE])
+@pytest.mark.parametrize("kind", ["link", "hard link", "fifo"])
+def test_state_files_that_lead_elsewhere_are_refused(tmp_path: Path, name: str, kind: str) -> None:
+    inputs, out, victim = make_inputs(tmp_path / "in", 1), tmp_path / "out", tmp_path / "folder" / "lock"
+    place = out / name
+    place.parent.mkdir(parents=True)
+    victim.parent.mkdir()
+    victim.write_text("precious")
+    if kind == "fifo":
+        os.mkfifo(place)
+    elif kind == "link":
+        place.symlink_to(victim.parent if name == STATE else victim)
+    else:
+        os.link(victim, place)
+    with pytest.raises(xl.XoscLateralError, match=re.escape(str(place))) as error:
+        run(inputs, out)
+    assert "\n" not in str(error.value)
+    assert victim.read_text() == "precious"
+    place.unlink()
+    assert [outcome.state for outcome in run(inputs, out)] == [JobState.WRITTEN]
+
+
+def test_a_run_leaves_the_temporary_files_of_others_alone_and_removes_those_of_killed_ones(tmp_path: Path) -> None:
+    inputs, out = make_inputs(tmp_path / "in", 2), tmp_path / "out"
+    (out / STATE).mkdir(parents=True)
+    others, killed = "0123456789ab", "ba9876543210"
+    (out / STATE / "lock").write_text(json.dumps({"pid": 1, "host": "x", "runs": [killed, "../..", 5]}))
+    left: list[Path] = []
+    for name in (others, killed):
+        with files_of_run(name), pytest.raises(InterruptedError):
+
+            def stopped(path: Path) -> None:
+                path.rename(path.with_name(f"{path.name}.kept"))
+                left.append(path)
+                raise InterruptedError
+
+            replace_atomically(out / "sub" / "a.xosc", stopped)
+    for path in left:
+        path.with_name(f"{path.name}.kept").rename(path)
+    run(inputs, out)
+    assert [path.exists() for path in left] == [True, False]
+
+
+def test_a_folder_that_is_up_to_date_need_not_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(path: Path) -> None:
+        raise OSError(errno.EROFS, "Read-only file system", str(path))
+
+    inputs, out = make_inputs(tmp_path / "in", 2), tmp_path / "out"
+    run(inputs, out)
+    monkeypatch.setattr("xosc_lateral.workflows.batch.journal.open_own", refused)
+    assert [outcome.state for outcome in run(inputs, out)] == [JobState.UP_TO_DATE] * 2
+    (inputs / "000.xosc").write_text("<OpenSCENARIO><Storyboard/></OpenSCENARIO>")
+    with pytest.raises(BatchStoppedError, match="lock: Read-only file system"):
+        run(inputs, out)
+
+
+STOPPED_RUN = """
+import sys
+from tests.kit.fake_converter import convert
+from xosc_lateral.workflows.batch import convert_job
+convert_job.convert_job = convert
+from xosc_lateral.cli import main
+main(None)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_is_one_line_with_the_number_of_finished_outputs(tmp_path: Path, number: signal.Signals) -> None:
+    inputs = make_inputs(tmp_path / "in", 8, **{f"slow{index}": "slow" for index in range(80)})
+    out = tmp_path / "out"
+    words = ["convert", str(inputs), "-o", str(out), "--jobs", "2", "-q"]
+    command = [sys.executable, "-c", STOPPED_RUN, *words]
+    with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as process:
+        while len(list(out.glob("*.xosc"))) < 10:
+            assert process.poll() is None
+            time.sleep(0.02)
+        process.send_signal(number)
+        _, said = process.communicate(timeout=60)
+    assert process.returncode == 128 + number
+    there = len(list(out.glob("*.xosc")))
+    assert 10 <= there < 88
+    assert said == f"xosc-lateral: interrupted; {there} outputs in {out} are finished, and the same command continues\n"
+    assert not list(out.glob(".*.tmp*"))
+    states = [outcome.state for outcome in convert_many(plan_batch([inputs], out), workers=0, converter=convert)]
+    assert states.count(JobState.UP_TO_DATE) == there and len(states) == 88
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_any_other_verb_in_one_line(number: signal.Signals) -> None:
+    script = "import sys, xosc_lateral.workflows.live.stdio as s\nfrom xosc_lateral.cli import main\n"
+    script += "s.Pipe.answers = lambda self, lines: iter([print('ready', flush=True), *lines])\nmain(None)\n"
+    words = [sys.executable, "-c", script, "live", "stdio"]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen(words, cwd=ROOT, text=True, **pipes) as process:
+        assert process.stdout is not None and process.stdout.readline() == "ready\n"
+        process.send_signal(number)
+        _, said = process.communicate(timeout=60)
+    assert process.returncode == 128 + number
+    assert said.count("\n") == 1 and said.startswith("xosc-lateral: interrupted;")

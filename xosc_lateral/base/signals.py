@@ -1,0 +1,64 @@
+"""Signals that end a program: an exception at once, or, while work is shared out, a wish that the work asks for."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+
+
+class Interrupted(BaseException):
+    """A signal ended the run; `number`: which. Not a KeyboardInterrupt, which typer swallows."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.number = number
+
+
+_waits = False
+_pending: int | None = None
+
+
+def _receive(number: int, frame: FrameType | None) -> None:
+    global _pending
+    if not _waits or _pending is not None:  # the second one is not waited with
+        raise Interrupted(number)
+    _pending = number
+
+
+@contextmanager
+def raising_signals() -> Iterator[None]:
+    """While the block runs, signals that end a program raise `Interrupted`; in a thread, nothing changes."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.getsignal(number) for number in ENDING}
+    for number, handler in before.items():
+        if handler is not signal.SIG_IGN:  # `nohup`
+            signal.signal(number, _receive)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            if handler is not None:
+                signal.signal(number, handler)
+
+
+@contextmanager
+def deferring_signals() -> Iterator[None]:
+    """While the block runs, the first such signal is noted only: see `pending_signal`."""
+    global _waits, _pending
+    _waits, _pending = True, None
+    try:
+        yield
+    finally:
+        _waits, _pending = False, None
+
+
+def pending_signal() -> int | None:
+    """The signal that was noted."""
+    return _pending

@@ -1,0 +1,126 @@
+"""Whether anything is left for the columns to explain: one check over all of them, at all delays, after the search.
+
+What the refined profile leaves of the drives, white, is regressed on every column's distributed lag [1]_ in turn. The
+search asks for one delay and one time constant; this asks for any course over time.
+
+References
+----------
+.. [1] A. Gasparrini, B. Armstrong, M. G. Kenward, "Distributed lag non-linear models", Statistics in Medicine 29, 2010.
+.. [2] H. White, "A heteroskedasticity-consistent covariance matrix estimator", Econometrica 48, 1980.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
+from xosc_lateral.drivers.loop.autocorrelation import Whitener, positions_in_run
+from xosc_lateral.drivers.loop.candidates import Family
+from xosc_lateral.drivers.loop.dictionary import (
+    CROSS_BASIS,
+    MIN_SUPPORT_S,
+    NULL_DRAWS,
+    Quantities,
+    beside,
+    draw_null,
+    orthonormal,
+)
+from xosc_lateral.drivers.loop.model import Fitted
+from xosc_lateral.drivers.loop.significance import LoopSeed, as_one_degree, upper_tail
+from xosc_lateral.drivers.model.seeds import generator
+
+# Delays between which a course over time is linear: from what a driver sees ahead to where a bend has long ended. [s]
+DELAYS = (-5.0, -3.0, -1.0, 1.0, 3.0, 6.0, 9.0, 12.0, 15.0)
+LEVEL = 0.05  # p-value of the check up to which more is left than chance. [-]
+
+
+@dataclass(frozen=True, slots=True)
+class Omnibus:
+    """The check's outcome."""
+
+    p_value: float  # That chance explains as much of the innovations by whichever column; 1 without columns.
+    columns: tuple[str, ...]  # The column that explains most beside chance.
+    share: float  # Of the innovations' variance that its response explains, less what chance does. [-]
+
+    @property
+    def silent(self) -> bool:
+        """Whether no column predicts what is left."""
+        return self.p_value > LEVEL
+
+
+def tents(values: FloatArray, delays: tuple[float, ...], drive: IndexArray, step: float = 1.0) -> FloatArray:
+    """Values [any unit], shape (n,), through kernels that rise to each delay from the one before and fall to the next.
+
+    Each has gain 1; shape (n, delays). Before the first and after the last row of a drive its outermost row holds.
+    """
+    first, last = np.searchsorted(drive, drive, side="left"), np.searchsorted(drive, drive, side="right") - 1
+    rows, knots = np.arange(len(values)), np.asarray(delays) / step
+    reach = np.arange(int(np.floor(knots[0])), int(np.ceil(knots[-1])) + 1)
+    weights = np.stack([np.interp(reach, knots, unit, left=0.0, right=0.0) for unit in np.eye(len(knots))])
+    weights /= weights.sum(axis=1, keepdims=True)
+    shifted = (values[np.clip(rows - late, first, last)] for late in reach)
+    return np.asarray(sum(part[:, None] * weight for part, weight in zip(shifted, weights.T, strict=True)))
+
+
+def amid_runs(valid: BoolArray) -> BoolArray:
+    """Rows whose delays stay within their own run, shape (n,).
+
+    Runs begin and end with a lane change, say, and so do courses of what changes with it; what a car does just then is
+    its end, and no response.
+    """
+    before = positions_in_run(valid)
+    after = positions_in_run(valid[::-1])[::-1]
+    return np.asarray((before >= DELAYS[-1]) & (after >= -DELAYS[0]))
+
+
+def courses(quantities: Quantities, whitener: Whitener, amid: BoolArray) -> dict[tuple[str, ...], FloatArray]:
+    """Of every column, what its plain shapes can do over time: white, orthonormal, shape (rows amid runs, rank)."""
+    found: dict[tuple[str, ...], list[FloatArray]] = {}
+    compact, valid = whitener.compact, whitener.valid
+    for candidate, values in zip(quantities.candidates, quantities.values, strict=True):
+        if candidate.family is Family.PLAIN:
+            moved = tents(values.astype(np.float64), DELAYS, quantities.drive)[valid]
+            rows, power = compact.rows(moved)[amid[valid]], float(np.square(moved).sum())
+            if float(np.square(rows).sum()) > 1e-9 * power:  # it varies within drives
+                found.setdefault(candidate.columns, []).append(rows)
+    return {columns: orthonormal(np.concatenate(rows, axis=1), CROSS_BASIS) for columns, rows in found.items()}
+
+
+def check_remainder(
+    fitted: Fitted, quantities: Quantities, seed: np.random.SeedSequence, *, draws: int = NULL_DRAWS
+) -> Omnibus:
+    """Whether any column predicts what a fit leaves better than the same innovations in another order."""
+    whitener, coarse = fitted.whitener, fitted.coarse
+    amid = amid_runs(whitener.valid)
+    if amid.sum() < MIN_SUPPORT_S:
+        return Omnibus(1.0, (), 0.0)
+    known = orthonormal(whitener.rows(fitted.columns)[amid])
+    left = beside(known, whitener.rows(coarse.offset - fitted.columns @ fitted.sizes)[amid])
+    null = draw_null(left, coarse.drive[amid], generator(seed, LoopSeed.OMNIBUS), draws)
+    rows = np.concatenate([left[:, None], beside(known, null)], axis=1)
+    rows /= np.sqrt(np.mean(np.square(rows), axis=0))
+    best, largest, chosen, share = -np.inf, np.full(draws, -np.inf), tuple[str, ...](), 0.0
+    for columns, course in courses(quantities, whitener, amid).items():
+        basis = orthonormal(beside(known, course), CROSS_BASIS)
+        if not basis.shape[1]:
+            continue
+        explained = np.square(basis.T @ rows).sum(axis=0)
+        largest = np.maximum(largest, as_one_degree(explained[1:], basis.shape[1]))
+        score = float(as_one_degree(_beside_loud_rows(basis, rows[:, 0]), basis.shape[1]))
+        if score > best:
+            best, chosen = score, columns
+            share = max(0.0, float(explained[0] - basis.shape[1]) / len(left))
+    return Omnibus(upper_tail(best, largest), chosen, share) if chosen else Omnibus(1.0, (), 0.0)
+
+
+def _beside_loud_rows(basis: FloatArray, rows: FloatArray) -> float:
+    """Squares that an orthonormal basis explains, or, if that is less, beside the squares of the rows it rests on [2]_.
+
+    The null keeps how large innovations are, not where.
+    """
+    scores = basis.T @ rows
+    left = rows - basis @ scores
+    weighed = basis * (left / max(float(np.sqrt(np.mean(left**2))), 1e-300))[:, None]
+    return min(float(scores @ scores), float(scores @ np.linalg.pinv(weighed.T @ weighed) @ scores))
