@@ -12,6 +12,7 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.limits import DRIVE_SPAN, TIME
 from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.drives.frozen import frozen_rows
 from xosc_lateral.drivers.drives.markings import both_markings
 
 MAX_STEP = 0.25
@@ -20,8 +21,8 @@ MAX_STEP = 0.25
 LANE_WIDTHS = (2.0, 6.0)
 """What a lane's median width is believed to be. [m]"""
 
-MAX_MEDIAN_SPEED = 60.0
-"""A drive faster than this in the median has its speed in km/h. [m/s]"""
+MAX_MEDIAN_SPEED = 50.0
+"""A drive faster than this (180 km/h) in the median has its speed in km/h: 50 to 60 km/h are towns. [m/s]"""
 
 MAX_OUTSIDE = 0.01
 """Share of rows farther than one lane width from the lane centre that is still taken for glitches. [-]"""
@@ -80,6 +81,10 @@ def clean_drive(
     speed = columns.get("speed")
     if speed is not None and np.isfinite(speed).any():
         good &= np.isfinite(speed)
+    frozen = np.zeros(len(good), dtype=np.bool_)
+    if RUN not in columns:
+        frozen[good] = frozen_rows(columns["time"][good], offset[good], lane_width[good])
+        good &= ~frozen
     if good.sum() < 2:
         return None
     every = {key: values[good] for key, values in columns.items() if key not in DRIVE_COLUMNS}
@@ -88,7 +93,7 @@ def clean_drive(
     run = columns[RUN][good].astype(np.int64) if RUN in columns else None
     drive = Drive(
         name, columns["time"][good], offset[good], lane_width[good],
-        context, frozenset(levels & context.keys()), str(path), run, empty=empty,
+        context, frozenset(levels & context.keys()), str(path), run, empty=empty, frozen=int(frozen.sum()),
         valid_below=_stated(VALID_BELOW, columns, good, path), resolution=_stated(RESOLUTION, columns, good, path),
     )  # fmt: skip
     return drive if run is not None else _seen_through(drive)

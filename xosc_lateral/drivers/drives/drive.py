@@ -51,6 +51,8 @@ class Drive:
     empty : frozenset of str
         Columns of its table that hold nothing in this drive, and are not in `context`: there is none, all along (no
         lane to that side). Of a column that the table lacks, nothing is known.
+    frozen : int
+        Rows left out because a camera had repeated itself, see `frozen`.
     driver : str
         Who drove, where the table says; several drives may be one driver's.
     half_width : array, shape (n,), optional
@@ -76,6 +78,7 @@ class Drive:
     valid_below: float | None = None
     resolution: float | None = None
     driver: str = ""
+    frozen: int = 0
 
     def __post_init__(self) -> None:
         """Copy and freeze; refuse unequal lengths and what readers must have taken out."""

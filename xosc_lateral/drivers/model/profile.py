@@ -15,6 +15,7 @@ from msgspec import Meta, defstruct, field, structs
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError
+from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.model.core.base import CoreModel
 from xosc_lateral.drivers.model.core.registry import CORE_MODELS, any_model
 from xosc_lateral.drivers.model.effects import Effect, any_effect
@@ -143,6 +144,10 @@ class DriverProfile(Record, frozen=True):
         if not 0 < self.lane_width <= MAX_LANE_WIDTH:
             raise DriverProfileError(
                 f"profile {self.name}: lane width {self.lane_width} m, expected above 0, at most {MAX_LANE_WIDTH:g} m"
+            )
+        if abs(self.model.step - STEP) > 1e-9 * STEP:
+            raise DriverProfileError(
+                f"profile {self.name}: model.step {self.model.step} s; drivers have steps of {STEP} s"
             )
         for side in self.beside:
             if side not in SIDES:

@@ -24,7 +24,7 @@ from xosc_lateral.workflows.conversion.seen import NOTHING_SEEN, SAMPLE_STEP, Co
 from xosc_lateral.world.motion.deviation import SETTLING_TIME, SampledDeviation, deviation_through
 from xosc_lateral.world.motion.gaps import Gap
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
-from xosc_lateral.world.motion.segments import SegmentSpan, cut_segments
+from xosc_lateral.world.motion.segments import SegmentKind, SegmentSpan, cut_segments
 from xosc_lateral.world.motion.trajectory import WorldTrajectory, displace, distance_driven
 from xosc_lateral.world.road.network import RoadNetwork
 
@@ -46,6 +46,7 @@ def enrich(
     neighbours: Neighbours = Neighbours.BORROW,
     with_sensor: bool = False,
     uncertain: Collection[str] = (),
+    heeds_controllers: bool = True,
     at_least: float = 0.0,
 ) -> Enriched:
     """Enrich a played scenario.
@@ -76,8 +77,10 @@ def enrich(
         Add what the sensor added to the drives that each profile was fitted on. Nobody drives that: it is added after
         drivers have given way and after what nobody could drive was smoothed.
     uncertain : collection of str
-        Entities whose motion will be another one, since it depends on a vehicle under test: nobody responds to where
-        they nominally are, nor do they to others.
+        Entities whose motion will be another one, since it depends on a vehicle under test or a controller: nobody
+        responds to where they nominally are, nor do they to others.
+    heeds_controllers : bool
+        Where a controller of the player steers, nothing is sampled.
     at_least : float
         Time for which each segment is sampled, should it last longer in another run. [s]
 
@@ -88,7 +91,9 @@ def enrich(
     """
     trailers, words = trailers or {}, entropy or {}
     few = sum(len(entity.time) for entity in motion.entities) <= KEPT_ROWS and not context
-    run = (_run if few else _run.__wrapped__)(motion, network, frozenset(trailers), frozenset(uncertain), neighbours)
+    run = (_run if few else _run.__wrapped__)(
+        motion, network, frozenset(trailers), frozenset(uncertain), neighbours, heeds_controllers
+    )
 
     def drawn_for(index: int, attempt: int) -> _Drawn:
         entity = motion.entities[index]
@@ -219,8 +224,12 @@ def _run(
     pulled: frozenset[str],
     uncertain: frozenset[str],
     neighbours: Neighbours,
+    heeds_controllers: bool,
 ) -> _Run:
-    spans = tuple(cut_segments(entity, network, is_trailer=entity.name in pulled) for entity in motion.entities)
+    spans = tuple(
+        cut_segments(entity, network, is_trailer=entity.name in pulled, heeds_controllers=heeds_controllers)
+        for entity in motion.entities
+    )
     gaps = gaps_of(motion, [_nominal(entity) for entity in motion.entities])
     certain = tuple(one for one in motion.entities if one.name not in uncertain)
     return _Run(spans, gaps, replace(motion, entities=certain), {}, {})
@@ -229,7 +238,8 @@ def _run(
 def _draw(blank: _Drawn, driver: DriverProfile, seed: np.random.SeedSequence, with_sensor: bool, least: int) -> _Drawn:
     """With the offsets of one entity; each segment goes on to `least` rows."""
     if not blank.seen.segments:
-        return replace(blank, why="no road-following segment")
+        steered = any(span.kind is SegmentKind.STEERED for span in blank.spans)
+        return replace(blank, why="steered by its controller" if steered else "no road-following segment")
     sampler, sensor = OffsetSampler(driver, seed), known_sensor(driver) if with_sensor else None
     samples: list[_Sample] = []
     for span, knots, segment, side, responses in blank.seen.segments:

@@ -89,6 +89,7 @@ def fit(
     """
     from msgspec.structs import replace
 
+    from xosc_lateral.drivers.drives.frozen import summary_of
     from xosc_lateral.drivers.fitting.bands import WHOLE, split_by_band
     from xosc_lateral.drivers.fitting.fitting import fit_profile
     from xosc_lateral.drivers.model.core.base import ModelKind
@@ -102,7 +103,12 @@ def fit(
     has_prior = prior is not None and (is_partial or not by_default)
     if by_default and model_named(model).model.kind == ModelKind.TWO_LEVEL:
         has_prior = False
-    known = Provenance(source=source or ", ".join(given.inputs), licence=licence, inputs=dict(given.inputs))
+    known = Provenance(
+        source=source or ", ".join(given.inputs),
+        licence=licence,
+        inputs=dict(given.inputs),
+        fit=dict(summary_of(given.drives)),
+    )
     with naming(given):
         profile = fit_profile(
             given.drives,

@@ -33,7 +33,7 @@ DRIVES, BEFORE, AFTER = BLUE, MUTED, VERMILLION
 SPECTRUM_ROWS, CYCLE_ROWS = 512, 4096
 SURROUNDINGS_HZ = 0.07  # To either side of a cycle's line. [Hz]
 TWO_ERRORS = 2.0  # Half width of bands, in standard errors: chance leaves them 1 time in 20. [-]
-FLAT_AXIS_CM = 1.0  # A residual's axis reaches at least so far to both sides, lest noise look large. [cm]
+FLAT_AXIS = 10.0  # A residual's axis reaches at least so far to both sides, lest noise look large. [mm]
 NEGLIGIBLE = 1e-2  # Share of a column's range that is written as 0. [-]
 PANELS = 4  # Residual panels side by side.
 # Averaging times of the paths of the mean, of the spread, and of the spread with regimes. [s]
@@ -58,7 +58,7 @@ def residual_figure(result: LoopResult, what: str) -> Figure:
     figure = Figure(-(-len(names) // PANELS), PANELS, height=66.0, share_y="all", legend=True)
     for number, (panel, name) in enumerate(zip(figure.panels, names, strict=False)):
         _draw_residual(panel, result, f"{what} by {name}", name)
-        panel.y.label = "residual [cm]" if number % PANELS == 0 else ""
+        panel.y.label = "residual [mm]" if number % PANELS == 0 else ""
     return figure
 
 
@@ -77,21 +77,27 @@ def _draw_residual(panel: Panel, result: LoopResult, group: str, name: str) -> N
     """One column's fifths side by side, over what chance gives; the outer ones and the middle one say their value."""
     scored, middles = result.scored, result.scored.statistics.middles[name]
     place = np.arange(len(scored.real[group]))
-    floor = 100.0 * TWO_ERRORS * result.lack_of_fit.floors[group]
+    floor = 1000.0 * TWO_ERRORS * result.lack_of_fit.floors[group]
     panel.band(place, -floor, floor, MUTED, opacity=0.2, label="sampling error")
     panel.level(color=MUTED)
     for values, color, label in ((scored.before, BEFORE, "before"), (scored.after, AFTER, "after")):
-        residual = 100.0 * (scored.real[group] - values[group])
+        residual = 1000.0 * (scored.real[group] - values[group])
         panel.line(place, residual, color, label=label)
         panel.dots(place, residual, color)
     # what a smoothed switch decays to is as good as 0
     shown = np.where(np.abs(middles) < NEGLIGIBLE * np.nanmax(np.abs(middles)), 0.0, middles)
+    if name in WHOLE_NUMBERED:
+        shown = np.round(shown)
     last = len(middles) - 1
     panel.x.ticks = [
         (k, f"{100 * shown[k]:.0f} %" if name == "time" else _short(shown[k])) for k in sorted({0, last // 2, last})
     ]
-    panel.x.limits, panel.y.holds = (-0.3, last + 0.3), (-FLAT_AXIS_CM, FLAT_AXIS_CM)
+    panel.x.limits, panel.y.holds = (-0.3, last + 0.3), (-FLAT_AXIS, FLAT_AXIS)
     panel.title = column_label(name, hint=False)
+
+
+WHOLE_NUMBERED = frozenset(["lane_index", "lane_count"])
+"""Columns whose quantile groups have means that no reader can take for a lane."""
 
 
 def _short(value: float) -> str:

@@ -153,7 +153,7 @@ def meaning(finding: Finding, result: LoopResult) -> str:
             f"{others_words(finding, '`')} would explain it about as well; these drives cannot tell which it is."
         )
     measure = _PLAIN_GROUPS.get(finding.statistic, finding.measure)
-    change = f"{_cm(finding.error_before)} before, {_cm(finding.error_after)} now"
+    change = f"{_mm(finding.error_before)} before, {_mm(finding.error_after)} now"
     words.append(f"Error of the {measure} on held-out blocks: {change}.")
     return " ".join(word for word in words if word)
 
@@ -357,10 +357,6 @@ def _over_values(effect: ColumnEffect, column: str, seen: NDArray[np.float64]) -
     unit = "" if unit in ("", "-") else f" {unit}"
     name += f" ({HINTS[column]})" if column in HINTS else ""
     return f"As {name} goes from {low:.3g} to {high:.3g}{unit} (5 % and 95 % quantile of these drives)"
-
-
-def _cm(value: float) -> str:
-    return f"{100.0 * value:.1f}{GAP}cm"
 
 
 def _mm(value: float) -> str:

@@ -28,6 +28,7 @@ class SegmentKind(Enum):
     NOT_A_VEHICLE = "not a vehicle"
     TRAILER = "trailer"
     OFF_ROAD = "off the road"
+    STEERED = "steered by a controller"
     TRAJECTORY = "follows a trajectory"
     LATERAL_ACTION = "lateral action"
     NOT_DRIVING_LANE = "not in a driving lane"
@@ -71,15 +72,18 @@ class SegmentRow(Struct, frozen=True):
     """Where it begins; empty and 0 off the road."""
 
 
-def cut_segments(motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool = False) -> tuple[SegmentSpan, ...]:
+def cut_segments(
+    motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool = False, heeds_controllers: bool = True
+) -> tuple[SegmentSpan, ...]:
     """Cut an entity's whole motion into segments, each row into exactly one; teleports always cut.
 
-    `is_trailer`: the entity is pulled by another, and has no driver.
+    `is_trailer`: the entity is pulled by another, and has no driver; `heeds_controllers`: where one steers, no driver
+    does.
     """
     firsts: list[tuple[int, int]] = []  # rows at which segments begin, and their kinds
     before = -1
     for rows in blocks(len(motion.time)):
-        kinds = _row_kinds(motion, network, rows, is_trailer)
+        kinds = _row_kinds(motion, network, rows, is_trailer, heeds_controllers)
         placed_anew = (motion.activity[rows] & Activity.TELEPORTED) != 0
         cut = np.flatnonzero((np.diff(kinds, prepend=before) != 0) | placed_anew)
         firsts += zip((rows.start + cut).tolist(), kinds[cut].tolist(), strict=True)
@@ -91,16 +95,18 @@ def cut_segments(motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool
     )
 
 
-def _row_kinds(motion: EntityMotion, network: RoadNetwork, rows: slice, is_trailer: bool) -> IntArray:
+def _row_kinds(
+    motion: EntityMotion, network: RoadNetwork, rows: slice, is_trailer: bool, heeds_controllers: bool
+) -> IntArray:
     """Kind of each of these rows, as its index in `SegmentKind`; the first reason that applies, in the enum's order."""
     kinds = np.zeros(rows.stop - rows.start, dtype=np.int64)
-    for kind, applies in reversed(_reasons(motion, network, rows, is_trailer).items()):
+    for kind, applies in reversed(_reasons(motion, network, rows, is_trailer, heeds_controllers).items()):
         kinds[applies] = _KINDS.index(kind)
     return kinds
 
 
 def _reasons(
-    motion: EntityMotion, network: RoadNetwork, rows: slice, is_trailer: bool
+    motion: EntityMotion, network: RoadNetwork, rows: slice, is_trailer: bool, heeds_controllers: bool
 ) -> dict[SegmentKind, BoolArray | bool]:
     """Where in these rows each kind applies, by the enum's order."""
     activity, road, lane, s = motion.activity[rows], motion.road[rows], motion.lane[rows], motion.s[rows]
@@ -112,6 +118,7 @@ def _reasons(
         SegmentKind.NOT_A_VEHICLE: not motion.entity.is_vehicle,
         SegmentKind.TRAILER: is_trailer,
         SegmentKind.OFF_ROAD: ~on_road,
+        SegmentKind.STEERED: heeds_controllers and (activity & Activity.STEERED) != 0,
         SegmentKind.TRAJECTORY: (activity & Activity.TRAJECTORY) != 0,
         SegmentKind.LATERAL_ACTION: (activity & Activity.LATERAL) != 0,
         SegmentKind.NOT_DRIVING_LANE: on_road & ~in_driving_lane,
