@@ -45,7 +45,7 @@ from xosc_lateral.drivers.model.profile import DriverProfile, Metadata, Provenan
 from xosc_lateral.drivers.model.sensor.model import SensorModel
 from xosc_lateral.files.drives import drives_of_table, read_drives
 from xosc_lateral.files.hashes import parsed_hash
-from xosc_lateral.workflows.recordings.importers.dlr_ht import HIGHEST, import_dlr_ht
+from xosc_lateral.workflows.recordings.importers.dlr_ht import HIGHEST_FREQUENCY, import_dlr_ht
 from xosc_lateral.workflows.recordings.importers.openacc import import_openacc
 from xosc_lateral.workflows.recordings.importers.table import write_imported
 
@@ -144,7 +144,7 @@ def _rural(gnss: Sequence[Path], model: str) -> tuple[DriverProfile, FastPart]:
     bands = tuple(replace(band, source=GNSS) for band in profile.validity.bands)
     profile = replace(profile, validity=replace(profile.validity, bands=bands, roads=("rural road",)))
     runs = driver_runs(all_runs(drives), drives)[0]
-    return profile, fast_part_of_runs(runs, profile.validity.highest or PASS_BAND_EDGES, GNSS)
+    return profile, fast_part_of_runs(runs, profile.validity.highest_frequency or PASS_BAND_EDGES, GNSS)
 
 
 BANDS = (0.04, 0.08, 0.12, 0.2, 0.32, 0.5, 1.0)
@@ -189,7 +189,7 @@ class Seen:
     def completed(self, profile: DriverProfile, runs: Sequence[Run]) -> DriverProfile:
         """A profile of some runs with fast movement, and what it is valid for."""
         known = replace(measured(runs), roads=("motorway",))
-        return with_fast_movement(profile, known, HIGHEST, self.fast, MOTORWAY)
+        return with_fast_movement(profile, known, HIGHEST_FREQUENCY, self.fast, MOTORWAY)
 
     def of(self, holds: Callable[[Run], bool]) -> Seen:
         """Some of the runs."""

@@ -124,7 +124,7 @@ def test_a_second_recording_gives_back_what_the_provider_took() -> None:
     assert powers[0] == pytest.approx(1.0, abs=0.4)
     assert powers[1] < 0.02
     assert [band.high for band in both.validity.bands] == [0.15, 1.5]
-    assert alone.validity.highest == 0.1
+    assert alone.validity.highest_frequency == 0.1
     by_prior = fit_profile(smoothed, name="prior", prior=fit_profile(clean, name="clean"))
     assert power_at(by_prior, 0.3, 25.0) == pytest.approx(power_at(both, 0.3, 25.0), rel=0.3)
     for profile in (both, by_prior):  # what is slow is the smoothed recording's in any case

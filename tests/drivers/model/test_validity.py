@@ -33,8 +33,8 @@ def test_validity_is_said_in_a_line_and_kept_in_the_file(profile: DriverProfile)
         "0 to 0.15 Hz (tracks); 0.15 to 1 Hz (GNSS, 50 to 90 km/h), above: assumed; 72 to 144 km/h; "
         "lanes of 3.50 to 3.80 m; motorway"
     )
-    assert KNOWN.highest == 1.0
-    assert Validity().in_words() == "" and Validity().highest is None
+    assert KNOWN.highest_frequency == 1.0
+    assert Validity().in_words() == "" and Validity().highest_frequency is None
     assert DriverProfile.from_dict(profile.to_dict()).validity == KNOWN
     assert "validity" not in replace(profile, validity=Validity()).to_dict()
 

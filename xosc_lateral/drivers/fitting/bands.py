@@ -27,10 +27,10 @@ from xosc_lateral.drivers.model.core.base import ModelKind
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.validity import Band, Validity
 
-WHOLE = 0.5
+KEEPING_BAND = 0.5
 """A recording that is valid up to here shows how people keep their lane; one of less needs another beside it. [Hz]"""
 
-OUTERMOST = 0.01
+TAIL_SHARE = 0.01
 """Share of the rows left out at each end of the speeds and lane widths that count as measured. [-]"""
 
 
@@ -40,13 +40,13 @@ def split_by_band(drives: Sequence[Drive]) -> tuple[list[Drive], list[Drive]]:
     Raises `DriverProfileError` for more than two bands, or two that both lack fast movement.
     """
     bands = sorted({drive.valid_below or np.inf for drive in drives})
-    if len(bands) == 1 or bands[0] >= WHOLE:
+    if len(bands) == 1 or bands[0] >= KEEPING_BAND:
         return list(drives), []
-    if len(bands) > 2 or bands[1] < WHOLE:
+    if len(bands) > 2 or bands[1] < KEEPING_BAND:
         stated = ", ".join(f"{band:g}" for band in bands)
         raise DriverProfileError(
             f"tables that are valid below {stated} Hz: at most two bands can be combined, of which the upper reaches "
-            f"{WHOLE:g} Hz"
+            f"{KEEPING_BAND:g} Hz"
         )
     slow = [drive for drive in drives if (drive.valid_below or np.inf) == bands[0]]
     return slow, [drive for drive in drives if (drive.valid_below or np.inf) != bands[0]]
@@ -65,7 +65,7 @@ def measured(runs: Sequence[Run], highest: float | None = None, source: str = ""
 
 
 def _range(parts: Sequence[FloatArray]) -> tuple[float, float]:
-    low, high = np.quantile(np.concatenate(parts), (OUTERMOST, 1.0 - OUTERMOST)).tolist()
+    low, high = np.quantile(np.concatenate(parts), (TAIL_SHARE, 1.0 - TAIL_SHARE)).tolist()
     low, high = all_significant((low, high), 5)
     return low, high
 
@@ -99,10 +99,10 @@ def in_bands(
     highest = stated or visible_below(profile)
     if prior is not None and highest < PASS_BAND_EDGES:
         return with_fast_movement(profile, known, highest, fast_part_of(prior), names)
-    if highest < WHOLE and stated is not None:
+    if highest < KEEPING_BAND and stated is not None:
         return replace(with_fast_part(profile, None, highest), validity=known)
     known = measured(runs, highest, names)
-    if highest >= WHOLE and shows_growth(runs):
+    if highest >= KEEPING_BAND and shows_growth(runs):
         profile = with_fast_part(profile, fast_part_of_runs(runs, highest, names), SPLIT_AT)
     return replace(profile, validity=known)
 
@@ -127,33 +127,34 @@ def visible_below(profile: DriverProfile) -> float:
     if sensor is None:
         return PASS_BAND_EDGES
     rounding = 2.0 * STEP * uniform_variance(sensor.rounding)
-    hidden = density_of(profile)(SEEN) < sensor.density(SEEN) + rounding
-    return PASS_BAND_EDGES if not hidden.any() else float(np.round(SEEN[np.argmax(hidden)], 2))
+    hidden = density_of(profile)(COMPARED_FREQUENCIES) < sensor.density(COMPARED_FREQUENCIES) + rounding
+    return PASS_BAND_EDGES if not hidden.any() else float(np.round(COMPARED_FREQUENCIES[np.argmax(hidden)], 2))
 
 
-SEEN = np.linspace(0.02, PASS_BAND_EDGES, 149)
+COMPARED_FREQUENCIES = np.linspace(0.02, PASS_BAND_EDGES, 149)
 """Frequencies at which driver and sensor are compared. [Hz]"""
 
-LEAST_SHARE = 0.2
+MINIMUM_POWER_SHARE = 0.2
 """Share of other drivers' power below which movement falls as no driver's does: real ones differ by a factor of two to
 either side. [-]"""
 
 
 def smoothed_above(profile: DriverProfile, reference: DriverProfile) -> float | None:
-    """Frequency above which a profile's power is less than `LEAST_SHARE` of that of real drivers at its speed. [Hz]
+    """Frequency above which a profile's power is less than `MINIMUM_POWER_SHARE` of that of real drivers at its speed. [Hz]
 
-    None where it is not, up to `WHOLE`. `reference`: profile of those.
+    None where it is not, up to `KEEPING_BAND`. `reference`: profile of those.
     """
     speed = profile.validity.speed
     if speed is None or profile.model.kind != ModelKind.AUTOREGRESSIVE:
         return None
-    at = SEEN[(SEEN >= 0.1) & (min(WHOLE, profile.validity.highest or WHOLE) >= SEEN)]
+    top = min(KEEPING_BAND, profile.validity.highest_frequency or KEEPING_BAND)
+    at = COMPARED_FREQUENCIES[(COMPARED_FREQUENCIES >= SPLIT_AT) & (top >= COMPARED_FREQUENCIES)]
     fast = fast_part_of(reference)
     driven = np.array([0.5 * sum(speed)])
     strength = sum(
         float(found[0]) for effect in fast.effects if (found := effect.strength(STEP, {"speed": driven})) is not None
     )
-    low = density_of(profile)(at) < LEAST_SHARE * np.exp(2.0 * strength) * fast.density(at)
+    low = density_of(profile)(at) < MINIMUM_POWER_SHARE * np.exp(2.0 * strength) * fast.density(at)
     if not len(at) or not low[-1]:
         return None
     return float(np.round(at[len(at) - int(np.argmin(low[::-1])) if not low.all() else 0], 2))

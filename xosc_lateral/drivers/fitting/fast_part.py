@@ -61,23 +61,23 @@ LEAST_WINDOWS = 16
 GROWTH_BAND = (0.12, 0.5)
 """In which growth with the speed is looked for: slower, drivers use their lane as they like. [Hz]"""
 
-SURE = 2.6
+ERROR_FACTOR = 2.6
 """Standard errors by which growth has to be there, and may differ from the law: a chance of 1 %. [-]"""
 
 ROLL_OFF = 1.5
 """The coarse part of a recording ends at so many times the frequency that it is valid to: its power there is kept to
 2 %, and nothing is counted twice beyond. At 1.2 the classifier's AUC below 0.1 Hz rises from 0.52 to 0.61. [-]"""
 
-ORDER = 10
+ROLL_OFF_ORDER = 10
 """Of the roll-off: power 1 / (1 + (f / corner)^10). [-]"""
 
-RISE = (0.8, 1.1)
+RISE_SHARES = (0.8, 1.1)
 """Shares of that corner from which on the fine part makes up for what the coarse lacks, and makes up for all. [-]"""
 
 SPLIT_AT = 0.1
 """Of a recording that shows all of it: movement above grows with the speed, below it does not. [Hz]"""
 
-FINE = FitSettings(n_knots=101, n_taps=151)
+FINE_SETTINGS = FitSettings(n_knots=101, n_taps=151)
 """Knots every 0.025 Hz: the power falls by 20 dB from 0.1 to 0.2 Hz; kernels of 14 s leak into that. [-]"""
 
 VOLATILE_WINDOW = 5.0
@@ -139,7 +139,7 @@ def fast_part_of_runs(runs: Sequence[Run], highest: float, source: str) -> FastP
     law = growth_with_speed(float(speed.mean())) if known else None
     if law is not None:
         slope, error = _growth(power, speed)
-        law = law if abs(slope - 1.0) <= SURE * error else None
+        law = law if abs(slope - 1.0) <= ERROR_FACTOR * error else None
     frequency: FloatArray = np.asarray(np.fft.rfftfreq(round(WINDOW / STEP), STEP), dtype=np.float64)
     steady = power * np.exp(-2.0 * _strengths(speed, law))[:, None]
     typical = np.exp(np.log(steady).mean(axis=0) + np.euler_gamma)
@@ -161,7 +161,7 @@ def shows_growth(runs: Sequence[Run]) -> bool:
     if not np.isfinite(speed).all() or np.ptp(speed) == 0.0:
         return False
     slope, error = _growth(power, speed)
-    return slope > SURE * error and abs(slope - 1.0) <= SURE * error
+    return slope > ERROR_FACTOR * error and abs(slope - 1.0) <= ERROR_FACTOR * error
 
 
 def _windows(runs: Sequence[Run]) -> tuple[FloatArray, FloatArray]:
@@ -194,12 +194,12 @@ def _growth(power: FloatArray, speed: FloatArray) -> tuple[float, float]:
     score = about * (level - level.mean() - slope * about)
     # neighbours share half their rows, and a manoeuvre lasts: products up to four windows apart count (Bartlett)
     variance = float(score @ score) + sum(
-        2.0 * (1.0 - lag / LAGS) * float(score[lag:] @ score[:-lag]) for lag in range(1, LAGS)
+        2.0 * (1.0 - lag / LAG_COUNT) * float(score[lag:] @ score[:-lag]) for lag in range(1, LAG_COUNT)
     )
     return slope, float(np.sqrt(max(variance, 0.0))) / size
 
 
-LAGS = 5
+LAG_COUNT = 5
 
 
 def _strengths(speed: FloatArray, law: Piecewise | None) -> FloatArray:
@@ -284,7 +284,7 @@ def fast_part_of(profile: DriverProfile) -> FastPart:
     )
     volatility = _autoregressive(profile).fine_volatility
     known = profile.validity
-    highest, speed = known.highest or np.inf, known.speed
+    highest, speed = known.highest_frequency or np.inf, known.speed
     return FastPart(density_of(profile), effects, volatility, highest, f"profile {profile.name}", speed)
 
 
@@ -296,23 +296,26 @@ def with_fast_part(profile: DriverProfile, fast: FastPart | None, below: float) 
     """
     model, corner = _autoregressive(profile), ROLL_OFF * below
     hertz = FREQUENCIES / (COARSE_EVERY * model.step)
-    coarse = scaled_spectrum(model.coarse, np.sqrt(_kept(hertz, corner)))
-    at = np.linspace(0.0, 0.5 / model.step, FINE.n_knots)
-    own = _fine_power(model, at) * _kept(at, corner)
+    coarse = scaled_spectrum(model.coarse, np.sqrt(_roll_off(hertz, corner)))
+    at = np.linspace(0.0, 0.5 / model.step, FINE_SETTINGS.n_knots)
+    own = _fine_power(model, at) * _roll_off(at, corner)
     if fast is not None:
         power = fast.density(np.maximum(at, at[1])) / (2.0 * model.step * profile.lane_width**2)
-        share = np.sin(0.5 * np.pi * np.clip((at / corner - RISE[0]) / (RISE[1] - RISE[0]), 0.0, 1.0)) ** 2
+        share = (
+            np.sin(0.5 * np.pi * np.clip((at / corner - RISE_SHARES[0]) / (RISE_SHARES[1] - RISE_SHARES[0]), 0.0, 1.0))
+            ** 2
+        )
         own = own + share**2 * np.maximum(power - own - coarse_power(coarse, at * model.step), 0.0)
     volatility = model.fine_volatility if fast is None or corner > BORDER else fast.volatility
-    fine = shaped(np.sqrt(own / NOISE_VARIANCE), FINE)
+    fine = shaped(np.sqrt(own / NOISE_VARIANCE), FINE_SETTINGS)
     made = replace(model, coarse=coarse, fine=fine, fine_volatility=volatility)
     kept = tuple(effect for effect in profile.effects if not _describes_fast_movement(effect))
     return replace(profile, model=rounded(made), effects=(*kept, *(() if fast is None else fast.effects)))
 
 
-def _kept(hertz: FloatArray, corner: float) -> FloatArray:
+def _roll_off(hertz: FloatArray, corner: float) -> FloatArray:
     """Share of a recording's power that is kept, shape of the frequencies. [-]"""
-    return np.asarray(1.0 / (1.0 + (hertz / corner) ** ORDER))
+    return np.asarray(1.0 / (1.0 + (hertz / corner) ** ROLL_OFF_ORDER))
 
 
 def _fine_power(model: AutoregressiveModel, hertz: FloatArray) -> FloatArray:

@@ -72,7 +72,7 @@ class Validity(Record, frozen=True):
                 raise DriverProfileError(f"validity: {name} from {interval[0]:g} to {interval[1]:g}")
 
     @property
-    def highest(self) -> float | None:
+    def highest_frequency(self) -> float | None:
         """Frequency up to which the movement is measured. [Hz]"""
         return max((band.high for band in self.bands), default=None)
 

@@ -90,7 +90,7 @@ def fit(
     from msgspec.structs import replace
 
     from xosc_lateral.drivers.drives.frozen import summary_of
-    from xosc_lateral.drivers.fitting.bands import WHOLE, split_by_band
+    from xosc_lateral.drivers.fitting.bands import KEEPING_BAND, split_by_band
     from xosc_lateral.drivers.fitting.fitting import fit_profile
     from xosc_lateral.drivers.model.core.base import ModelKind
     from xosc_lateral.drivers.model.core.registry import model_named
@@ -98,7 +98,7 @@ def fit(
 
     given = given_drives(drives, columns).valid_below(valid_below)
     slow, fast = split_by_band(given.drives)
-    is_partial = not fast and any(drive.valid_below is not None and drive.valid_below < WHOLE for drive in slow)
+    is_partial = not fast and any(drive.valid_below is not None and drive.valid_below < KEEPING_BAND for drive in slow)
     by_default = isinstance(prior, str) and prior == PRIOR
     has_prior = prior is not None and (is_partial or not by_default)
     if by_default and model_named(model).model.kind == ModelKind.TWO_LEVEL:
@@ -124,13 +124,13 @@ def fit(
 
 def band_warnings(profile: DriverProfile) -> list[str]:
     """What to know about the band that a profile's drives show, in lines."""
-    from xosc_lateral.drivers.fitting.bands import WHOLE, smoothed_above
+    from xosc_lateral.drivers.fitting.bands import KEEPING_BAND, smoothed_above
     from xosc_lateral.drivers.model.core.base import ModelKind
 
-    highest = profile.validity.highest
+    highest = profile.validity.highest_frequency
     if profile.model.kind != ModelKind.AUTOREGRESSIVE:
         return []
-    if highest is not None and highest < WHOLE:
+    if highest is not None and highest < KEEPING_BAND:
         what = f"{profile.name} moves below {highest:g} Hz alone, as its drives show it"
         return [f"{what}: a second table or --prior gives it what is faster"]
     above = smoothed_above(profile, given_profile(PRIOR))

@@ -42,34 +42,34 @@ LICENCE = (
 LANE_WIDTH = 3.5
 """Assumed: usual on rural roads; the campaign gives none. [m]"""
 
-HIGHEST = 1.5
+HIGHEST_FREQUENCY = 1.5
 """Runs at 5 Hz keep what is slower; the noise there (2e-8 m2/Hz at most) is a tenth of the movement. [Hz]"""
 
-GRAIN = 1e-3
+POSITION_RESOLUTION = 1e-3
 """Noise of the positions. [m]"""
 
-GRID = 1.0
+GRID_STEP = 1.0
 """Points of the centre line are so far apart. [m]"""
 
 SMOOTHING, ROUNDS = 12.0, 5
 """Standard deviation of the Gaussian by which the centre line follows the mean path [m], and how often."""
 
-RETURN = 5.0
+RETURN_DISTANCE = 5.0
 """A lap is over where a car is as near to where it began [m] ..."""
 
-SHORTEST_LAP = 500.0
+MINIMUM_LAP = 500.0
 """... and has come so far since. [m]"""
 
-LEAST_SPEED = 5.0
+MINIMUM_SPEED = 5.0
 """Slower rows (standing start, end of a test) say nothing about the lane's centre. [m/s]"""
 
-IN_LANE = 0.5
+LANE_SHARE = 0.5
 """Of the lane's width: rows further from its centre are elsewhere. [-]"""
 
-LONGEST_STEP = 0.25
+MAXIMUM_STEP = 0.25
 """Rows further apart in time are no longer one run. [s]"""
 
-SKIPPED = 50
+HEADER_LINES = 50
 """Lines before the header, at most: the campaign's files have five. [-]"""
 
 
@@ -132,7 +132,7 @@ def _cars(path: Path) -> list[_Car]:
     cars = []
     for k in numbers:
         speed = values[f"Speed{k}"]
-        if np.isfinite(speed).any() and np.nanmax(speed) > LEAST_SPEED:
+        if np.isfinite(speed).any() and np.nanmax(speed) > MINIMUM_SPEED:
             ahead = values.get(f"IVS{k - 1}", nobody)
             there = np.isfinite(values[f"E{k}"]) & np.isfinite(values[f"N{k}"]) & np.isfinite(speed)
             columns = (values["Time"], values[f"E{k}"], values[f"N{k}"], speed, ahead)
@@ -144,7 +144,7 @@ def _read(path: Path) -> tuple[pd.DataFrame, int]:
     """The table below whatever stands above its header, and the header's line."""
     with open_source(path) as opened:
         lines = unpacked_text(opened).read().decode("utf-8", "replace").splitlines(keepends=True)
-    heads = [k for k, line in enumerate(lines[:SKIPPED]) if line.split(",")[0].strip().lower() == "time"]
+    heads = [k for k, line in enumerate(lines[:HEADER_LINES]) if line.split(",")[0].strip().lower() == "time"]
     if not heads:
         raise FormatError("no header that begins with Time; is this a file of OpenACC?", path=path, line=1)
     frame = pd.read_csv(io.StringIO("".join(lines[heads[0] :])), low_memory=False)
@@ -164,7 +164,7 @@ def _numbers(column: pd.Series, path: Path, first: int) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class _Loop:
-    """A closed line with points about `GRID` apart, shape (n, 2). [m]"""
+    """A closed line with points about `GRID_STEP` apart, shape (n, 2). [m]"""
 
     points: FloatArray
 
@@ -206,9 +206,9 @@ class _Loop:
         near = cKDTree(points).query(where)[1]
         along = np.stack([normals[:, 1], -normals[:, 0]], axis=1)
         index: FloatArray = np.asarray(near, dtype=np.float64)
-        for _ in range(PLACING):
+        for _ in range(PLACING_STEPS):
             centre, _, tangent = self._at(index, points, normals, along)
-            index = index + np.einsum("ij,ij->i", where - centre, tangent) / GRID
+            index = index + np.einsum("ij,ij->i", where - centre, tangent) / GRID_STEP
         centre, normal, _ = self._at(index, points, normals, along)
         return np.asarray(index % len(points)), np.einsum("ij,ij->i", where - centre, normal)
 
@@ -226,7 +226,7 @@ class _Loop:
         return found
 
 
-PLACING = 4
+PLACING_STEPS = 4
 """Steps of the search for the point of a line that lies abreast: each leaves less than a tenth of the last. [-]"""
 
 
@@ -236,7 +236,7 @@ def _centre_line(cars: Sequence[_Car]) -> _Loop:
     x, y = (np.concatenate([getattr(car, name)[_moves(car)] for car in cars]) for name in ("x", "y"))
     for _ in range(ROUNDS):
         index, offset = loop.place(x, y)
-        near = np.abs(offset) < IN_LANE * LANE_WIDTH
+        near = np.abs(offset) < LANE_SHARE * LANE_WIDTH
         at, n = np.round(index[near]).astype(np.int64) % len(loop.points), len(loop.points)
         sums, counts = (
             np.bincount(at, each, minlength=n).astype(np.float64) for each in (offset[near], np.ones(len(at)))
@@ -247,11 +247,11 @@ def _centre_line(cars: Sequence[_Car]) -> _Loop:
 
 
 def _moves(car: _Car) -> BoolArray:
-    return np.asarray(car.speed > LEAST_SPEED)
+    return np.asarray(car.speed > MINIMUM_SPEED)
 
 
 def _first_lap(cars: Sequence[_Car]) -> FloatArray:
-    """The first closed lap of the car that goes furthest, shape (n, 2), points `GRID` apart, its ends met. [m]"""
+    """The first closed lap of the car that goes furthest, shape (n, 2), points `GRID_STEP` apart, its ends met. [m]"""
     car = max(cars, key=lambda one: float(np.hypot(np.diff(one.x), np.diff(one.y)).sum()))
     moves = _moves(car)
     path = np.stack([car.x[moves], car.y[moves]], axis=1)
@@ -259,7 +259,7 @@ def _first_lap(cars: Sequence[_Car]) -> FloatArray:
     for begin in range(0, len(path), max(1, len(path) // 100)):  # the very first metres may lie beside the loop
         gone = way - way[begin]
         back = np.hypot(*(path - path[begin]).T)
-        returned = np.flatnonzero((gone > SHORTEST_LAP) & (back < RETURN))
+        returned = np.flatnonzero((gone > MINIMUM_LAP) & (back < RETURN_DISTANCE))
         if len(returned):
             end = returned[0] + int(np.argmin(back[returned[0] : returned[0] + 50]))
             return _resampled(path[begin:end])
@@ -267,10 +267,10 @@ def _first_lap(cars: Sequence[_Car]) -> FloatArray:
 
 
 def _resampled(path: FloatArray) -> FloatArray:
-    """A closed line at even steps of about `GRID`, what is missing between its ends spread over all of it."""
+    """A closed line at even steps of about `GRID_STEP`, what is missing between its ends spread over all of it."""
     closed = np.concatenate([path, path[:1]])
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
-    even = np.linspace(0.0, way[-1], round(way[-1] / GRID) + 1)[:-1]
+    even = np.linspace(0.0, way[-1], round(way[-1] / GRID_STEP) + 1)[:-1]
     return np.stack([np.interp(even, way, closed[:, k]) for k in range(2)], axis=1)
 
 
@@ -280,13 +280,13 @@ def _even(points: FloatArray) -> _Loop:
 
     closed = np.concatenate([points, points[:1]])
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
-    even = np.linspace(0.0, way[-1], round(way[-1] / GRID) + 1)[:-1]
+    even = np.linspace(0.0, way[-1], round(way[-1] / GRID_STEP) + 1)[:-1]
     return _Loop(np.asarray(CubicSpline(way, closed, bc_type="periodic")(even)))
 
 
 def _smooth(values: FloatArray) -> FloatArray:
     """Periodic columns through the Gaussian, shape of the values, (n,) or (n, 2)."""
-    frequency = np.fft.rfftfreq(len(values), GRID)
+    frequency = np.fft.rfftfreq(len(values), GRID_STEP)
     gain = np.exp(-0.5 * (2.0 * np.pi * SMOOTHING * frequency) ** 2)
     spectrum = np.fft.rfft(values, axis=0)
     return np.asarray(np.fft.irfft((spectrum.T * gain).T, len(values), axis=0))
@@ -297,8 +297,8 @@ def _placed(cars: Sequence[_Car], loop: _Loop, lane_width: float) -> list[pd.Dat
     frames = []
     for car in cars:
         index, offset = loop.place(car.x, car.y)
-        inside = np.abs(offset) <= IN_LANE * lane_width
-        new = np.r_[True, (np.diff(car.time) > LONGEST_STEP) | (np.diff(inside.astype(np.int8)) != 0)]
+        inside = np.abs(offset) <= LANE_SHARE * lane_width
+        new = np.r_[True, (np.diff(car.time) > MAXIMUM_STEP) | (np.diff(inside.astype(np.int8)) != 0)]
         frames.append(
             pd.DataFrame(
                 {
@@ -309,8 +309,8 @@ def _placed(cars: Sequence[_Car], loop: _Loop, lane_width: float) -> list[pd.Dat
                     "speed": car.speed.round(4),
                     "curvature": bends[np.floor(index).astype(np.int64) % len(bends)].round(7),
                     "lead_distance": np.where(car.lead > 0.0, car.lead, np.nan).round(3),
-                    VALID_BELOW: HIGHEST,
-                    RESOLUTION: GRAIN,
+                    VALID_BELOW: HIGHEST_FREQUENCY,
+                    RESOLUTION: POSITION_RESOLUTION,
                     RUN: np.cumsum(new),
                     "state": np.where(inside, KEPT_ROWS, "outside the lane"),
                 }
