@@ -17,8 +17,8 @@ from xosc_lateral.files.opendrive.write import SHOULDER, WIDTH_PIECE, WrittenLan
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.workflows.recordings.importers import dlr_ht, levelx
 from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH, Tracks, read_tracks, tracks_of
-from xosc_lateral.workflows.recordings.lane_shapes import LaneShape
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
+from xosc_lateral.workflows.recordings.lane_shapes import LaneShape
 from xosc_lateral.workflows.recordings.recorded import Track
 from xosc_lateral.workflows.recordings.roads_from_lanes import DrivenLane, roads_of_lanes
 from xosc_lateral.workflows.recordings.sumo import NET_ENDINGS, first_tag, read_fcd, read_net
