@@ -8,14 +8,14 @@ DOCS_STAMP := $(VENV)/.installed-docs
 
 .PHONY: laboratory fuzz lock install-locked sbom reproducible licences test-matrix demo test fast style lint format docs schema profiles refined templates loop-dlr picture map clean
 
-# Python compiles what it imports when it does: a fifth of what is installed.
-QUICK := --disable-pip-version-check --progress-bar on --no-compile
+# Python compiles what it imports when it does: a fifth of what is installed. What is installed is not listed.
+QUICK := --disable-pip-version-check --quiet --progress-bar on --no-compile
 
 # What running needs, and no more.
 $(STAMP): pyproject.toml
 	@echo "Setting up $(VENV): numpy, scipy, pandas, pyarrow, numba ... (a minute or two, 0.8 GB)"
 	@$(PYTHON) -m venv $(VENV)
-	@$(BIN)/python -m pip install --disable-pip-version-check --progress-bar on --upgrade pip | grep -v '^Requirement' || true
+	@$(BIN)/python -m pip install --disable-pip-version-check --quiet --upgrade pip
 	@$(BIN)/python -m pip install $(QUICK) -e .
 	@touch $@
 

@@ -14,7 +14,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.segment import CONTEXT_UNITS
-from xosc_lateral.drivers.drives.cleaning import DRIVE_COLUMNS, MAX_MEDIAN_SPEED, MAX_OUTSIDE, clean_drive
+from xosc_lateral.drivers.drives.cleaning import DRIVE_COLUMNS, LANE_WIDTHS, MAX_MEDIAN_SPEED, MAX_OUTSIDE, clean_drive
 from xosc_lateral.drivers.drives.cuts import MIN_RUN
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.model.plausibility import drives_nobody, first_implausible, implausible, implausible_rows
@@ -26,6 +26,10 @@ from xosc_lateral.files.tables import comma_numbers, indicators, listed, numbers
 
 LABELS = ("drive", "driver")
 """Columns that say which drive a row is of, and whose."""
+
+WHEEL_WIDTH = 2.5
+"""Lanes of roads driven at 40 km/h and more are wider but for the left one at roadworks; from the wheels of a car
+(1.5 to 1.6 m apart) one of 3.0 to 3.75 m has 1.4 to 2.25 m. [m]"""
 
 MAX_LEVELS = 12
 """A column of whole numbers with at most so many values holds levels, not a quantity."""
@@ -108,7 +112,28 @@ def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.Dat
     if "time" in kept and not pd.api.types.is_numeric_dtype(kept["time"]):
         seconds = seconds_of_stamps(kept["time"], path, mapping.time_zone, kept.get("drive"))
         kept["time"] = kept["time"] if seconds is None else pd.Series(seconds, index=table.index)
-    return pd.DataFrame(kept)
+    recorded = {name: value for name, value in mapping.recorded.items() if name not in kept}
+    return from_middle(pd.DataFrame(kept).assign(**recorded), mapping, path)
+
+
+def from_middle(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.DataFrame:
+    """The table with distances to the markings from the vehicle's middle: those from its wheels make lanes narrow.
+
+    Raises `FormatError`: they do, and the mapping does not say how far apart the wheels are.
+    """
+    if not {"distance_left", "distance_right"} <= set(table.columns):
+        return table
+    left, right = (numbers_of(table[name], path, name) for name in ("distance_left", "distance_right"))
+    if mapping.wheel_track is None:
+        known = (left + right)[np.isfinite(left + right)]
+        median = float(np.median(known)) if len(known) else 0.0
+        if 0.5 * LANE_WIDTHS[0] <= median < WHEEL_WIDTH:
+            what = f"lanes of {median:.2f} m (median): distances may be from the wheels or sides, not from the middle"
+            advice = "the mapping says how far apart these are, wheel_track = 1.6, or 0"
+            raise FormatError(f"{what}; {advice}", path=path, element="columns 'distance_left', 'distance_right'")
+        return table
+    width = left + right + mapping.wheel_track
+    return table.drop(columns=["distance_left", "distance_right"]).assign(offset=0.5 * (right - left), lane_width=width)
 
 
 def _numeric_columns(table: pd.DataFrame, path: Path) -> dict[str, FloatArray]:

@@ -177,6 +177,15 @@ def test_osi(case: Case, tmp_path: Path) -> None:
     holds_truth(case, table, rows=int(case.duration * case.rate), accuracy=0.02)  # chords of 10 m in the curve: 1.6 cm
 
 
+@pytest.mark.parametrize("case", [Case(rate=10.0), Case("left", True, rate=10.0, radius=800.0)], ids=str)
+def test_osi_lanes_that_are_shown_piece_by_piece_and_without_a_direction(case: Case, tmp_path: Path) -> None:
+    pytest.importorskip("osi_utilities", reason="extra `osi` is not installed")
+    path = write_osi_trace(case, tmp_path, directions=False, horizon=400.0)
+    found = import_drives("osi", path, keep_cut=True).to_frame()
+    assert not (found["state"] == "no lane")[found["drive"] != "4"].any()  # the oncoming car comes from beyond
+    holds_truth(case, import_drives("osi", path).to_frame(), rows=400, accuracy=0.02)
+
+
 CLOCKS = {
     "s": lambda t: t,
     "epoch s": lambda t: 1.7e9 + t,

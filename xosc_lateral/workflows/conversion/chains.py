@@ -47,9 +47,10 @@ def chains_of(
     is_placed = first is not None and first.span.first == 0 and not tows
     ring = _ring(first or longest, from_middle=not is_placed)
     placed = _offset_t(entity, network, ring.origin) if is_placed else None
-    chains = [OffsetChain(entity.name, added, ring, placed)]
+    is_steered = bool(entity.motion.activity[0] & Activity.STEERED)
+    chains = [] if is_steered else [OffsetChain(entity.name, added, ring, placed)]
     for item in items:
-        if not item.adds:
+        if not item.adds and not item.steers:
             found = max(_in_phase(entity, motion, item.path, items), key=_length, default=longest)
             chains.append(OffsetChain(entity.name, item.path, _ring(found, from_middle=True)))
     return [chain for chain in chains if chain.ring.moves]

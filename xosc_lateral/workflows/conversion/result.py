@@ -18,6 +18,7 @@ from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.world.motion.segments import SegmentSpan
 from xosc_lateral.world.motion.trajectory import WorldTrajectory, leaps
 from xosc_lateral.world.road.network import RoadNetwork
+from xosc_lateral.world.scenario.under_test import Control
 
 
 class Neighbours(StrEnum):
@@ -199,3 +200,4 @@ class ConvertedScenario:
     warnings: tuple[str, ...]  # what a user has to know, a line each
     data: bytes = b""  # the converted scenario, if it was not to be written
     is_replay: bool = True  # everything happens by the clock of the nominal run, whoever drives
+    controllers: Mapping[str, Control] = field(default_factory=dict)  # of entities that are left to them

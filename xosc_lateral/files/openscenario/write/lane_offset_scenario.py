@@ -79,7 +79,7 @@ def write_lane_offset_scenario(
     maneuvers = ReplacedManeuvers(draft, moving)
     story = build.story("xosc-lateral")
     lateral = lateral_actions(scenario)
-    changing = changing_speed(scenario) | controlled_entities(scenario)
+    changing = changing_speed(scenario) | controlled_entities(scenario).keys()
     for chain in chains:
         acts = _Acts(story, chain, draft, lateral.get(chain.entity, ()), chain.entity in changing)
         acts.add()
@@ -211,7 +211,9 @@ class _Acts:
                 continue
             trigger = build.sub(act, "StopTrigger") if trigger is None else trigger
             group = build.sub(trigger, "ConditionGroup")
-            build.state_condition(group, item.kind, item.reference, "runningState", 0.0)
+            # A controller is given its domain at once, and some players' assignments run for ever.
+            state = "runningState" if item.steers is None else "startTransition"
+            build.state_condition(group, item.kind, item.reference, state, 0.0)
             build.state_condition(group, "act", name, "runningState", LOOKING)
 
 

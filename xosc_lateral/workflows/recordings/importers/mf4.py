@@ -35,6 +35,7 @@ from xosc_lateral.base.limits import CLOCK_ROWS, TIME
 from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.drivers.drives.cuts import JUMP, MAX_GAP
 from xosc_lateral.drivers.drives.resampling import average, resample
+from xosc_lateral.files.drives import from_middle
 from xosc_lateral.files.labels import file_labels
 from xosc_lateral.files.mapping import ColumnSource, MappingLike, as_mapping, factor, is_measured, parse_map, spelled
 from xosc_lateral.files.rows import refuse_marker
@@ -135,7 +136,8 @@ def import_mf4(
             }
     named = zip(read.items(), file_labels(files), strict=True)
     tables, notes = zip(*(_table(signals, file, name, step) for (file, signals), name in named), strict=True)
-    table = pd.concat(tables, ignore_index=True)
+    table = pd.concat([from_middle(own, saved, file) for own, file in zip(tables, files, strict=True)])
+    table = table.reset_index(drop=True)
     # column -> unit that it was read in; several where logs differ
     every = {name: {signals[name].unit for signals in read.values()} for name in sources_of}
     units = {name: " | ".join(sorted(found)) for name, found in every.items()}
