@@ -29,6 +29,7 @@ from xosc_lateral.workflows.conversion.meaning import Shift, keep_meaning, meani
 from xosc_lateral.workflows.conversion.modes import (
     WritingPlan,
     chosen_egos,
+    follow_trajectories,
     heeds_controllers,
     is_replay,
     kept_controllers,
@@ -122,6 +123,7 @@ def _convert(
             neighbours=settings.neighbours,
             uncertain=depends.entities,
             heeds_controllers=heeds_controllers(settings),
+            through=follow_trajectories(played.scenario, settings, depends, drivers),
             at_least=0.0 if is_replay(settings, depends) else SUPPLY,
         )
     except DriverProfileError as error:  # found in the movement: who sampled knows the profile by its name alone

@@ -75,6 +75,17 @@ def is_replay(settings: ConvertSettings, depends: Dependence) -> bool:
     return settings.target.player is Player.CARLA or not (depends.entities or settings.only is not None)
 
 
+def follow_trajectories(
+    scenario: Scenario, settings: ConvertSettings, depends: Dependence, names: Collection[str]
+) -> frozenset[str]:
+    """Those of the named entities that will follow trajectories if they get offsets."""
+    if settings.mode is OutputMode.LANE_OFFSET:
+        return frozenset()
+    if settings.mode is OutputMode.TRAJECTORY or is_replay(settings, depends):
+        return frozenset(names)
+    return separable(scenario, set(names) - depends.entities)
+
+
 def writing_plan(
     scenario: Scenario,
     settings: ConvertSettings,

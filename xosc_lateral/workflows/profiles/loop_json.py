@@ -44,6 +44,7 @@ def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
         "unused": [{"column": column, "why": why} for column, why in result.identified.usable.unused.items()],
         "error": {"measure": MEASURE, **error},
         "held_out_gain": _gain(result.identified.total),
+        "explained": _explained(result),
         "returned_base": result.identified.returned_base or None,
         "unexplained": _unexplained(result),
         "residual": [
@@ -81,6 +82,16 @@ def _feedback(item: Feedback) -> dict[str, Any]:
     }
 
 
+def _explained(result: LoopResult) -> dict[str, Any] | None:
+    known = result.explained
+    if known is None:
+        return None
+    gains = {"after_nat_per_block": known.after, "free_nat_per_block": known.free}
+    if not known.is_known:
+        return {"share": None, "interval": None} | gains
+    return {"share": known.share, "interval": list(known.interval)} | gains
+
+
 def _unexplained(result: LoopResult) -> dict[str, Any]:
     return {
         "measure": "root of error after squared minus floor squared, m",
@@ -112,8 +123,18 @@ def finding_record(finding: Finding) -> dict[str, Any]:
         "instead": [list(columns) for columns in finding.alike],
         "interval": _interval(finding),
         "held_out_gain": _gain(finding.gain),
+        "passage": _passage(finding),
         "added": [effect.to_dict() for effect in finding.effects],
     }
+
+
+def _passage(finding: Finding) -> dict[str, Any] | None:
+    """The path through a typical passage of the column, by the second."""
+    passage = finding.passage
+    if passage is None:
+        return None
+    path = {"time_s": list(passage.time), "path_m": list(passage.path), "path_error_m": list(passage.error)}
+    return {"from": passage.usual, "to": passage.high, "lasts_s": passage.lasts_s} | path
 
 
 def finite(value: Any) -> Any:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import Enum
+from math import inf
 
 import numpy as np
 from msgspec import Struct
@@ -10,8 +12,9 @@ from msgspec import Struct
 from xosc_lateral.base.arrays import BoolArray, IntArray
 from xosc_lateral.base.rows import blocks
 from xosc_lateral.base.segment import MINIMUM_SPEED
-from xosc_lateral.world.motion.nominal import Activity, EntityMotion
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
+from xosc_lateral.world.scenario.private_actions import LateralDistanceAction
 
 _ACROSS_LANE = np.pi / 4
 """Heading relative to the lane, whichever way it is driven, beyond which the vehicle does not follow it. [rad]"""
@@ -93,6 +96,39 @@ def cut_segments(
         SegmentSpan(_KINDS[kind], a, b, float(motion.time[a]), float(motion.time[b]))
         for (a, kind), b in zip(firsts, lasts, strict=True)
     )
+
+
+def movement_runs(
+    motion: NominalMotion, entity: EntityMotion, network: RoadNetwork, spans: Sequence[SegmentSpan]
+) -> tuple[tuple[SegmentSpan, ...], ...]:
+    """Road-following segments together with the lane changes and lane offsets between and beside them.
+
+    A driver does not hold still to change lanes: what moves him inside his lane goes on. Not where he keeps a distance
+    sideways from somebody, nor where he drives too slowly, is put elsewhere at once, or is on no driving lane.
+    """
+    runs: list[list[SegmentSpan]] = [[]]
+    for span in spans:
+        if span.is_road_following or _goes_on_through(motion, entity, network, span):
+            placed_anew = bool(entity.activity[span.first] & Activity.TELEPORTED)
+            runs += [[span]] if placed_anew else []
+            runs[-1] += [] if placed_anew else [span]
+        elif runs[-1]:
+            runs.append([])
+    return tuple(tuple(run) for run in runs if any(span.is_road_following for span in run))
+
+
+def _goes_on_through(motion: NominalMotion, entity: EntityMotion, network: RoadNetwork, span: SegmentSpan) -> bool:
+    if span.kind is not SegmentKind.LATERAL_ACTION:
+        return False
+    kept = (one for one in motion.actions if isinstance(one.action.content, LateralDistanceAction))
+    if any(one.actor == entity.name and one.start <= span.end and span.start <= (one.end or inf) for one in kept):
+        return False
+    ignored = (SegmentKind.LATERAL_ACTION, SegmentKind.ACROSS_LANE)
+    for rows in blocks(span.last + 1, span.first):
+        reasons = _reasons(entity, network, rows, is_trailer=False, heeds_controllers=True)
+        if any(np.any(applies) for kind, applies in reasons.items() if kind not in ignored):
+            return False
+    return True
 
 
 def _row_kinds(
