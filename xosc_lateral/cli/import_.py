@@ -186,6 +186,24 @@ def fcd(
     _import("fcd", [source], output, said, net=net, types=types, lane_width=lane_width)
 
 
+@command(
+    group, "openacc", "OpenACC, AstaZero campaign.",
+    "import openacc ASta_040719_platoon3.csv ASta_050719_platoon1.csv -o drives.parquet",
+)  # fmt: skip
+def openacc(
+    sources: Annotated[
+        list[Path], typer.Argument(metavar="FILE...", help="Files of one track (.csv, .csv.gz).", show_default=False)
+    ],
+    *,
+    output: Output,
+    lane_width: Annotated[float, typer.Option(help="Of the road, which the files don't give. [m]", min=2, max=6)] = 3.5,
+    keep_cut: KeepCut = False,
+    said: Written,
+) -> None:
+    """OpenACC's platoons on the closed loop of AstaZero: lane centre from all passes of all files."""
+    _import("openacc", sources, output, said, lane_width=lane_width, keep_cut=keep_cut)
+
+
 @command(group, "commonroad", "CommonRoad scenarios.", "import commonroad DEU_A9-1_1_T-1.xml -o drives.parquet")
 def commonroad(
     sources: Annotated[list[Path], typer.Argument(metavar="SOURCE...", help="Scenarios (.xml).", show_default=False)],

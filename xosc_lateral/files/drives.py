@@ -112,7 +112,8 @@ def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.Dat
     if "time" in kept and not pd.api.types.is_numeric_dtype(kept["time"]):
         seconds = seconds_of_stamps(kept["time"], path, mapping.time_zone, kept.get("drive"))
         kept["time"] = kept["time"] if seconds is None else pd.Series(seconds, index=table.index)
-    return from_middle(pd.DataFrame(kept), mapping, path)
+    recorded = {name: value for name, value in mapping.recorded.items() if name not in kept}
+    return from_middle(pd.DataFrame(kept).assign(**recorded), mapping, path)
 
 
 def from_middle(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.DataFrame:

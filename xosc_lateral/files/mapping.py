@@ -1,8 +1,9 @@
 """What foreign tables hold, in standard names: a mapping given word by word (``--map``) or saved in a file.
 
-A file is TOML: how tables are written (``encoding``, ``separator``, ``decimal``), ``[columns]`` with a line per
-standard name, as in ``--map``, ``[values.NAME]`` with the number that each text of a column stands for (of
-`vehicle_class`: the class that a number stands for), ``[roles]``; besides, ``rows = ["quality >= 2"]``: which rows
+A file is TOML: how tables are written (``encoding``, ``separator``, ``decimal``), what the recording shows
+(``valid_below`` in Hz, ``resolution`` in m), ``[columns]`` with a line per standard name, as in ``--map``,
+``[values.NAME]`` with the number that each text of a column stands for (of `vehicle_class`: the class that a number
+stands for), ``[roles]``; besides, ``rows = ["quality >= 2"]``: which rows
 count, ``missing = [-9999]``: what stands for no value, ``time_zone = "Europe/Berlin"``: of local stamps,
 ``reference = "front"``, "centre", "rear" or "rear axle": the point of tracks that x and y are of,
 ``wheel_track = 1.6``: how far apart the points are that distances to the markings count from.
@@ -100,9 +101,12 @@ def factor(column: str, unit: str) -> float:
     return sign * to_si / target_to_si
 
 
+RECORDED = ("valid_below", "resolution")
+"""What a mapping says of the recordings: driving below a frequency [Hz], offsets to a step [m]."""
+
 KEYS = (
-    "encoding", "separator", "decimal", "columns", "values", "roles", "rows", "missing", "time_zone", "reference",
-    "wheel_track",
+    "encoding", "separator", "decimal", *RECORDED, "columns", "values", "roles", "rows", "missing", "time_zone",
+    "reference", "wheel_track",
 )  # fmt: skip
 
 REFERENCES = ("centre", "front", "rear", "rear axle")
@@ -136,6 +140,7 @@ class TableMapping:
     time_zone: str = ""  # of local stamps
     wheel_track: float | None = None  # between the points that distances to the markings count from [m]
     reference: str = "centre"  # of `REFERENCES`: the point of a vehicle that x and y of tracks are of
+    recorded: Mapping[str, float] = field(default_factory=dict)  # by the names in `RECORDED`
 
     def class_names(self, column: pd.Series, path: Path) -> pd.Series:
         """Vehicle classes in words.
@@ -258,6 +263,7 @@ def read_mapping(path: Path) -> TableMapping:
         _text(values.get("time_zone", "-"), path, "time_zone").removeprefix("-"),
         None if track is None else float(track),
         reference,
+        {key: _above_zero(values[key], path, key) for key in RECORDED if key in values},
     )
 
 
@@ -265,6 +271,12 @@ def _marker(entry: Any, path: Path) -> float | str:
     if isinstance(entry, bool) or not isinstance(entry, int | float | str):
         raise FormatError(f"{entry!r}, expected a number or a text", path=path, element="missing")
     return entry if isinstance(entry, str) else float(entry)
+
+
+def _above_zero(entry: Any, path: Path, key: str) -> float:
+    if isinstance(entry, bool) or not isinstance(entry, int | float) or not 0.0 < entry < np.inf:
+        raise FormatError(f"{key} {entry!r}, expected a number above 0", path=path)
+    return float(entry)
 
 
 def _role(entry: Any, path: Path, where: str) -> str:

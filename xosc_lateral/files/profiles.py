@@ -194,6 +194,8 @@ def describe_profile(profile: DriverProfile) -> str:
     )
     if profile.columns:
         text += f" of {', '.join(profile.columns)}"
+    if valid := profile.validity.in_words():
+        text += f"\nvalid: {valid}"
     if "offset_mean_m" in known.fit:
         text += f"\n{_measured(known.fit, known.hours)}"
     if one := known.fit.get("one_marking"):

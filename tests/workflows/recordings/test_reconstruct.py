@@ -375,13 +375,29 @@ def test_an_osi_trace_of_a_played_scenario_gives_it_back(tmp_path):
         assert away.max() < 0.01, name
 
 
+@pytest.mark.parametrize("template", ["cut-in", "curves"])
+def test_an_osi_trace_brings_its_road_with_it(template, tmp_path):
+    pytest.importorskip("osi_utilities", reason="extra `osi` is not installed")
+    scenario, _ = xl.write_template(template, tmp_path / "first")
+    trace = tmp_path / "trace.osi"
+    assert main(["play", str(scenario), "--osi", str(trace), "-q"]) == 0
+    made = xl.reconstruct(trace, tmp_path / "again")
+    changes = [row["kind"] for row in made.to_dict()["maneuvers"]]
+    assert changes == (["lane change"] if template == "cut-in" else [])
+    before, after = placed(scenario), placed(tmp_path / "again/trace.xosc")
+    for name, rows in before.items():
+        away = np.hypot(rows["x"] - after[name]["x"], rows["y"] - after[name]["y"])
+        assert away.max() < 0.05, name
+
+
 @pytest.mark.filterwarnings("default")
-def test_commonroad_obstacles_drive_on_a_given_road(tmp_path):
+@pytest.mark.parametrize("is_given", [True, False])
+def test_commonroad_obstacles_drive_on_a_given_road_or_on_their_lanelets(is_given, tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         pytest.importorskip("commonroad", reason="extra `commonroad` is not installed")
     path = commonroad_scenario(tmp_path)
-    road = bent_road(tmp_path, 0.0, 2 * WIDTH, WIDTH)
+    road = bent_road(tmp_path, 0.0, 2 * WIDTH, WIDTH) if is_given else None
     made = xl.reconstruct(path, tmp_path / "out", road=road, host="32")
     vehicles = {row["recorded_as"]: (row["class"], row["lane_changes"]) for row in made.to_dict()["vehicles"]}
     assert vehicles == {"31": ("car", 0), "32": ("truck", 0)}

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.limits import DRIVE_SPAN, TIME
 from xosc_lateral.drivers.drives.drive import Drive
@@ -36,7 +36,16 @@ MAX_CONTRADICTIONS = 0.01
 RUN = "following_run"
 """Column of tables that an import has cut: number of the road-following stretch. What it has cut is not cut again."""
 
-DRIVE_COLUMNS = frozenset({"time", "drive", "driver", "offset", "lane_width", "distance_left", "distance_right", RUN})
+VALID_BELOW, RESOLUTION = "valid_below", "resolution"
+"""Columns of what a recording shows: driving below this frequency [Hz], offsets to this step [m]; each is one number
+for a whole drive."""
+
+DRIVE_COLUMNS = frozenset(
+    {
+        *("time", "drive", "driver", "offset", "lane_width", "distance_left", "distance_right"),
+        *(RUN, VALID_BELOW, RESOLUTION),
+    }
+)
 """Columns that are no context."""
 
 
@@ -85,8 +94,24 @@ def clean_drive(
     drive = Drive(
         name, columns["time"][good], offset[good], lane_width[good],
         context, frozenset(levels & context.keys()), str(path), run, empty=empty, frozen=int(frozen.sum()),
+        valid_below=_stated(VALID_BELOW, columns, good, path), resolution=_stated(RESOLUTION, columns, good, path),
     )  # fmt: skip
     return drive if run is not None else _seen_through(drive)
+
+
+def _stated(column: str, columns: Mapping[str, FloatArray], good: BoolArray, path: Path) -> float | None:
+    """The one number above 0 that a column has for a drive; None without the column, or where it is empty."""
+    if column not in columns:
+        return None
+    values = np.unique(columns[column][good & np.isfinite(columns[column])])
+    if not len(values):
+        return None
+    if len(values) > 1 or not values[0] > 0.0:
+        what = (
+            f"{values[0]:g}{f' and {values[-1]:g}' if len(values) > 1 else ''}, expected one number above 0 per drive"
+        )
+        raise FormatError(what, path=path, element=f"column {column!r}")
+    return float(values[0])
 
 
 def _seen_through(drive: Drive) -> Drive:

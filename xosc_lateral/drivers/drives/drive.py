@@ -58,6 +58,10 @@ class Drive:
     half_width : array, shape (n,), optional
         Half the lane width as a camera recorded it, with errors of both markings, as the offset has them. None: the
         lane width comes from a map, or from elsewhere than the offset. [m]
+    valid_below : float, optional
+        Frequency below which the recording shows driving, where it is known. [Hz]
+    resolution : float, optional
+        Step or noise of the offsets, where it is known. [m]
     """
 
     name: str
@@ -71,6 +75,8 @@ class Drive:
     mended: MarkingShares | None = None
     empty: frozenset[str] = frozenset()
     half_width: FloatArray | None = None
+    valid_below: float | None = None
+    resolution: float | None = None
     driver: str = ""
     frozen: int = 0
 
@@ -107,7 +113,9 @@ class Run:
     """As in `Drive`."""
     levels: frozenset[str] = frozenset()
     empty: frozenset[str] = frozenset()
-    """As in `Drive`."""
+    """As in `Drive`, as are the next two."""
+    valid_below: float | None = None
+    resolution: float | None = None
 
     def __post_init__(self) -> None:
         """Copy and freeze; refuse unequal lengths and missing values."""

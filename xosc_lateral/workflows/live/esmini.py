@@ -150,7 +150,7 @@ class EsminiTraffic:
         self._back = StoryboardCallback(self._on_element)
         self.player.SE_RegisterStoryBoardElementStateChangeCallback(self._back)
         names = {name for name, _ in self._objects()}
-        if missing := sorted(self._ego - names):
+        if missing := sorted((self._ego | set(profiles or {})) - names):
             there = ", ".join(sorted(names))
             raise SimulationError(f"there is no vehicle {missing[0]!r} in the scenario (vehicles: {there})")
         self.moves: dict[str, tuple[float, bool]] = {}
@@ -161,7 +161,11 @@ class EsminiTraffic:
         Raises `SimulationError` if what the simulation says can't be used; nothing was reported then, and the
         simulation can go on.
         """
-        seen = [(name, state) for name, state in self._objects() if self._is_sound(name, state)]
+        there = dict(self._objects())
+        for gone in self._base.keys() - there.keys():  # who is added again begins anew
+            for known in (self._base, self._rests, self._lane_of):
+                known.pop(gone, None)
+        seen = [(name, state) for name, state in there.items() if self._is_sound(name, state)]
         moment = self._moment(seen, dt)
         moves = self.traffic.step(self.player.SE_GetSimulationTime() + dt, moment)
         for row, (_, state) in enumerate(seen):

@@ -183,8 +183,9 @@ def _add_picture(page: Page, result: LoopResult, finding: Finding) -> None:
     elif finding.statistic in result.scored.real:
         page.figure(
             effect_figure(result, finding),
-            "Left: the fitted effect and the measured offsets, less the drives' own means and all other effects (bars "
-            "and band: two standard errors). Right: means of held-out blocks, by fifths of the effect.",
+            "Path: where the effect puts the car while its column goes from its usual value to a high one and back. "
+            "Effect: fitted, and measured offsets less the drives' means and all other effects. Bars and bands: two "
+            "standard errors. Held-out blocks: means by fifths of the effect.",
             f"Curve of {finding.effect} over measured points, and measured against expected before and after.",
         )
 

@@ -26,12 +26,13 @@ FACING_STEP = 5.0
 class LaneShape(ABC):
     """A lane between two boundaries, in coordinates along and across its centre line.
 
-    `centre`: in the direction of travel, shape (n, 2) or (n, 3). [m] `boundaries`: lines about it. [m] `beyond`: so far
-    out of their box a point may lie in the lane. [m]
+    `centre`: in the direction of travel, shape (n, 2) or (n, 3). [m] `boundaries`: on its left and right. [m] `beyond`:
+    so far out of their box a point may lie in the lane. [m]
     """
 
     def __init__(self, centre: FloatArray, boundaries: Sequence[FloatArray], beyond: float = 0.0) -> None:
         self.centre = centre
+        self.left, self.right = boundaries
         self.step = np.diff(centre[:, :2], axis=0)
         self.size = np.hypot(*self.step.T)
         self.start = np.concatenate([[0.0], np.cumsum(self.size)])

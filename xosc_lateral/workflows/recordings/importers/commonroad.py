@@ -82,9 +82,11 @@ def _opened(path: Path) -> Any:
     return scenario
 
 
-def read_obstacles(path: Path) -> Tracks:
-    """All obstacles that move along a recorded trajectory. Raises `FormatError`, `NotEnoughDataError`."""
-    return _tracks(_opened(path), path, path.stem)
+def read_obstacles(path: Path) -> tuple[Tracks, list[_Lanelet], LaneGraph]:
+    """All obstacles that move along a recorded trajectory, and lanes. Raises `FormatError`, `NotEnoughDataError`."""
+    scenario = _opened(path)
+    graph, shapes = _graph(scenario)
+    return _tracks(scenario, path, path.stem), shapes, graph
 
 
 def _tracks(scenario: Any, path: Path, label: str) -> Tracks:
@@ -121,9 +123,9 @@ class _Lanelet(LaneShape):
     """A lane whose bounds have as many points each, which face each other."""
 
     def __init__(self, lanelet: Any) -> None:
-        self.left = np.asarray(lanelet.left_vertices, dtype=np.float64)[:, :2]
-        self.right = np.asarray(lanelet.right_vertices, dtype=np.float64)[:, :2]
-        super().__init__(0.5 * (self.left + self.right), [self.left, self.right])
+        left = np.asarray(lanelet.left_vertices, dtype=np.float64)[:, :2]
+        right = np.asarray(lanelet.right_vertices, dtype=np.float64)[:, :2]
+        super().__init__(0.5 * (left + right), [left, right])
 
     def place(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, ...]:
         """See `LaneShape`."""
