@@ -21,6 +21,7 @@ Views = list[tuple[Scene, list[View]]]
 
 TUNED_RATE = 5.0
 """False alarms that a detector is tuned to at most. [1/h]"""
+TUNED = ("lateral-speed", "wandering-zone", "time-to-line")
 EQUAL_SHARE = 0.95
 """Cut-ins seen before the marking at which trained detectors are compared. [-]"""
 DRAWS = 500
@@ -55,42 +56,42 @@ def alarm_lines(pools: Sequence[Pool]) -> str:
 
 
 def default_lines(pools: Sequence[Pool]) -> str:
-    """Every rule at its default."""
-    lines = [
-        "| detector | traffic | false alarms an hour | before the marking | time before it [s] |",
-        "|---|---|---|---|---|",
-    ]
+    """Every rule at its default: false alarms an hour, and the median time before the marking."""
+    shown = _shown(pools)
+    lines = ["| detector | " + " | ".join(pool.name for pool in shown) + " |", "|---" * (1 + len(shown)) + "|"]
     for number, first in enumerate(pools[0].curves):
-        for pool in pools:
-            curve = pool.curves[number]
-            if len(curve.leads):
-                k = curve.detector.chosen
-                share, lead = f"{100 * curve.in_time[k]:.0f} %", f"{curve.lead(0.5)[k]:.2f}"
-                cells = [_rate(curve), share, "-" if lead == "nan" else lead]
-                lines.append(f"| {first.detector.label()} | {pool.name} | " + " | ".join(cells) + " |")
+        curves = [pool.curves[number] for pool in shown]
+        cells = [f"{_rate(curve)}, {_lead(curve, curve.detector.chosen)}" for curve in curves]
+        lines.append(f"| {first.detector.label()} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
 
 def tuned_lines(pools: Sequence[Pool]) -> str:
-    """Each rule tuned on one kind of traffic, tried on the motorway recording."""
+    """Rules tuned on one kind of traffic, on the recording: threshold, false alarms, time before the marking."""
     real = next(pool for pool in pools if "recording" in pool.name)
-    lines = [
-        "| detector | tuned on | threshold | false alarms an hour | before the marking | time before it [s] |",
-        "|---|---|---|---|---|---|",
-    ]
-    for number, first in enumerate(pools[0].curves):
-        if first.detector.needs_observer:
-            continue
-        for pool in pools:
-            if len(pool.curves[number].leads):
-                k, curve = pool.curves[number].tuned(TUNED_RATE), real.curves[number]
-                low, high = curve.rate_interval()[:, k]
-                lines.append(
-                    f"| {first.detector.name} | {pool.name} | {curve.detector.thresholds[k]:g} | "
-                    f"{curve.rate[k]:.1f} ({low:.1f} to {high:.1f}) | {100 * curve.in_time[k]:.0f} % | "
-                    f"{curve.lead(0.5)[k]:.2f} |"
-                )
+    rules = [n for n, one in enumerate(pools[0].curves) if one.detector.name in TUNED]
+    names = [f"`{pools[0].curves[n].detector.name}`, {pools[0].curves[n].detector.quantity}" for n in rules]
+    lines = ["| tuned on | " + " | ".join(names) + " |", "|---" * (1 + len(rules)) + "|"]
+    for pool in _shown(pools):
+        cells = []
+        for number in rules:
+            k, curve = pool.curves[number].tuned(TUNED_RATE), real.curves[number]
+            low, high = curve.rate_interval()[:, k]
+            rate = f"{curve.rate[k]:.0f} ({low:.0f} to {high:.0f})"
+            cells.append(f"{curve.detector.thresholds[k]:g}: {rate}, {_lead(curve, k)}")
+        lines.append(f"| {pool.name} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
+
+
+def _shown(pools: Sequence[Pool]) -> list[Pool]:
+    """Those with cut-ins, without profiles that are variants of another."""
+    with_changes = [pool for pool in pools if len(pool.curves[0].leads)]
+    return [pool for pool in with_changes if "refined" not in pool.name and "single" not in pool.name]
+
+
+def _lead(curve: Curve, k: int) -> str:
+    lead = curve.lead(0.5)[k]
+    return "none seen" if np.isnan(lead) else f"{lead:.2f} s"
 
 
 def _rate(curve: Curve) -> str:

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import rankdata
 
+import xosc_lateral as xl
+from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.workflows.detection.logistic import features, fit_regression
 from xosc_lateral.workflows.detection.observation import View
+from xosc_lateral.workflows.detection.sources import played_scene
 from xosc_lateral.workflows.detection.tracks import STEP, Scene
 from xosc_lateral.workflows.detection.truth import EDGE, MARGIN
 
@@ -21,6 +26,22 @@ BEFORE = round(5.0 / STEP)
 """Rows before a lane change in which nothing may give it away. [rows]"""
 EVERY = round(0.5 / STEP)
 FOLDS, DRAWS = 5, 300
+
+
+def played_variants(scenarios: Sequence[Path], ego: str, variants: int) -> Iterator[Scene]:
+    """Converted scenarios as they play, every lane watched; with an ego, vehicles alone that react to it."""
+    for path in scenarios:
+        for variant in range(1, variants + 1):
+            with TemporaryDirectory() as folder:
+                output = Path(folder) / path.name
+                made = xl.convert(path, output, variant=variant, profile="motorway", seed=55, ego=[ego])
+                around = {path.parent, *path.parent.rglob("catalogs/*"), *path.parent.glob("road_networks")}
+                played = play_scenario(output, step=STEP, allowed=around)
+                found = played_scene(played, f"{path.stem} #{variant}", "none", cluster=path.stem)
+            reacts = {name for name, mode in made.modes.items() if mode == "lane-offset"}
+            tracks = found.tracks if ego == "none" else tuple(one for one in found.tracks if one.name in reacts)
+            if tracks:
+                yield replace(found, tracks=tracks)
 
 
 @dataclass(frozen=True, eq=False)

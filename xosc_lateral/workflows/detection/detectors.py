@@ -180,7 +180,7 @@ class TimeToLine(Rule):
     quantity = "time to the marking [s]"
     growing = False
     OPTIONS: ClassVar[Limits] = {"threshold": (0.0, 60.0)}
-    CURVE = np.round(np.geomspace(0.2, 20.0, 40), 2)
+    CURVE = np.round(np.geomspace(0.05, 20.0, 48), 3)
     threshold: float = 1.0
 
     def score(self, view: View) -> FloatArray:

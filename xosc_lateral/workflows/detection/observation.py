@@ -146,6 +146,7 @@ class View:
 def views_of(scene: Scene, sensor: Sensor, seed: int, *, with_observers: bool = True) -> list[View]:
     """Every vehicle but the ego, from both sides where it is ever watched from there."""
     root = (seed, crc32(scene.name.encode()))
+    several = len({track.name for track in scene.tracks}) > 1
     found = []
     for number, track in enumerate(scene.tracks):
         if track.name == scene.ego:
@@ -154,7 +155,7 @@ def views_of(scene: Scene, sensor: Sensor, seed: int, *, with_observers: bool = 
         measured = measure(track, sensor, np.random.default_rng((*root, number)))
         for side in (1, -1):
             watched, observer = track.has_lane(side), None
-            if scene.ego is not None or (with_observers and len(scene.tracks) > 1):
+            if scene.ego is not None or (with_observers and several):
                 observer = _observer(scene, track, side, measured.taken)
             if scene.ego is not None:
                 assert observer is not None

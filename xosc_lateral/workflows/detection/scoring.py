@@ -89,6 +89,8 @@ class Tally:
             self._add_case(Case("false alarm", scene, view, float(view.track.time[row]), badness, score, limit))
 
     def _add_late_change(self, scene: Scene, view: View, score: FloatArray, change: LaneChange, lead: float) -> None:
+        if self.detector.needs_observer:  # it waits for danger, which not every cut-in is
+            return
         limit = float(self.detector.limits[self.detector.chosen])
         time = float(view.track.time[change.crossing])
         if np.isnan(lead):

@@ -21,7 +21,7 @@ from xosc_lateral.workflows.conversion.convert import convert_scenario
 from xosc_lateral.workflows.conversion.load import Played, play_scenario
 from xosc_lateral.workflows.conversion.modes import chosen_egos
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
-from xosc_lateral.workflows.detection.tracks import Rows, Scene, Size, Track, tracks_of
+from xosc_lateral.workflows.detection.tracks import STEP, Rows, Scene, Size, Track, tracks_of
 from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH
 from xosc_lateral.workflows.recordings.recorded import RecordedVehicle, place_tracks
 from xosc_lateral.workflows.recordings.recordings import REAR_AXLE, USUAL_WIDTH, read_recording
@@ -29,8 +29,8 @@ from xosc_lateral.workflows.result import given_drives
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
 from xosc_lateral.world.road.network import RoadNetwork
 
-EVERY = 5
-"""Of the player's steps of 0.02 s; between them motion is smooth. [rows]"""
+EVERY = 2
+"""Rows of a played scenario that are taken, 0.1 s apart as in recordings; between them motion is smooth. [rows]"""
 ACROSS_LANE = np.pi / 4
 """Heading from the lane's, beyond which a vehicle does not follow it, as in `motion.segments`. [rad]"""
 
@@ -121,7 +121,8 @@ def _lifelike(label: str, named: Sequence[tuple[Path, str]], profile: str, setti
 
 def _play(scenario: Path, settings: SourceSettings) -> Played:
     given = settings.convert
-    return play_scenario(scenario, time_limit=given.time_limit, allowed=given.allow, roads=given.roads)
+    roads = given.roads
+    return play_scenario(scenario, step=STEP, time_limit=given.time_limit, allowed=given.allow, roads=roads)
 
 
 def played_scene(played: Played, name: str, ego: str | None, *, cluster: str = "") -> Scene:
