@@ -14,7 +14,7 @@ from tests.workflows.conversion.test_vehicle_under_test import CHANGE, EXTERNAL
 from tests.world.scenario.test_under_test import at, event, headway, stories
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.workflows.conversion.result import EntityResult
-from xosc_lateral.world.motion.crossings import ALPHA, BETA, NINE_TENTHS, PEAK, TENTH
+from xosc_lateral.world.motion.crossings import ALPHA, BETA, NINE_TENTHS, PEAK_SHARE, TENTH
 
 WIDTH = 3.5
 
@@ -23,7 +23,7 @@ def test_the_bell_is_a_beta_distribution_with_its_peak_where_drivers_are_fastest
     bell = beta(ALPHA, BETA)
     np.testing.assert_allclose(bell.ppf([0.1, 0.9]), [TENTH, NINE_TENTHS], atol=1e-6)
     time = np.linspace(0.0, 1.0, 10_001)
-    assert time[np.argmax(bell.pdf(time))] == pytest.approx(PEAK, abs=1e-4)
+    assert time[np.argmax(bell.pdf(time))] == pytest.approx(PEAK_SHARE, abs=1e-4)
 
 
 def change(shape: str, duration: str) -> str:

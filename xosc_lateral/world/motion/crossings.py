@@ -25,17 +25,17 @@ from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMot
 from xosc_lateral.world.motion.segments import SegmentKind, SegmentSpan
 from xosc_lateral.world.scenario.private_actions import LaneChangeAction, LaneOffsetAction
 
-PEAK = 0.469
+PEAK_SHARE = 0.469
 """When drivers are fastest, of the bell's duration: the mean of 323, standard error 0.006. [-]"""
 CONCENTRATION = 8.0
 """Sum of the beta distribution's exponents plus two. Between 6 and 12 the way differs by at most 0.4 % of it. [-]"""
-ALPHA = 1.0 + PEAK * (CONCENTRATION - 2.0)
+ALPHA = 1.0 + PEAK_SHARE * (CONCENTRATION - 2.0)
 BETA = CONCENTRATION - ALPHA
 TENTH, NINE_TENTHS = 0.257102, 0.699345
 """Of the bell's duration, when it has done so much of the way. [-]"""
-SHORTEST, LONGEST = 3.0, 13.0
+SHORTEST_DURATION, LONGEST_DURATION = 3.0, 13.0
 """Durations of actions that get the bell; below 6 s it is extrapolated. [s]"""
-FASTER = 1.1
+LARGEST_SPEED_RATIO = 1.1
 """Times the written peak of lateral speed, at most. [-]"""
 
 
@@ -110,8 +110,8 @@ def _bell_time(entity: EntityMotion, crossing: Crossing) -> tuple[float, float]:
 
 def _why_not(entity: EntityMotion, run: Sequence[SegmentSpan], first: int, last: int, way: FloatArray) -> str:
     taken = float(entity.time[last] - entity.time[first])
-    if not SHORTEST - entity.time[1] <= taken <= LONGEST + entity.time[1]:
-        return f"it takes {taken:.1f} s, the bell is for {SHORTEST:g} to {LONGEST:g} s"
+    if not SHORTEST_DURATION - entity.time[1] <= taken <= LONGEST_DURATION + entity.time[1]:
+        return f"it takes {taken:.1f} s, the bell is for {SHORTEST_DURATION:g} to {LONGEST_DURATION:g} s"
     if abs(way[-1]) < 1e-3 or np.max(np.abs(way)) > 1.001 * abs(way[-1]):
         return "it leads nowhere, or beyond its end"
     begin, duration = _bell_time(entity, Crossing(first, last, way, "", False))
@@ -121,9 +121,13 @@ def _why_not(entity: EntityMotion, run: Sequence[SegmentSpan], first: int, last:
         begin + duration > entity.time[behind] and behind < len(entity.time) - 1
     ):
         return "there is no time for the bell before or after it"
-    peak = PEAK ** (ALPHA - 1.0) * (1.0 - PEAK) ** (BETA - 1.0) / _beta_function(ALPHA, BETA) / duration
+    peak = PEAK_SHARE ** (ALPHA - 1.0) * (1.0 - PEAK_SHARE) ** (BETA - 1.0) / _beta_function(ALPHA, BETA) / duration
     written = float(np.max(np.abs(np.diff(way)) / np.diff(entity.time[first : last + 1]))) / abs(way[-1])
-    return "" if peak <= FASTER * written else f"the bell would be {peak / written:.2f} times as fast sideways"
+    return (
+        ""
+        if peak <= LARGEST_SPEED_RATIO * written
+        else f"the bell would be {peak / written:.2f} times as fast sideways"
+    )
 
 
 def _beta_function(a: float, b: float) -> float:
