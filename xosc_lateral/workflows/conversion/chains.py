@@ -46,8 +46,8 @@ def chains_of(
     first = next(iter(_in_phase(entity, motion, added, items)), None)
     is_placed = first is not None and first.span.first == 0 and not tows
     ring = _ring(first or longest, from_middle=not is_placed)
-    placed = _offset_t(entity, network, ring.origin) if is_placed else None
-    chains = [OffsetChain(entity.name, added, ring, placed)]
+    side, middle_t = _middle(entity, network) if is_placed else (1.0, 0.0)
+    chains = [OffsetChain(entity.name, added, ring, middle_t + side * ring.origin if is_placed else None, side)]
     for item in items:
         if not item.adds:
             found = max(_in_phase(entity, motion, item.path, items), key=_length, default=longest)
@@ -86,9 +86,12 @@ def _ring(segment: SampledSegment, *, from_middle: bool) -> Ring:
     return ring_along(grid, path, from_middle=from_middle)
 
 
-def _offset_t(entity: EntityResult, network: RoadNetwork, aside: float) -> float:
-    """Along +t from the lane's centre, beside where the entity begins nominally. [m]"""
+def _middle(entity: EntityResult, network: RoadNetwork) -> tuple[float, float]:
+    """Where an entity begins: +1 where +t is to its left, else -1; its nominal place along +t from the lane's centre.
+
+    [m]
+    """
     motion = entity.motion
     direction = float(network.travel_directions(motion.road[:1], motion.lane[:1])[0])
     along_lane = 1.0 if np.cos(motion.heading_relative[0]) >= 0.0 else -1.0
-    return direction * (float(motion.offset[0]) + along_lane * aside)
+    return direction * along_lane, direction * float(motion.offset[0])

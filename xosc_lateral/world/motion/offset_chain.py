@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 from msgspec import Struct
+from msgspec.structs import replace
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.world.motion.deviation import smoother_step
@@ -91,12 +92,28 @@ class OffsetChain(Struct, frozen=True):
     placed_t : float, optional
         The entity is put down there, along +t from the lane's centre, and the ring begins at once; None: it is led to
         the ring's origin. [m]
+    side : float
+        +1 where +t is to the left of travel, else -1.
     """
 
     entity: str
     after: tuple[str, ...] | None
     ring: Ring
     placed_t: float | None = None
+    side: float = 1.0
+
+
+def scaled(chain: OffsetChain, factor: float) -> OffsetChain:
+    """With moves of another size that take as long; none at all with 0."""
+    if factor == 1.0:
+        return chain
+    ring, placed = chain.ring, chain.placed_t
+    places = np.round(factor * np.cumsum([ring.origin, *(move.change for move in ring.moves[:-1])]), RESOLUTION)
+    changes = np.round(np.diff(np.append(places, places[:1])), RESOLUTION).tolist() if factor else ()
+    moves = tuple(replace(move, change=change) for move, change in zip(ring.moves, changes, strict=False) if change)
+    if placed is not None:
+        placed -= chain.side * (ring.origin - float(places[0]))
+    return replace(chain, ring=Ring(float(places[0]), moves), placed_t=placed)
 
 
 def ring_along(time: FloatArray, offset: FloatArray, *, from_middle: bool) -> Ring:
