@@ -145,6 +145,10 @@ def _convert(
     )
 
 
+_Trial = tuple[tuple[OffsetChain, ...], WritingPlan, ConversionProvenance, WrittenScenario, Scenario, NominalMotion]
+"""Chains, how they were written, and what was played."""
+
+
 @dataclass(frozen=True, slots=True)
 class _Making:
     """All that one output is made from, but for the offsets; `lasting` is the run that they are for."""
@@ -194,18 +198,20 @@ class _Making:
                 tows=entity.name in self.played.trailers.values(),
             )
         ]
-        last: list[tuple[WritingPlan, ConversionProvenance, WrittenScenario, Scenario, NominalMotion]] = []
+        last: list[_Trial] = []
 
         def attempt(some: Sequence[OffsetChain]) -> list[Comparison]:
             written_for = replace(plan, lane_offsets=frozenset(chain.entity for chain in some))
             provenance, written = self.write(enriched, written_for, chains=some, save=False)
             again = read_written(written.data, self.output, source, settings)
             comparisons, run = meaning.compare(again, plan.trajectories)
-            last[:] = [(written_for, provenance, written, again, run)]
+            last[:] = [(tuple(some), written_for, provenance, written, again, run)]
             return comparisons
 
         kept = keep_meaning(chains, self.played.motion, attempt)
-        written_for, provenance, written, again, run = last[0]
+        if last[0][0] != kept.chains:
+            attempt(kept.chains)
+        _, written_for, provenance, written, again, run = last[0]
         left = plan.lane_offsets - written_for.lane_offsets
         measured = as_written(enriched, self.lasting, again, run, written_for.lane_offsets, left)
         if self.save:

@@ -32,6 +32,9 @@ from xosc_lateral.world.scenario.storyboard import Condition, Trigger
 
 EVENT_TOLERANCE = 0.05
 """By which an event may be earlier or later beyond what is explained: a frame of a coarse player. [s]"""
+PASSED_ON = 3.0
+"""Times as late as an entity begins to change its speed, it comes to a distance from another: change over closing
+speed. What is later by more is told. [-]"""
 LEAST_WAY = 1e-3
 """A lateral action over less than this has no duration to compare. [m]"""
 OURS = "xosc-lateral"
@@ -152,7 +155,8 @@ class _Shifts:
         rest = _nearest(start, self._causes(self._triggers.get(path[:-1], ())))
         begun = self._start_times.setdefault(actor or "", [])
         end, over, duration = start, 0.0, 0.0
-        if then.end is not None and now.end is not None:
+        if self._is_over(then, 0) and self._is_over(now, 1):
+            assert then.end is not None and now.end is not None
             duration, end = then.end - then.start, now.end - now.start - (then.end - then.start) + start
             expected = [start + longer for longer in self._longer(then, now)]
             cut = [shift for moment, shift in begun if abs(moment - then.end) <= EVENT_TOLERANCE]
@@ -165,6 +169,10 @@ class _Shifts:
             self._of_entity.setdefault(actor, []).extend((start, end))
         self.largest = max(self.largest, start, end)
         return EventShift(path[-2] if len(path) > 1 else path[-1], actor, then.start, duration, start, end, rest, over)
+
+    def _is_over(self, played: PlayedAction, run: int) -> bool:
+        """Before its run is: what the run's end cuts has no end of its own."""
+        return played.end is not None and played.end < self._ends[run] - EVENT_TOLERANCE
 
     def of_end(self, moved: float) -> float:
         """What of the end's shift is unexplained. [s]"""
@@ -184,9 +192,9 @@ class _Shifts:
             looked_at = set(entity_references(content))
             if condition.triggering_entities is not None:
                 looked_at |= set(condition.triggering_entities.entity_refs)
-            moved = [shift for name in looked_at for shift in self._of_entity.get(name, ())]
-            if moved:  # anything between: an entity that begins later is somewhere else by a part of that
-                found += np.linspace(min(0.0, *moved), max(0.0, *moved), 1 + int(np.ptp([0.0, *moved]) / 0.02)).tolist()
+            moved = [abs(shift) for name in looked_at for shift in self._of_entity.get(name, ())]
+            far = PASSED_ON * max(moved, default=0.0)
+            found += np.arange(-far, far, EVENT_TOLERANCE / 5.0).tolist()
         return found if found and not others else [*found, 0.0]
 
     def _longer(self, then: PlayedAction, now: PlayedAction) -> list[float]:
