@@ -17,7 +17,7 @@ from xosc_lateral.files.context_table import read_context
 from xosc_lateral.files.openscenario.provenance import PENDING
 from xosc_lateral.files.openscenario.write.build import named
 from xosc_lateral.files.openscenario.write.draft import WrittenScenario
-from xosc_lateral.files.openscenario.write.lateral_actions import lateral_actions
+from xosc_lateral.files.openscenario.write.lateral_actions import changing_speed, lateral_actions
 from xosc_lateral.files.openscenario.write.target import Player
 from xosc_lateral.files.openscenario.write.trajectory_scenario import motion_unknown_to, write_trajectory_scenario
 from xosc_lateral.files.output_paths import refuse_outputs
@@ -185,7 +185,7 @@ class _Making:
         """Write it with offsets that leave what happens as it was; all trials are made in memory."""
         settings, source = self.settings, self.played.scenario
         meaning = meaning_of(self.played, tuple(self.egos), step=settings.step, time_limit=settings.time_limit)
-        lateral = lateral_actions(source)
+        lateral, changing = lateral_actions(source), changing_speed(source)
         chains = [
             chain
             for entity in enriched.entities
@@ -196,6 +196,7 @@ class _Making:
                 self.played.network,
                 lateral.get(entity.name, ()),
                 tows=entity.name in self.played.trailers.values(),
+                changes_speed=entity.name in changing,
             )
         ]
         last: list[_Trial] = []

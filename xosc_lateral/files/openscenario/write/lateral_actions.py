@@ -11,6 +11,7 @@ from xosc_lateral.world.scenario import Action, Scenario
 from xosc_lateral.world.scenario.dependence import actors_of
 from xosc_lateral.world.scenario.global_actions import AddEntityAction
 from xosc_lateral.world.scenario.private_actions import LATERAL, LONGITUDINAL, TeleportAction
+from xosc_lateral.world.scenario.under_test import controlled_entities
 
 
 class LateralAction(Struct, frozen=True):
@@ -49,13 +50,14 @@ def lateral_actions(scenario: Scenario) -> dict[str, tuple[LateralAction, ...]]:
 
 
 def changing_speed(scenario: Scenario) -> set[str]:
-    """Entities that have longitudinal actions in events."""
-    return {
+    """Entities that have longitudinal actions in events, or a controller."""
+    own = {
         actor
         for _, actors, action, *_ in _actions(scenario)
         if isinstance(action.content, LONGITUDINAL)
         for actor in actors
     }
+    return own | controlled_entities(scenario)
 
 
 def _actions(scenario: Scenario) -> Iterator[tuple[tuple[str, ...], tuple[str, ...], Action, bool, bool]]:
