@@ -1,11 +1,15 @@
 """The shipped profile library, built from the public recording.
 
-    python -m laboratory.build_library tasi-0.15.4-py3-none-any.whl -o FOLDER
+    python -m laboratory.build_library tasi-0.15.4-py3-none-any.whl --gnss ASta_040719_platoon3.csv.gz \
+        --gnss ASta_050719_platoon1.csv.gz -o FOLDER
 
-The same wheel gives the same bytes on the same kind of processor. Every profile is scored before it is written: for
+Levels, spreads, effects and slow movement of the motorway profiles come from the motorway recording, which its provider
+smoothed; fast movement and its growth with speed from cars with differential GNSS, of which `rural` is made alone.
+
+The same files give the same bytes on the same kind of processor. Every profile is scored before it is written: for
 the population a fit to half of the vehicles (for the refined profile, a closed loop over them) is scored on the other
 half; for single vehicles a fit to the first part of the drive is held against the last part of its own drive and
-those of the others. What is written is fitted to all.
+those of the others; for `rural` a fit to the first file on the other ones. What is written is fitted to all.
 """
 
 from __future__ import annotations
@@ -13,6 +17,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -25,19 +30,23 @@ from laboratory.refined import NOTES, refine_population, refined_profile
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.drives.cuts import all_runs
 from xosc_lateral.drivers.drives.drive import Drive, Run
-from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.drives.resampling import PASS_BAND_EDGES, STEP
 from xosc_lateral.drivers.evaluation.metrics import snippet_metrics, summary_of
 from xosc_lateral.drivers.evaluation.record import scores_to_dict
 from xosc_lateral.drivers.evaluation.scores import SNIPPET, score_profile
-from xosc_lateral.drivers.evaluation.snippets import snippets_of
-from xosc_lateral.drivers.fitting.fitting import fit_population, fit_runs
+from xosc_lateral.drivers.evaluation.snippets import sample_runs, snippets_of
+from xosc_lateral.drivers.evaluation.spectra import spectrum
+from xosc_lateral.drivers.fitting.bands import measured, with_fast_movement
+from xosc_lateral.drivers.fitting.fast_part import FastPart, fast_part_of_runs
+from xosc_lateral.drivers.fitting.fitting import fit_population, fit_profile, fit_runs
 from xosc_lateral.drivers.fitting.sensor.runs import driver_runs
 from xosc_lateral.drivers.model.profile import POPULATION as ANSWERS
 from xosc_lateral.drivers.model.profile import DriverProfile, Metadata, Provenance
 from xosc_lateral.drivers.model.sensor.model import SensorModel
-from xosc_lateral.files.drives import read_drives
+from xosc_lateral.files.drives import drives_of_table, read_drives
 from xosc_lateral.files.hashes import parsed_hash
-from xosc_lateral.workflows.recordings.importers.dlr_ht import LICENCE, import_dlr_ht
+from xosc_lateral.workflows.recordings.importers.dlr_ht import HIGHEST_FREQUENCY, import_dlr_ht
+from xosc_lateral.workflows.recordings.importers.openacc import import_openacc
 from xosc_lateral.workflows.recordings.importers.table import write_imported
 
 FloatArray = NDArray[np.float64]
@@ -50,19 +59,44 @@ SPREAD_FACTOR = 1.35  # a single vehicle's profile whose spread is off by more t
 FITTED_SHARE = 0.6  # of a single vehicle's drive; the rest is held out
 
 
+RURAL = "rural"
+RURAL_SOURCE = "OpenACC, AstaZero campaign (rural road, 4 and 5 July 2019), Joint Research Centre"
+RURAL_NOTES = "Cars driven by hand on a rural road at 50 to 90 km/h, measured by differential GNSS: the population."
+GNSS = "OpenACC AstaZero, differential GNSS, 4 drives"
+MOTORWAY = "DLR Highway Traffic, 349 vehicles"
+NO_DATA = "No data are shipped: a profile holds fitted numbers, no track of any vehicle."
+RURAL_LICENCE = (
+    "Measured by the Joint Research Centre of the European Commission, (c) European Union, CC BY 4.0: any use, "
+    f"commercial too, with this credit; changed: lane centre estimated, model fitted. {NO_DATA}"
+)
+MOTORWAY_LICENCE = (
+    "Slow movement, levels and effects: measured by the German Aerospace Center (DLR Highway Traffic, "
+    "doi:10.5281/zenodo.14012005), a data set said by others to be under CC BY-NC-SA 4.0, whose first file lies in the "
+    "wheel of tasi under Apache-2.0. Fast movement: measured by the Joint Research Centre of the European Commission, "
+    f"(c) European Union, CC BY 4.0. {NO_DATA} The profile itself comes under the licence of this package; where data "
+    "for non-commercial use may not even be fitted to, use `rural`, which owes nothing to them."
+)
+SHORT_LICENCES = {
+    "motorway": "Apache-2.0; data CC BY-NC-SA 4.0 (as others say), CC BY 4.0",
+    RURAL: "Apache-2.0; data CC BY 4.0",
+}
+"""By road, for lists."""
+
 POPULATION = "motorway"
 POPULATION_NOTES = "All vehicles on a two-lane German motorway in the morning: the population."
 
 
-def build_library(source: Path, *, model: str = "best", refine: bool = True) -> list[DriverProfile]:
-    """All shipped profiles, from the wheel of `tasi` (or the data set's zip or CSV).
+def build_library(
+    source: Path, gnss: Sequence[Path], *, model: str = "best", kept: DriverProfile | None = None
+) -> list[DriverProfile]:
+    """All shipped profiles, from the wheel of `tasi` (or the data set's zip or CSV) and files of OpenACC's AstaZero.
 
     All vehicles were seen by the same cameras: driver and sensor are told apart once, every profile knows the sensor.
 
     Parameters
     ----------
-    refine : bool
-        Whether to close the loop for `motorway-refined` as well: most of the time.
+    kept : DriverProfile, optional
+        `motorway-refined` as the closed loop made it before; without, the loop is closed anew: most of the time.
 
     Raises
     ------
@@ -76,13 +110,63 @@ def build_library(source: Path, *, model: str = "best", refine: bool = True) -> 
         write_imported(imported, table)
         drives = read_drives(table)
     runs = all_runs(drives)
-    seen = Seen(runs, *driver_runs(runs, drives))
-    known = Provenance(source=SOURCE, licence=LICENCE, inputs={source.name: parsed_hash(source)})
+    rural, fast = _rural(gnss, model)
+    seen = Seen(runs, *driver_runs(runs, drives), fast)
+    inputs = {path.name: parsed_hash(path) for path in (source, *gnss)}
+    known = Provenance(source=f"{SOURCE}; {RURAL_SOURCE}", licence=MOTORWAY_LICENCE, inputs=inputs)
     population = _population_profile(seen, known, model)
-    refined = [_refined_profile(drives, runs, known)] if refine else []
-    of_all = [replace(profile, beside=ANSWERS) for profile in (population, *refined)]
-    profiles = [*of_all, *_single_profiles(seen, kind, known, model)]
+    refined = _refined_profile(drives, runs, known) if kept is None else _renewed(kept, known)
+    if not refined.validity.bands:
+        refined = seen.completed(refined, runs)
+    of_all = [replace(profile, beside=ANSWERS) for profile in (population, refined)]
+    profiles = [*of_all, *_single_profiles(seen, kind, known, model), rural]
     return [replace(profile, metadata=shipped_metadata(profile)) for profile in profiles]
+
+
+def _renewed(refined: DriverProfile, known: Provenance) -> DriverProfile:
+    """With what is known of its data now."""
+    provenance = replace(refined.provenance, source=known.source, licence=known.licence, inputs=known.inputs)
+    return replace(refined, provenance=provenance)
+
+
+def _rural(gnss: Sequence[Path], model: str) -> tuple[DriverProfile, FastPart]:
+    """The profile of the cars with differential GNSS, scored on the files that a fit to the first has not seen."""
+    inputs = {path.name: parsed_hash(path) for path in gnss}
+    known = Provenance(source=RURAL_SOURCE, licence=RURAL_LICENCE, inputs=inputs, notes=RURAL_NOTES)
+    first, others = _gnss_drives(gnss[:1]), _gnss_drives(gnss[1:])
+    half = fit_profile(first, name=RURAL, model=model)
+    evaluation = {
+        "held_out": f"{gnss[0].name.split('.')[0]} fitted, the others not",
+        "power_ratio": _power_ratios(half, all_runs(others)),
+    }
+    drives = _gnss_drives(gnss)
+    profile = fit_profile(drives, name=RURAL, model=model, provenance=replace(known, evaluation=evaluation))
+    bands = tuple(replace(band, source=GNSS) for band in profile.validity.bands)
+    profile = replace(profile, validity=replace(profile.validity, bands=bands, roads=("rural road",)))
+    runs = driver_runs(all_runs(drives), drives)[0]
+    return profile, fast_part_of_runs(runs, profile.validity.highest_frequency or PASS_BAND_EDGES, GNSS)
+
+
+BANDS = (0.04, 0.08, 0.12, 0.2, 0.32, 0.5, 1.0)
+"""In which power is compared. [Hz]"""
+
+
+def _power_ratios(profile: DriverProfile, runs: Sequence[Run]) -> dict[str, float]:
+    """Power of free runs over that of real ones, band by band. [-]"""
+    real, made = (
+        spectrum(paths, STEP)
+        for paths in ([run.offset for run in runs], sample_runs(profile, runs, SEED, same_start=False))
+    )
+    ratios = {}
+    for low, high in pairwise(BANDS):
+        band = (real.frequency >= low) & (real.frequency < high)
+        ratios[f"{low:g}-{high:g} Hz"] = round(float(made.density[band].sum() / real.density[band].sum()), 2)
+    return ratios
+
+
+def _gnss_drives(files: Sequence[Path]) -> list[Drive]:
+    table = import_openacc(files).table
+    return drives_of_table(table, None, Path(files[0].name))
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,16 +177,25 @@ class Seen:
     ----------
     recorded, driven : list of Run
     sensor : SensorModel or None
+    fast : FastPart
+        What the recording does not show.
     """
 
     recorded: list[Run]
     driven: list[Run]
     sensor: SensorModel | None
+    fast: FastPart
+
+    def completed(self, profile: DriverProfile, runs: Sequence[Run]) -> DriverProfile:
+        """A profile of some runs with fast movement, and what it is valid for."""
+        known = replace(measured(runs), roads=("motorway",))
+        return with_fast_movement(profile, known, HIGHEST_FREQUENCY, self.fast, MOTORWAY)
 
     def of(self, holds: Callable[[Run], bool]) -> Seen:
         """Some of the runs."""
         chosen = [k for k, run in enumerate(self.recorded) if holds(run)]
-        return Seen([self.recorded[k] for k in chosen], [self.driven[k] for k in chosen], self.sensor)
+        recorded, driven = ([runs[k] for k in chosen] for runs in (self.recorded, self.driven))
+        return Seen(recorded, driven, self.sensor, self.fast)
 
 
 def shipped_metadata(profile: DriverProfile) -> Metadata:
@@ -111,7 +204,12 @@ def shipped_metadata(profile: DriverProfile) -> Metadata:
     words = f"{profile.name} {profile.provenance.notes}".lower() if single else profile.name
     vehicle = next((kind for kind in ("truck", "car", "van") if kind in words), "")
     tags = ("single-vehicle" if single else "population", *([vehicle] if vehicle else []))
-    return Metadata(version="1", vehicle=vehicle, road="motorway", country="DE", date="2024-10-07", tags=tags)
+    road, country, date = ("motorway", "DE", "2024-10-07")
+    if profile.name == RURAL:
+        road, country, date, vehicle = "rural", "SE", "2019-07-04/2019-07-05", "car"
+    return Metadata(
+        version="2", vehicle=vehicle, road=road, country=country, date=date, licence=SHORT_LICENCES[road], tags=tags
+    )
 
 
 def _population_profile(seen: Seen, known: Provenance, model: str) -> DriverProfile:
@@ -119,9 +217,10 @@ def _population_profile(seen: Seen, known: Provenance, model: str) -> DriverProf
     chosen = _fitted_half(seen.recorded)
     fitted = seen.of(lambda run: run.drive in chosen)
     half = fit_population(fitted.driven, name=POPULATION, model=model, sensor=seen.sensor)
-    evaluation = _evaluation(half, seen.of(lambda run: run.drive not in chosen).recorded)
+    evaluation = _evaluation(seen.completed(half, fitted.driven), seen.of(lambda run: run.drive not in chosen).recorded)
     provenance = replace(known, notes=POPULATION_NOTES, evaluation=evaluation)
-    return fit_population(seen.driven, name=POPULATION, model=model, provenance=provenance, sensor=seen.sensor)
+    whole = fit_population(seen.driven, name=POPULATION, model=model, provenance=provenance, sensor=seen.sensor)
+    return seen.completed(whole, seen.driven)
 
 
 def _refined_profile(drives: Sequence[Drive], runs: Sequence[Run], known: Provenance) -> DriverProfile:
@@ -171,7 +270,7 @@ def _single_profiles(seen: Seen, kind: Mapping[str, str], known: Provenance, mod
             known, notes=notes, evaluation=evaluation, fit={"vehicle": name, "vehicle_class": kind[name]}
         )
         fitted = fit_runs(long[name], name=label, model=model, provenance=provenance)
-        profiles.append(replace(fitted, sensor=seen.sensor))
+        profiles.append(seen.completed(replace(fitted, sensor=seen.sensor), long[name]))
     return profiles
 
 

@@ -1,20 +1,18 @@
-"""Twins of a recorded window beside the recording: in-lane movement, gaps, and the verdicts of UN R157's models.
+"""Twins of a recorded window beside the recording: in-lane movement and gaps.
 
-    python -m laboratory.twins WHEEL [--begin 0] [--variants 20] [--cut-ins 8] [--write PAGE.md]
+    python -m laboratory.twins WHEEL [--begin 0] [--variants 20] [--write PAGE.md]
 
 WHEEL is `tasi-0.15.4-py3-none-any.whl`; 6 minutes of processor time. The window is reconstructed and played once, and
 enriched with each variant as `convert` does it (which also plays its output again, to see that the same happens).
 A classifier is shown snippets of 10 s, below 0.5 Hz as in the fair measure, of the recorded road-following and of the
-twin's at the same times. The null is the same test of a twin against the next twin: a model that is the truth. The
-verdicts are those of `laboratory.r157` on recorded cut-ins, with the follower as the vehicle under test, put nearer and
-farther.
+twin's at the same times. The null is the same test of a twin against the next twin: a model that is the truth.
 """
 
 from __future__ import annotations
 
 import argparse
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,8 +21,6 @@ from numpy.typing import NDArray
 
 from laboratory.fair_null import slow_test
 from laboratory.markers import show
-from laboratory.r157.study.encounters import Target
-from laboratory.r157.study.verdicts import GAPS, MODELS, limits, verdicts_of
 from laboratory.reconstruction import WINDOW, write
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.evaluation.filters import below_half_hertz
@@ -35,13 +31,9 @@ from xosc_lateral.workflows.conversion.enrich import enrich
 from xosc_lateral.workflows.conversion.load import Played, play_scenario
 from xosc_lateral.workflows.conversion.result import Enriched
 from xosc_lateral.workflows.recordings.drivers import STEP, in_lane_offsets
-from xosc_lateral.workflows.recordings.encounters import Encounter
 from xosc_lateral.workflows.recordings.page import recorded_path
-from xosc_lateral.workflows.recordings.plan import VehiclePlan
 from xosc_lateral.workflows.recordings.reconstruct import Reconstructed, ReconstructSettings, reconstruct_recording
 from xosc_lateral.workflows.recordings.recordings import read_recording
-from xosc_lateral.world.motion.nominal import Activity
-from xosc_lateral.world.road.network import RoadNetwork
 
 FloatArray = NDArray[np.float64]
 
@@ -134,126 +126,15 @@ def _gap_numbers(gaps: Sequence[Gap], pairs: set[tuple[str, str]]) -> list[float
     return [*np.quantile(values, [0.0, 0.05, 0.5]), float((values < 0.5).sum())]
 
 
-# ---- verdicts --------------------------------------------------------------------------------------------------------
-def cut_ins(made: Reconstructed, most: int) -> list[Encounter]:
-    """Lane changes before followers who close in, the shortest time to collision first."""
-    met = [one for one in made.encounters if one.kind == "lane change" and one.behind is not None]
-    closing = [one for one in met if one.behind is not None and 0.0 < one.behind.time_to_collision < np.inf]
-    return sorted(closing, key=lambda one: one.behind.time_to_collision if one.behind else np.inf)[:most]
-
-
-@dataclass(frozen=True)
-class Place:
-    """Where a vehicle is: centre along its travel [m], speed [m/s], to the left of the reference line [m]."""
-
-    along: FloatArray
-    speed: FloatArray
-    left: FloatArray
-
-
-def recorded_place(plan: VehiclePlan, time: FloatArray, network: RoadNetwork) -> Place:
-    one = plan.vehicle
-    travel = network.travel_direction(int(one.road[0]), int(one.lane[0]))
-    left = travel * network.lane_centre_t(one.road, one.lane, one.s) + one.offset
-    along = travel * one.s + one.centre
-    speed = np.gradient(along, one.time)
-    return Place(*(np.interp(time, one.time, values) for values in (along, speed, left)))
-
-
-def played_place(twins: Twins, name: str, time: FloatArray, deviation: FloatArray) -> Place:
-    one, network = twins.variants[0].entity(name).motion, twins.played.network
-    there = (one.activity & Activity.ACTIVE) != 0
-    road, lane, s = one.road[there], one.lane[there], one.s[there]
-    travel = network.travel_direction(int(road[0]), int(lane[0]))
-    left = travel * network.lane_centre_t(road, lane, s) + (one.offset + deviation)[there]
-    along = travel * s + one.entity.bounding_box.center_x
-    return Place(*(np.interp(time, one.time[there], values) for values in (along, one.speed[there], left)))
-
-
-def targets(twins: Twins, met: Encounter) -> Iterator[Target]:
-    """One recorded run; then the maneuvers alone and every twin, as runs of one target."""
-    assert met.behind is not None
-    plans = {plan.name: plan for plan in twins.made.plans}
-    cutter, ego, network = plans[met.vehicle], plans[met.behind.name], twins.played.network
-    number = next(k for k, one in enumerate(cutter.lateral.transitions) if one.start <= met.time <= one.end)
-    change, lane = cutter.lateral.transitions[number], cutter.targets[number]
-    first = max(change.start - AROUND, cutter.present[0], ego.present[0])
-    last = min(change.end + AROUND, cutter.present[1], ego.present[1])
-    time = np.arange(first, last, EVERY)
-    row = int(np.searchsorted(cutter.vehicle.time, change.start))
-    where = np.array([cutter.vehicle.road[row]]), np.array([lane]), cutter.vehicle.s[row : row + 1]
-    travel = network.travel_direction(int(where[0][0]), lane)
-    centre = travel * float(network.lane_centre_t(*where)[0])
-    side = float(np.sign(change.change))
-    width = float(network.lane_width(*where)[0])
-    still = np.zeros(len(twins.played.motion.entities[0].time))
-    deviations = [still, *(one.entity(met.vehicle).deviation for one in twins.variants)]
-    played = [played_place(twins, met.vehicle, time, deviation) for deviation in deviations]
-    for several, behind in (
-        ([recorded_place(cutter, time, network)], recorded_place(ego, time, network)),
-        (played, played_place(twins, ego.name, time, still)),
-    ):
-        away = np.array([side * (centre - one.left) for one in several])  # from the lane that it comes to
-        boxes = cutter.vehicle.width, cutter.vehicle.length, ego.vehicle.length, ego.vehicle.width
-        yield Target(
-            twins.made.traffic.name,
-            met.vehicle,
-            EVERY,
-            several[0].along,
-            several[0].speed,
-            behind.along,
-            behind.speed,
-            width - away,
-            away,
-            np.zeros(len(time), dtype=np.bool_),
-            change.start - first,
-            width,
-            *boxes,
-        )
-
-
-def verdict_lines(twins: Twins, most: int) -> list[str]:
-    head = " | ".join(f"{name} [m]" for name in MODELS)
-    lines = [
-        f"Gap from which on the models prevent it, of {GAPS[0]:g} to {GAPS[-1]:g} m: recorded, maneuvers alone, twins "
-        "5 to 95 %.",
-        "",
-        f"| cut-in: gap, time to collision half way | {head} |",
-        "|---" * (1 + len(MODELS)) + "|",
-    ]
-    inside: Mapping[str, list[bool]] = {name: [] for name in MODELS}
-    for met in cut_ins(twins.made, most):
-        recorded, played = (verdicts_of(one) for one in targets(twins, met))
-        cells = []
-        for name in MODELS:
-            own, others = float(limits(recorded.prevented[name])[0]), limits(played.prevented[name])
-            low, high = np.quantile(others[1:], [0.05, 0.95], method="nearest")
-            inside[name].append(bool(others[1:].min() <= own <= others[1:].max()))
-            cells.append(f"{_limit(own)}, {_limit(others[0])}, {_limit(low)} to {_limit(high)}")
-        assert met.behind is not None
-        lines.append(
-            f"| {met.vehicle} before {met.behind.name}, {met.behind.gap:.0f} m, {met.behind.time_to_collision:.0f} s | "
-            f"{' | '.join(cells)} |"
-        )
-    counts = " | ".join(f"{sum(inside[name])} of {len(inside[name])}" for name in MODELS)
-    return [*lines, f"| recorded one within the twins' | {counts} |"]
-
-
-def _limit(gap: float) -> str:
-    """Prevented from this gap on; "all", or "none" of those that were tried."""
-    return "all" if gap < GAPS[0] else "none" if gap > GAPS[-1] else f"{gap:.1f}"
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("source", type=Path)
     parser.add_argument("--begin", type=float, default=0.0)
     parser.add_argument("--variants", type=int, default=20)
-    parser.add_argument("--cut-ins", type=int, default=8)
     parser.add_argument("--write", type=Path, help="page with the markers")
     args = parser.parse_args()
     twins = twins_of(args.source, args.begin, args.variants)
-    parts = movement_lines(twins), gap_lines(twins), verdict_lines(twins, args.cut_ins)
+    parts = movement_lines(twins), gap_lines(twins)
     show("\n\n".join("\n".join(part) for part in parts), args.write, "twins")
 
 

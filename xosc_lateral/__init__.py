@@ -21,6 +21,7 @@ _HOME = {
     "sample": "workflows.profiles.sample",
     "evaluate": "workflows.profiles.evaluate",
     "close_loop": "workflows.profiles.loop",
+    "detect": "workflows.detection.call",
     "read_drives": "workflows.profiles.fit",
     "import_drives": "workflows.recordings.importing",
     "read_profile": "workflows.profiles.profiles",
@@ -50,6 +51,7 @@ _HOME = {
     "Offsets": "workflows.profiles.sample",
     "Evaluation": "workflows.profiles.evaluate",
     "ClosedLoop": "workflows.profiles.loop",
+    "Detection": "workflows.detection.call",
     "ImportedDrives": "workflows.recordings.importing",
     "XoscLateralError": "base.errors",
     "FormatError": "base.errors",
@@ -72,6 +74,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "sample",
     "evaluate",
     "close_loop",
+    "detect",
     "read_drives",
     "import_drives",
     "read_profile",
@@ -101,6 +104,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "Offsets",
     "Evaluation",
     "ClosedLoop",
+    "Detection",
     "ImportedDrives",
     "XoscLateralError",
     "FormatError",
@@ -127,6 +131,7 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.batch.verify_call import Verification, reproduce, verify
     from xosc_lateral.workflows.conversion.call import Conversion, convert
     from xosc_lateral.workflows.conversion.settings import ConvertSettings
+    from xosc_lateral.workflows.detection.call import Detection, detect
     from xosc_lateral.workflows.live.call import LiveRun, live_esmini, live_sumo
     from xosc_lateral.workflows.live.esmini import EsminiTraffic
     from xosc_lateral.workflows.live.fmu import export_fmu

@@ -61,6 +61,7 @@ def test_every_schema_is_one_and_is_listed():
         ("sample", "sample -p motorway --like drives.csv -o snippets.parquet"),
         ("fit", "fit drives.csv -o fitted.json"),
         ("evaluate", "evaluate drives.csv -p motorway --no-classify"),
+        ("detect", "detect in/cut-in.xosc drives.csv --variants 1 --report detection.html -o detection.csv"),
         ("close-loop", "close-loop short.csv -o refined.json --report loop"),
         ("template-list", "template list"),
         ("template-write", "template write curves -o written --set radius=800"),
@@ -73,6 +74,8 @@ def test_every_schema_is_one_and_is_listed():
         ("profiles-tag", "profiles tag mine --library lib --tag night --set country=DE"),
         ("profiles-export", "profiles export mine motorway --library lib -o exported/"),
         ("profiles-check", "profiles check --library lib"),
+        ("profiles-rename", "profiles rename mine ours --library lib"),
+        ("profiles-remove", "profiles remove ours --library lib"),
     ],
     ids=lambda value: value.replace(" ", "_")[:40],
 )
@@ -90,6 +93,9 @@ def test_a_batch_is_json_lines(folder, monkeypatch, capsys):
         holds(value, "batch-output")
     holds(summary, "batch-summary")
     assert (summary["failed"], summary["written"]) == (1, 1)
+    (value,) = objects(capsys, 0, "profiles", "uses", "motorway", "batch")
+    holds(value, "profiles-uses")
+    assert [use["is_current"] for use in value["outputs"]] == [True]
 
 
 @pytest.mark.parametrize(

@@ -33,6 +33,7 @@ RUN = (
     "tutorials/test_data_engineer.md",
     "tutorials/pipeline_owner.md",
     "tutorials/researcher.md",
+    "how_to/detect.md",
     "how_to/effect.md",
     "how_to/importer.md",
     "how_to/carla.md",

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import gzip
 import json
 import os
 import re
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -19,6 +21,7 @@ from xosc_lateral import write_template
 from xosc_lateral.base.shipped import shipped_folder
 from xosc_lateral.cli import main
 from xosc_lateral.drivers.model.stream import OffsetStream
+from xosc_lateral.files.output_tables import csv_text
 from xosc_lateral.files.profiles import profile_bytes
 from xosc_lateral.workflows.batch.batch import STATE
 from xosc_lateral.workflows.batch.journal import Journal, folder_lock
@@ -208,3 +211,87 @@ def test_the_lock_is_an_event_where_the_log_is_json(tmp_path, capsys):
         assert main(["convert", str(tmp_path / "in"), "-o", str(tmp_path / "out"), "--log-json"]) == 1
     event = json.loads(capsys.readouterr().err.splitlines()[-1])
     assert event["event"] == "error" and "another run" in event["error"]["message"]
+
+
+def test_drives_that_are_all_the_same_show_no_difference_between_drivers(drive, tmp_path, capsys):
+    twice = tmp_path / "again.csv"
+    twice.write_bytes(drive.read_bytes())
+    pd.concat([pd.read_csv(drive)] * 4).assign(drive=np.repeat(["a", "b", "c", "d"], len(pd.read_csv(drive)))).to_csv(
+        twice
+    )
+    assert "is one there twice?" in refused(["evaluate", "-p", "motorway", twice], capsys)
+
+
+@pytest.mark.parametrize(("step", "what"), [(0.1, "steps of 0.2 s"), (1e-9, "steps of 0.2 s"), ("0.2", "model")])
+def test_a_profile_with_other_steps_is_refused_by_whoever_reads_it(step, what, profile, tmp_path, capsys):
+    values = json.loads(profile.read_text())
+    model = values["model"]
+    model.get("settings", model)["step"] = step
+    profile.write_text(json.dumps(values))
+    out = ["--duration", 10, "--seed", 1, "-o", tmp_path / "o.csv"]
+    for words in (
+        ["sample", "-p", profile, *out],
+        ["profiles", "show", profile],
+        ["profiles", "add", profile, "--library", tmp_path],
+    ):
+        assert what in refused(words, capsys)
+
+
+def test_numbers_that_are_texts_are_no_numbers(profile, tmp_path, capsys):
+    text = profile.read_text()
+    damping = re.search(r'"damping": \[([^],]*)', text)
+    assert damping is not None
+    profile.write_text(text.replace(damping[0], f'"damping": ["{damping[1].strip()}"'))
+    assert "expected numbers" in refused(["profiles", "show", profile], capsys)
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ("a = " + "[" * 5000, "nested too deeply"),
+        ("columns = 1" + "0" * 5000, "Exceeds the limit"),
+        ('separator = ","\ndecimal = ","', "both"),
+        ('[roles]\nspeed = "magic"', "'magic' is none of road"),
+    ],
+)
+def test_a_mapping_that_no_table_is_read_by_is_refused(text, what, drive, tmp_path, capsys):
+    (tmp_path / "m.toml").write_text(text)
+    line = refused(["import", "table", drive, "--mapping", tmp_path / "m.toml", "-o", tmp_path / "o.csv"], capsys)
+    assert what in line and "m.toml" in line
+
+
+def test_a_name_in_a_file_steers_no_terminal(tmp_path, capsys):
+    path = tmp_path / "x\x1b[2Jy\u202e.csv"
+    path.write_text("time,offset\n")
+    line = refused(["fit", path, "-o", tmp_path / "p.json"], capsys)
+    assert line.isprintable() or line[:-1].isprintable()
+    assert r"\x1b[2J" in line
+
+
+def test_a_full_disk_names_the_output(tmp_path, capsys, monkeypatch):
+    def full(self, target):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    write_template("cut-in", tmp_path)
+    monkeypatch.setattr(Path, "replace", full)
+    line = refused(["play", tmp_path / "cut-in.xosc", "-o", tmp_path / "states.csv"], capsys)
+    assert line == f"xosc-lateral: {tmp_path}/states.csv.json: no space left on device\n"
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "what"),
+    [
+        ('<Center x="', '<Center x="" x2="', "x='' is not a number"),
+        ("</Entities>", '<EntitySelection name="Ego"><Members/></EntitySelection></Entities>', "called 'Ego'"),
+        ('north="', 'north="inf" n2="', "north='inf' is not finite"),
+    ],
+)
+def test_what_no_scenario_says_is_refused(before, after, what, tmp_path, capsys):
+    write_template("cut-in", tmp_path)
+    for path in (tmp_path / "cut-in.xosc", *tmp_path.rglob("*.xodr")):
+        path.write_text(path.read_text().replace(before, after))
+    assert what in refused(["play", tmp_path / "cut-in.xosc", "-o", tmp_path / "states.csv"], capsys)
+
+
+def test_a_header_cell_is_no_formula():
+    assert csv_text(pd.DataFrame({"=HYPERLINK(1)": ["=1"]})) == "'=HYPERLINK(1)\n'=1\n"

@@ -156,7 +156,7 @@ BAD = {
         r"offsets of up to 20 m in a lane of 3\.5 m, 100 % of the rows",
     ),
     "lane in cm": (changed(offset=0.0, lane_width=350.0), FormatError, r"lane is 350 m wide \(median\)"),
-    "speed in km/h": (changed(speed=120.0), FormatError, r"speed is 120 m/s \(median\), more than 60; .*km/h"),
+    "speed in km/h": (changed(speed=120.0), FormatError, r"speed is 120 m/s \(median\), more than 50; .*km/h"),
     "time in ms": (changed(time=table().time * 1000), FormatError, r"rows are 50 s apart \(median\).*:ms"),
     "too sparse": (table(rate=2.0), FormatError, r"rows are 0\.5 s apart"),
     "two drives in one": (

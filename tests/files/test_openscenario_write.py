@@ -267,7 +267,10 @@ def test_controllers_of_converted_entities_go_and_are_named(tmp_path: Path) -> N
     assert again.entity("Ego").controllers == ()
     assert [found.name for found in again.entity("B").controllers] == ["pilot"]
     assert "ActivateControllerAction" not in (tmp_path / "out.xosc").read_text()
-    assert {removed.kind for removed in written.removed} == {"ObjectController", "ActivateControllerAction"}
+    (removed,) = written.removed
+    assert removed.reason == (
+        "'Ego' follows a trajectory: controller 'pilot': along and across the road; now as the default driver would"
+    )
     assert written.converted == ("Ego",)
 
 

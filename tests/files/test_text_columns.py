@@ -8,7 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from xosc_lateral.files.tables import comma_numbers, indicators, plain_cells, seconds_of_text
+from xosc_lateral.files.clock import seconds_of_stamps
+from xosc_lateral.files.tables import comma_numbers, indicators, plain_cells
 
 
 def column(*values: object) -> pd.Series:
@@ -62,33 +63,33 @@ FORMS = {
 def test_times_in_words_are_seconds_from_the_first_or_from_midnight(form: str) -> None:
     begin = datetime(2026, 3, 5, 14, 3, 5, 120_000, tzinfo=UTC)  # a day that is a month as well
     steps = 0.05 * np.arange(40)
-    found = seconds_of_text(column(*(FORMS[form](begin + timedelta(seconds=float(step))) for step in steps)))
+    found = seconds_of_stamps(column(*(FORMS[form](begin + timedelta(seconds=float(step))) for step in steps)))
     assert found is not None
     midnight = 14 * 3600 + 3 * 60 + 5.12 if form.startswith("clock") else 0.0
     np.testing.assert_allclose(found, midnight + steps, atol=0.011)
 
 
 def test_a_clock_runs_on_past_midnight() -> None:
-    found = seconds_of_text(column("23:59:59", "00:00:01", "00:00:03"))
+    found = seconds_of_stamps(column("23:59:59", "00:00:01", "00:00:03"))
     assert found is not None
     np.testing.assert_allclose(found, [86_399.0, 86_401.0, 86_403.0])
 
 
 def test_hours_and_minutes_alone_are_a_clock_too() -> None:
-    found = seconds_of_text(column("7:30", "7:31"))
+    found = seconds_of_stamps(column("7:30", "7:31"))
     assert found is not None
     assert found.tolist() == [27_000.0, 27_060.0]
 
 
 def test_a_row_without_a_time_has_none() -> None:
-    found = seconds_of_text(column("2026-03-05T14:00:00", None, "2026-03-05T14:00:02"))
+    found = seconds_of_stamps(column("2026-03-05T14:00:00", None, "2026-03-05T14:00:02"))
     assert found is not None
     np.testing.assert_array_equal(found, [0.0, np.nan, 2.0])
 
 
 @pytest.mark.parametrize("cells", [("dry", "wet"), (None,), ("14:00", "noon")], ids=str)
 def test_words_are_no_times(cells: tuple[object, ...]) -> None:
-    assert seconds_of_text(column(*cells)) is None
+    assert seconds_of_stamps(column(*cells)) is None
 
 
 # ---- words -----------------------------------------------------------------------------------------------------------

@@ -10,9 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from xosc_lateral.files.clock import seconds_of_stamps
 from xosc_lateral.files.mapping import UNITS, factor, is_measured, spelled
 from xosc_lateral.files.output_tables import harmless
-from xosc_lateral.files.tables import comma_numbers, indicators, plain_cells, seconds_of_text
+from xosc_lateral.files.tables import comma_numbers, indicators, plain_cells
 
 
 # ---- units -----------------------------------------------------------------------------------------------------------
@@ -110,20 +111,20 @@ def test_numbers_written_the_german_way_come_back(values: list[float]) -> None:
     ],
 )
 def test_dates_count_from_the_earliest(texts: list[str]) -> None:
-    found = seconds_of_text(pd.Series(texts))
+    found = seconds_of_stamps(pd.Series(texts))
     assert found is not None
     np.testing.assert_allclose(found, [0.0, 1.0, 60.0], atol=1e-6)
 
 
 def test_clock_times_count_from_midnight_and_run_past_it() -> None:
-    found = seconds_of_text(pd.Series(["23:59:58", "23:59:59,5", "00:00:01", None, "00:01"]))
+    found = seconds_of_stamps(pd.Series(["23:59:58", "23:59:59,5", "00:00:01", None, "00:01"]))
     assert found is not None
     np.testing.assert_allclose(found, [86398.0, 86399.5, 86401.0, np.nan, 86460.0])
 
 
 @pytest.mark.parametrize("texts", [["left", "right"], [None], ["2026-11-21T14:03:05", "soon"]])
 def test_what_are_no_times_are_none(texts: list[str | None]) -> None:
-    assert seconds_of_text(pd.Series(texts, dtype=object)) is None
+    assert seconds_of_stamps(pd.Series(texts, dtype=object)) is None
 
 
 # ---- words -----------------------------------------------------------------------------------------------------------

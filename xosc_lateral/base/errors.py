@@ -10,7 +10,15 @@ from collections.abc import Iterable
 
 
 class XoscLateralError(Exception):
-    """Base of all errors that a user can cause. `str()` of it is one line, fit for stderr."""
+    """Base of all errors that a user can cause. `str()` of it is one line, fit for stderr: no file moves a cursor."""
+
+    def __str__(self) -> str:
+        return printable(super().__str__())
+
+
+def printable(text: str) -> str:
+    """Text without signs that steer a terminal or turn the direction of reading; they appear as escapes."""
+    return "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in text)
 
 
 class FormatError(XoscLateralError, ValueError):

@@ -30,6 +30,7 @@ VERBS = {
     "fit": "Fit a profile to measured drives.",
     "sample": "Sample offsets alone, as a table.",
     "evaluate": "Score a profile on measured drives.",
+    "detect": "Cut-in detectors on scenarios and real traffic.",
     "close-loop": "Find and add what a profile lacks.",
     "import": "Convert recordings into drive tables.",
     "profiles": "The library of driver profiles.",

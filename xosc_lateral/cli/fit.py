@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Mapped, Tables, Written, command, warn, write_stdout
+from xosc_lateral.cli.words import Library, Mapped, Tables, Written, command, warn, write_stdout
 
 app = group_of_verbs()
 
@@ -25,6 +25,7 @@ def _known_model(text: str) -> str:
 @command(
     app, "fit", VERBS["fit"],
     "fit drives.csv.gz -o mine.json", "fit monday.csv tuesday.csv -o profiles/ --name anna --map speed=v_kmh:km/h",
+    "fit smoothed.csv -o mine.json --valid-below 0.3",
 )  # fmt: skip
 def fit(
     tables: Tables,
@@ -58,6 +59,23 @@ def fit(
             help="Whether to fit how drivers keep away from vehicles beside them; default: where they are known.",
         ),
     ] = None,
+    valid_below: Annotated[
+        float | None,
+        typer.Option(
+            metavar="HZ",
+            min=0.02,
+            max=2.5,
+            help="Frequency up to which tables show driving that do not state it: smoothed tracks. [Hz]",
+        ),
+    ] = None,
+    prior: Annotated[
+        str,
+        typer.Option(
+            metavar="PROFILE|none",
+            help="Whose fast movement it has above the band that the tables show; rural: only where they state one.",
+        ),
+    ] = "rural",
+    library: Library = None,
     said: Written,
 ) -> None:
     """Fit a driver profile to measured drives."""
@@ -65,6 +83,7 @@ def fit(
     from xosc_lateral.drivers.model.drivability import fit_warnings
     from xosc_lateral.files.output_paths import STDOUT, claim, output_file
     from xosc_lateral.files.profiles import describe_profile, profile_bytes, profile_record
+    from xosc_lateral.workflows.profiles.fit import band_warnings
     from xosc_lateral.workflows.profiles.profiles import PROFILE_SUFFIXES
 
     usual = name or tables[0].name.split(".")[0]
@@ -80,6 +99,9 @@ def fit(
         sensor_noise=sensor_noise,
         left_hand=left_hand,
         neighbours=neighbours,
+        valid_below=valid_below,
+        prior=None if prior == "none" else prior,
+        library=library or (),
     )
     if written is None:
         write_stdout(profile_bytes(profile))
@@ -87,4 +109,4 @@ def fit(
         write_profile(profile, written, force=said.force)
     facts = None if written is None else {"output": str(written), **profile_record(profile)}
     said.say_words(describe_profile(profile), facts)
-    warn(fit_warnings(profile, sensor_noise))
+    warn([*fit_warnings(profile, sensor_noise), *band_warnings(profile)])

@@ -175,12 +175,33 @@ def fcd(
     source: Annotated[Path, typer.Argument(help="What --fcd-output wrote (.xml).", show_default=False)],
     *,
     output: Output,
-    net: Annotated[Path | None, typer.Option(help="Road network (.net.xml): widths and counts of lanes.")] = None,
+    net: Annotated[
+        Path | None, typer.Option(help="Road network (.net.xml): lanes, side of the road, who is on the next edge.")
+    ] = None,
+    types: Annotated[Path | None, typer.Option(help="File with the vehicle types (.rou.xml): lengths.")] = None,
     lane_width: Annotated[float, typer.Option(help="Without a network. [m]", min=1, max=10)] = 3.2,
     said: Written,
 ) -> None:
     """SUMO's FCD output of a run with the sublane model: a drive for every vehicle."""
-    _import("fcd", [source], output, said, net=net, lane_width=lane_width)
+    _import("fcd", [source], output, said, net=net, types=types, lane_width=lane_width)
+
+
+@command(
+    group, "openacc", "OpenACC, AstaZero campaign.",
+    "import openacc ASta_040719_platoon3.csv ASta_050719_platoon1.csv -o drives.parquet",
+)  # fmt: skip
+def openacc(
+    sources: Annotated[
+        list[Path], typer.Argument(metavar="FILE...", help="Files of one track (.csv, .csv.gz).", show_default=False)
+    ],
+    *,
+    output: Output,
+    lane_width: Annotated[float, typer.Option(help="Of the road, which the files don't give. [m]", min=2, max=6)] = 3.5,
+    keep_cut: KeepCut = False,
+    said: Written,
+) -> None:
+    """OpenACC's platoons on the closed loop of AstaZero: lane centre from all passes of all files."""
+    _import("openacc", sources, output, said, lane_width=lane_width, keep_cut=keep_cut)
 
 
 @command(group, "commonroad", "CommonRoad scenarios.", "import commonroad DEU_A9-1_1_T-1.xml -o drives.parquet")

@@ -27,11 +27,12 @@ def reconstruct(
     format_: Annotated[
         str | None,
         typer.Option(
-            "--format", help="dlr-ht, levelx, osi, commonroad, tracks; default: by the name.", show_default=False
+            "--format", help="dlr-ht, levelx, osi, commonroad, fcd, tracks; default: by the file.", show_default=False
         ),
     ] = None,
     road: Annotated[
-        Path | None, typer.Option("--road", help="OpenDRIVE file that it was recorded on.", show_default=False)
+        Path | None,
+        typer.Option("--road", help="OpenDRIVE file, or SUMO network, that it was recorded on.", show_default=False),
     ] = None,
     mapped: Mapped,
     settings: Annotated[dict[str, Any], ReconstructSettings],

@@ -23,12 +23,19 @@ def verify(
     ],
     *,
     library: Library = None,
+    allow: Allow = None,
+    road_path: RoadPath = None,
+    fast: Annotated[bool, typer.Option("--fast", help="Compare hashes alone; make nothing again.")] = False,
+    jobs: Annotated[int, typer.Option(help="Number of processes; -1: one per core.")] = 1,
     said: Printing,
 ) -> None:
-    """Name outputs that were edited, whose inputs have changed, or that another version made; exit code 1 then."""
+    """Make outputs again in memory and name those that differ, and why: edited, other inputs, another version."""
     from xosc_lateral import verify as check
 
-    result = check(outputs, library=library or ())
+    if jobs == 0 or jobs < -1:
+        raise typer.BadParameter("at least 1, or -1 for one per core", param_hint="--jobs")
+    places = {"library": library or (), "allow": allow or (), "road_path": road_path or ()}
+    result = check(outputs, **places, fast=fast, workers=0 if jobs == 1 else jobs)
     said.say(result, even=bool(result.failing))
     if result.failing:
         raise typer.Exit(1)

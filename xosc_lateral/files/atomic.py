@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import re
 import tempfile
@@ -59,9 +60,12 @@ def replace_atomically(path: Path | str, write: Callable[[Path], object]) -> Pat
     """
     path = Path(path)
     refuse_guarded(path)
-    with _temporary_beside(path) as temporary:
-        write(temporary)
-        temporary.replace(path)
+    try:
+        with _temporary_beside(path) as temporary:
+            write(temporary)
+            temporary.replace(path)
+    except OSError as error:  # of a full disk, say: libraries name no file, or one that nobody knows
+        raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
     return path
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,12 +14,22 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.segment import CONTEXT_UNITS
-from xosc_lateral.drivers.drives.cleaning import DRIVE_COLUMNS, MAX_MEDIAN_SPEED, MAX_OUTSIDE, clean_drive
+from xosc_lateral.drivers.drives.cleaning import DRIVE_COLUMNS, LANE_WIDTHS, MAX_MEDIAN_SPEED, MAX_OUTSIDE, clean_drive
 from xosc_lateral.drivers.drives.cuts import MIN_RUN
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.model.plausibility import drives_nobody, first_implausible, implausible, implausible_rows
+from xosc_lateral.files.clock import seconds_of_stamps
+from xosc_lateral.files.labels import file_label
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping
+from xosc_lateral.files.rows import chosen_rows, without_markers
 from xosc_lateral.files.tables import comma_numbers, indicators, listed, numbers_of, plain_cells, read_table
+
+LABELS = ("drive", "driver")
+"""Columns that say which drive a row is of, and whose."""
+
+WHEEL_WIDTH = 2.5
+"""Lanes of roads driven at 40 km/h and more are wider but for the left one at roadworks; from the wheels of a car
+(1.5 to 1.6 m apart) one of 3.0 to 3.75 m has 1.4 to 2.25 m. [m]"""
 
 MAX_LEVELS = 12
 """A column of whole numbers with at most so many values holds levels, not a quantity."""
@@ -45,11 +56,15 @@ def read_drives(paths: str | Path | Sequence[str | Path], mapping: MappingLike |
 
 
 def with_distinct_names(drives: Sequence[Drive]) -> list[Drive]:
-    """Drives of several tables; those of one name are called by their table as well."""
-    names = [drive.name for drive in drives]
+    """Drives of several tables; those of one name are called by their table as well, of one table's by number."""
+    names = Counter(drive.name for drive in drives)
+    apart = [drive.name if names[drive.name] == 1 else f"{drive.source}:{drive.name}" for drive in drives]
+    seen, again = Counter[str](), Counter(apart)
+    for k, name in enumerate(apart):
+        seen[name] += 1
+        apart[k] = name if again[name] == 1 else f"{name} #{seen[name]}"
     return [
-        drive if names.count(drive.name) == 1 else replace(drive, name=f"{drive.source}:{drive.name}")
-        for drive in drives
+        drive if name == drive.name else replace(drive, name=name) for drive, name in zip(drives, apart, strict=True)
     ]
 
 
@@ -67,7 +82,8 @@ def drives_of_table(table: pd.DataFrame, mapping: MappingLike, path: Path | str 
         clean_drive(name, {key: values[rows] for key, values in columns.items()}, levels, path)
         for name, rows in zip(names, every, strict=True)
     ]
-    found = [drive for drive in drives if drive is not None]
+    drivers = [_driver(table, name, rows, path) for name, rows in zip(names, every, strict=True)]
+    found = [replace(drive, driver=driver) for drive, driver in zip(drives, drivers, strict=True) if drive is not None]
     if not found:
         what = f"no drive has two rows with time, offset and lane width; {MIN_RUN:g} s are needed"
         raise NotEnoughDataError(f"{path}: {what}")
@@ -85,14 +101,39 @@ def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.Dat
         if source.column not in table.columns:
             what = f"no column {source.column!r} for {name}; there are {listed(table.columns)}"
             raise FormatError(what, path=path, line=1)
+    table = chosen_rows(without_markers(table, mapping.missing, path), mapping.rows, path)
     own = [name for name in table.columns if name not in taken and name not in mapping.columns]
     kept = {name: mapping.numbers(name, plain_cells(table[name]), path) for name in own}
     for name, source in mapping.columns.items():
         column = mapping.numbers(name, plain_cells(table[source.column]), path)
-        if name != "drive" and source.factor != 1.0:
+        if name not in LABELS and source.factor != 1.0:
             column = pd.Series(numbers_of(column, path, name) * source.factor, index=column.index)
         kept[name] = column
-    return pd.DataFrame(kept)
+    if "time" in kept and not pd.api.types.is_numeric_dtype(kept["time"]):
+        seconds = seconds_of_stamps(kept["time"], path, mapping.time_zone, kept.get("drive"))
+        kept["time"] = kept["time"] if seconds is None else pd.Series(seconds, index=table.index)
+    recorded = {name: value for name, value in mapping.recorded.items() if name not in kept}
+    return from_middle(pd.DataFrame(kept).assign(**recorded), mapping, path)
+
+
+def from_middle(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.DataFrame:
+    """The table with distances to the markings from the vehicle's middle: those from its wheels make lanes narrow.
+
+    Raises `FormatError`: they do, and the mapping does not say how far apart the wheels are.
+    """
+    if not {"distance_left", "distance_right"} <= set(table.columns):
+        return table
+    left, right = (numbers_of(table[name], path, name) for name in ("distance_left", "distance_right"))
+    if mapping.wheel_track is None:
+        known = (left + right)[np.isfinite(left + right)]
+        median = float(np.median(known)) if len(known) else 0.0
+        if 0.5 * LANE_WIDTHS[0] <= median < WHEEL_WIDTH:
+            what = f"lanes of {median:.2f} m (median): distances may be from the wheels or sides, not from the middle"
+            advice = "the mapping says how far apart these are, wheel_track = 1.6, or 0"
+            raise FormatError(f"{what}; {advice}", path=path, element="columns 'distance_left', 'distance_right'")
+        return table
+    width = left + right + mapping.wheel_track
+    return table.drop(columns=["distance_left", "distance_right"]).assign(offset=0.5 * (right - left), lane_width=width)
 
 
 def _numeric_columns(table: pd.DataFrame, path: Path) -> dict[str, FloatArray]:
@@ -101,7 +142,7 @@ def _numeric_columns(table: pd.DataFrame, path: Path) -> dict[str, FloatArray]:
 
     columns: dict[str, FloatArray] = {}
     for name in table.columns:
-        if name == "drive":
+        if name in LABELS:
             continue
         if name in (*DRIVE_COLUMNS, "speed") or pd.api.types.is_numeric_dtype(table[name]):
             columns[name] = _cleaned(table, name, path)
@@ -156,10 +197,21 @@ def _require_columns(columns: Mapping[str, FloatArray], path: Path) -> None:
 
 def _drive_names(table: pd.DataFrame, path: Path) -> tuple[list[str], list[NDArray[np.intp]]]:
     if "drive" not in table.columns:
-        return [path.name.split(".")[0]], [np.arange(len(table))]
+        return [file_label(path)], [np.arange(len(table))]
     codes, names = table["drive"].factorize()
     if (codes < 0).any():
         raise FormatError("no value", path=path, line=int(np.argmax(codes < 0)) + 2, element="column 'drive'")
     order = np.argsort(codes, kind="stable")
     bounds = np.searchsorted(codes[order], np.arange(1, len(names)))
     return [str(name) for name in names], list(np.split(order, bounds))
+
+
+def _driver(table: pd.DataFrame, name: str, rows: NDArray[np.intp], path: Path) -> str:
+    """Who drove, empty where the table doesn't say."""
+    if "driver" not in table.columns:
+        return ""
+    found = table["driver"].iloc[rows].dropna().unique()
+    if len(found) > 1:
+        what = f"drive {name}: {found[0]} and {found[1]}; a drive has one driver"
+        raise FormatError(what, path=path, element="column 'driver'")
+    return str(found[0]) if len(found) else ""

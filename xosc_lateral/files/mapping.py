@@ -1,7 +1,12 @@
 """What foreign tables hold, in standard names: a mapping given word by word (``--map``) or saved in a file.
 
-A file is TOML: how tables are written (``encoding``, ``separator``, ``decimal``), ``[columns]`` with a line per
-standard name, as in ``--map``, ``[values.NAME]`` with the number that each text of a column stands for, ``[roles]``.
+A file is TOML: how tables are written (``encoding``, ``separator``, ``decimal``), what the recording shows
+(``valid_below`` in Hz, ``resolution`` in m), ``[columns]`` with a line per standard name, as in ``--map``,
+``[values.NAME]`` with the number that each text of a column stands for (of `vehicle_class`: the class that a number
+stands for), ``[roles]``; besides, ``rows = ["quality >= 2"]``: which rows
+count, ``missing = [-9999]``: what stands for no value, ``time_zone = "Europe/Berlin"``: of local stamps,
+``reference = "front"``, "centre", "rear" or "rear axle": the point of tracks that x and y are of,
+``wheel_track = 1.6``: how far apart the points are that distances to the markings count from.
 """
 
 from __future__ import annotations
@@ -18,6 +23,7 @@ import numpy as np
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.segment import CONTEXT_UNITS
+from xosc_lateral.files.rows import as_word, parse_condition
 from xosc_lateral.files.source import read_toml
 
 # Factors to SI. Degrees stay apart from radians only by their factor.
@@ -95,7 +101,15 @@ def factor(column: str, unit: str) -> float:
     return sign * to_si / target_to_si
 
 
-KEYS = ("encoding", "separator", "decimal", "columns", "values", "roles")
+RECORDED = ("valid_below", "resolution")
+"""What a mapping says of the recordings: driving below a frequency [Hz], offsets to a step [m]."""
+
+KEYS = (
+    "encoding", "separator", "decimal", *RECORDED, "columns", "values", "roles", "rows", "missing", "time_zone",
+    "reference", "wheel_track",
+)  # fmt: skip
+
+REFERENCES = ("centre", "front", "rear", "rear axle")
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +134,26 @@ class TableMapping:
     encoding: str | None = None  # encoding, separator: of text files; None: found out
     separator: str | None = None
     decimal: str = "."
+    classes: Mapping[str, str] = field(default_factory=dict)  # vehicle classes by what the table has for them
+    rows: tuple[str, ...] = ()  # conditions that rows have to fulfil
+    missing: tuple[float | str, ...] | None = None  # what stands for no value; None: not said
+    time_zone: str = ""  # of local stamps
+    wheel_track: float | None = None  # between the points that distances to the markings count from [m]
+    reference: str = "centre"  # of `REFERENCES`: the point of a vehicle that x and y of tracks are of
+    recorded: Mapping[str, float] = field(default_factory=dict)  # by the names in `RECORDED`
+
+    def class_names(self, column: pd.Series, path: Path) -> pd.Series:
+        """Vehicle classes in words.
+
+        Raises `FormatError`: they are numbers, and the mapping does not say of what.
+        """
+        words = column.map(as_word)
+        if self.classes:
+            return words.map(lambda word: self.classes.get(word, word))
+        if pd.api.types.is_numeric_dtype(column) and column.notna().any():
+            what = f"numbers such as {words.iloc[0]}: [values.vehicle_class] of the mapping says what they stand for"
+            raise FormatError(what, path=path, element=f"column {str(column.name)!r}")
+        return words
 
     def with_words(self, words: Mapping[str, str]) -> TableMapping:
         """With further columns, as ``--map`` has them, in place of those of the same name."""
@@ -134,7 +168,7 @@ class TableMapping:
         if name not in self.values:
             return column
         known = {text.strip().lower(): number for text, number in self.values[name].items()}
-        texts = column.map(lambda cell: "" if pd.isna(cell) else _as_word(cell))
+        texts = column.map(lambda cell: "" if pd.isna(cell) else as_word(cell))
         strange = texts[(texts != "") & ~texts.isin(list(known))]
         if len(strange):
             what = f"{strange.iloc[0]!r} is not in [values.{name}] of the mapping: {', '.join(self.values[name])}"
@@ -157,11 +191,6 @@ def as_mapping(given: MappingLike | None) -> TableMapping:
     words = {name: entry for name, entry in given.items() if isinstance(entry, str)}
     sources = {name: entry for name, entry in given.items() if isinstance(entry, ColumnSource)}
     return TableMapping(sources).with_words(words)
-
-
-def _as_word(cell: object) -> str:
-    whole = isinstance(cell, float) and cell.is_integer()
-    return str(int(cell) if whole else cell).strip().lower()  # type: ignore[call-overload]
 
 
 def parse_map(words: Iterable[str]) -> dict[str, ColumnSource]:
@@ -197,17 +226,65 @@ def read_mapping(path: Path) -> TableMapping:
     decimal = values.get("decimal", ".")
     if decimal not in (".", ","):
         raise FormatError(f"decimal {decimal!r}, expected . or ,", path=path)
+    if decimal == values.get("separator"):
+        raise FormatError(f"separator and decimal are both {decimal!r}", path=path)
     for key in ("encoding", "separator"):
         if not isinstance(values.get(key, ""), str) or values.get(key) == "":
             raise FormatError(f"{key} {values[key]!r}, expected a text", path=path)
+    for key in ("rows", "missing"):
+        if not isinstance(values.get(key, []), list):
+            raise FormatError(f"{key} {values[key]!r}, expected a list", path=path)
+    rows = [_text(entry, path, "rows") for entry in values.get("rows", [])]
+    for condition in rows:
+        parse_condition(condition, path)
+    track = values.get("wheel_track")
+    if track is not None and (isinstance(track, bool) or not isinstance(track, int | float) or not 0.0 <= track <= 3.0):
+        raise FormatError(f"wheel_track {track!r}, expected 0 to 3 m", path=path)
+    reference = values.get("reference", "centre")
+    if reference not in REFERENCES:
+        raise FormatError(f"reference {reference!r}, expected {', '.join(REFERENCES)}", path=path)
     return TableMapping(
         {name: _column(name, entry, path) for name, entry in values.get("columns", {}).items()},
-        {name: _numbers(name, entry, path) for name, entry in values.get("values", {}).items()},
-        {name: _text(entry, path, f"[roles] {name}") for name, entry in values.get("roles", {}).items()},
+        {
+            name: _numbers(name, entry, path)
+            for name, entry in values.get("values", {}).items()
+            if name != "vehicle_class"
+        },
+        {name: _role(entry, path, f"[roles] {name}") for name, entry in values.get("roles", {}).items()},
         values.get("encoding"),
         values.get("separator"),
         decimal,
+        {
+            str(number).strip().lower(): _text(entry, path, f"[values.vehicle_class] {number}")
+            for number, entry in values.get("values", {}).get("vehicle_class", {}).items()
+        },
+        tuple(rows),
+        None if "missing" not in values else tuple(_marker(entry, path) for entry in values["missing"]),
+        _text(values.get("time_zone", "-"), path, "time_zone").removeprefix("-"),
+        None if track is None else float(track),
+        reference,
+        {key: _above_zero(values[key], path, key) for key in RECORDED if key in values},
     )
+
+
+def _marker(entry: Any, path: Path) -> float | str:
+    if isinstance(entry, bool) or not isinstance(entry, int | float | str):
+        raise FormatError(f"{entry!r}, expected a number or a text", path=path, element="missing")
+    return entry if isinstance(entry, str) else float(entry)
+
+
+def _above_zero(entry: Any, path: Path, key: str) -> float:
+    if isinstance(entry, bool) or not isinstance(entry, int | float) or not 0.0 < entry < np.inf:
+        raise FormatError(f"{key} {entry!r}, expected a number above 0", path=path)
+    return float(entry)
+
+
+def _role(entry: Any, path: Path, where: str) -> str:
+    from xosc_lateral.drivers.loop.columns import Role
+
+    if _text(entry, path, where) not in list(Role):
+        raise FormatError(f"{entry!r} is none of {', '.join(Role)}", path=path, element=where)
+    return str(entry)
 
 
 def _text(entry: Any, path: Path, where: str) -> str:

@@ -84,7 +84,8 @@ def harmless_frame(frame: pd.DataFrame) -> pd.DataFrame:
         for name in frame.columns
         if frame[name].dtype.kind not in "fiubM"
     }
-    return frame.assign(**words) if words else frame
+    frame = frame.assign(**words) if words else frame
+    return frame.rename(columns=lambda name: harmless(name) if isinstance(name, str) else name)
 
 
 def stamped(provenance: Mapping[str, Any]) -> dict[str, Any]:

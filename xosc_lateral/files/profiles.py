@@ -194,12 +194,32 @@ def describe_profile(profile: DriverProfile) -> str:
     )
     if profile.columns:
         text += f" of {', '.join(profile.columns)}"
+    if valid := profile.validity.in_words():
+        text += f"\nvalid: {valid}"
+    if "offset_mean_m" in known.fit:
+        text += f"\n{_measured(known.fit, known.hours)}"
     if one := known.fit.get("one_marking"):
         text += (
             f"\n{100 * one:.1f} % of the rows follow one lane marking, because the other was misjudged; "
             f"{100 * known.fit['no_marking']:.1f} % are left out, because both were"
         )
     return text if profile.sensor is None else f"{text}\n{profile.sensor.in_words()}"
+
+
+def _measured(fit: Mapping[str, Any], hours: float) -> str:
+    """What was measured, in two lines, so that exchanged sides and wrong units are seen."""
+    mean, spread = fit["offset_mean_m"], fit["offset_sd_m"]
+    speed = "no speed"
+    if "speed_5" in fit:
+        speed = f"{3.6 * fit['speed_5']:.0f} to {3.6 * fit['speed_95']:.0f} km/h"
+    side = "left" if mean > 0.0 else "right"
+    text = (
+        f"measured: {abs(mean):.2f} m {side} of the lane's centre on average, spread {spread:.2f} m, "
+        f"lanes {fit['lane_width_m']:.2f} m wide, {speed}\nused: {hours:.2f} of {fit['driven_h']:.2f} h"
+    )
+    if "drivers" in fit:
+        text += f" of {fit['drivers']:g} driver{'s' if fit['drivers'] > 1 else ''}"
+    return text + (f"; {100 * fit['frozen']:.1f} % of the rows repeat others: frozen" if "frozen" in fit else "")
 
 
 FIELDS = tuple(name for name in Metadata.__struct_fields__ if name != "tags")
@@ -292,9 +312,11 @@ def described(
 
 
 def own_path(name: str, folders: Iterable[Path]) -> Path:
-    """Path of a profile that may be changed. Raises `FormatError` if it comes with the package."""
+    """Path of a profile that may be changed. Raises `FormatError` if it comes with the package or a plug-in."""
     path = find_profile(name, folders)
-    if path.parent == SHIPPED:
-        what = f"comes with the package: profiles add {path.stem} --library FOLDER copies it to where it can be changed"
+    offered = {one.resolve() for one in _from_plugins().values()}
+    if path.parent.resolve() == SHIPPED.resolve() or path.resolve() in offered:
+        whose = "a plug-in" if path.resolve() in offered else "the package"
+        what = f"comes with {whose}: profiles add {path.stem} --library FOLDER copies it to where it can be changed"
         raise FormatError(what, path=path)
     return path

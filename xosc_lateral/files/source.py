@@ -87,7 +87,9 @@ def read_toml(path: Path, otherwise: str) -> dict[str, Any]:
 
     try:
         return tomllib.loads(read_source(path).data.decode("utf-8-sig"))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except RecursionError as error:
+        raise FormatError(f"{otherwise}: it is nested too deeply", path=path) from error
+    except ValueError as error:  # no UTF-8, no TOML, a number of thousands of digits
         raise FormatError(f"{otherwise}: {error}", path=path) from error
 
 

@@ -17,6 +17,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.limits import TABLE_CELLS, TABLE_COLUMNS
+from xosc_lateral.files.clock import seconds_of_stamps
 from xosc_lateral.files.hashes import parsed_hash
 from xosc_lateral.files.source import Source, open_source
 
@@ -24,10 +25,6 @@ if TYPE_CHECKING:
     from xosc_lateral.files.mapping import TableMapping
 
 _COMMA_NUMBER = r"\s*[+-]?(?:\d{1,3}(?:\.\d{3})+|\d*)(?:,\d+)?(?:[eE][+-]?\d+)?\s*"
-
-_CLOCK = r"\s*\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?\s*"
-
-_DAY = 86_400.0
 
 
 def plain_cells(column: pd.Series) -> pd.Series:
@@ -47,40 +44,6 @@ def comma_numbers(column: pd.Series) -> pd.Series | None:
     return pd.to_numeric(plain, errors="coerce").reindex(column.index)
 
 
-def seconds_of_text(column: pd.Series) -> FloatArray | None:
-    """Dates with times (ISO 8601, ``21.11.2026 14:03:05,12``, ``11/21/2026 2:03 PM``) or clock times, as seconds.
-
-    Counted from the earliest, or from midnight for clock times, which may run past it; NaN where there is none.
-    None if a value is neither.
-    """
-    known = column.dropna().astype(str).str.strip()
-    if known.empty:
-        return None
-    if known.str.fullmatch(_CLOCK).all():
-        clock = known.str.replace(",", ".", regex=False).str.split(":", expand=True)
-        parts = clock.astype(float).fillna(0.0).to_numpy()
-        seconds = parts @ np.array([3600.0, 60.0, 1.0])[: parts.shape[1]]
-        past_midnight = np.cumsum(np.diff(seconds, prepend=seconds[0]) < -0.5 * _DAY)
-        seconds = seconds + _DAY * past_midnight
-    else:
-        stamps = _stamps(known.str.replace(r"(?<=\d),(?=\d)", ".", regex=True))
-        if stamps is None:
-            return None
-        seconds = (stamps - stamps.min()).dt.total_seconds().to_numpy()
-    return np.array(pd.Series(seconds, index=known.index).reindex(column.index), dtype=np.float64)
-
-
-def _stamps(text: pd.Series) -> pd.Series | None:
-    """Times in UTC. Days come first where dots part them; slashes are read the American way where that can be."""
-    dotted = bool(text.str.match(r"\d{1,2}\.\d{1,2}\.\d{4}").all())
-    for form, day_first in (("ISO8601", False), ("mixed", dotted), ("mixed", not dotted)):
-        try:
-            return pd.to_datetime(text, format=form, dayfirst=day_first, utc=True)
-        except ValueError:
-            continue
-    return None
-
-
 def listed(columns: Iterable[object]) -> str:
     """The first twenty names, and how many more there are."""
     names = [str(name) for name in columns]
@@ -92,11 +55,11 @@ def numbers_of(column: pd.Series, path: Path, name: str) -> FloatArray:
 
     Raises `FormatError` for a cell that is no number.
     """
+    is_text = not pd.api.types.is_numeric_dtype(column)
+    if is_text and name == "time" and (seconds := seconds_of_stamps(column, path)) is not None:
+        return seconds
     if pd.api.types.is_datetime64_any_dtype(column):
         return np.array((column - column.min()).dt.total_seconds(), dtype=np.float64)
-    is_text = not pd.api.types.is_numeric_dtype(column)
-    if is_text and name == "time" and (seconds := seconds_of_text(column)) is not None:
-        return seconds
     numbers = pd.to_numeric(column, errors="coerce")
     if is_text and numbers.isna().any():
         commas = comma_numbers(column)

@@ -6,7 +6,7 @@ import hashlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -86,6 +86,13 @@ class GivenDrives:
     drives: list[Drive]
     inputs: Mapping[str, str]
     files: tuple[Path, ...]
+
+    def valid_below(self, frequency: float | None) -> GivenDrives:
+        """The same, where drives that don't state their band show driving below a frequency [Hz]."""
+        if frequency is None:
+            return self
+        drives = [drive if drive.valid_below else replace(drive, valid_below=frequency) for drive in self.drives]
+        return replace(self, drives=drives)
 
 
 @contextmanager

@@ -118,3 +118,26 @@ def test_the_mirror_image_is_found_with_the_same_certainty(found: Outcome) -> No
     assert other is not None
     assert other.p_value == pytest.approx(found.p_value, rel=1e-6)
     assert other.columns == found.columns
+
+
+def test_a_product_has_to_give_more_than_its_parts() -> None:
+    """What one column does alone, curved and late, is never blamed on its product with another that goes along."""
+    rng = np.random.default_rng(61)
+    n = round(1500.0 / 0.2)
+    x, idle = wander(rng, n, 12.0), wander(rng, n, 12.0)
+    names = {"x": x, "along": x + 0.3 * wander(rng, n, 12.0), "idle": idle}
+    shift = 0.2 * respond(np.maximum(x, 0.0) ** 1.5, 0.2, 3.0, 5.0)
+    coarse = coarse_of(shift + movement(rng, 1500.0), names)
+    columns = [Column(name, Values.NUMBER, False) for name in sorted(names)]
+    found = select(Search.over(coarse, columns, np.random.SeedSequence(1), ERROR_BUDGET))
+    assert [one.term.columns for one in found.accepted if one.term.component in ("mean", "course")] == [("x",)]
+
+
+def test_a_true_product_is_named_beside_its_parts() -> None:
+    rng = np.random.default_rng(62)
+    n = round(1500.0 / 0.2)
+    x, other = wander(rng, n, 12.0), wander(rng, n, 12.0)
+    coarse = coarse_of(0.1 * respond(x * other, 0.2, 0.0, 2.0) + movement(rng, 1500.0), {"x": x, "other": other})
+    columns = [Column(name, Values.NUMBER, False) for name in ("other", "x")]
+    found = select(Search.over(coarse, columns, np.random.SeedSequence(1), ERROR_BUDGET))
+    assert ("other", "x") in [one.term.columns for one in found.accepted]

@@ -52,7 +52,7 @@ def nested(coarse: Coarse) -> Nested:
     folds = [blocks % 3 == fold for fold in range(3)]
     picked = ((X,), (X, IDLE), (X,))
     selections = tuple(chosen(coarse.only(~held), *terms) for held, terms in zip(folds, picked, strict=True))
-    return Nested(selections, coarse, blocks)
+    return Nested(selections, selections, coarse, blocks)
 
 
 def test_what_acts_gains_on_rows_that_it_was_not_fitted_on(nested: Nested) -> None:
@@ -99,7 +99,7 @@ def test_only_a_loss_by_a_standard_error_vetoes_a_term_and_being_found_in_no_fol
 
 def test_a_fold_is_scored_with_its_own_version_of_what_was_kept(coarse: Coarse) -> None:
     fold = chosen(coarse, X, IDLE)
-    nested = Nested((fold,), coarse, np.zeros(len(coarse), dtype=np.intp))
+    nested = Nested((fold,), (fold,), coarse, np.zeros(len(coarse), dtype=np.intp))
     assert nested.only((mean_term("x"), mean_term("idle"))).selections[0].final is fold.final
     assert nested.only((mean_term("x"),)).selections[0].final.terms == (X,)
     assert nested.only(()).selections[0].final.terms == ()
@@ -149,3 +149,11 @@ def test_a_population_s_base_holds_what_its_trucks_do_to_the_rest() -> None:
     assert [effect.columns for effect in spread] == [("is_truck",)]
     assert np.exp(spread[0].coefficients[0]) == pytest.approx(0.5, rel=0.25)  # type: ignore[union-attr]
     assert fit_without(fitted, used, ModelKind.TWO_LEVEL, "before", None).effects == ()
+
+
+def test_what_is_scored_keeps_what_a_fold_chose_otherwise_but_not_what_was_taken_back(nested: Nested) -> None:
+    """An error after that leaves out what only a fold chose would know the whole table."""
+    judging, scored = nested.only([X]), nested.only([X], [IDLE])
+    assert [len(one.accepted) for one in judging.selections] == [1, 1, 1]
+    assert [len(one.accepted) for one in judging.scored] == [1, 2, 1]
+    assert [len(one.accepted) for one in scored.scored] == [1, 1, 1]

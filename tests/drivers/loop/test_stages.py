@@ -22,8 +22,8 @@ def test_the_order_of_the_stages() -> None:
     names = [[kind.component for kind in stage] for stage in STAGES]
     assert names == [
         ["mean"],
-        ["cycle", "time_mean"],
-        ["mean"],
+        ["cycle", "time_mean", "course"],
+        ["mean", "course"],
         ["time_spread", "spread", "slow_spread"],
         ["regimes"],
         ["fine_noise"],

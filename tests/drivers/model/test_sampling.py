@@ -13,6 +13,7 @@ from xosc_lateral.drivers.model.effects import Acts, Cycle, Drift, EffectTerms, 
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import OffsetSampler, combine, sample_offsets
 from xosc_lateral.drivers.model.seeds import child
+from xosc_lateral.drivers.model.validity import Validity
 
 CURVE = Linear(acts=Acts.LOCATION, column="curvature", coefficients=(200.0,), errors=(1.0,), reference=(0.0,))
 
@@ -32,7 +33,7 @@ def segment(n: int, *, first: int = 0, width: float = 3.5, before: int = 0, afte
 
 @pytest.fixture(scope="module", params=["two-level", "best"])
 def profile(request: pytest.FixtureRequest) -> DriverProfile:
-    return simulated_profile(request.param)
+    return replace(simulated_profile(request.param), validity=Validity())  # as in files that state none
 
 
 def test_offsets_are_relative_to_the_lanes_width(profile: DriverProfile) -> None:

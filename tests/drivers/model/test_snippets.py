@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from examples.driver_simulator import simulate_drive
 from tests.kit.profiles import as_drive, simulated_profile
@@ -11,6 +12,7 @@ from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.drives.cuts import all_runs
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.model.sampled_offsets import cut_snippets, sample_context, sample_free, sample_like
+from xosc_lateral.drivers.model.validity import Validity
 
 
 @pytest.fixture(scope="module")
@@ -56,6 +58,7 @@ def test_a_free_run_covers_the_whole_drive(drives: list[Drive]) -> None:
 
 def test_a_free_run_of_a_duration_has_its_length_and_the_profiles_lane() -> None:
     profile = simulated_profile()
+    profile = replace(profile, validity=Validity())
     (run,) = sample_free(profile, 60.0, 1)
     (wide,) = sample_free(profile, 60.0, 1, lane_width=2 * profile.lane_width)
     assert len(run.time) == 301

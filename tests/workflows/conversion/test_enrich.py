@@ -66,6 +66,47 @@ def test_the_path_deviates_by_the_sampled_offsets_to_a_centimetre_in_lane_coordi
         assert np.ptp(segment.offset) > 0.05
 
 
+def test_whoever_follows_a_trajectory_moves_in_a_lane_change_as_if_there_were_none(tmp_path: Path) -> None:
+    network = two_roads(tmp_path)
+    deviations = []
+    for rows in (slice(400, 600), slice(0, 0), slice(0, 200), slice(801, 1001)):
+        activity = np.full(1001, int(Activity.ACTIVE), dtype=np.uint8)
+        activity[rows] |= int(Activity.LATERAL)
+        motion = together(drive(network, entity(), duration=20.0, activity=activity))
+        result = enrich(motion, network, {"car": simulated_profile()}, seed=1, through=["car"])
+        (item,) = result.entities
+        deviations.append(item.deviation)
+        following = [segment.span for segment in item.segments]
+        assert all(span.is_road_following for span in following)
+        assert sum(span.last - span.first + 1 for span in following) == 1001 - (rows.stop - rows.start)
+        for segment in item.segments:
+            assert segment.span.start <= segment.time[0] and segment.time[-1] <= segment.span.end
+    for deviation in deviations[1:]:
+        np.testing.assert_array_equal(deviation, deviations[0])
+    assert np.ptp(deviations[0][400:600]) > 0.02
+
+
+@pytest.mark.parametrize("what", ["placed anew", "slow"])
+def test_movement_does_not_go_on_through_what_is_no_driving(tmp_path: Path, what: str) -> None:
+    network = two_roads(tmp_path)
+    activity = np.full(1001, int(Activity.ACTIVE), dtype=np.uint8)
+    activity[400:600] |= int(Activity.LATERAL)
+    motion = drive(network, entity(), duration=20.0, activity=activity)
+    if what == "slow":
+        motion.speed[480:520] = 5.0
+    else:
+        activity[500] |= int(Activity.TELEPORTED)
+    motion = replace(motion, activity=activity)
+    found = [
+        enrich(together(motion), network, {"car": simulated_profile()}, seed=1, through=names).entities[0].deviation
+        for names in ((), ("car",))
+    ]
+    if what == "slow":
+        np.testing.assert_array_equal(found[0], found[1])
+    else:  # before and after it, it goes on
+        assert np.ptp(found[1][401:499]) > 0.005
+
+
 def test_a_lane_change_leads_over_smoothly_and_no_offset_is_sampled_in_it(tmp_path: Path) -> None:
     network = two_roads(tmp_path)
     activity = np.full(1001, int(Activity.ACTIVE), dtype=np.uint8)

@@ -105,6 +105,32 @@ def test_a_vehicle_that_says_nonsense_is_left_alone_and_the_others_drive_on() ->
     assert traffic.moves.keys() == {"Ego", "Truck"}
 
 
+def test_who_is_added_again_begins_anew_in_the_middle_of_its_lane() -> None:
+    player = StandIn()
+    open_player(player, CUT_IN)
+    traffic = EsminiTraffic(player, CUT_IN, read_profile("motorway"), ego="Ego")
+    player.offset["Truck"] = 0.6  # what a maneuver leaves
+    traffic.steer(0.01)
+    player.gone.add("Truck")
+    player.SE_StepDT(0.01)
+    traffic.steer(0.01)
+    player.gone.clear()
+    player.offset["Truck"] = 0.0
+    for _ in range(200):
+        player.SE_StepDT(0.01)
+        traffic.steer(0.01)
+    assert abs(traffic.moves["Truck"][0]) < 0.3
+
+
+def test_an_ego_that_nobody_drives_and_names_that_nobody_has_are_said() -> None:
+    player = StandIn()
+    player.broken["Ego"] = {"ctrl_type": 1, "x": 5.0, "y": 1.0}
+    run = live_esmini(CUT_IN, player, seed=3, duration=1.0, step=0.1)
+    assert run.warnings[-1].startswith("'Ego' stood all the time: its controller waits for another program")
+    with pytest.raises(SimulationError, match=r"no vehicle 'Trcuk' in the scenario \(vehicles: CutIn, Ego, Truck\)"):
+        live_esmini(CUT_IN, StandIn(), profiles={"Trcuk": "motorway"}, duration=1.0)
+
+
 def test_neighbours_give_way_to_the_ego_where_it_really_is() -> None:
     ends = {}
     for aside in (0.0, 0.6):  # the ego leans to the left, towards who overtakes it

@@ -159,6 +159,8 @@ def test_a_road_may_be_empty_for_a_while(tmp_path: Path) -> None:
     states = xl.live_sumo(config, duration=140.0).to_frame()
     gone = states.time[states.name == "v0"].max()
     assert gone < 90.0
+    with pytest.raises(SimulationError, match=r"no vehicle 'v1' until 5 s; there were v0"):
+        xl.live_sumo(config, duration=5.0, ego=["v1"])
     assert states[states.name == "v90"].steered.iloc[1:].all()
     assert states[states.name == "v90"].offset.std() > 0.01
 

@@ -131,7 +131,7 @@ def test_shipped_profile_names_its_source_and_stays_in_the_lane(path):
 def test_the_population_and_single_vehicles_are_shipped():
     names = {path.stem for path in list_profiles()}
     single = {f"motorway-vehicle-{number}" for number in range(1, SINGLE_VEHICLES + 1)}
-    assert names == {POPULATION, "motorway-refined", *single}
+    assert names == {POPULATION, "motorway-refined", "rural", *single}
 
 
 def test_most_shipped_profiles_differ_beyond_what_their_few_minutes_tell():

@@ -122,8 +122,8 @@ def test_what_would_explain_as_much_is_said_by_its_columns(result: LoopResult) -
 def test_the_page_has_every_part_that_a_reader_needs(page: str) -> None:
     sections = re.findall(r"<h2[^>]*>([^<]+)", page)
     assert sections == [
-        "Columns, and what they are taken for", "What the profile lacked", "Residual by context", "Movement",
-        "Consequences of the car&#x27;s own movement", "Tested and rejected", "How to read this page",
+        "What the profile lacked", "Residual by context", "Movement", "Consequences of the car&#x27;s own movement",
+        "Tested and rejected", "Columns, and what they are taken for", "How to read this page",
     ]  # fmt: skip
     assert "the mean of 24 simulated runs" in page  # counted, not typed
     assert page.count("<figure") == 6  # effect, residual of mean and of spread, traces, spectra, violins
@@ -182,7 +182,7 @@ def test_an_error_clearly_above_the_floor_is_called_unexplained(result: LoopResu
 def test_an_error_at_the_floor_is_not_called_unexplained(result: LoopResult) -> None:
     scored = result.scored
     at_floor = lack_of_fit_of(scored.real, scored.before, scored.real, scored.halves)
-    assert not at_floor.clear
+    assert not at_floor.is_clear
     assert "do not exceed the difference between halves" in lack_of_fit_words(replace(result, lack_of_fit=at_floor))
 
 

@@ -42,9 +42,9 @@ def test_offsets_are_what_was_added_and_all_on_one_scale(enriched: Enriched) -> 
     assert len({(panel.x.ends, panel.y.ends) for panel in figure.panels}) == 1
 
 
-def test_shades_cover_the_segments_that_got_offsets(enriched: Enriched) -> None:
+def test_grey_covers_what_is_not_road_following(enriched: Enriched) -> None:
     (panel,) = offsets_over_time(enriched, enriched.entities[1:2]).panels
-    spans = [span for span in enriched.entities[1].spans if span.is_road_following]
+    spans = [span for span in enriched.entities[1].spans if not span.is_road_following]
     shaded = sorted((mark.x.min(), mark.x.max()) for mark in panel.marks if mark.kind == "area")
     np.testing.assert_allclose(shaded, [(span.start, span.end) for span in spans])
 
@@ -62,11 +62,13 @@ def test_speeds_are_drawn_nominal_and_enriched_in_the_entity_s_colour(enriched: 
     assert panel.y.ends[0] <= 0.0
 
 
-def test_accelerations_are_what_was_added_over_the_band_of_real_drivers(enriched: Enriched) -> None:
-    for panel, one in zip(accelerations_over_time(enriched.entities).panels, enriched.entities, strict=True):
+def test_accelerations_are_what_was_added_between_the_bounds_of_real_drivers(enriched: Enriched) -> None:
+    panels = accelerations_over_time(enriched, enriched.entities).panels
+    for number, (panel, one) in enumerate(zip(panels, enriched.entities, strict=True)):
         np.testing.assert_allclose(lines(panel)["added"][:, 1], one.lateral_acceleration()[shown_rows(one.motion)])
-        (band,) = (mark for mark in panel.marks if mark.kind == "area")
-        assert (band.y.min(), band.y.max()) == (-COMFORTABLE, COMFORTABLE)
+        levels = {float(mark.y[0]) for mark in panel.marks if mark.dashes}
+        assert levels == {-COMFORTABLE, COMFORTABLE}
+        assert [mark.color for mark in panel.marks if mark.label == "added"] == [color_of(number)]
 
 
 def test_the_timeline_has_a_bar_for_every_span_that_says_what_it_is(enriched: Enriched) -> None:

@@ -93,10 +93,10 @@ def test_only_long_bridges_count_as_gaps():
 def test_crumbs_between_cuts_are_named_short():
     reasons = {"gap": np.isin(np.arange(300), [100, 140])}
     zeros = np.zeros(300, dtype=np.int64)
-    state = name_states(reasons, zeros, zeros, np.arange(300), 0.05, CutSettings(edge=0.5, shortest=3.0))
+    state = name_states(reasons, zeros, zeros, 0.05 * np.arange(300), 0.05, CutSettings(edge=0.5, shortest=3.0))
     assert set(state[101:140]) == {"short"} and set(state[10:90]) == {"kept"} and state[140] == "gap"
     assert set(state[:10]) == set(state[90:100]) == {"edge"}
-    runs = number_runs(state, zeros, zeros, np.arange(300))
+    runs = number_runs(state, zeros, zeros, 0.05 * np.arange(300))
     assert set(runs[10:90]) == {0} and set(runs[151:290]) == {1} and set(runs[state != "kept"]) == {-1}
 
 

@@ -11,8 +11,9 @@ import pytest
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main
+from xosc_lateral.workflows.recordings.importers.track_table import read_esmini_log
 from xosc_lateral.workflows.recordings.importers.tracks import import_tracks
-from xosc_lateral.workflows.recordings.placed import LaneGraph
+from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
 
 WIDTH = 3.5
 HEADING = 0.3
@@ -104,7 +105,7 @@ def test_a_lane_change_is_cut_and_a_new_section_is_none(road, tmp_path):
 
 def test_tracks_in_other_coordinates_are_told(road, tmp_path):
     source = tmp_path / "tracks.csv"
-    driven("a", 1, 100.0, 30.0).assign(x=lambda rows: rows.x + 5e5).to_csv(source, index=False)
+    driven("a", 1, 100.0, 30.0).drop(columns="psi").assign(x=lambda rows: rows.x + 5e5).to_csv(source, index=False)
     with pytest.raises(FormatError, match=r"tracks\.csv: no row lies in a driving lane of road\.xodr: x from 5001"):
         import_tracks(source, road=road)
     with pytest.raises(FormatError, match=r"no column 'vehicle'.*--map vehicle=COLUMN"):
@@ -114,11 +115,11 @@ def test_tracks_in_other_coordinates_are_told(road, tmp_path):
 
 def test_a_layout_of_lanes_puts_the_next_piece_ahead_and_the_left_one_beside():
     graph = LaneGraph(np.array([100.0, 100.0, 50.0, 50.0]), np.array([1, -1, 3, -1]), [[2], [3], [], []])
-    part, station, rank = graph.layout()
+    part, station, rank, _ = graph.stations(np.arange(4), np.zeros(4))
     assert set(part) == {0}
     assert station.tolist() == [0.0, 0.0, 100.0, 100.0] and rank.tolist() == [0, 1, 0, 1]
     ring = LaneGraph(np.array([10.0, 20.0]), np.array([-1, -1]), [[1], [0]])
-    assert ring.layout()[1].tolist() == [0.0, 10.0]
+    assert ring.stations(np.arange(2), np.zeros(2))[1].tolist() == [0.0, 10.0]
 
 
 @pytest.mark.filterwarnings("default")
@@ -231,6 +232,29 @@ def test_a_log_of_esmini_is_a_table_of_tracks_with_gaps_from_the_boxes(road, tmp
     # against s and to the left of travel: positive; x and y were logged 1.4 m behind the middle, on the same line
     swayed = 0.2 * np.sin(2 * np.pi * found.loc["back", "time"] / 12)
     assert found.loc["back", "offset"].to_numpy() == pytest.approx(swayed, abs=2e-6)
+
+
+def test_a_log_of_esmini_has_vehicles_that_come_and_go(road, tmp_path):
+    """The head knows those of the first line; a line has as many groups as there are vehicles, in any order."""
+    cars = {
+        name: (driven(name, 1, start, 30.0), 1.4, 5.0) for name, start in (("a", 100.0), ("b", 200.0), ("c", 300.0))
+    }
+    head, *lines = esmini_log(cars).split("Index")[1].splitlines()
+    groups = [[", ".join(line.split(", ")[2 + k * 10 : 12 + k * 10]) for k in range(3)] for line in lines]
+    there = [(0, 1) if k < 300 else (0, 1, 2) if k < 700 else (2, 1) for k in range(len(lines))]
+    text = f"{LINES_BEFORE}Index{head.split('#3')[0]}\n"
+    for line, of, who in zip(lines, groups, there, strict=True):
+        text += ", ".join([*line.split(", ")[:2], *(of[k] for k in who)]) + ", \n"
+    source = tmp_path / "log.csv"
+    source.write_text(text)
+    rows = read_esmini_log(source)
+    spans = rows.groupby("vehicle")["time"].agg(["min", "max", "size"]).round(2)
+    assert spans.loc["a"].tolist() == [0.0, 27.96, 700]
+    assert spans.loc["b"].tolist() == [0.0, 39.96, 1000]
+    assert spans.loc["c"].tolist() == [12.0, 39.96, 700]
+    c = rows[rows["vehicle"] == "c"]
+    x, _ = world(300.0 - 1.4 + 30.0 * c["time"].to_numpy(), np.full(len(c), -1.5 * WIDTH))
+    assert c["x"].to_numpy() == pytest.approx(x, abs=1e-5)
 
 
 @pytest.mark.parametrize(

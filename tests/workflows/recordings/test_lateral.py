@@ -92,6 +92,37 @@ def test_a_lane_change_that_is_given_up_is_aborted():
     assert back.end == pytest.approx(17.5, abs=0.9)
 
 
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_change_that_crosses_with_the_side_only_is_aborted(side):
+    """A car of 1.8 m in a lane of 3.5 m: its side crosses at 0.85 m, its middle stays in the lane at up to 1.5 m."""
+    for seed in range(9):
+        rng = np.random.default_rng([11, seed])
+        height, start, out, back = rng.uniform((1.15, 8.0, 2.0, 2.5), (1.5, 16.0, 3.5, 5.0))
+        stay = rng.uniform(0.0, 3.0)
+        y = side * height * (moved(start, out) - moved(start + out + stay, back)) + 0.3 * sway(seed)
+        plan = lateral_plan(recorded(y), 0.0)
+        one, other = plan.transitions
+        assert (one.aborted, other.aborted, one.lanes, other.lanes) == (True, True, 0, 0), seed
+        assert one.offset == pytest.approx(side * height, abs=0.35), seed
+        assert one.start == pytest.approx(start, abs=1.0), seed
+        assert other.end == pytest.approx(start + out + stay + back, abs=1.6), seed
+        assert np.sqrt(((plan.at(TIME) - y) ** 2).mean()) < 0.2, seed
+
+
+def test_swaying_drivers_abort_nothing():
+    assert not [seed for seed in range(200) if lateral_plan(recorded(sway(seed, 0.25)), 0.0).transitions]
+
+
+def test_an_aborted_change_that_is_part_of_a_change_leaves_no_half():
+    """Out over the marking, back a little, and then over: one lane change."""
+    for pause in np.arange(0.0, 2.0, 0.25):
+        y = 1.2 * moved(10.0, 2.0) - 0.5 * moved(12.0 + pause, 1.0) + (WIDTH - 0.7) * moved(13.0 + pause, 4.0)
+        plan = lateral_plan(recorded(y + 0.3 * sway(4)), 0.0)
+        assert [one.lanes for one in plan.transitions if one.lanes] == [1], pause
+        assert len([one for one in plan.transitions if one.aborted]) in (0, 2), pause
+        assert plan.at(TIME[-1:])[0] == pytest.approx(WIDTH, abs=0.5)
+
+
 def test_two_lanes_in_one_movement_are_one_maneuver_and_with_a_rest_two():
     at_once = lateral_plan(recorded(2 * WIDTH * moved(10.0, 7.0) + sway(2)), 0.0).transitions
     assert [one.lanes for one in at_once] == [2]

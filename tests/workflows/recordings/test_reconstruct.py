@@ -12,6 +12,7 @@ import pytest
 from lxml import etree
 
 import xosc_lateral as xl
+from tests.kit.jam import LENGTH, RADIUS, ROAD, jam
 from tests.workflows.recordings.test_importers_tracks import (
     WIDTH,
     commonroad_scenario,
@@ -223,6 +224,47 @@ def test_bad_vehicles_are_named_and_left_out(tracks, road, tmp_path):
     placed(tmp_path / "out/bad.xosc")
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.02, 0.05])
+def test_stop_and_go_is_kept_whole_whatever_the_noise(noise, tmp_path):
+    """Noise moves a vehicle that stands across its lane and backwards; where it goes is not told from that."""
+    (tmp_path / "road.xodr").write_text(ROAD)
+    table, truth = jam(1, noise, vehicles=3)
+    table.to_csv(tmp_path / "jam.csv", index=False)
+    made = xl.reconstruct(tmp_path / "jam.csv", tmp_path / "out", road=tmp_path / "road.xodr")
+    assert not made.left_out
+    assert made.to_dict()["summary"]["lane_changes"] == 0
+    for name, rows in placed(tmp_path / "out/jam.xosc").items():
+        true = truth[truth["id"] == name]
+        x, y = (np.interp(rows["time"], true["time"], true[axis]) - rows[axis] for axis in "xy")
+        h = rows["h"]
+        assert np.abs(x * np.cos(h) + y * np.sin(h) - 0.3 * LENGTH).max() < 0.55, name  # `--error` and a frame
+        assert np.abs(y * np.cos(h) - x * np.sin(h)).max() < 0.2, name
+
+
+def test_a_vehicle_that_never_moves_points_along_its_lane(tmp_path):
+    (tmp_path / "road.xodr").write_text(ROAD)
+    table, _ = jam(1, 0.02, vehicles=2)
+    parked = table[table["id"] == "j0"].assign(id="parked", x=table["x"].iloc[0], y=table["y"].iloc[0])
+    noise = np.random.default_rng(5).normal(0.0, 0.02, (len(parked), 2))
+    noisy = parked.assign(id="noisy", x=parked["x"] + 30.0 + noise[:, 0], y=parked["y"] + noise[:, 1])
+    pd.concat([table, parked, noisy]).to_csv(tmp_path / "jam.csv", index=False)
+    xl.reconstruct(tmp_path / "jam.csv", tmp_path / "out", road=tmp_path / "road.xodr")
+    for name, rows in placed(tmp_path / "out/jam.xosc").items():
+        along = np.arctan2(rows["x"], RADIUS - rows["y"])
+        assert np.cos(rows["h"] - along).min() > 0.99, name
+
+
+def test_a_name_that_begins_with_a_dollar_sign_is_no_parameter(tmp_path):
+    (tmp_path / "$road.xodr").write_text(ROAD)
+    table, _ = jam(1, 0.0, vehicles=2)
+    table.replace({"id": {"j0": "$x", "j1": "${y}"}}).to_csv(tmp_path / "$jam.csv", index=False)
+    made = xl.reconstruct(tmp_path / "$jam.csv", tmp_path / "out", road=tmp_path / "$road.xodr")
+    assert set(made.to_frame()["recorded_as"]) == {"$x", "${y}"}
+    assert set(placed(tmp_path / "out/$jam.xosc")) == {"_x", "__y_"}
+    batch = xl.convert_many([tmp_path / "out/drivers.csv"], tmp_path / "twins")
+    assert not [row for row in batch.to_frame().to_dict("records") if row["error"]]
+
+
 def test_numbers_that_no_vehicle_has_are_named_or_passed_over(tracks, road, tmp_path):
     table = pd.read_csv(tracks)
     rows = table[table["id"].isin(["A", "B", "C"]) & (table["time"] < 12.0)].assign(length=4.5, width=1.8)
@@ -238,6 +280,9 @@ def test_numbers_that_no_vehicle_has_are_named_or_passed_over(tracks, road, tmp_
     assert "C: no vehicle has 4.5 m x nan m" in said
     assert set(placed(tmp_path / "out/odd.xosc")) == {"A", "B", "C"}
     rows.assign(time=1e6 * rows["time"]).to_csv(path, index=False)
+    with pytest.raises(FormatError, match=r"s apart \(median\)"):
+        xl.reconstruct(path, road=road, columns=COLUMNS)
+    rows.assign(time=rows["time"] + 1e6 * (rows["id"] == "A")).to_csv(path, index=False)
     with pytest.raises(FormatError, match="--from and --to"):
         xl.reconstruct(path, road=road, columns=COLUMNS)
 
@@ -319,19 +364,40 @@ def test_an_osi_trace_of_a_played_scenario_gives_it_back(tmp_path):
     assert [(row["entity"], row["kind"], row["side"]) for row in made.to_dict()["maneuvers"]] == [
         ("CutIn", "lane change", "right")
     ]
+    assert made.to_dict()["host"] == "Ego"  # as the trace says
+    assert pd.read_csv(tmp_path / "again/drivers.csv")["ego"].tolist() == ["Ego"]
+    assert xl.reconstruct(trace, road=road, host="none").to_dict()["host"] is None
+    assert xl.reconstruct(trace, road=road, host="CutIn").to_dict()["host"] == "CutIn"
+    assert xl.reconstruct(trace, road=road, vehicles=["CutIn"]).to_dict()["host"] is None
     before, after = placed(scenario), placed(tmp_path / "again/trace.xosc")
     for name, rows in before.items():
         away = np.hypot(rows["x"] - after[name]["x"], rows["y"] - after[name]["y"])
         assert away.max() < 0.01, name
 
 
+@pytest.mark.parametrize("template", ["cut-in", "curves"])
+def test_an_osi_trace_brings_its_road_with_it(template, tmp_path):
+    pytest.importorskip("osi_utilities", reason="extra `osi` is not installed")
+    scenario, _ = xl.write_template(template, tmp_path / "first")
+    trace = tmp_path / "trace.osi"
+    assert main(["play", str(scenario), "--osi", str(trace), "-q"]) == 0
+    made = xl.reconstruct(trace, tmp_path / "again")
+    changes = [row["kind"] for row in made.to_dict()["maneuvers"]]
+    assert changes == (["lane change"] if template == "cut-in" else [])
+    before, after = placed(scenario), placed(tmp_path / "again/trace.xosc")
+    for name, rows in before.items():
+        away = np.hypot(rows["x"] - after[name]["x"], rows["y"] - after[name]["y"])
+        assert away.max() < 0.05, name
+
+
 @pytest.mark.filterwarnings("default")
-def test_commonroad_obstacles_drive_on_a_given_road(tmp_path):
+@pytest.mark.parametrize("is_given", [True, False])
+def test_commonroad_obstacles_drive_on_a_given_road_or_on_their_lanelets(is_given, tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         pytest.importorskip("commonroad", reason="extra `commonroad` is not installed")
     path = commonroad_scenario(tmp_path)
-    road = bent_road(tmp_path, 0.0, 2 * WIDTH, WIDTH)
+    road = bent_road(tmp_path, 0.0, 2 * WIDTH, WIDTH) if is_given else None
     made = xl.reconstruct(path, tmp_path / "out", road=road, host="32")
     vehicles = {row["recorded_as"]: (row["class"], row["lane_changes"]) for row in made.to_dict()["vehicles"]}
     assert vehicles == {"31": ("car", 0), "32": ("truck", 0)}

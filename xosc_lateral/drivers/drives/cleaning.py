@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.limits import DRIVE_SPAN, TIME
 from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.drives.frozen import frozen_rows
 from xosc_lateral.drivers.drives.markings import both_markings
 
 MAX_STEP = 0.25
@@ -20,8 +21,8 @@ MAX_STEP = 0.25
 LANE_WIDTHS = (2.0, 6.0)
 """What a lane's median width is believed to be. [m]"""
 
-MAX_MEDIAN_SPEED = 60.0
-"""A drive faster than this in the median has its speed in km/h. [m/s]"""
+MAX_MEDIAN_SPEED = 50.0
+"""A drive faster than this (180 km/h) in the median has its speed in km/h: 50 to 60 km/h are towns. [m/s]"""
 
 MAX_OUTSIDE = 0.01
 """Share of rows farther than one lane width from the lane centre that is still taken for glitches. [-]"""
@@ -35,7 +36,16 @@ MAX_CONTRADICTIONS = 0.01
 RUN = "following_run"
 """Column of tables that an import has cut: number of the road-following stretch. What it has cut is not cut again."""
 
-DRIVE_COLUMNS = frozenset({"time", "drive", "offset", "lane_width", "distance_left", "distance_right", RUN})
+VALID_BELOW, RESOLUTION = "valid_below", "resolution"
+"""Columns of what a recording shows: driving below this frequency [Hz], offsets to this step [m]; each is one number
+for a whole drive."""
+
+DRIVE_COLUMNS = frozenset(
+    {
+        *("time", "drive", "driver", "offset", "lane_width", "distance_left", "distance_right"),
+        *(RUN, VALID_BELOW, RESOLUTION),
+    }
+)
 """Columns that are no context."""
 
 
@@ -71,6 +81,10 @@ def clean_drive(
     speed = columns.get("speed")
     if speed is not None and np.isfinite(speed).any():
         good &= np.isfinite(speed)
+    frozen = np.zeros(len(good), dtype=np.bool_)
+    if RUN not in columns:
+        frozen[good] = frozen_rows(columns["time"][good], offset[good], lane_width[good])
+        good &= ~frozen
     if good.sum() < 2:
         return None
     every = {key: values[good] for key, values in columns.items() if key not in DRIVE_COLUMNS}
@@ -79,9 +93,25 @@ def clean_drive(
     run = columns[RUN][good].astype(np.int64) if RUN in columns else None
     drive = Drive(
         name, columns["time"][good], offset[good], lane_width[good],
-        context, frozenset(levels & context.keys()), str(path), run, empty=empty,
+        context, frozenset(levels & context.keys()), str(path), run, empty=empty, frozen=int(frozen.sum()),
+        valid_below=_stated(VALID_BELOW, columns, good, path), resolution=_stated(RESOLUTION, columns, good, path),
     )  # fmt: skip
     return drive if run is not None else _seen_through(drive)
+
+
+def _stated(column: str, columns: Mapping[str, FloatArray], good: BoolArray, path: Path) -> float | None:
+    """The one number above 0 that a column has for a drive; None without the column, or where it is empty."""
+    if column not in columns:
+        return None
+    values = np.unique(columns[column][good & np.isfinite(columns[column])])
+    if not len(values):
+        return None
+    if len(values) > 1 or not values[0] > 0.0:
+        what = (
+            f"{values[0]:g}{f' and {values[-1]:g}' if len(values) > 1 else ''}, expected one number above 0 per drive"
+        )
+        raise FormatError(what, path=path, element=f"column {column!r}")
+    return float(values[0])
 
 
 def _seen_through(drive: Drive) -> Drive:

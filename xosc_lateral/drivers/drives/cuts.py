@@ -137,7 +137,10 @@ def _run(drive: Drive, index: int, rows: slice, grid: FloatArray) -> Run:
         for name, values in drive.context.items()
     }
     lane_width, offset = average(time, drive.lane_width[rows], grid), resample(time, drive.offset[rows], grid)
-    return Run(drive.name, index, grid, offset, lane_width, context, drive.levels, drive.empty)
+    return Run(
+        drive.name, index, grid, offset, lane_width, context, drive.levels, drive.empty,
+        drive.valid_below, drive.resolution,
+    )  # fmt: skip
 
 
 def _uninterrupted(drive: Drive, keep: BoolArray, max_gap: float) -> list[slice]:

@@ -51,9 +51,17 @@ class Drive:
     empty : frozenset of str
         Columns of its table that hold nothing in this drive, and are not in `context`: there is none, all along (no
         lane to that side). Of a column that the table lacks, nothing is known.
+    frozen : int
+        Rows left out because a camera had repeated itself, see `frozen`.
+    driver : str
+        Who drove, where the table says; several drives may be one driver's.
     half_width : array, shape (n,), optional
         Half the lane width as a camera recorded it, with errors of both markings, as the offset has them. None: the
         lane width comes from a map, or from elsewhere than the offset. [m]
+    valid_below : float, optional
+        Frequency below which the recording shows driving, where it is known. [Hz]
+    resolution : float, optional
+        Step or noise of the offsets, where it is known. [m]
     """
 
     name: str
@@ -67,6 +75,10 @@ class Drive:
     mended: MarkingShares | None = None
     empty: frozenset[str] = frozenset()
     half_width: FloatArray | None = None
+    valid_below: float | None = None
+    resolution: float | None = None
+    driver: str = ""
+    frozen: int = 0
 
     def __post_init__(self) -> None:
         """Copy and freeze; refuse unequal lengths and what readers must have taken out."""
@@ -101,7 +113,9 @@ class Run:
     """As in `Drive`."""
     levels: frozenset[str] = frozenset()
     empty: frozenset[str] = frozenset()
-    """As in `Drive`."""
+    """As in `Drive`, as are the next two."""
+    valid_below: float | None = None
+    resolution: float | None = None
 
     def __post_init__(self) -> None:
         """Copy and freeze; refuse unequal lengths and missing values."""

@@ -1,6 +1,7 @@
 """From rows at irregular times to an even grid, without aliasing.
 
-Resampling in two steps. Rows are interpolated linearly to 40 Hz, which evens out irregular stamps; a zero-phase
+Resampling in two steps. Rows are interpolated linearly to 40 Hz, or to their own rate where that is higher (else what
+is above 20 Hz would fold back here already), which evens out irregular stamps; a zero-phase
 low-pass (Kaiser window, pass to 1.5 Hz, stop from 2.5 Hz = half the final rate, 50 dB) then keeps what lies above
 half the final rate from folding back. Past its two ends a run is continued point-symmetrically, so that a slope is
 kept. Context is averaged over +-0.2 s with positive weights instead: a leader that appears must not ring.
@@ -22,10 +23,13 @@ STEP = 0.2
 """Step of the model. [s]"""
 
 OVERSAMPLING = 8
-"""Points of the even grid per final step: 40 Hz. [-]"""
+"""Points of the even grid per final step at least: 40 Hz. [-]"""
 
 PASS_STEP = 0.18
 """Rows at least this far apart (in the median) are taken as 5 Hz already and only interpolated. [s]"""
+
+STAMP_ERROR = 1e-3
+"""Rounding of time stamps adds no point: rows at 40 Hz have 8 per step. [-]"""
 
 ATTENUATION = 50.0
 """Of what would fold back: a movement of 1 m leaves 3 mm. [dB]"""
@@ -41,9 +45,10 @@ def resample(time: FloatArray, values: FloatArray, grid: FloatArray) -> FloatArr
     """
     if _is_sparse(time, grid):
         return np.interp(grid, time, values)
-    kernel = low_pass_between(PASS_BAND_EDGES, STOPPED, STEP / OVERSAMPLING, ATTENUATION)
-    fine = np.interp(_fine_grid(grid), time, values)
-    return _decimate(mirrored(fine, len(kernel) // 2), kernel, len(grid))
+    points = _points(time, grid)
+    kernel = low_pass_between(PASS_BAND_EDGES, STOPPED, STEP / points, ATTENUATION)
+    fine = np.interp(_fine_grid(grid, points), time, values)
+    return _decimate(mirrored(fine, len(kernel) // 2), kernel, len(grid), points)
 
 
 def _is_sparse(time: FloatArray, grid: FloatArray) -> bool:
@@ -69,10 +74,11 @@ def average(time: FloatArray, values: FloatArray, grid: FloatArray) -> FloatArra
 
 def _hann_average(time: FloatArray, values: FloatArray, missing: BoolArray, grid: FloatArray) -> FloatArray:
     """Over one step to each side, shape of `grid`, of what is there; 0 where nothing is."""
-    kernel, fine_grid = np.hanning(2 * OVERSAMPLING + 1), _fine_grid(grid)
+    points = _points(time, grid)
+    kernel, fine_grid = np.hanning(2 * points + 1), _fine_grid(grid, points)
     weight = (nearest(time, missing.astype(np.float64), fine_grid) == 0).astype(np.float64)
     fine = np.interp(fine_grid, time[~missing], values[~missing]) * weight
-    sums, weights = (_decimate(np.pad(part, OVERSAMPLING), kernel, len(grid)) for part in (fine, weight))
+    sums, weights = (_decimate(np.pad(part, points), kernel, len(grid), points) for part in (fine, weight))
     return np.asarray(sums / np.where(weights > 0, weights, 1.0))
 
 
@@ -94,10 +100,16 @@ def in_digits(values: FloatArray) -> FloatArray:
     return np.round(values, 12 - int(np.ceil(np.log10(largest)))) if largest > 0.0 else values
 
 
-def _fine_grid(grid: FloatArray) -> FloatArray:
-    return np.linspace(grid[0], grid[-1], (len(grid) - 1) * OVERSAMPLING + 1)
+def _points(time: FloatArray, grid: FloatArray) -> int:
+    """Of the fine grid, per step of the grid: no fewer than there are rows."""
+    rows = (grid[1] - grid[0]) / np.median(np.diff(time))
+    return max(OVERSAMPLING, int(np.ceil(rows - STAMP_ERROR)))
 
 
-def _decimate(extended: FloatArray, kernel: FloatArray, n: int) -> FloatArray:
-    windows = np.lib.stride_tricks.sliding_window_view(extended, len(kernel))[::OVERSAMPLING]
+def _fine_grid(grid: FloatArray, points: int) -> FloatArray:
+    return np.linspace(grid[0], grid[-1], (len(grid) - 1) * points + 1)
+
+
+def _decimate(extended: FloatArray, kernel: FloatArray, n: int, points: int) -> FloatArray:
+    windows = np.lib.stride_tricks.sliding_window_view(extended, len(kernel))[::points]
     return np.asarray(windows[:n] @ kernel)

@@ -69,7 +69,12 @@ def score_snippets(
         half = split_groups(group, rng)
         model.append(metric_distances(metrics[half], artificial[half]))
         floor.append(metric_distances(metrics[half], metrics[~half]))
-    return SnippetScores(seconds, len(real), mean_distances(model), mean_distances(floor))
+    beside = mean_distances(floor)
+    if not all(beside.by_metric[name] > 0.0 for name in METRICS):
+        raise NotEnoughDataError(
+            "the drives are all the same, so none tells how real drivers differ; is one there twice?"
+        )
+    return SnippetScores(seconds, len(real), mean_distances(model), beside)
 
 
 LONG_SNIPPET = 60.0  # [s]

@@ -12,6 +12,7 @@ from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.drives.cuts import PAPER_RULES, CutRules, all_runs
 from xosc_lateral.drivers.drives.drive import Drive, Run
 from xosc_lateral.drivers.fitting.answers import answer_effects, measure_beside
+from xosc_lateral.drivers.fitting.bands import in_bands, split_by_band
 from xosc_lateral.drivers.fitting.place import LEAST_DRIVES, fit_place, without_place
 from xosc_lateral.drivers.fitting.sensor.runs import driver_runs
 from xosc_lateral.drivers.model.core.base import CoreModel, ModelKind
@@ -30,6 +31,7 @@ def fit_profile(
     provenance: Provenance | None = None,
     sensor_noise: float | None = None,
     neighbours: bool | None = None,
+    prior: DriverProfile | None = None,
 ) -> DriverProfile:
     """Cut drives into runs, separate driver and sensor, and fit a profile.
 
@@ -38,7 +40,7 @@ def fit_profile(
 
     Raises `NotEnoughDataError` when too little is left after cutting, or neighbours are asked for (True) and not known;
     `DriverProfileError` when neighbours are asked for (True) of the two-level model, which is the paper's to the
-    letter.
+    letter, or drives of different bands are given to it.
 
     Parameters
     ----------
@@ -49,18 +51,26 @@ def fit_profile(
     neighbours : bool, optional
         Whether a population's profile holds how its drivers keep away from vehicles beside them. None: where they are
         known.
+    prior : DriverProfile, optional
+        Where its movement comes from above the band that the drives show (`Drive.valid_below`), if no other drives show
+        it: without, there is none above.
     """
-    runs = all_runs(drives, rules)
+    slow, fast = split_by_band(drives)
+    runs = all_runs(slow, rules)
     if (
         model_named(model).model.kind == ModelKind.TWO_LEVEL
     ):  # to the letter: the paper takes offsets as they were measured
         if neighbours:
             raise DriverProfileError(f"a {ModelKind.TWO_LEVEL} profile is fitted without what neighbours do")
-        return fit_runs(runs, name=name, model=model, provenance=provenance)
-    cleaned, sensor = driver_runs(runs, drives, sensor_noise=sensor_noise)
+        if fast or prior is not None:
+            raise DriverProfileError(f"a {ModelKind.TWO_LEVEL} profile is fitted to one recording alone")
+        return in_bands(fit_runs(runs, name=name, model=model, provenance=provenance), runs)
+    cleaned, sensor = driver_runs(runs, slow, sensor_noise=sensor_noise)
     known = provenance or Provenance()
-    known = replace(known, fit={**known.fit, **_marking_notes(drives)})
-    return fit_population(cleaned, name=name, model=model, provenance=known, sensor=sensor, neighbours=neighbours)
+    known = replace(known, fit={**known.fit, **_marking_notes(slow)})
+    profile = fit_population(cleaned, name=name, model=model, provenance=known, sensor=sensor, neighbours=neighbours)
+    fast_runs = driver_runs(all_runs(fast, rules), fast)[0] if fast else ()
+    return in_bands(profile, cleaned, fast_runs, prior)
 
 
 def _marking_notes(drives: Sequence[Drive]) -> Mapping[str, float]:

@@ -73,6 +73,12 @@ class Candidate:
         """Columns that it reads."""
         return self.effect.columns
 
+    @property
+    def of_vector(self) -> bool:
+        """Whether it is the component of a vector: of a speed and a direction, say."""
+        factors = self.effect.factors if isinstance(self.effect, Product) else ()
+        return any(factor.form in (Form.SINE, Form.COSINE) for factor in factors)
+
     def values(self, context: Mapping[str, FloatArray]) -> FloatArray:
         """Quantity before lag and response, shape (n,); NaN: as usual."""
         return np.asarray(self.effect.seen(context) @ np.asarray(self.contrast))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, fields
 from types import MappingProxyType
 from typing import Any
 
@@ -47,11 +47,18 @@ class Finding(Description):
     effects: tuple[Effect, ...] = ()  # What the profile got.
     gain: Gain | None = None  # Held-out gain, nested; None where its path can't be predicted.
 
+    @property
+    def over_time(self) -> bool:
+        """Whether it is a course over time, which one delay does not describe."""
+        return self.passage is not None and self.lag_s is None
+
 
 def _finding(size: Description, scored: HeldOut, **about: Any) -> Finding:
     """Put errors on held-out blocks to what was described."""
     before, after = scored.error_of(size.statistic)
-    described = asdict(size) | {"measure": size.measure or size.statistic}
+    described = {one.name: getattr(size, one.name) for one in fields(size)} | {
+        "measure": size.measure or size.statistic
+    }
     return Finding(error_before=before, error_after=after, **described, **about)
 
 

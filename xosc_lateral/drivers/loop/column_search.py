@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -14,11 +15,13 @@ from xosc_lateral.drivers.loop.dictionary import (
     CROSS_BASIS,
     NULL_DRAWS,
     Dictionary,
+    beside_parts,
     build_dictionary,
     orthonormal,
     score_entries,
 )
 from xosc_lateral.drivers.loop.model import Fitted, Outcome
+from xosc_lateral.drivers.loop.omnibus import courses
 from xosc_lateral.drivers.loop.refinement import Refined, Refinement
 from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.search import Search
@@ -127,17 +130,19 @@ class ColumnSearch:
         ----------
         .. [1] C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948.
         """
-        scored, refused = self._scored_once(), set[tuple[str, ...]]()
+        refused = {term.columns for term in of_kind(self.fitted, self.kind)}  # one column, one finding
+        there = len(refused)
+        scored = self._scored_once()
         while scored is not None:
             found, p_value = scored.likeliest()
             if not self.kind.passes(self.search, p_value, self.fitted):  # refined, it would not be accepted either
                 return Outcome(None, found.columns, p_value)
             term, after = self._term(scored, refused)
-            if not _grows(self.fitted, after) and after.log_likelihood >= self.fitted.log_likelihood - ROUNDING:
+            if not grows(self.fitted, after) and after.log_likelihood >= self.fitted.log_likelihood - ROUNDING:
                 return Outcome(term, term.columns, p_value, after)
             refused.add(term.columns)
             scored = self._scored(scored.problem, scored.dictionary, refused)
-        return Outcome(None, min(refused), 1.0) if refused else None
+        return Outcome(None, min(refused), 1.0) if len(refused) > there else None
 
     def probability_of(self, columns: tuple[str, ...]) -> float:
         """p-value of the best candidate of given columns, against the same null as in `outcome`.
@@ -161,7 +166,8 @@ class ColumnSearch:
 
     def _scored_once(self) -> _Scored | None:
         def make() -> _Scored | None:
-            return self._scored(self.kind.problem(self.fitted))
+            taken = {term.columns for term in of_kind(self.fitted, self.kind)}
+            return self._scored(self.kind.problem(self.fitted), refused=taken)
 
         found: _Scored | None = self.search.once(self.kind, self.fitted, make)
         return found
@@ -197,8 +203,19 @@ class ColumnSearch:
         known = orthonormal(np.concatenate(blocks, axis=1), 1e-6)
         drive, rng = search.coarse.drive[problem.whitener.valid], generator(search.seed, LoopSeed.COLUMNS)
         of_mean = kind.acts is Acts.LOCATION
-        scores = score_entries(dictionary, problem.observed, known, barred, drive, rng, draws=draws, of_mean=of_mean)
-        return _Scored(problem, dictionary, known, *scores)
+        scores, maxima = score_entries(
+            dictionary, problem.observed, known, barred, drive, rng, draws=draws, of_mean=of_mean
+        )
+
+        @cache
+        def span(column: str) -> FloatArray:
+            rows = [i for i, candidate in enumerate(candidates) if candidate.columns == (column,)]
+            course = courses(search.quantities, problem.whitener, problem.whitener.valid, (column,))
+            both = [dictionary.rows[rows].astype(np.float64).T, *course.values()]
+            return orthonormal(np.concatenate(both, axis=1), CROSS_BASIS)
+
+        scores = beside_parts(scores, dictionary, problem.observed, known, span, WITHIN)
+        return _Scored(problem, dictionary, known, scores, maxima)
 
     def _term(self, scored: _Scored, refused: Collection[tuple[str, ...]]) -> tuple[SearchedTerm, Fitted]:
         """The term that the best candidate becomes, and the fit with it.
@@ -250,7 +267,7 @@ class ColumnSearch:
         return best, self.kind.of(best.effect, tuple(alike))
 
 
-def _grows(before: Fitted, after: Fitted) -> bool:
+def grows(before: Fitted, after: Fitted) -> bool:
     """Whether the movement that is left is larger with a term than without it, beyond chance.
 
     Generalised and ordinary least squares agree on a quantity that moves the driver [1]_. What was sized on a few odd

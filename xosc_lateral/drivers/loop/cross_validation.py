@@ -8,7 +8,8 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -21,6 +22,7 @@ from xosc_lateral.drivers.loop.model import Fitted, Term
 from xosc_lateral.drivers.loop.regression import design_of, fit_model
 from xosc_lateral.drivers.loop.search import Search
 from xosc_lateral.drivers.loop.selection import Gain, Selection, select
+from xosc_lateral.drivers.loop.terms.time import StepTerm
 from xosc_lateral.drivers.loop.timeline import Coarse, Timeline, coarse_middle
 
 Progress = Callable[[float, str], None]  # Gets the share that is done and what is being done.
@@ -90,19 +92,24 @@ def _log_likelihood(fitted: Fitted, noise: Fitted, coarse: Coarse, held: BoolArr
 
 @dataclass(frozen=True, eq=False)
 class Nested:
-    """Selections of all folds, one each, and what they gain."""
+    """Selections of all folds, one each, and what they gain.
 
-    selections: tuple[Selection, ...]
+    What is scored knows nothing of the rows that are held out: neither how many effects there are, nor of which kind.
+    What judges a single effect has as many of its kind as the table: a level that all folds have to reach would bias
+    its gain. What a fold lacks of an effect, the others have more of: it is significant in just those whose own
+    held-out rows show least of it.
+    """
+
+    scored: tuple[Selection, ...]  # By the table's levels.
+    selections: tuple[Selection, ...]  # At least as many terms of every component as the table has, the best ones.
     coarse: Coarse
     blocks: IntArray  # shape (n,): On the 1 Hz grid.
 
-    def only(self, terms: Sequence[Term]) -> Nested:
-        """The same without what a fold chose that is none of these terms."""
-        reduced = []
-        for selection in self.selections:
-            extra = [one.term for one in selection.accepted if not _any_matches(one.term, terms)]
-            reduced.append(selection.without(extra, "") if extra else selection)
-        return replace(self, selections=tuple(reduced))
+    def only(self, terms: Sequence[Term], gone: Sequence[Term] = ()) -> Nested:
+        """What judges without what a fold chose that is none of these terms; what is scored without those `gone`."""
+        judging = (_without(one, lambda term: not _any_matches(term, terms)) for one in self.selections)
+        scored = (_without(one, lambda term: _any_matches(term, gone)) for one in self.scored)
+        return replace(self, selections=tuple(judging), scored=tuple(scored))
 
     def of(self, term: Term) -> Gain:
         """What one accepted term gains: each fold's own version of it, in or out; nothing where it was not chosen."""
@@ -141,34 +148,40 @@ def gain_over(rows: FloatArray, blocks: IntArray, valid: BoolArray, folds: int) 
 def nest(
     search: Search,
     initial: Sequence[Term],
-    wanted: Mapping[str, int],
+    found: Sequence[Term],
     progress: Callable[[float], None] = lambda _: None,
 ) -> Nested:
-    """Select anew without each fold: of every component at least as many terms as the table has, the best ones.
-
-    A level that all have to reach would bias the gain. What a fold lacks of an effect, the others have more of: it is
-    significant in just those whose own held-out rows show least of it.
-
-    `wanted`: terms that the table has, of the components in which any was accepted.
-    """
+    """Select anew without each fold: by the table's levels, and then at least as many terms as were `found` there."""
     from joblib import cpu_count
 
     coarse, blocks = search.coarse, hold_out_blocks(search.coarse.timeline)
     seconds, folds = coarse_middle(blocks)[: len(coarse)], folds_of(blocks)
-    quiet = replace(search, wanted=wanted, progress=lambda _: None)
+    # what happened once can't be found without the block in which it happened: what judges the others knows when
+    once = tuple(term for term in found if term.component == StepTerm.component)
+    wanted = Counter(term.component for term in found if term not in once)
 
-    def selected(fold: int) -> Selection:
+    def selected(fold: int) -> tuple[Selection, Selection]:
         part = coarse.only(seconds % folds != fold) if folds > 1 else coarse
-        return select(replace(quiet, coarse=part), initial)
+        own = replace(search, coarse=part, progress=lambda _: None)
+        scored = select(own, initial)
+        there = Counter(one.term.component for one in scored.accepted)
+        if not once and all(there[component] >= number for component, number in wanted.items()):
+            return scored, scored
+        return scored, select(replace(own, wanted=wanted), (*initial, *once))
 
-    selections = []
+    pairs = []
     # threads: the work is in compiled code that lets others run, and all folds read the same candidates
     with ThreadPoolExecutor(min(folds, cpu_count())) as pool:
-        for selection in pool.map(selected, range(folds)):
-            selections.append(selection)
-            progress(len(selections) / folds)
-    return Nested(tuple(selections), coarse, seconds)
+        for pair in pool.map(selected, range(folds)):
+            pairs.append(pair)
+            progress(len(pairs) / folds)
+    return Nested(tuple(pair[0] for pair in pairs), tuple(pair[1] for pair in pairs), coarse, seconds)
+
+
+def _without(selection: Selection, leave_out: Callable[[Term], bool]) -> Selection:
+    extra = [one.term for one in selection.accepted if leave_out(one.term)]
+    return selection.without(extra, "") if extra else selection
 
 
 def _any_matches(term: Term, others: Sequence[Term]) -> bool:
-    return any(type(term) is type(other) and term.matches(other) for other in others)
+    return any(term.kind == other.kind and term.matches(other) for other in others)

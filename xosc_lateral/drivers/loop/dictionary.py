@@ -9,7 +9,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -225,6 +225,51 @@ def _beside_loud_stretches(
     costs = dictionary.costs[order]
     robust[order] = (scores[order] + costs) / scatter - costs
     return robust
+
+
+def beside_parts(
+    scores: FloatArray,
+    dictionary: Dictionary,
+    residual: FloatArray,
+    known: FloatArray,
+    spans: Callable[[str], FloatArray],
+    within: float,
+) -> FloatArray:
+    """Scores of products beside all that either column does alone, where that is less: they have to give more.
+
+    Of those alone that may be within a distance of the best. A number that goes with an angle is a vector's component,
+    one quantity and no product of two.
+
+    Parameters
+    ----------
+    scores : array, shape (entries,)
+        As `score_entries` gives them.
+    residual, known
+        As `score_entries` got them.
+    spans : callable
+        Column -> rows that it may explain alone, shape (seconds, k).
+    within : float
+    """
+    left = beside(known, residual)
+    left = left / max(float(np.sqrt(np.mean(left**2))), 1e-300)
+    members: dict[tuple[str, ...], list[int]] = {}
+    for index in np.flatnonzero(np.isfinite(scores)):
+        candidate = dictionary.candidates[index]
+        if len(candidate.columns) > 1 and not candidate.of_vector:
+            members.setdefault(candidate.columns, []).append(int(index))
+    scores, open_pairs = scores.copy(), set(members)
+    while open_pairs:
+        pair = max(open_pairs, key=lambda one: float(scores[members[one]].max()))
+        if float(scores[members[pair]].max()) < float(scores.max()) - within:
+            break
+        open_pairs.remove(pair)
+        own = members[pair]
+        span = orthonormal(np.concatenate([known, *(spans(column) for column in pair)], axis=1), CROSS_BASIS)
+        rows = beside(span, dictionary.rows[own].astype(np.float64).T)
+        power = np.square(rows).sum(axis=0)
+        gains = np.square(beside(span, left) @ rows) / np.maximum(power, TINY) - dictionary.costs[own]
+        scores[own] = np.where(power > LEFT_OVER, np.minimum(scores[own], gains), -np.inf)
+    return scores
 
 
 def draw_null(residual: FloatArray, drive: IndexArray, rng: np.random.Generator, draws: int = NULL_DRAWS) -> FloatArray:

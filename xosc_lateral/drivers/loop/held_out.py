@@ -156,7 +156,6 @@ def _held_out_runs(
     """Runs of base and refined profile over all rows, each row's by profiles chosen and fitted without its fold."""
     coarse, start = setting.coarse, selection.start
     folds = folds_of(setting.blocks)
-    own = None if nested is None else nested.only([one.term for one in selection.accepted])
     sides: list[FloatArray] = [np.zeros(0), np.zeros(0)]
     for fold in range(folds):
         progress(0.6 + 0.3 * fold / folds, f"held-out fold {fold + 1} of {folds}")
@@ -165,7 +164,7 @@ def _held_out_runs(
         without = fit_model(coarse.only(coarse_middle(used)), start.terms)
         profiles = [setting.fixed or fit_without(without, used, setting.kind, "before", None)]
         if selection.accepted or setting.kind is not setting.refined_kind:
-            fitted = without if own is None else own.selections[fold].final
+            fitted = without if nested is None else nested.scored[fold].final
             profiles.append(fit_without(fitted, used, setting.refined_kind, "after", None))
         for side, profile in enumerate(profiles):
             # the same luck for both sides and all folds: what differs is the profile, and runs go on from fold to fold

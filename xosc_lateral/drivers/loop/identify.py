@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -20,7 +19,7 @@ from xosc_lateral.drivers.loop.selection import ERROR_BUDGET, Gain, Rejected, Se
 from xosc_lateral.drivers.loop.terms.between import BetweenTerm, is_between
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
 from xosc_lateral.drivers.loop.terms.spread import SpreadTerm
-from xosc_lateral.drivers.loop.terms.time import StepTerm, TimeMeanTerm, TimeSpreadTerm
+from xosc_lateral.drivers.loop.terms.time import TimeMeanTerm, TimeSpreadTerm
 from xosc_lateral.drivers.loop.timeline import Coarse, Timeline, unsized
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Drift, TimeSmooth, VarianceTrend
 from xosc_lateral.drivers.model.profile import DriverProfile
@@ -63,7 +62,7 @@ class Identified:
         if not out.accepted:
             return replace(self, selection=out, nested=None, total=None, returned_base=why)
         kept = [one.term for one in out.accepted]
-        nested = None if self.nested is None else self.nested.only(kept)
+        nested = None if self.nested is None else self.nested.only(kept, terms)
         return replace(self, selection=out, nested=nested)
 
 
@@ -90,18 +89,13 @@ def identify(
         selection = select(search, initial)
         if not selection.accepted:
             return Identified(usable, selection, search.quantities)
-        # what happened once can't be found without the block in which it happened: folds know when, and size it
-        once = tuple(one.term for one in selection.accepted if one.term.component == StepTerm.component)
-        found = {one.term.component for one in selection.accepted} - {StepTerm.component}
-        there = Counter(term.component for term in selection.final.terms)
-        wanted = {component: there[component] for component in sorted(found)}
+        accepted = [one.term for one in selection.accepted]
 
         def finished(share: float) -> None:
             progress(0.3 + 0.3 * share, "selecting without a fold")
 
-        return _worst_first(
-            Identified(usable, selection, search.quantities, nest(search, (*initial, *once), wanted, finished))
-        )
+        nested = nest(search, initial, accepted, finished)
+        return _worst_first(Identified(usable, selection, search.quantities, nested))
 
 
 def usable_columns(

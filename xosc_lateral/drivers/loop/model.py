@@ -18,6 +18,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.loop.autocorrelation import Whitener
 from xosc_lateral.drivers.loop.innovations import innovations
+from xosc_lateral.drivers.loop.passage import Passage
 from xosc_lateral.drivers.loop.refinement import Alternatives
 from xosc_lateral.drivers.loop.search import Search
 from xosc_lateral.drivers.loop.timeline import Coarse, on_fine_grid
@@ -52,6 +53,7 @@ class Description:
     measure: str = ""  # What the errors before and after compare; empty: that group.
     lag_s: float | None = None
     response_s: float | None = None
+    passage: Passage | None = None  # The path through a typical bend, say.
 
 
 @dataclass(eq=False)
@@ -76,6 +78,7 @@ class Outcome:
     p_value: float  # Family-wise over everything that the test tried.
     after: Fitted | None = None  # Fit with the term, where the test has made it.
     together: tuple[Term, ...] = ()  # Found with it, as one finding.
+    instead_of: Term | None = None  # Whose place it takes.
 
 
 class Term(ABC):

@@ -11,6 +11,7 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,18 +51,23 @@ class Omnibus:
         return self.p_value > LEVEL
 
 
-def tents(values: FloatArray, delays: tuple[float, ...], drive: IndexArray, step: float = 1.0) -> FloatArray:
-    """Values [any unit], shape (n,), through kernels that rise to each delay from the one before and fall to the next.
+def weights_of(delays: tuple[float, ...]) -> FloatArray:
+    """Of whole seconds, from the first delay to the last, in kernels that rise to each delay from the one before and
+    fall to the next, each of gain 1; shape (delays, seconds). [-]"""
+    seconds = np.arange(delays[0], delays[-1] + 1.0)
+    weights = np.stack([np.interp(seconds, delays, unit) for unit in np.eye(len(delays))])
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
-    Each has gain 1; shape (n, delays). Before the first and after the last row of a drive its outermost row holds.
+
+def tents(values: FloatArray, delays: tuple[float, ...], drive: IndexArray) -> FloatArray:
+    """Values by the second [any unit], shape (n,), through the kernels of `weights_of`; shape (n, delays).
+
+    Before the first and after the last row of a drive its outermost row holds.
     """
     first, last = np.searchsorted(drive, drive, side="left"), np.searchsorted(drive, drive, side="right") - 1
-    rows, knots = np.arange(len(values)), np.asarray(delays) / step
-    reach = np.arange(int(np.floor(knots[0])), int(np.ceil(knots[-1])) + 1)
-    weights = np.stack([np.interp(reach, knots, unit, left=0.0, right=0.0) for unit in np.eye(len(knots))])
-    weights /= weights.sum(axis=1, keepdims=True)
-    shifted = (values[np.clip(rows - late, first, last)] for late in reach)
-    return np.asarray(sum(part[:, None] * weight for part, weight in zip(shifted, weights.T, strict=True)))
+    rows, reach = np.arange(len(values)), np.arange(int(delays[0]), int(delays[-1]) + 1)
+    shifted = np.stack([values[np.clip(rows - late, first, last)] for late in reach], axis=1)
+    return np.asarray(shifted @ weights_of(delays).T)
 
 
 def amid_runs(valid: BoolArray) -> BoolArray:
@@ -75,12 +81,14 @@ def amid_runs(valid: BoolArray) -> BoolArray:
     return np.asarray((before >= DELAYS[-1]) & (after >= -DELAYS[0]))
 
 
-def courses(quantities: Quantities, whitener: Whitener, amid: BoolArray) -> dict[tuple[str, ...], FloatArray]:
-    """Of every column, what its plain shapes can do over time: white, orthonormal, shape (rows amid runs, rank)."""
+def courses(
+    quantities: Quantities, whitener: Whitener, amid: BoolArray, only: tuple[str, ...] = ()
+) -> dict[tuple[str, ...], FloatArray]:
+    """What plain shapes of every column, or of one, can do over time: white, orthonormal, shape (rows amid, rank)."""
     found: dict[tuple[str, ...], list[FloatArray]] = {}
     compact, valid = whitener.compact, whitener.valid
     for candidate, values in zip(quantities.candidates, quantities.values, strict=True):
-        if candidate.family is Family.PLAIN:
+        if candidate.family is Family.PLAIN and (not only or candidate.columns == only):
             moved = tents(values.astype(np.float64), DELAYS, quantities.drive)[valid]
             rows, power = compact.rows(moved)[amid[valid]], float(np.square(moved).sum())
             if float(np.square(rows).sum()) > 1e-9 * power:  # it varies within drives
@@ -89,27 +97,35 @@ def courses(quantities: Quantities, whitener: Whitener, amid: BoolArray) -> dict
 
 
 def check_remainder(
-    fitted: Fitted, quantities: Quantities, seed: np.random.SeedSequence, *, draws: int = NULL_DRAWS
+    fitted: Fitted,
+    quantities: Quantities,
+    seed: np.random.SeedSequence,
+    taken: Collection[tuple[str, ...]] = (),
+    *,
+    only: tuple[str, ...] = (),
 ) -> Omnibus:
-    """Whether any column predicts what a fit leaves better than the same innovations in another order."""
+    """Whether any column predicts what a fit leaves better than the same innovations in another order.
+
+    But for those `taken`; `only`: of the null all columns, of the innovations as they are this one.
+    """
     whitener, coarse = fitted.whitener, fitted.coarse
     amid = amid_runs(whitener.valid)
     if amid.sum() < MIN_SUPPORT_S:
         return Omnibus(1.0, (), 0.0)
     known = orthonormal(whitener.rows(fitted.columns)[amid])
     left = beside(known, whitener.rows(coarse.offset - fitted.columns @ fitted.sizes)[amid])
-    null = draw_null(left, coarse.drive[amid], generator(seed, LoopSeed.OMNIBUS), draws)
+    null = draw_null(left, coarse.drive[amid], generator(seed, LoopSeed.OMNIBUS), NULL_DRAWS)
     rows = np.concatenate([left[:, None], beside(known, null)], axis=1)
     rows /= np.sqrt(np.mean(np.square(rows), axis=0))
-    best, largest, chosen, share = -np.inf, np.full(draws, -np.inf), tuple[str, ...](), 0.0
+    best, largest, chosen, share = -np.inf, np.full(NULL_DRAWS, -np.inf), tuple[str, ...](), 0.0
     for columns, course in courses(quantities, whitener, amid).items():
         basis = orthonormal(beside(known, course), CROSS_BASIS)
-        if not basis.shape[1]:
+        if columns in taken or not basis.shape[1]:
             continue
         explained = np.square(basis.T @ rows).sum(axis=0)
         largest = np.maximum(largest, as_one_degree(explained[1:], basis.shape[1]))
         score = float(as_one_degree(_beside_loud_rows(basis, rows[:, 0]), basis.shape[1]))
-        if score > best:
+        if score > best and (not only or columns == only):
             best, chosen = score, columns
             share = max(0.0, float(explained[0] - basis.shape[1]) / len(left))
     return Omnibus(upper_tail(best, largest), chosen, share) if chosen else Omnibus(1.0, (), 0.0)

@@ -125,16 +125,19 @@ def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
                 if test is None:
                     continue
                 if test.term is not None and kind.passes(search, test.p_value, fitted):
-                    passed.append((test.p_value, (test.term, *test.together), test.after))
+                    passed.append((test.p_value, (test.term, *test.together), test))
                 else:
                     seen_at[component] = len(accepted)
                     why = f"not significant: its p-value is above {search.levels[component]:.2g}"
                     rejected[component] = Rejected(component, test.columns, test.p_value, why)
             if not passed:
                 break
-            p_value, new, after = min(passed, key=lambda one: one[0])
-            accepted += [Accepted(term, p_value) for term in new]
-            fitted = after or fit_model(search.coarse, (*fitted.terms, *new))
+            p_value, new, test = min(passed, key=lambda one: one[0])
+            former = [one for one in accepted if one.term is test.instead_of]
+            accepted = [one for one in accepted if one not in former]
+            accepted += [Accepted(term, min([p_value, *(one.p_value for one in former)])) for term in new]
+            seen_at = {}
+            fitted = test.after or fit_model(search.coarse, (*fitted.terms, *new))
     selection = Selection(tuple(accepted), tuple(rejected.values()), start, fitted)
     for one in accepted:
         selection = _tested_again(search, selection, one)

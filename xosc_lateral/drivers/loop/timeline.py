@@ -85,6 +85,11 @@ class Timeline:
         starts = np.searchsorted(self.drive, np.arange(len(self.names)))
         return anew[np.maximum(rows, np.minimum(starts + PAD // 2, len(rows) - 1)[self.drive])]
 
+    def shifted(self, values: FloatArray, late_s: float) -> FloatArray:
+        """Values so much later [s], shape (n, ...), in their unit; beyond a drive's ends its outermost value holds."""
+        rows, edges = np.arange(len(values)), np.searchsorted(self.drive, np.arange(len(self.names) + 1))
+        return values[np.clip(rows - round(late_s / STEP), edges[self.drive], edges[self.drive + 1] - 1)]
+
 
 def smoothed(offset: FloatArray, timeline: Timeline, times_s: Sequence[float]) -> list[FloatArray]:
     """Moving averages of a series over each of several times, shape (n,) each, in its unit."""
@@ -254,7 +259,9 @@ class Coarse:
 
     def fine_response(self, effect: ColumnEffect) -> FloatArray:
         """The same on the 0.2 s grid, as it is, shape (fine n, k). [own unit]"""
-        return self.timeline.respond(effect.known(self.context), effect.lag_s, effect.response_s)
+        timeline, course = self.timeline, effect.course
+        response = timeline.respond(effect.known(self.context), effect.lag_s, effect.response_s)
+        return response if not course else np.sum([w * timeline.shifted(response, late) for late, w in course], axis=0)
 
     def strength(self, effect: ColumnEffect) -> FloatArray:
         """What an effect of columns that the table has does on the 0.2 s grid, shape (fine n,). [m], or log factor"""

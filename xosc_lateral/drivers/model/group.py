@@ -170,7 +170,8 @@ class OffsetGroup:
         movement = Movement(state["mean"][who], parts[0], parts[1])
         hidden = EffectTerms(*parts[2:]) if self._hidden else EffectTerms()
         terms = combine([hidden, effects])
-        return offsets_of(movement, EffectTerms(terms.location, terms.spread, None, terms.fine), width)
+        factors = EffectTerms(terms.location, terms.spread, None, terms.fine)
+        return offsets_of(self.profile, movement, factors, width)
 
     def _next_rated(self, who: IntArray, effects: EffectTerms, width: FloatArray) -> FloatArray:
         """The same where effects act on the rate of mean reversion: nothing can be drawn ahead."""

@@ -47,12 +47,13 @@ class Movement(NamedTuple):
     fine: FloatArray
 
 
-def offsets_of(movement: Movement, terms: EffectTerms, width: FloatArray) -> FloatArray:
+def offsets_of(profile: DriverProfile, movement: Movement, terms: EffectTerms, width: FloatArray) -> FloatArray:
     """Offsets, by the formula of `EffectTerms`; rows of one drive, or one row of many drives, shape (n,) each. [m]"""
     mean, coarse, fine = movement
+    by_lane, by_hand = profile.scales(width)
     moved = coarse if terms.spread is None else mean + terms.spread * (coarse - mean)
-    moved = moved + (fine if terms.fine is None else terms.fine * fine)
-    offset = moved * width
+    noise = fine if terms.fine is None else terms.fine * fine
+    offset = (moved + noise) * by_lane if by_lane is by_hand else moved * by_lane + noise * by_hand
     return np.asarray(offset if terms.location is None else offset + terms.location)
 
 
@@ -60,7 +61,7 @@ class DriveProcess:
     """One drive; what is random is drawn `ahead` by so many rows, to be quick with blocks of a single row."""
 
     def __init__(self, profile: DriverProfile, seed: np.random.SeedSequence, *, ahead: int = 0) -> None:
-        self._model, self._seed = profile.model, seed
+        self._profile, self._model, self._seed = profile, profile.model, seed
         self._ahead = self._core_ahead = ahead
         for effect in profile.effects:
             if not isinstance(effect, HiddenEffect | ColumnEffect):
@@ -144,11 +145,13 @@ class DriveProcess:
         Raises `ValueError` if the first offset `start` [m] is given in the middle of a drive.
         """
         if self._core is None:
-            self._core = self._model.stream(child(self._seed, DriveSeed.CORE), _start(start, width, terms))
+            self._core = self._model.stream(
+                child(self._seed, DriveSeed.CORE), _start(self._profile, start, width, terms)
+            )
             self.state.core = self._core.state
         elif start is not None:
             raise ValueError("a drive that continues from a state has no start")
-        return offsets_of(self.movement(len(width), terms.rate), terms, width)
+        return offsets_of(self._profile, self.movement(len(width), terms.rate), terms, width)
 
     def movement(self, n: int, rate: FloatArray | None = None) -> Movement:
         """Next movement, before effects act: what `take` makes offsets of; `rate` [-] of shape (n,).
@@ -239,12 +242,13 @@ def combine(terms: Sequence[EffectTerms]) -> EffectTerms:
     return EffectTerms(location, spread, rate, fine)
 
 
-def _start(offset: float | None, width: FloatArray, terms: EffectTerms) -> Start | None:
+def _start(profile: DriverProfile, offset: float | None, width: FloatArray, terms: EffectTerms) -> Start | None:
     if offset is None:
         return None
     location = 0.0 if terms.location is None else float(terms.location[0])
+    by_lane, by_hand = (float(scale[0]) for scale in profile.scales(width[:1]))
     return Start(
-        rel_offset=(offset - location) / float(width[0]),
+        rel_offset=(offset - location) / by_lane,
         spread=1.0 if terms.spread is None else float(terms.spread[0]),
-        fine=1.0 if terms.fine is None else float(terms.fine[0]),
+        fine=(1.0 if terms.fine is None else float(terms.fine[0])) * by_hand / by_lane,
     )

@@ -10,14 +10,18 @@ from functools import lru_cache
 from typing import Annotated, Any
 
 import msgspec
+import numpy as np
 from msgspec import Meta, defstruct, field, structs
 
+from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError
+from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.model.core.base import CoreModel
 from xosc_lateral.drivers.model.core.registry import CORE_MODELS, any_model
 from xosc_lateral.drivers.model.effects import Effect, any_effect
 from xosc_lateral.drivers.model.records import Record, read_as, schema_hook, set_once
 from xosc_lateral.drivers.model.sensor.model import SensorModel
+from xosc_lateral.drivers.model.validity import Validity
 
 SIDES = ("left", "right")
 
@@ -117,9 +121,11 @@ class DriverProfile(Record, frozen=True):
         Fitted on left-hand traffic. On a road of the other hand it is sampled as in a mirror.
     beside : mapping of str to Beside
         By side, "left" and "right": whether its answer to neighbours there is known, and how.
+    validity : Validity
+        Where it is known to hold.
     """
 
-    later = ("left_hand", "beside")
+    later = ("left_hand", "beside", "validity")
 
     name: str = field(name="id")
     model: CoreModel
@@ -130,6 +136,7 @@ class DriverProfile(Record, frozen=True):
     sensor: SensorModel | None = None
     left_hand: bool = False
     beside: Mapping[str, Beside] = field(default_factory=dict)
+    validity: Validity = Validity()
 
     def __post_init__(self) -> None:
         if not self.name:
@@ -137,6 +144,10 @@ class DriverProfile(Record, frozen=True):
         if not 0 < self.lane_width <= MAX_LANE_WIDTH:
             raise DriverProfileError(
                 f"profile {self.name}: lane width {self.lane_width} m, expected above 0, at most {MAX_LANE_WIDTH:g} m"
+            )
+        if abs(self.model.step - STEP) > 1e-9 * STEP:
+            raise DriverProfileError(
+                f"profile {self.name}: model.step {self.model.step} s; drivers have steps of {STEP} s"
             )
         for side in self.beside:
             if side not in SIDES:
@@ -147,6 +158,18 @@ class DriverProfile(Record, frozen=True):
         known = self.provenance
         effects = f"{len(self.effects)} effect{'' if len(self.effects) == 1 else 's'}"
         return f"<DriverProfile {self.name}: {self.model.kind}, {effects}, {known.hours:g} h of {known.drives} drives>"
+
+    def scales(self, width: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Metres that one unit of the coarse and of the fine part is in lanes of a width, shape (n,). [m]
+
+        Drivers use the lane that they have, up to the widest that was measured; the noise of steering knows no lane.
+        Where that is not stated, as in files of older versions, both are shares of the width.
+        """
+        measured = self.validity.lane_width
+        if measured is None:
+            return width, width
+        coarse = np.minimum(width, measured[1])
+        return coarse, coarse if self.model.fine_scales_with_lane else np.full(np.shape(width), self.lane_width)
 
     def with_effects(self, *effects: Effect, name: str | None = None) -> DriverProfile:
         """A profile with further effects, under another name if one is given."""
@@ -162,7 +185,18 @@ class DriverProfile(Record, frozen=True):
         values = super().to_dict()
         values["effects"] = [effect.to_dict() for effect in self.effects]
         values["sensor"] = None if self.sensor is None else self.sensor.to_dict()
-        order = ("id", "metadata", "lane_width", "left_hand", "model", "effects", "beside", "sensor", "provenance")
+        order = (
+            "id",
+            "metadata",
+            "validity",
+            "lane_width",
+            "left_hand",
+            "model",
+            "effects",
+            "beside",
+            "sensor",
+            "provenance",
+        )
         return {"format": FORMAT, "version": VERSION, **{name: values[name] for name in order if name in values}}
 
     @classmethod
@@ -222,4 +256,6 @@ def sampling_hash(profile: DriverProfile) -> str:
     """SHA-256 of what a profile's offsets depend on; what only describes it may change."""
     values = profile.to_dict()
     parts = {name: values[name] for name in ("lane_width", "model", "effects")}
+    if profile.validity.lane_width is not None:
+        parts["lane_width_measured"] = profile.validity.lane_width
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()

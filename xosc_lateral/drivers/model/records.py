@@ -98,7 +98,10 @@ def _decoded(kind: type, value: Any) -> Any:
     if get_origin(kind) is np.ndarray:
         if isinstance(value, dict):  # no values: lists can't say how many there are none of
             return _empty(value, _dtype(kind))
-        return np.array(value, dtype=_dtype(kind))
+        array, wanted = np.array(value), _dtype(kind)
+        if array.size and not np.can_cast(array.dtype, wanted, "same_kind"):
+            raise ValueError("expected numbers")  # of texts, numpy would make some, and of 1.5 a whole number
+        return array.astype(wanted)
     if kind is np.random.Generator:
         generator = np.random.default_rng(0)
         generator.bit_generator.state = value

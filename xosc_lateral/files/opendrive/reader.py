@@ -41,6 +41,9 @@ def read_opendrive(path: str | PathLike[str]) -> RoadNetwork:
     roads = tuple(_read_road(e, plan, line, source) for e, plan, line in zip(elements, plans, lines, strict=True))
     junctions = tuple(_read_junction(element, source) for element in root.iterfind("junction"))
     reference, offset = root.findtext("header/geoReference"), root.find("header/offset")
+    for header in root.iterfind("header"):
+        for name in ("north", "south", "east", "west"):
+            source.number(header, name, 0.0)
     shift = () if offset is None else (source.number(offset, name, 0.0) for name in ("x", "y", "z", "hdg"))
     return RoadNetwork(
         roads=roads,

@@ -5,8 +5,8 @@ Written with lxml, as scenarios are (`files/openscenario/write/build.py` says wh
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from lxml import etree
@@ -31,6 +31,8 @@ class WrittenLane:
 
     kind: str  # OpenDRIVE lane type
     width: FloatArray  # start s [m] and the polynomial's a, b, c, d of each piece, shape (n, 5)
+    predecessor: int | None = None  # predecessor, successor: lanes of the linked roads
+    successor: int | None = None
 
     @classmethod
     def even(cls, kind: str, width: float) -> WrittenLane:
@@ -57,21 +59,33 @@ class WrittenRoad:
     left: Sequence[WrittenLane]
     right: Sequence[WrittenLane]
     origin: tuple[float, float] = (0.0, 0.0)  # of its coordinates in the recording's [m]
+    number: int = 1
+    rule: str = "RHT"
+    kind: str = "motorway"
+    offset: FloatArray | None = None  # of its lanes, laid out as a lane's width
+    links: Mapping[str, tuple[str, int]] = field(default_factory=dict)
+    """Of "predecessor" and "successor": "road" or "junction", and its number. A road is entered at its start."""
 
     def to_xml(self) -> str:
-        """The document, the same bytes each time."""
-        root = etree.Element("OpenDRIVE")
-        header = sub(root, "header", revMajor="1", revMinor="6", name=self.name, vendor="xosc-lateral")
-        if self.origin != (0.0, 0.0):
-            x, y = (decimal(value, 3) for value in self.origin)
-            sub(header, "offset", x=x, y=y, z="0", hdg="0")
-        length = float(self.plan[-1, 0] + self.plan[-1, 4])
-        road = sub(root, "road", name=self.name, length=decimal(length, 6), id="1", junction="-1", rule="RHT")
-        sub(road, "type", s="0", type="motorway")
+        """The document of this road alone, the same bytes each time."""
+        return roads_xml(self.name, [self], origin=self.origin)
+
+    def add_to(self, root: etree._Element) -> None:
+        """Write it into a document."""
+        about = {"name": self.name, "length": decimal(float(self.plan[-1, 0] + self.plan[-1, 4]), 6)}
+        road = sub(root, "road", **about, id=str(self.number), junction="-1", rule=self.rule)
+        for end, (element, number) in self.links.items():
+            touched = {"contactPoint": "start" if end == "successor" else "end"} if element == "road" else {}
+            owner = road[0] if len(road) else sub(road, "link")
+            sub(owner, end, elementType=element, elementId=str(number), **touched)
+        sub(road, "type", s="0", type=self.kind)
         plan = sub(road, "planView")
         for piece in self.plan:
             _geometry(plan, piece)
-        section = sub(sub(road, "lanes"), "laneSection", s="0")
+        lanes_element = sub(road, "lanes")
+        for s, *cubic in [] if self.offset is None else self.offset:
+            sub(lanes_element, "laneOffset", s=decimal(s, 6), **_cubic(cubic))
+        section = sub(lanes_element, "laneSection", s="0")
         for tag, lanes, sign in (("left", self.left, 1), ("center", (), 0), ("right", self.right, -1)):
             side = sub(section, tag) if lanes or not sign else None
             if side is not None and not sign:
@@ -81,9 +95,41 @@ class WrittenRoad:
                 assert side is not None
                 outer = lanes[abs(number)].kind if abs(number) < len(lanes) else ""
                 _lane(side, number, lane, outer)
-        etree.indent(root, "  ")
-        text = f"<?xml version='1.0' encoding='UTF-8'?>\n{etree.tostring(root, encoding='unicode')}\n"
-        return text + template_mark(text)
+
+
+Connections = Sequence[tuple[int, int, Sequence[tuple[int, int]]]]
+"""From a road's end to another's start, by their numbers, and lanes from and to."""
+
+
+def roads_xml(
+    name: str,
+    roads: Sequence[WrittenRoad],
+    *,
+    junctions: Mapping[int, Connections] | None = None,
+    origin: tuple[float, float] = (0.0, 0.0),
+) -> str:
+    """A document of several roads, the same bytes each time.
+
+    `junctions`: where roads part or meet, by number: direct ones, which are new in OpenDRIVE 1.7. `origin`: of the
+    coordinates in the recording's. [m]
+    """
+    root = etree.Element("OpenDRIVE")
+    header = sub(root, "header", revMajor="1", revMinor="7" if junctions else "6", name=name, vendor="xosc-lateral")
+    if origin != (0.0, 0.0):
+        x, y = (decimal(value, 3) for value in origin)
+        sub(header, "offset", x=x, y=y, z="0", hdg="0")
+    for road in roads:
+        road.add_to(root)
+    for junction, connections in (junctions or {}).items():
+        element = sub(root, "junction", name="", id=str(junction), type="direct")
+        for number, (incoming, linked, lanes) in enumerate(connections):
+            ends = {"incomingRoad": str(incoming), "linkedRoad": str(linked), "contactPoint": "start"}
+            connection = sub(element, "connection", id=str(number), **ends)
+            for one, other in lanes:
+                sub(connection, "laneLink", **{"from": str(one), "to": str(other)})
+    etree.indent(root, "  ")
+    text = f"<?xml version='1.0' encoding='UTF-8'?>\n{etree.tostring(root, encoding='unicode')}\n"
+    return text + template_mark(text)
 
 
 def _geometry(plan: etree._Element, piece: FloatArray) -> None:
@@ -107,17 +153,24 @@ def _geometry(plan: etree._Element, piece: FloatArray) -> None:
 
 def _lane(side: etree._Element, number: int, lane: WrittenLane, outer: str) -> None:
     item = sub(side, "lane", id=str(number), type=lane.kind, level="false")
-    for s, a, b, c, d in lane.width:
-        values = {name: f"{value:.9g}" for name, value in zip("abcd", (a, b, c, d), strict=True)}
-        sub(item, "width", sOffset=decimal(s, 6), **values)
+    links = {"predecessor": lane.predecessor, "successor": lane.successor}
+    for tag, linked in links.items():
+        if linked is not None:
+            sub(item[0] if len(item) else sub(item, "link"), tag, id=str(linked))
+    for s, *cubic in lane.width:
+        sub(item, "width", sOffset=decimal(s, 6), **_cubic(cubic))
     if lane.kind == "driving":
         mark = "broken" if outer == "driving" else "solid"
         sub(item, "roadMark", sOffset="0", type=mark, weight="standard", color="white", width="0.15")
 
 
-def curved_plan(line: ReferenceLine, origin: tuple[float, float]) -> FloatArray:
-    """A smooth line as cubic pieces over its length, shape (n, 10); see `WrittenRoad.plan`."""
-    edges = np.linspace(0.0, line.length, max(1, round(line.length / PIECE)) + 1)
+def _cubic(values: Sequence[float]) -> dict[str, str]:
+    return {name: f"{value:.9g}" for name, value in zip("abcd", values, strict=True)}
+
+
+def curved_plan(line: ReferenceLine, origin: tuple[float, float] = (0.0, 0.0), piece: float = PIECE) -> FloatArray:
+    """A smooth line as cubic pieces of about that length [m], shape (n, 10); see `WrittenRoad.plan`."""
+    edges = np.linspace(0.0, line.length, max(1, round(line.length / piece)) + 1)
     place, way = line.place(edges, 0) - np.array(origin), line.place(edges, 1)
     way = way / np.linalg.norm(way, axis=1, keepdims=True)
     heading = np.arctan2(way[:-1, 1], way[:-1, 0])

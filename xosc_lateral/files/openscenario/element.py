@@ -91,9 +91,9 @@ class XmlElement:
             self.fail(f"{name}: {error}")
 
     def optional_number(self, name: str, *, finite: bool = True) -> float | None:
-        """Attribute as a number; None where it is missing or empty. NaN is refused, infinity where `finite`."""
+        """Attribute as a number; None where it is missing. NaN is refused, infinity where `finite`."""
         text = self.optional_text(name)
-        if text is None or not text.strip():
+        if text is None:
             return None
         try:
             value = float(text)

@@ -104,7 +104,10 @@ def _read_selections(owner: XmlElement, entities: list[Entity], context: Context
             elif member.tag == "ByType":
                 wanted = member.choice("objectType", EntityCategory)
                 members.extend(entity.name for entity in entities if entity.category is wanted)
-        selections[selection.text("name")] = tuple(dict.fromkeys(members))
+        name = selection.text("name")
+        if name in context.entities or name in selections:
+            selection.fail(f"something else is called '{name}'")
+        selections[name] = tuple(dict.fromkeys(members))
     return selections
 
 

@@ -110,9 +110,10 @@ class Page:
         self._main.append(f'<h2 id="{anchor}">{inline(title)}</h2>')
         self.text(*paragraphs)
 
-    def heading(self, title: str) -> None:
-        """Begin a part of a section."""
-        self._main.append(f"<h3>{inline(title)}</h3>")
+    def heading(self, title: str, *, anchor: str = "") -> None:
+        """Begin a part of a section; `anchor`: what a link on the page leads to it by."""
+        place = f' id="{anchor}"' if anchor else ""
+        self._main.append(f"<h3{place}>{inline(title)}</h3>")
 
     def text(self, *paragraphs: str) -> None:
         """Add paragraphs."""
@@ -168,13 +169,13 @@ class Page:
             return
         self._main.append(_table(rows, list(rows[0]), caption, formats or {}, tones or {}))
 
-    def player(self, scene: str, label: str) -> None:
-        """Add the player; `scene` is the JSON of `playing.scene`."""
+    def player(self, scene: str, label: str, *, anchor: str = "scene") -> None:
+        """Add the player; `scene` is the JSON of `playing.scene`, `anchor` what a link on the page leads to it by."""
         self._need("player.js")
         self._main.append(
             f'<div class="player" aria-label="{escape(label)}">'
             "<noscript>The player needs JavaScript; the figures below show the same.</noscript></div>\n"
-            f'<script type="application/json" id="scene">{scene}</script>{KEYS}'
+            f'<script type="application/json" id="{anchor}">{scene}</script>{KEYS}'
         )
 
     def html(self, provenance: Mapping[str, object]) -> str:

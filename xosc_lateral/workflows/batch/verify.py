@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.base.version import BEHAVIOUR
@@ -17,10 +19,12 @@ from xosc_lateral.files.hashes import file_hash
 from xosc_lateral.files.openscenario.provenance import CONTENT, content_hash, facts_in, without_provenance
 from xosc_lateral.files.output_paths import path_below
 from xosc_lateral.files.profiles import profile_hash, read_profile
-from xosc_lateral.files.source import check_regular
+from xosc_lateral.files.source import check_regular, read_source
 from xosc_lateral.workflows.batch.batch import convert_many
+from xosc_lateral.workflows.batch.guard import JobLimits, within_limits
 from xosc_lateral.workflows.batch.jobs import Batch, Job, fingerprint
 from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, read_manifest
+from xosc_lateral.workflows.batch.workers import WorkerDiedError, open_pool, run_tasks
 from xosc_lateral.workflows.conversion.convert import convert_scenario
 from xosc_lateral.workflows.conversion.drivers import AUTO_PROFILE
 from xosc_lateral.workflows.conversion.settings import AUTO, ConvertSettings
@@ -83,19 +87,46 @@ class _Origin:
         return cls(facts, scenario, replace(settings, **places), variant)
 
 
-def verify(outputs: Sequence[Path], search: ConvertSettings) -> Iterator[Checked]:
-    """Check outputs one by one: files, and folders by their manifests, which may be named as well.
+def verify(
+    outputs: Sequence[Path], search: ConvertSettings, *, fast: bool = False, workers: int = 0
+) -> Iterator[Checked]:
+    """Check outputs: files, and folders by their manifests, which may be named as well.
 
-    Raises `FormatError`: there is no such file, or no manifest in a folder.
+    Each is made again in memory, unless `fast`; `workers`: processes, 0: this one. Raises `FormatError`: there is no
+    such file, or no manifest in a folder.
     """
+    tasks = [_Task(number, *task) for number, task in enumerate(_tasks(outputs))]
+    found: dict[int, Checked] = {}
+    with open_pool(min(workers, len(tasks)), None) as pool:
+        for task, checked in run_tasks(pool, partial(_checked, search, fast), tasks):
+            if isinstance(checked, WorkerDiedError):
+                checked = Checked(task.path, ((Problem.FAILED, str(checked)),))
+            found[task.number] = checked
+    yield from (found[task.number] for task in tasks)
+
+
+class _Task(NamedTuple):
+    """An output to check: its place in the order, its path, its row of a manifest; or what is wrong with it already."""
+
+    number: int
+    path: Path
+    row: ManifestRow | None = None
+    problem: tuple[Problem, str] | None = None
+
+
+def _tasks(outputs: Sequence[Path]) -> Iterator[tuple[Any, ...]]:
     for given in outputs:
         given = given.parent if given.name == MANIFEST else given
         if not given.is_dir():
-            yield _check(given, search, None)
+            check_regular(given)
+            yield (given,)
             continue
-        for row in _rows(given):
-            path = path_below(given, row.output, "output")
-            yield _check(path, search, row) if path.exists() else Checked(path, ((Problem.MISSING, "is gone"),))
+        named = {path_below(given, row.output, "output"): row for row in _rows(given)}
+        yield from ((path, row, None if path.exists() else (Problem.MISSING, "is gone")) for path, row in named.items())
+        for path in sorted(given.rglob("*.xosc")):
+            folders = path.parents[: len(path.relative_to(given).parts) - 1]
+            if path not in named and not any((folder / MANIFEST).exists() for folder in folders):
+                yield path, None, (Problem.FOREIGN, "is not in the manifest")
 
 
 def _rows(folder: Path) -> Iterator[ManifestRow]:
@@ -105,17 +136,59 @@ def _rows(folder: Path) -> Iterator[ManifestRow]:
     return (row for row in read_manifest(folder / MANIFEST) if row.output_sha256)
 
 
-def _check(output: Path, search: ConvertSettings, row: ManifestRow | None) -> Checked:
-    check_regular(output)
-    data = output.read_bytes()
+def _checked(search: ConvertSettings, fast: bool, task: _Task) -> Checked:
+    if task.problem is not None:
+        return Checked(task.path, (task.problem,))
+    try:
+        return within_limits(partial(_check, search, fast), task, JobLimits())
+    except (XoscLateralError, OSError) as error:
+        return Checked(task.path, ((Problem.FAILED, " ".join(str(error).split())),))
+
+
+def _check(search: ConvertSettings, fast: bool, task: _Task) -> Checked:
+    output, row = task.path, task.row
+    data = read_source(output).data
     try:
         origin = _Origin.of(output, data, search)
     except FormatError as error:
         return Checked(output, ((Problem.FOREIGN, error.what),))
     problems = _changes(data, origin)
-    if not problems and row is not None and hashlib.sha256(data).hexdigest() != row.output_sha256:
-        problems.append((Problem.EDITED, "is not the file that the manifest names"))
-    return Checked(output, tuple(problems))
+    if row is not None and not problems and (others := list(_other_row(row, data, origin))):
+        problems.append((Problem.EDITED, f"the manifest states another {', '.join(others)}"))
+    return Checked(output, tuple(problems if problems or fast else _made_otherwise(output, data, origin)))
+
+
+def _other_row(row: ManifestRow, data: bytes, origin: _Origin) -> Iterator[str]:
+    """What a row of a manifest says otherwise than its output."""
+    facts = origin.facts
+    if hashlib.sha256(data).hexdigest() != row.output_sha256:
+        yield "output_sha256"
+    stated = {"seed": origin.settings.seed, "variant": origin.variant, "options": facts["options"]}
+    stated |= {name: facts.get(name) for name in ("behaviour", "content_sha256", "package_version")}
+    yield from (name for name, value in stated.items() if getattr(row, name) != value)
+    if sorted(row.inputs.values()) != sorted(map(str, facts["inputs"].values())):
+        yield "inputs"
+
+
+def _made_otherwise(output: Path, data: bytes, origin: _Origin) -> list[tuple[Problem, str]]:
+    """How today's program makes it otherwise, from what its provenance states."""
+    made = convert_scenario(origin.scenario, output, origin.settings, variant=origin.variant - 1, save=False).data
+    stated, now = origin.facts, facts_in(made) or {}
+    if made.replace(_version_of(now), _version_of(stated), 1) == data:
+        return []
+    same = without_provenance(made) == without_provenance(data)
+    found = [] if same else [(Problem.DIFFERS, "another content comes out of what its provenance states")]
+    names = sorted(name for name in stated.keys() | now.keys() if stated.get(name) != now.get(name))
+    found += [(Problem.EDITED, f"its provenance states another {name}") for name in names if name not in _FREE]
+    return found or [(Problem.EDITED, "its provenance is not as it was written")]
+
+
+_FREE = (CONTENT, "package_version")
+
+
+def _version_of(facts: Mapping[str, Any]) -> bytes:
+    """As it stands in the provenance: versions that make the same differ there."""
+    return f'"package_version": {json.dumps(facts.get("package_version"))}'.encode()
 
 
 def _changes(data: bytes, origin: _Origin) -> list[tuple[Problem, str]]:

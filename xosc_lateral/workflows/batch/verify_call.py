@@ -53,25 +53,39 @@ class Verification(Result):
         return {"checked": len(self.checked), "failing": len(outputs), "outputs": outputs}
 
 
-def verify(outputs: Paths, *, library: Paths = ()) -> Verification:
+def verify(
+    outputs: Paths,
+    *,
+    library: Paths = (),
+    allow: Paths = (),
+    road_path: Paths = (),
+    fast: bool = False,
+    workers: int = 0,
+) -> Verification:
     """Whether outputs are what their provenance says, and what today's inputs and program would give.
 
-    Nothing is converted: hashes are compared, of the content, of all inputs and profiles, and the behaviour version.
+    Each is made again in memory from what it states, within the limits of a batch, and compared byte for byte.
 
     Parameters
     ----------
     outputs : path or paths
         Converted scenarios, and folders with a manifest.
-    library : path or paths
-        Folders with further profiles.
+    library, allow, road_path : path or paths
+        As for `convert`: where files are looked for is in no output.
+    fast : bool
+        Nothing is converted: only the hashes of content, inputs and profiles that an output states itself, and the
+        behaviour version, are compared.
+    workers : int
+        Processes; -1: one per core; 0: this one.
 
     Raises
     ------
     FormatError
         There is no such file, or a folder has no manifest.
     """
-    search = ConvertSettings(library=as_paths(library))
-    return Verification(list(checks.verify(as_paths(outputs), search)), "outputs are what would be made today")
+    search = ConvertSettings(library=as_paths(library), allow=as_paths(allow), road_path=as_paths(road_path))
+    done = "outputs have the hashes that they state; none was made again" if fast else "outputs are what is made today"
+    return Verification(list(checks.verify(as_paths(outputs), search, fast=fast, workers=workers)), done)
 
 
 def reproduce(

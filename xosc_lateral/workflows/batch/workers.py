@@ -317,7 +317,7 @@ def run_tasks(
                 task = suspects.pop(0)
                 yield task, _alone(pool, work, task)
             continue
-        for future in _done(pool, running):
+        for future in _wait_for_any(pool, running):
             task = running.pop(future)
             try:
                 result = future.result()
@@ -329,7 +329,7 @@ def run_tasks(
                 yield task, result
 
 
-def _done(pool: Pool, running: Collection[Future[Result]]) -> Collection[Future[Result]]:
+def _wait_for_any(pool: Pool, running: Collection[Future[Result]]) -> Collection[Future[Result]]:
     """What is done; nothing once a signal has come."""
     begin = time.monotonic()
     while pending_signal() is None:
@@ -355,7 +355,7 @@ def _alone(pool: Pool, work: Callable[[Task], Result], task: Task) -> Result | W
         begin = time.monotonic()
         try:
             future = pool.submit(work, task)
-            if not _done(pool, [future]):
+            if not _wait_for_any(pool, [future]):
                 raise Interrupted(pending_signal() or signal.SIGINT)
             return future.result()
         except (Exception, CancelledError) as error:

@@ -70,9 +70,10 @@ def chains_of(
     side, middle_t = _middle(entity, network) if is_placed else (1.0, 0.0)
     begin = ring.origin if path is None else path.offset[0]
     placed = middle_t + side * begin if is_placed else None
-    chains = [OffsetChain(entity.name, added, ring, placed, side, path)]
+    is_steered = bool(entity.motion.activity[0] & Activity.STEERED)
+    chains = [] if is_steered else [OffsetChain(entity.name, added, ring, placed, side, path)]
     for item in items:
-        if not item.adds:
+        if not item.adds and not item.steers:
             found = max(_in_phase(entity, motion, item.path, items), key=_length, default=longest)
             chains.append(OffsetChain(entity.name, item.path, _ring(found, from_middle=True)))
     return [chain for chain in chains if chain.ring.moves]

@@ -29,7 +29,15 @@ from xosc_lateral.workflows.conversion.drivers import choose_drivers
 from xosc_lateral.workflows.conversion.enrich import enrich
 from xosc_lateral.workflows.conversion.load import Played, input_hashes, play_scenario, play_until
 from xosc_lateral.workflows.conversion.meaning import Kept, keep_meaning, meaning_of
-from xosc_lateral.workflows.conversion.modes import WritingPlan, chosen_egos, is_replay, writing_plan
+from xosc_lateral.workflows.conversion.modes import (
+    WritingPlan,
+    chosen_egos,
+    follow_trajectories,
+    heeds_controllers,
+    is_replay,
+    kept_controllers,
+    writing_plan,
+)
 from xosc_lateral.workflows.conversion.result import ConversionProvenance, ConvertedScenario, Enriched, EventShift
 from xosc_lateral.workflows.conversion.settings import ConvertSettings, OutputMode, relative
 from xosc_lateral.workflows.conversion.shifts import Comparison, largest_of
@@ -87,19 +95,22 @@ def _convert(
     )
     _refuse_lane_offsets_for_carla(played.scenario, settings)
     egos = chosen_egos(played.scenario, settings)
-    depends = dependence(played.scenario, egos)
-    sampled = _sampled_too(played, settings, egos)
+    controllers = kept_controllers(played.scenario, settings, egos)
+    unforeseeable = (*egos, *controllers)
+    depends = dependence(played.scenario, unforeseeable)
+    sampled = _sampled_too(played, settings, unforeseeable)
     context = None if settings.context is None else read_context(settings.context)
     inputs = dict(input_hashes(played.scenario, played.network))
     if context is not None and settings.context is not None:
         inputs[settings.context] = context.sha256
     refuse_outputs([output if save else None, report], inputs)
-    drivers = choose_drivers(played.scenario, settings, egos)
+    for_carla = settings.target.player is Player.CARLA
+    drivers = choose_drivers(played.scenario, settings, egos, controllers if for_carla else {})
     lasting = played
     reacts = settings.mode is OutputMode.AUTO and not is_replay(settings, depends)
     ends = depends.of_trigger(played.scenario.storyboard.stop_trigger) and played.motion.cut_off is None
     if reacts and ends:
-        runs = meaning_of(played, tuple(egos), step=settings.step, time_limit=settings.time_limit)
+        runs = meaning_of(played, unforeseeable, step=settings.step, time_limit=settings.time_limit)
         end = min(max(runs.end, LEAST_LONGER * played.motion.end_time), LONGER * played.motion.end_time)
         end = min(end, runs.limit)
         lasting = play_until(played, end, step=settings.step) if end > played.motion.end_time else played
@@ -117,15 +128,17 @@ def _convert(
             with_sensor=settings.with_sensor,
             neighbours=settings.neighbours,
             uncertain=depends.entities,
+            heeds_controllers=heeds_controllers(settings),
+            through=follow_trajectories(played.scenario, settings, depends, drivers),
             at_least=0.0 if is_replay(settings, depends) else SUPPLY,
         )
     except DriverProfileError as error:  # found in the movement: who sampled knows the profile by its name alone
         raise DriverProfileError(f"{source}: {error}") from error
     names = [entity.name for entity in enriched.entities if entity.is_enriched]
     plan = writing_plan(played.scenario, settings, depends, names, pulled=played.trailers, sampled=sampled)
-    making = _Making(played, lasting, settings, variant, inputs, egos, depends, output, save)
+    making = _Making(played, lasting, settings, variant, inputs, egos, unforeseeable, depends, output, save)
     if plan.is_replay:
-        replayed = _in_replay(played, settings, egos, sampled)
+        replayed = _in_replay(played, settings, unforeseeable, sampled)
         provenance, written = making.write(enriched, plan, replayed=replayed, save=save)
         changes, shifts = tuple[str, ...](), tuple[EventShift, ...]()
     else:
@@ -141,7 +154,7 @@ def _convert(
         warnings = (str(played.motion.cut_off), *warnings)
     data = b"" if save else written.data
     return ConvertedScenario(
-        source, output, written.sha256, enriched, provenance, warnings, data, plan.is_replay, shifts
+        source, output, written.sha256, enriched, provenance, warnings, data, plan.is_replay, shifts, controllers
     )
 
 
@@ -159,6 +172,7 @@ class _Making:
     variant: int
     inputs: Mapping[Path, str]
     egos: Mapping[str, str]
+    unforeseeable: tuple[str, ...]
     depends: Dependence
     output: Path
     save: bool
@@ -356,21 +370,21 @@ def _write(
 
 
 def _in_replay(
-    played: Played, settings: ConvertSettings, egos: Collection[str], sampled: Collection[str]
+    played: Played, settings: ConvertSettings, left: Collection[str], sampled: Collection[str]
 ) -> frozenset[str] | None:
     """Who follows a trajectory where everything happens by the clock; None: everybody."""
-    if settings.only is None and not egos:
+    if settings.only is None and not left:
         return None
     everybody = frozenset(entity.name for entity in played.motion.entities)
     only = everybody if settings.only is None else settings.only
-    return (only | _pulled_by(played, only) | frozenset(sampled)) - frozenset(egos)
+    return (only | _pulled_by(played, only) | frozenset(sampled)) - frozenset(left)
 
 
-def _sampled_too(played: Played, settings: ConvertSettings, egos: Collection[str]) -> dict[str, str]:
+def _sampled_too(played: Played, settings: ConvertSettings, unforeseeable: Collection[str]) -> dict[str, str]:
     """Entities that `only` leaves out, but whose maneuvers the target does not know, and why."""
     if settings.only is None or settings.mode is OutputMode.LANE_OFFSET:
         return {}
-    left = {*settings.only, *egos}
+    left = {*settings.only, *unforeseeable}
     others = [entity.name for entity in played.motion.entities if entity.name not in left]
     if settings.target.player is Player.CARLA:
         return dict.fromkeys(others, "CARLA's ScenarioRunner plays maneuvers in ways of its own")

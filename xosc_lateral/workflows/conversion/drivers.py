@@ -13,6 +13,7 @@ from xosc_lateral.workflows.conversion.enrich import Drivers
 from xosc_lateral.workflows.conversion.settings import AUTO, ConvertSettings
 from xosc_lateral.world.scenario import Entity, Scenario
 from xosc_lateral.world.scenario.enums import VehicleCategory
+from xosc_lateral.world.scenario.under_test import Control
 
 AUTO_PROFILE = "motorway"
 """What "auto" chooses: it gives every class, lane and speed its own. Motorcycles ride like cars for want of measured
@@ -27,8 +28,15 @@ NO_DRIVER = {
 """Vehicles that "auto" leaves alone, and why."""
 
 
-def choose_drivers(scenario: Scenario, settings: ConvertSettings, egos: Mapping[str, str] | None = None) -> Drivers:
-    """Per entity its profile, or why it gets none; `egos` are the vehicles under test, and why each is one.
+def choose_drivers(
+    scenario: Scenario,
+    settings: ConvertSettings,
+    egos: Mapping[str, str] | None = None,
+    controllers: Mapping[str, Control] | None = None,
+) -> Drivers:
+    """Per entity its profile, or why it gets none.
+
+    `egos`: the vehicles under test, and why each is one; `controllers`: those of entities that are left to them.
 
     Raises `FormatError`: if the settings name an entity that the scenario doesn't have; `DriverProfileError`: if a
     profile is not known.
@@ -43,9 +51,10 @@ def choose_drivers(scenario: Scenario, settings: ConvertSettings, egos: Mapping[
                     f"there are {', '.join(sorted(known)) or 'none'}",
                     path=scenario.path,
                 )
-    under_test = {name: f"vehicle under test: {why}" for name, why in (egos or {}).items()}
+    left = {name: f"vehicle under test: {why}" for name, why in (egos or {}).items()}
+    left |= {name: f"driven by controller {control}" for name, control in (controllers or {}).items()}
     read = cache(partial(read_profile, folders=settings.library))
-    return {entity.name: under_test.get(entity.name) or _driver(entity, settings, read) for entity in scenario.entities}
+    return {entity.name: left.get(entity.name) or _driver(entity, settings, read) for entity in scenario.entities}
 
 
 def _driver(entity: Entity, settings: ConvertSettings, read: Callable[[str], DriverProfile]) -> DriverProfile | str:

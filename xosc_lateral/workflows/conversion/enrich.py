@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
@@ -24,7 +24,7 @@ from xosc_lateral.workflows.conversion.seen import NOTHING_SEEN, SAMPLE_STEP, Co
 from xosc_lateral.world.motion.deviation import SETTLING_TIME, SampledDeviation, deviation_through
 from xosc_lateral.world.motion.gaps import Gap
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
-from xosc_lateral.world.motion.segments import SegmentSpan, cut_segments
+from xosc_lateral.world.motion.segments import SegmentKind, SegmentSpan, cut_segments, movement_runs
 from xosc_lateral.world.motion.trajectory import WorldTrajectory, displace, distance_driven
 from xosc_lateral.world.road.network import RoadNetwork
 
@@ -46,6 +46,8 @@ def enrich(
     neighbours: Neighbours = Neighbours.BORROW,
     with_sensor: bool = False,
     uncertain: Collection[str] = (),
+    heeds_controllers: bool = True,
+    through: Collection[str] = (),
     at_least: float = 0.0,
 ) -> Enriched:
     """Enrich a played scenario.
@@ -76,8 +78,13 @@ def enrich(
         Add what the sensor added to the drives that each profile was fitted on. Nobody drives that: it is added after
         drivers have given way and after what nobody could drive was smoothed.
     uncertain : collection of str
-        Entities whose motion will be another one, since it depends on a vehicle under test: nobody responds to where
-        they nominally are, nor do they to others.
+        Entities whose motion will be another one, since it depends on a vehicle under test or a controller: nobody
+        responds to where they nominally are, nor do they to others.
+    heeds_controllers : bool
+        Where a controller of the player steers, nothing is sampled.
+    through : collection of str
+        Entities whose movement goes on through lane changes and lane offsets (`movement_runs`); that of the others
+        leads from the segment before to the one behind.
     at_least : float
         Time for which each segment is sampled, should it last longer in another run. [s]
 
@@ -88,7 +95,9 @@ def enrich(
     """
     trailers, words = trailers or {}, entropy or {}
     few = sum(len(entity.time) for entity in motion.entities) <= KEPT_ROWS and not context
-    run = (_run if few else _run.__wrapped__)(motion, network, frozenset(trailers), frozenset(uncertain), neighbours)
+    run = (_run if few else _run.__wrapped__)(
+        motion, network, frozenset(trailers), frozenset(uncertain), neighbours, heeds_controllers, frozenset(through)
+    )
 
     def drawn_for(index: int, attempt: int) -> _Drawn:
         entity = motion.entities[index]
@@ -98,7 +107,7 @@ def enrich(
         whose, seen = run.seen.get(index, (None, None))
         if seen is None or whose is not driver:
             among = replace(motion, entities=(entity,)) if entity.name in uncertain else run.certain
-            seen = seen_by(driver, entity, among, network, spans, context or {}, neighbours)
+            seen = seen_by(driver, entity, among, network, run.runs[index], context or {}, neighbours)
             if few:
                 run.seen[index] = driver, seen
         own = np.random.SeedSequence(
@@ -131,9 +140,9 @@ def _trouble(enriched: Enriched) -> int:
 
 
 class _Sample(NamedTuple):
-    """Offsets sampled on one segment."""
+    """Offsets sampled on one run of spans."""
 
-    span: SegmentSpan
+    spans: tuple[SegmentSpan, ...]
     knots: IntArray
     """Rows of the motion that were sampled."""
     offset: FloatArray
@@ -179,6 +188,8 @@ class _Run(NamedTuple):
 
     spans: tuple[tuple[SegmentSpan, ...], ...]
     """Of each entity."""
+    runs: tuple[tuple[tuple[SegmentSpan, ...], ...], ...]
+    """Those that are sampled, one after another without a break, of each entity."""
     gaps: tuple[Gap, ...]
     """Of the nominal motion."""
     certain: NominalMotion
@@ -196,20 +207,32 @@ def _run(
     pulled: frozenset[str],
     uncertain: frozenset[str],
     neighbours: Neighbours,
+    heeds_controllers: bool,
+    through: frozenset[str],
 ) -> _Run:
-    spans = tuple(cut_segments(entity, network, is_trailer=entity.name in pulled) for entity in motion.entities)
+    spans = tuple(
+        cut_segments(entity, network, is_trailer=entity.name in pulled, heeds_controllers=heeds_controllers)
+        for entity in motion.entities
+    )
     gaps = gaps_of(motion, [_nominal(entity) for entity in motion.entities])
     certain = tuple(one for one in motion.entities if one.name not in uncertain)
-    return _Run(spans, gaps, replace(motion, entities=certain), {}, {})
+    runs = tuple(
+        movement_runs(motion, entity, network, own)
+        if entity.name in through
+        else tuple((span,) for span in own if span.is_road_following)
+        for entity, own in zip(motion.entities, spans, strict=True)
+    )
+    return _Run(spans, runs, gaps, replace(motion, entities=certain), {}, {})
 
 
 def _draw(blank: _Drawn, driver: DriverProfile, seed: np.random.SeedSequence, with_sensor: bool, least: int) -> _Drawn:
     """With the offsets of one entity; each segment goes on to `least` rows."""
     if not blank.seen.segments:
-        return replace(blank, why="no road-following segment")
+        steered = any(span.kind is SegmentKind.STEERED for span in blank.spans)
+        return replace(blank, why="steered by its controller" if steered else "no road-following segment")
     sampler, sensor = OffsetSampler(driver, seed), known_sensor(driver) if with_sensor else None
     samples: list[_Sample] = []
-    for span, knots, segment, side, responses in blank.seen.segments:
+    for spans, knots, segment, side, responses in blank.seen.segments:
         offset = side * sampler.sample(segment, responses=responses)
         more = least - len(knots)
         give_back(len(segment.time))
@@ -217,7 +240,7 @@ def _draw(blank: _Drawn, driver: DriverProfile, seed: np.random.SeedSequence, wi
         who = f"profile {driver.name} for {blank.motion.name!r}"
         check_offsets(offset, segment.lane_width[segment.inside], who, segment.time[segment.inside])
         error = stored(sensor_error(sensor, offset, SAMPLE_STEP, seed, part=len(samples)))
-        samples.append(_Sample(span, knots, stored(offset), error, beyond))
+        samples.append(_Sample(spans, knots, stored(offset), error, beyond))
     return replace(blank, seen=blank.seen._replace(segments=()), samples=tuple(samples))
 
 
@@ -251,7 +274,8 @@ def _sampled(one: _Drawn, rows: IntArray) -> SampledVehicle:
     if one.samples:
         deviation = one.deviation(rows)
         for sample in one.samples:
-            can_move[(rows >= sample.span.first) & (rows <= sample.span.last)] = True
+            for span in sample.spans:
+                can_move[(rows >= span.first) & (rows <= span.last)] = span.is_road_following
     give_back(len(one.motion.time))
     return SampledVehicle(one.motion, stored(deviation), stored(can_move), one.seen.responds, one.seen.alone)
 
@@ -273,12 +297,21 @@ def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:
         drawn.spans,
         drawn.profile,
         "",
-        tuple(SampledSegment(one.span, stored(entity.time[one.knots]), one.offset, one.beyond) for one in samples),
+        tuple(part for one in samples for part in _parts(one, entity)),
         deviation,
         displace(entity, network, deviation),
         drawn.seen.neutral,
         max(filter(None, bounds), key=lambda bound: bound.before.excess, default=None),
     )
+
+
+def _parts(sample: _Sample, entity: EntityMotion) -> Iterator[SampledSegment]:
+    """Its road-following segments; what comes after the run comes after the last of them."""
+    for span in sample.spans:
+        inside = slice(*np.searchsorted(sample.knots, (span.first, span.last + 1)))
+        if span.is_road_following and inside.stop - inside.start > 1:
+            beyond = sample.beyond if span is sample.spans[-1] else np.empty(0)
+            yield SampledSegment(span, stored(entity.time[sample.knots[inside]]), sample.offset[inside], beyond)
 
 
 def _with_trailers(

@@ -12,7 +12,7 @@ from xosc_lateral.workflows.conversion.settings import ConvertSettings, OutputMo
 from xosc_lateral.world.scenario import Scenario
 from xosc_lateral.world.scenario.dependence import Dependence, conditions_of
 from xosc_lateral.world.scenario.storyboard import Condition
-from xosc_lateral.world.scenario.under_test import vehicles_under_test
+from xosc_lateral.world.scenario.under_test import Control, controlled_entities, vehicles_under_test
 
 
 def chosen_egos(scenario: Scenario, settings: ConvertSettings) -> dict[str, str]:
@@ -34,6 +34,18 @@ def chosen_egos(scenario: Scenario, settings: ConvertSettings) -> dict[str, str]
                     path=scenario.path,
                 )
     return found
+
+
+def kept_controllers(scenario: Scenario, settings: ConvertSettings, egos: Collection[str]) -> dict[str, Control]:
+    """Entities that a conversion leaves to the controllers of its player; none where everybody is replayed."""
+    if not heeds_controllers(settings):
+        return {}
+    return {name: control for name, control in controlled_entities(scenario).items() if name not in egos}
+
+
+def heeds_controllers(settings: ConvertSettings) -> bool:
+    """Whether what a controller drives stays its own; else the default driver drives it."""
+    return settings.mode is not OutputMode.TRAJECTORY and (settings.ego is None or bool(settings.ego))
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +73,17 @@ def is_replay(settings: ConvertSettings, depends: Dependence) -> bool:
     if settings.mode is OutputMode.LANE_OFFSET:
         return False
     return settings.target.player is Player.CARLA or not (depends.entities or settings.only is not None)
+
+
+def follow_trajectories(
+    scenario: Scenario, settings: ConvertSettings, depends: Dependence, names: Collection[str]
+) -> frozenset[str]:
+    """Those of the named entities that will follow trajectories if they get offsets."""
+    if settings.mode is OutputMode.LANE_OFFSET:
+        return frozenset()
+    if settings.mode is OutputMode.TRAJECTORY or is_replay(settings, depends):
+        return frozenset(names)
+    return separable(scenario, set(names) - depends.entities)
 
 
 def writing_plan(
@@ -100,5 +123,5 @@ def _frozen(scenario: Scenario, depends: Dependence, entities: Collection[str] |
     if entities is None:
         conditions += conditions_of(scenario.storyboard.stop_trigger)
     places = [condition.place for condition in conditions if depends.of_condition(condition)]
-    what = "depends on a vehicle under test, and happens at the time of the nominal run in a trajectory"
+    what = "depends on a vehicle under test or a controller, and happens at the time of the nominal run in a trajectory"
     return tuple(dict.fromkeys(locate(what, path=one.path, line=one.line, element=one.element) for one in places))

@@ -125,7 +125,8 @@ def _add_offsets(page: Page, enriched: Enriched, done: Sequence[EntityResult]) -
     if done:
         page.figure(
             figures.offsets_over_time(enriched, _with_largest_offsets(done, MOST_PANELS)),
-            "Grey: not road-following; there the offset leads smoothly from one segment to the next."
+            "Grey: not road-following. In lane changes and offsets of a trajectory the movement goes on; elsewhere it "
+            "leads smoothly from one segment to the next."
             f"{_left_out(done, MOST_PANELS)}",
             "Offset over time of each enriched entity",
             over_time=True,

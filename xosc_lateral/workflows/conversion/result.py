@@ -19,6 +19,7 @@ from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.world.motion.segments import SegmentSpan
 from xosc_lateral.world.motion.trajectory import WorldTrajectory, leaps
 from xosc_lateral.world.road.network import RoadNetwork
+from xosc_lateral.world.scenario.under_test import Control
 
 
 class Neighbours(StrEnum):
@@ -227,3 +228,4 @@ class ConvertedScenario:
     data: bytes = b""  # the converted scenario, if it was not to be written
     is_replay: bool = True  # everything happens by the clock of the nominal run, whoever drives
     shifts: tuple[EventShift, ...] = ()  # of events of a reactive output, the largest under several egos
+    controllers: Mapping[str, Control] = field(default_factory=dict)  # of entities that are left to them

@@ -7,7 +7,7 @@ offsets are mirrored back.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -46,9 +46,10 @@ Contexts = Mapping[str, tuple[FloatArray, FloatArray]]
 
 
 class SeenSegment(NamedTuple):
-    """A road-following segment as its driver sees it."""
+    """A road-following segment as its driver sees it, or several and what lies between and beside them."""
 
-    span: SegmentSpan
+    spans: tuple[SegmentSpan, ...]
+    """One after another; see `movement_runs`."""
     knots: IntArray
     """Rows of the motion that are sampled, shape (n,)."""
     segment: Segment
@@ -78,20 +79,25 @@ def seen_by(
     entity: EntityMotion,
     motion: NominalMotion,
     network: RoadNetwork,
-    spans: tuple[SegmentSpan, ...],
+    runs: Sequence[tuple[SegmentSpan, ...]],
     contexts: Contexts,
     neighbours: Neighbours,
 ) -> Seen:
-    """What the driver of an entity sees; `motion` is the run with those alone whose place beside him is certain."""
+    """What the driver of an entity sees on runs of spans.
+
+    `motion` is the run of the scenario with those alone whose place beside him is certain.
+    """
     index = next(k for k, one in enumerate(motion.entities) if one is entity)
     every = max(1, round(SAMPLE_STEP / motion.step))
     segments: list[SeenSegment] = []
     neutral, responds, alone = set[str](), set[str](), set[str]()
-    for span in spans:
-        knots = stored(np.arange(span.first, span.last + 1, every))
-        if not span.is_road_following or len(knots) < 2:
+    for spans in runs:
+        knots = stored(np.arange(spans[0].first, spans[-1].last + 1, every))
+        if len(knots) < 2:
             continue
-        _refuse_no_width(entity, span, network)
+        for span in spans:
+            if span.is_road_following:
+                _refuse_no_width(entity, span, network)
         segment = _segment(motion, network, index, knots, every, contexts)
         if neighbours is Neighbours.NONE:
             segment = _with_nobody_beside(segment)
@@ -101,7 +107,7 @@ def seen_by(
         responds |= sides_known(driver, {Basis.POPULATION}, other_hand=other_hand)
         alone |= sides_known(driver, {Basis.MEASURED, Basis.DECLARED}, other_hand=other_hand)
         segment, side = (mirrored(segment), -1.0) if other_hand else (segment, 1.0)
-        segments.append(SeenSegment(span, knots, segment, side, responses_to(segment, driver)))
+        segments.append(SeenSegment(spans, knots, segment, side, responses_to(segment, driver)))
     return Seen(tuple(segments), tuple(sorted(neutral)), frozenset(responds), frozenset(alone))
 
 

@@ -24,6 +24,9 @@ from xosc_lateral.workflows.conversion.result import Neighbours
 if TYPE_CHECKING:
     from xosc_lateral.drivers.model.profile import DriverProfile
 
+LEAST_STEP = 1e-3
+"""Of a simulation; below, a minute is a gigabyte. [s]"""
+
 STEP = 0.02
 """Of playback, as in the reference logs. [s]"""
 
@@ -198,6 +201,8 @@ class ConvertSettings:
     def of_record(cls, values: Mapping[str, Any], folder: Path) -> ConvertSettings:
         """Settings from what `record` gave; `ValueError` for a value that can't be."""
         found: dict[str, Any] = {"step": float(values.get("step", STEP)), "names_may_lack": True}
+        if not LEAST_STEP <= found["step"] <= 1.0:
+            raise ValueError(f"step {found['step']} s is not within [{LEAST_STEP}, 1]")
         for name, said in values.items():
             one = OPTIONS.get(name)
             if one is not None and said is not None:

@@ -59,10 +59,12 @@ def _responses(conversion: ConvertedScenario) -> list[str]:
 
 
 def under_test(conversion: ConvertedScenario) -> str:
-    """Who is under test, in a line."""
-    egos = conversion.provenance.ego
-    if egos:
-        return f"under test, left as written: {', '.join(egos)}"
+    """Vehicles that are not the storyboard's: under test, or driven by controllers, in a line."""
+    egos, controllers = conversion.provenance.ego, conversion.controllers
+    lines = [f"under test, left as written: {', '.join(egos)}"] if egos else []
+    lines += [f"'{name}' is left to controller {control}" for name, control in controllers.items()]
+    if lines:
+        return "; ".join(lines)
     return "no vehicle under test: " + (
         "everything is replayed" if conversion.is_replay else "maneuvers that stay react to the run"
     )
@@ -79,6 +81,10 @@ def facts(conversion: ConvertedScenario, report: Path | None = None) -> dict[str
         "end_time": round(enriched.motion.end_time, 6),
         "ended_by": enriched.motion.ended_by,
         "ego": list(conversion.provenance.ego),
+        "controllers": {
+            name: {"controllers": list(control.controllers), "drives": control.domains.words()}
+            for name, control in conversion.controllers.items()
+        },
         "entities": [
             {
                 "name": entity.name,

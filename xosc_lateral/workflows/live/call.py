@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 STATES = ("time", "name", "x", "y", "h", "speed", "road", "lane", "s", "offset", "driver", "steered")
 """Columns of a run: where vehicles are; offset from the lane's centre, positive left; the driver's; if it counts."""
 
+EXTERNAL = (1, 11)
+"""Controllers of esmini that wait for somebody else: external, UDP driver (`Controller::Type`)."""
+
 ROW = (*STATES, "z", "pitch", "roll")
 """The same with what only a trace has."""
 
@@ -72,6 +75,7 @@ def live_esmini(
     player = open_player(library, scenario, window=window)
     rows: list[tuple[Any, ...]] = []
     events: list[tuple[float, str, int]] = []
+    waiting: dict[str, set[tuple[float, float]]] = {}
     try:
 
         def note(_name: bytes, _kind: int, state: int, path: bytes) -> None:
@@ -89,6 +93,8 @@ def live_esmini(
                 place = (state.road, state.lane, state.s, traffic.offset_of(state))
                 pose = (state.x, state.y, state.h, state.speed)
                 rows.append((time, name, *pose, *place, *move, state.z, state.p, state.r))
+                if state.ctrl_type in EXTERNAL:
+                    waiting.setdefault(name, set()).add(pose[:2])
             if player.SE_GetQuitFlag() == 1 or k == round(duration / step):
                 break
             traffic.steer(step)
@@ -99,7 +105,9 @@ def live_esmini(
         player.SE_Close()
     settings = {"scenario": Path(scenario).name, "profile": chosen.name, "seed": seed}
     scene = Scene(traffic.entities, lambda: traffic.network, ego)
-    return LiveRun(rows, settings, traffic.warnings, events, scene)
+    stood = [f"{name!r} stood all the time: its controller waits for another program; drive it in a loop of your own "
+             "with EsminiTraffic" for name, places in waiting.items() if len(places) == 1]  # fmt: skip
+    return LiveRun(rows, settings, [*traffic.warnings, *stood], events, scene)
 
 
 def live_sumo(
@@ -144,6 +152,7 @@ def live_sumo(
     connection = start(["-c", str(config), *sublane, *options])
     rows: list[tuple[Any, ...]] = []
     entities: dict[str, Entity] = {}
+    time = 0.0
     collisions = teleports = 0
     try:
         net = str(connection.simulation.getOption("net-file"))
@@ -168,6 +177,9 @@ def live_sumo(
                     entities[name] = sumo_entity(connection.vehicle, name)
     finally:
         connection.close()
+    if strangers := sorted({*ego, *others} - entities.keys()):
+        seen = f"; there were {', '.join(sorted(entities)[:5])} ..." if entities else ""
+        raise SimulationError(f"{config}: no vehicle {strangers[0]!r} until {time:g} s{seen}")
     settings = {"scenario": Path(config).name, "profile": chosen.name, "seed": seed}
     warnings = [f"SUMO reports {count} {what}" for count, what in ((collisions, "collisions"), (teleports, "teleports"))
                 if count]  # fmt: skip

@@ -28,6 +28,7 @@ from xosc_lateral.workflows.live.surroundings import OpenDriveRoads, Places
 from xosc_lateral.workflows.live.traffic import Moment, Traffic
 from xosc_lateral.world.motion.deviation import SETTLING_TIME, settle
 from xosc_lateral.world.scenario import Scenario
+from xosc_lateral.world.scenario.controllers import Domains
 from xosc_lateral.world.scenario.private_actions import (
     FollowTrajectoryAction,
     LaneChangeAction,
@@ -35,6 +36,7 @@ from xosc_lateral.world.scenario.private_actions import (
     LateralDistanceAction,
     TeleportAction,
 )
+from xosc_lateral.world.scenario.under_test import controlled_entities
 
 LATERAL = (LaneChangeAction, LaneOffsetAction, LateralDistanceAction, FollowTrajectoryAction, TeleportAction)
 """Actions that say where a vehicle is sideways."""
@@ -123,6 +125,8 @@ class EsminiTraffic:
         model = scenario if isinstance(scenario, Scenario) else read_scenario(scenario)
         self.entities = model.entities
         self._ego = {ego} if isinstance(ego, str) else set(ego)
+        controlled = controlled_entities(model).items()  # the state of a vehicle names longitudinal controllers alone
+        self._steered = {name for name, control in controlled if Domains.LATERAL in control.domains}
         self._moved_by = lateral_actions(model)
         self._running: Counter[str] = Counter()
         self._touched: set[str] = set()
@@ -146,7 +150,7 @@ class EsminiTraffic:
         self._back = StoryboardCallback(self._on_element)
         self.player.SE_RegisterStoryBoardElementStateChangeCallback(self._back)
         names = {name for name, _ in self._objects()}
-        if missing := sorted(self._ego - names):
+        if missing := sorted((self._ego | set(profiles or {})) - names):
             there = ", ".join(sorted(names))
             raise SimulationError(f"there is no vehicle {missing[0]!r} in the scenario (vehicles: {there})")
         self.moves: dict[str, tuple[float, bool]] = {}
@@ -157,7 +161,11 @@ class EsminiTraffic:
         Raises `SimulationError` if what the simulation says can't be used; nothing was reported then, and the
         simulation can go on.
         """
-        seen = [(name, state) for name, state in self._objects() if self._is_sound(name, state)]
+        there = dict(self._objects())
+        for gone in self._base.keys() - there.keys():  # who is added again begins anew
+            for known in (self._base, self._rests, self._lane_of):
+                known.pop(gone, None)
+        seen = [(name, state) for name, state in there.items() if self._is_sound(name, state)]
         moment = self._moment(seen, dt)
         moves = self.traffic.step(self.player.SE_GetSimulationTime() + dt, moment)
         for row, (_, state) in enumerate(seen):
@@ -244,7 +252,8 @@ class EsminiTraffic:
         is_lane = np.array([one.is_driving for one in lanes], dtype=np.bool_)
         width = np.array([one.width for one in lanes])
         pulled = np.array([state.category in _PULLED for _, state in seen], dtype=np.bool_)
-        ours = np.array([state.ctrl_type == 0 and name not in self._ego for name, state in seen], dtype=np.bool_)
+        others = self._ego | self._steered
+        ours = np.array([state.ctrl_type == 0 and name not in others for name, state in seen], dtype=np.bool_)
         busy = self._busy()
         in_maneuver = np.array([name in busy or name in self._touched for name in names], dtype=np.bool_)
         for row, name in enumerate(names):

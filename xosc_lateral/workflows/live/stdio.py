@@ -23,7 +23,7 @@ SIZE = {"length": 4.6, "width": 1.9, "center_x": 1.4}
 
 _PLACE = ("road", "lane", "s")
 
-_OWN = (*_PLACE, *SIZE, "speed", "lane_width", "offset", "base", "following", "driven", "is_truck")
+_VEHICLE_KEYS = (*_PLACE, *SIZE, "speed", "lane_width", "offset", "base", "following", "driven", "is_truck")
 """What a line says of a vehicle beside its context."""
 
 
@@ -46,7 +46,7 @@ class Pipe:
         roads = None if self.network is None else OpenDriveRoads(self.network)
         left_hand = self.network is not None and any(one.rule == "LHT" for one in self.network.roads)
         self.traffic = Traffic(profile, seed=seed, roads=roads, left_hand=left_hand)
-        self._known = (set(CONTEXT_UNITS) | set(profile.columns)) - set(_OWN)
+        self._known = (set(CONTEXT_UNITS) | set(profile.columns)) - set(_VEHICLE_KEYS)
         self._columns: set[str] = set()
 
     def answers(self, lines: Iterable[str | bytes]) -> Iterator[str]:
@@ -100,7 +100,7 @@ class Pipe:
     def _moment(self, vehicles: Mapping[str, Mapping[str, Any]], columns: set[str]) -> Moment:
         seen = [(f"vehicle {name!r}", one) for name, one in vehicles.items()]
         for who, one in seen:
-            if unknown := one.keys() - self._known - set(_OWN):
+            if unknown := one.keys() - self._known - set(_VEHICLE_KEYS):
                 raise SimulationError(f"{who}: unknown column {min(unknown)!r}; see docs/schemas/live.json")
         placed = self.network is not None and all(all(key in one for key in _PLACE) for _, one in seen)
         places = self._places(seen) if placed else None

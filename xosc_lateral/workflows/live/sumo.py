@@ -9,9 +9,11 @@ only.)
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.files.sumo import is_left_handed
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.live.paths import Moves
 from xosc_lateral.workflows.live.scene import KINDS
@@ -67,15 +70,22 @@ def start(words: Iterable[str]) -> Any:
 
 
 class SumoRoads:
-    """SUMO's lanes as `Roads`: a road is an edge, a lane is its index plus 1, so that ids grow to the left."""
+    """SUMO's lanes as `Roads`: a road is an edge, a lane is its index from the right plus 1, so that ids grow to the
+    left. In left-hand networks SUMO counts lanes, and places in them, from the left kerb: `side` is -1 then.
+    """
 
     def __init__(self, connection: Any) -> None:
         self._lane = connection.lane
+        net = Path(str(connection.simulation.getOption("net-file")))
+        self.left_hand = net.is_file() and is_left_handed(net)
+        self.side = -1.0 if self.left_hand else 1.0
         self.names: list[str] = list(connection.lane.getIDList())
         edges = [name.rpartition("_")[0] for name in self.names]
         numbers = {edge: k for k, edge in enumerate(dict.fromkeys(edges))}
-        self.place = {name: (numbers[edge], int(name.rpartition("_")[2]) + 1)
-                      for name, edge in zip(self.names, edges, strict=True)}  # fmt: skip
+        index = [int(name.rpartition("_")[2]) for name in self.names]
+        lanes = Counter(edges)
+        self.place = {name: (numbers[edge], lanes[edge] - k if self.left_hand else k + 1)
+                      for name, edge, k in zip(self.names, edges, index, strict=True)}  # fmt: skip
         self._name = {place: name for name, place in self.place.items()}
         self.width = {place: float(connection.lane.getWidth(name)) for name, place in self.place.items()}
         self._length = {place: float(connection.lane.getLength(name)) for name, place in self.place.items()}
@@ -211,7 +221,10 @@ class SumoTraffic:
             raise SimulationError("SUMO's sublane model is off: start it with --lateral-resolution 4, say")
         self.roads = SumoRoads(connection)
         self._ego = {ego} if isinstance(ego, str) else set(ego)
-        self.traffic = Traffic(profile, profiles=profiles, seed=seed, roads=self.roads, neighbours=neighbours)
+        self.traffic = Traffic(
+            profile, profiles=profiles, seed=seed, roads=self.roads, left_hand=self.roads.left_hand,
+            neighbours=neighbours,
+        )  # fmt: skip
         self._known: dict[str, _Vehicle] = {}
         self.moves: dict[str, tuple[float, bool]] = {}
         self.warnings: list[str] = []
@@ -233,7 +246,7 @@ class SumoTraffic:
         moves = self.traffic.step(now + step, moment)
         for row, name in enumerate(moment.names):
             if moves.steered[row]:
-                vehicles.changeSublane(name, float(moves.offset[row] - moment.offset[row]))
+                vehicles.changeSublane(name, self.roads.side * float(moves.offset[row] - moment.offset[row]))
             elif self.moves.get(name, (0.0, False))[1]:  # what is left of the last way would hold SUMO's own back
                 vehicles.changeSublane(name, 0.0)
         self.moves = moves.by_name(moment.names)
@@ -243,7 +256,7 @@ class SumoTraffic:
         """Of everybody on a lane: name, x, y [m], heading [rad], speed [m/s], lane, s and offset [m]."""
         vehicles = self.connection.vehicle
         for name in vehicles.getIDList():
-            lane, offset = vehicles.getLaneID(name), float(vehicles.getLateralLanePosition(name))
+            lane, offset = vehicles.getLaneID(name), self.roads.side * float(vehicles.getLateralLanePosition(name))
             x, y = vehicles.getPosition(name)
             if lane not in self.roads.place:  # it is being teleported
                 continue

@@ -16,6 +16,7 @@ from xosc_lateral.workflows.conversion.load import Played, play_scenario
 from xosc_lateral.workflows.conversion.settings import STEP
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths, write_page
 from xosc_lateral.world.motion.segments import SegmentRow, cut_segments
+from xosc_lateral.world.scenario.under_test import controlled_entities
 
 if TYPE_CHECKING:
     from xosc_lateral.files.pages.figure import Figure
@@ -86,7 +87,9 @@ def segments(
         if isinstance(scenario, Playback)
         else play(scenario, step=step, time_limit=time_limit, parameters=parameters, allow=allow)
     )
-    return Segments(scenario_segments(played._played))
+    driven = controlled_entities(played._played.scenario)
+    lines = tuple(f"'{name}' is driven by controller {control}" for name, control in driven.items())
+    return Segments(scenario_segments(played._played), lines)
 
 
 class Playback(Result):
@@ -215,10 +218,12 @@ class Playback(Result):
 class Segments(Result):
     """Segments of all entities, road-following or not."""
 
-    __slots__ = ("_rows",)
+    __slots__ = ("_rows", "controllers")
 
-    def __init__(self, rows: tuple[SegmentRow, ...]) -> None:
+    def __init__(self, rows: tuple[SegmentRow, ...], controllers: tuple[str, ...] = ()) -> None:
         self._rows = rows
+        self.controllers = controllers
+        """Which controllers drive which entity at some time, a line each."""
 
     def __len__(self) -> int:
         return len(self._rows)
@@ -232,11 +237,12 @@ class Segments(Result):
 
     def __str__(self) -> str:
         width = max((len(row.entity) for row in self._rows), default=0)
-        return "\n".join(
+        lines = [
             f"{row.entity:<{width}}  {row.start:8.2f} - {row.end:8.2f} s  "
             + (f"road {row.road} lane {row.lane}: road-following" if row.road_following else f"no: {row.why}")
             for row in self._rows
-        )
+        ]
+        return "\n".join([*lines, *(f"note: {line}" for line in self.controllers)])
 
     def to_frame(self) -> pd.DataFrame:
         """One row per segment: `entity`, `start`, `end` [s], `road_following`, `why`, `road`, `lane`."""
@@ -247,7 +253,8 @@ class Segments(Result):
         """Plain values, as ``--json`` prints them."""
 
         rows = [structs.asdict(row) for row in self._rows]
-        return {"segments": [row | {"start": round(row["start"], 6), "end": round(row["end"], 6)} for row in rows]}
+        found = [row | {"start": round(row["start"], 6), "end": round(row["end"], 6)} for row in rows]
+        return {"segments": found, "controllers": list(self.controllers)}
 
 
 def scenario_segments(played: Played) -> tuple[SegmentRow, ...]:

@@ -161,7 +161,8 @@ def effect_line(effect: Effect) -> str:
     if isinstance(effect, ColumnEffect):
         lag = f", {abs(effect.lag_s):g} s {'ahead' if effect.lag_s < 0 else 'behind'}" if effect.lag_s else ""
         response = f", response time {effect.response_time:g} s" if effect.response_time else ""
-        return f"{CHANGED[effect.acts]} by {' and '.join(effect.columns)} ({effect.shape}{lag}{response})"
+        course = ", a course over time" if effect.course else ""
+        return f"{CHANGED[effect.acts]} by {' and '.join(effect.columns)} ({effect.shape}{lag}{response}{course})"
     plain = {name: value for name, value in effect.to_dict().items() if not isinstance(value, list | dict)}
     kind = str(plain.pop("kind")).replace("-", " ")
     return f"{kind}: " + ", ".join(f"{name} {format_value(value)}" for name, value in plain.items())

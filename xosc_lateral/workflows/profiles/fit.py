@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from xosc_lateral.workflows.result import DrivesLike, given_drives, naming
+from xosc_lateral.workflows.result import DrivesLike, Paths, ProfileLike, given_drives, given_profile, naming
 
 if TYPE_CHECKING:
     from xosc_lateral.drivers.drives.drive import Drive
     from xosc_lateral.drivers.model.profile import DriverProfile
     from xosc_lateral.files.mapping import MappingLike
+
+PRIOR = "rural"
+"""Profile of the library whose fast movement stands in where a recording shows none: fitted to differential GNSS."""
 
 
 def read_drives(drives: DrivesLike, columns: MappingLike | None = None) -> list[Drive]:
@@ -44,6 +47,9 @@ def fit(
     sensor_noise: float | None = None,
     left_hand: bool = False,
     neighbours: bool | None = None,
+    valid_below: float | None = None,
+    prior: ProfileLike | None = PRIOR,
+    library: Paths = (),
 ) -> DriverProfile:
     """Fit a driver profile.
 
@@ -67,6 +73,15 @@ def fit(
         `right_distance`: of 30 drives that had somebody there, or of fewer that are taken as one driver's and say it
         surely enough; not in the two-level model. None: where it can
         be fitted; True: or an error says why not; False: in no case.
+    valid_below : float, optional
+        Frequency below which drives show driving whose tables do not state it (column `valid_below`): tracks that their
+        provider smoothed. [Hz]
+    prior : DriverProfile, path or name, optional
+        Whose fast movement the profile has above the band that the drives show: `rural` of the library where tables
+        state a band below 0.5 Hz and no other table has one above it. Another one also where the sensor hides the
+        driver. None: none.
+    library : path or paths
+        Folders with further profiles.
 
     Raises
     ------
@@ -74,11 +89,26 @@ def fit(
     """
     from msgspec.structs import replace
 
+    from xosc_lateral.drivers.drives.frozen import summary_of
+    from xosc_lateral.drivers.fitting.bands import KEEPING_BAND, split_by_band
     from xosc_lateral.drivers.fitting.fitting import fit_profile
+    from xosc_lateral.drivers.model.core.base import ModelKind
+    from xosc_lateral.drivers.model.core.registry import model_named
     from xosc_lateral.drivers.model.profile import Provenance
 
-    given = given_drives(drives, columns)
-    known = Provenance(source=source or ", ".join(given.inputs), licence=licence, inputs=dict(given.inputs))
+    given = given_drives(drives, columns).valid_below(valid_below)
+    slow, fast = split_by_band(given.drives)
+    is_partial = not fast and any(drive.valid_below is not None and drive.valid_below < KEEPING_BAND for drive in slow)
+    by_default = isinstance(prior, str) and prior == PRIOR
+    has_prior = prior is not None and (is_partial or not by_default)
+    if by_default and model_named(model).model.kind == ModelKind.TWO_LEVEL:
+        has_prior = False
+    known = Provenance(
+        source=source or ", ".join(given.inputs),
+        licence=licence,
+        inputs=dict(given.inputs),
+        fit=dict(summary_of(given.drives)),
+    )
     with naming(given):
         profile = fit_profile(
             given.drives,
@@ -87,5 +117,26 @@ def fit(
             provenance=known,
             sensor_noise=sensor_noise,
             neighbours=neighbours,
+            prior=given_profile(prior, library) if has_prior and prior is not None else None,
         )
     return replace(profile, left_hand=left_hand)
+
+
+def band_warnings(profile: DriverProfile) -> list[str]:
+    """What to know about the band that a profile's drives show, in lines."""
+    from xosc_lateral.drivers.fitting.bands import KEEPING_BAND, smoothed_above
+    from xosc_lateral.drivers.model.core.base import ModelKind
+
+    highest = profile.validity.highest_frequency
+    if profile.model.kind != ModelKind.AUTOREGRESSIVE:
+        return []
+    if highest is not None and highest < KEEPING_BAND:
+        what = f"{profile.name} moves below {highest:g} Hz alone, as its drives show it"
+        return [f"{what}: a second table or --prior gives it what is faster"]
+    above = smoothed_above(profile, given_profile(PRIOR))
+    if above is None:
+        return []
+    return [
+        f"above {above:g} Hz {profile.name} has less than a fifth of the power of real drivers: if the drives were "
+        "smoothed, say so with --valid-below"
+    ]

@@ -12,7 +12,9 @@ from xosc_lateral.base.rows import true_slices
 from xosc_lateral.drivers.evaluation.spectra import gapped_spectrum
 from xosc_lateral.drivers.loop.close import Finding, LoopResult
 from xosc_lateral.drivers.loop.cross_validation import hold_out_blocks
+from xosc_lateral.drivers.loop.passage import Passage
 from xosc_lateral.drivers.loop.residual import LOCAL_QUANTILES
+from xosc_lateral.drivers.loop.timeline import coarse_mean
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Cycle, Product, Regimes, Step, TimeSmooth
 from xosc_lateral.files.pages.chart import BLUE, DASHED, MUTED, ORANGE, VERMILLION, Panel
 from xosc_lateral.files.pages.figure import Figure
@@ -33,7 +35,7 @@ DRIVES, BEFORE, AFTER = BLUE, MUTED, VERMILLION
 SPECTRUM_ROWS, CYCLE_ROWS = 512, 4096
 SURROUNDINGS_HZ = 0.07  # To either side of a cycle's line. [Hz]
 TWO_ERRORS = 2.0  # Half width of bands, in standard errors: chance leaves them 1 time in 20. [-]
-FLAT_AXIS_CM = 1.0  # A residual's axis reaches at least so far to both sides, lest noise look large. [cm]
+FLAT_AXIS = 10.0  # A residual's axis reaches at least so far to both sides, lest noise look large. [mm]
 NEGLIGIBLE = 1e-2  # Share of a column's range that is written as 0. [-]
 PANELS = 4  # Residual panels side by side.
 # Averaging times of the paths of the mean, of the spread, and of the spread with regimes. [s]
@@ -58,7 +60,7 @@ def residual_figure(result: LoopResult, what: str) -> Figure:
     figure = Figure(-(-len(names) // PANELS), PANELS, height=66.0, share_y="all", legend=True)
     for number, (panel, name) in enumerate(zip(figure.panels, names, strict=False)):
         _draw_residual(panel, result, f"{what} by {name}", name)
-        panel.y.label = "residual [cm]" if number % PANELS == 0 else ""
+        panel.y.label = "residual [mm]" if number % PANELS == 0 else ""
     return figure
 
 
@@ -77,21 +79,27 @@ def _draw_residual(panel: Panel, result: LoopResult, group: str, name: str) -> N
     """One column's fifths side by side, over what chance gives; the outer ones and the middle one say their value."""
     scored, middles = result.scored, result.scored.statistics.middles[name]
     place = np.arange(len(scored.real[group]))
-    floor = 100.0 * TWO_ERRORS * result.lack_of_fit.floors[group]
+    floor = 1000.0 * TWO_ERRORS * result.lack_of_fit.floors[group]
     panel.band(place, -floor, floor, MUTED, opacity=0.2, label="sampling error")
     panel.level(color=MUTED)
     for values, color, label in ((scored.before, BEFORE, "before"), (scored.after, AFTER, "after")):
-        residual = 100.0 * (scored.real[group] - values[group])
+        residual = 1000.0 * (scored.real[group] - values[group])
         panel.line(place, residual, color, label=label)
         panel.dots(place, residual, color)
     # what a smoothed switch decays to is as good as 0
     shown = np.where(np.abs(middles) < NEGLIGIBLE * np.nanmax(np.abs(middles)), 0.0, middles)
+    if name in WHOLE_NUMBERED:
+        shown = np.round(shown)
     last = len(middles) - 1
     panel.x.ticks = [
         (k, f"{100 * shown[k]:.0f} %" if name == "time" else _short(shown[k])) for k in sorted({0, last // 2, last})
     ]
-    panel.x.limits, panel.y.holds = (-0.3, last + 0.3), (-FLAT_AXIS_CM, FLAT_AXIS_CM)
+    panel.x.limits, panel.y.holds = (-0.3, last + 0.3), (-FLAT_AXIS, FLAT_AXIS)
     panel.title = column_label(name, hint=False)
+
+
+WHOLE_NUMBERED = frozenset(["lane_index", "lane_count"])
+"""Columns whose quantile groups have means that no reader can take for a lane."""
 
 
 def _short(value: float) -> str:
@@ -102,13 +110,42 @@ def _short(value: float) -> str:
 
 
 def effect_figure(result: LoopResult, finding: Finding) -> Figure:
-    """An effect's curve with its uncertainty over measured points, beside what held-out blocks show."""
+    """The path in a typical passage, an effect's curve over measured points, and what held-out blocks show."""
     effect = finding.effects[0]
     assert isinstance(effect, ColumnEffect)
-    on_mean = effect.acts is Acts.LOCATION
-    figure = Figure(1, 2, height=180.0, legend=True)
-    panel, held_out = figure.panels
-    curve = curve_of(result, effect)
+    curve = not finding.over_time  # a course has no gain that a curve would show
+    figure = Figure(1, 1 + curve + (finding.passage is not None), height=180.0, legend=True)
+    panels = iter(figure.panels)
+    if finding.passage is not None:
+        _draw_passage(next(panels), finding.passage, effect.columns[0])
+    if curve:
+        _draw_curve(next(panels), result, effect)
+    held_out, on_mean = next(panels), effect.acts is Acts.LOCATION
+    bins = result.scored.statistics.middles[finding.statistic.split(" by ", 1)[1]]
+    bins = bins if on_mean else np.exp(bins)
+    for values, color, label in _three(result):
+        held_out.line(bins, values[finding.statistic], color, label=label)
+        held_out.dots(bins, values[finding.statistic], color)
+    held_out.title = "Held-out blocks"
+    held_out.x.label = "shift by the effect [m]" if on_mean else "factor by the effect [-]"
+    held_out.y.label = "mean offset [m]" if on_mean else f"{SPREAD} [m]"
+    return figure
+
+
+def _draw_passage(panel: Panel, passage: Passage, column: str) -> None:
+    """Where the car is, and, from 0 to the path's height, what the column does."""
+    about = TWO_ERRORS * passage.error
+    there = coarse_mean(np.nan_to_num((passage.column - np.nan_to_num(passage.usual)) / (passage.high or 1.0)))
+    scale = passage.largest_shift[0] / max(float(np.abs(there).max()), 1e-300)
+    panel.line(passage.time, scale * there, BEFORE, label=f"{column} (scaled)")
+    panel.band(passage.time, passage.path - about, passage.path + about, AFTER, opacity=0.2)
+    panel.line(passage.time, passage.path, AFTER)
+    panel.title = "Path in a typical passage"
+    panel.x.label, panel.y.label = "time from its beginning [s]", "shift, positive to the left [m]"
+
+
+def _draw_curve(panel: Panel, result: LoopResult, effect: ColumnEffect) -> None:
+    on_mean, curve = effect.acts is Acts.LOCATION, curve_of(result, effect)
 
     def shown(strength: FloatArray) -> FloatArray:
         return strength if on_mean else np.exp(strength)
@@ -124,14 +161,6 @@ def effect_figure(result: LoopResult, finding: Finding) -> Figure:
     panel.title = "The effect"
     panel.x.label = product_label(effect) if isinstance(effect, Product) else column_label(effect.columns[0])
     panel.y.label = "shift, positive to the left [m]" if on_mean else "factor [-]"
-    bins = shown(result.scored.statistics.middles[finding.statistic.split(" by ", 1)[1]])
-    for values, color, label in _three(result):
-        held_out.line(bins, values[finding.statistic], color, label=label)
-        held_out.dots(bins, values[finding.statistic], color)
-    held_out.title = "Held-out blocks"
-    held_out.x.label = "shift by the effect [m]" if on_mean else "factor by the effect [-]"
-    held_out.y.label = "mean offset [m]" if on_mean else f"{SPREAD} [m]"
-    return figure
 
 
 # ---- movement ----

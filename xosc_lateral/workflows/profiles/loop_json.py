@@ -112,8 +112,18 @@ def finding_record(finding: Finding) -> dict[str, Any]:
         "instead": [list(columns) for columns in finding.alike],
         "interval": _interval(finding),
         "held_out_gain": _gain(finding.gain),
+        "passage": _passage(finding),
         "added": [effect.to_dict() for effect in finding.effects],
     }
+
+
+def _passage(finding: Finding) -> dict[str, Any] | None:
+    """The path through a typical passage of the column, by the second."""
+    passage = finding.passage
+    if passage is None:
+        return None
+    path = {"time_s": list(passage.time), "path_m": list(passage.path), "path_error_m": list(passage.error)}
+    return {"from": passage.usual, "to": passage.high, "lasts_s": passage.lasts_s} | path
 
 
 def finite(value: Any) -> Any:

@@ -51,8 +51,10 @@ def loop_text(result: LoopResult) -> str:
     for item in result.identified.usable.feedback:
         sure = "possibly a" if item.doubtful else "a"
         lines.append(f"{item.column}: {sure} consequence of the car's movement, not used as a cause")
-    error = f"held-out error {result.error_before:.4f} m before, {result.error_after:.4f} m after"
-    lines.append(f"{error} ({result.floor:.4f} m between halves of the drives)")
+    before, after, halves = (1000.0 * value for value in (result.error_before, result.error_after, result.floor))
+    lines.append(
+        f"held-out error {before:.1f} mm before, {after:.1f} mm after ({halves:.1f} mm between halves of the drives)"
+    )
     lines.append(lack_of_fit_words(result))
     return "\n".join(lines)
 
@@ -75,13 +77,6 @@ def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] 
     page.lead(outcome(result))
     page.key_figures(_numbers(result))
     page.lead(lack_of_fit_words(result))
-    page.section("Columns, and what they are taken for")
-    page.table(
-        [column_record(column, result) for column in sorted(result.identified.usable.roles)],
-        "Role of every column, by whom it was given, and its use. Road, weather and traffic that are declared are "
-        "never dismissed as consequences; own movement and time are never causes; all others are tested. Declare with "
-        "`--role COLUMN=ROLE`.",
-    )
     _add_findings(page, result, proofs)
     _add_residuals(page, result)
     _add_movement(page, result)
@@ -113,6 +108,13 @@ def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] 
         formats={"p-value": ".2g"},
     )
     page.items(f"`{column}` was not tested: {why}." for column, why in result.identified.usable.unused.items())
+    page.section("Columns, and what they are taken for")
+    page.table(
+        [column_record(column, result) for column in sorted(result.identified.usable.roles)],
+        "Role of every column, by whom it was given, and its use. Road, weather and traffic that are declared are "
+        "never dismissed as consequences; own movement and time are never causes; all others are tested. Declare with "
+        "`--role COLUMN=ROLE`.",
+    )
     page.section("How to read this page")
     page.items(line.format(n_runs=len(result.scored.runs_after), certain=f"{CERTAIN:g}") for line in HOW_TO_READ)
     return page.html(
@@ -146,6 +148,11 @@ def _add_findings(page: Page, result: LoopResult, proofs: Sequence[str]) -> None
         stays = "stays as it was given" if result.given else "is the base that was fitted to these drives"
         page.text(f"Nothing was added: the profile {stays}.")
         return
+    for finding in result.findings:
+        page.heading(_capital(finding.effect))
+        page.text(meaning(finding, result))
+        _add_picture(page, result, finding)
+    page.heading("All effects in numbers")
     timed = any(finding.lag_s is not None for finding in result.findings)
     page.table(
         [_finding_row(finding, timed) for finding in result.findings],
@@ -156,10 +163,6 @@ def _add_findings(page: Page, result: LoopResult, proofs: Sequence[str]) -> None
             **{"error before [mm]": ".1f", "error after [mm]": ".1f"},
         },
     )
-    for finding in result.findings:
-        page.heading(_capital(finding.effect))
-        page.text(meaning(finding, result))
-        _add_picture(page, result, finding)
     if proofs:
         said = "The same stretch converted with an effect and without it, four seeds; the shift is measured there."
         page.table([{"in a scenario": one} for one in proofs], said)
@@ -180,8 +183,9 @@ def _add_picture(page: Page, result: LoopResult, finding: Finding) -> None:
     elif finding.statistic in result.scored.real:
         page.figure(
             effect_figure(result, finding),
-            "Left: the fitted effect and the measured offsets, less the drives' own means and all other effects (bars "
-            "and band: two standard errors). Right: means of held-out blocks, by fifths of the effect.",
+            "Path: where the effect puts the car while its column goes from its usual value to a high one and back. "
+            "Effect: fitted, and measured offsets less the drives' means and all other effects. Bars and bands: two "
+            "standard errors. Held-out blocks: means by fifths of the effect.",
             f"Curve of {finding.effect} over measured points, and measured against expected before and after.",
         )
 
@@ -196,6 +200,7 @@ def _add_residuals(page: Page, result: LoopResult) -> None:
     page.text("" if result.identified.usable.columns else "The table has no column that varies.")
     for what, words in (("mean", "mean offset"), ("spread", SPREAD)):
         if any(name.startswith(f"{what} by ") and " by effect: " not in name for name in result.scored.real):
+            page.heading(_capital(words))
             page.figure(
                 residual_figure(result, what),
                 f"Residual of the {words}, before (grey) and after (orange). Columns of the effects come first.",

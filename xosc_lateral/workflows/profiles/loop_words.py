@@ -12,6 +12,7 @@ from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.drivers.loop.close import Finding, LoopResult
 from xosc_lateral.drivers.loop.feedback import BAND, FUNCTION, Feedback
 from xosc_lateral.drivers.loop.omnibus import DELAYS
+from xosc_lateral.drivers.loop.passage import Passage
 from xosc_lateral.drivers.loop.residual import LackOfFit
 from xosc_lateral.drivers.loop.selection import Rejected
 from xosc_lateral.drivers.loop.timeline import LOCAL_S
@@ -37,6 +38,7 @@ HINTS: Mapping[str, str] = MappingProxyType(
 COMPONENT_WORDS: Mapping[str, str] = MappingProxyType(
     {
         "mean": "a column that changes the mean offset",
+        "course": "a column that changes the mean offset over a course of time",
         "between": "a column that goes with the mean offset of whole drives",
         "spread": "a column that changes the spread",
         "slow_spread": "a column that changes the spread of slow movement",
@@ -102,6 +104,8 @@ def size_words(finding: Finding) -> str:
     if finding.kind != "location" or not isinstance(effect, ColumnEffect):
         return _size(finding)
     side = "left" if finding.size_m > 0 else "right"
+    if finding.over_time and finding.passage is not None:
+        return f"{_size(finding).lstrip('+-')} further {side} {_moment_words(finding.passage)}"
     rises = "as it rises" if len(finding.columns) == 1 else "from the low to the high end"
     plain = f"{_size(finding).lstrip('+-')} further {side} {rises}"
     return beside_words(effect, _share_of_error(finding)) or plain
@@ -132,6 +136,8 @@ def p_value_words(p_value: float) -> str:
 
 def when_words(finding: Finding) -> str:
     """Lag and response, or nothing; what goes with whole drives has neither."""
+    if finding.over_time:
+        return ""
     if finding.lag_s is None or finding.response_s is None:
         return "What counts is the mean of each drive, not changes within a drive." if finding.columns else ""
     lag = finding.lag_s
@@ -153,7 +159,7 @@ def meaning(finding: Finding, result: LoopResult) -> str:
             f"{others_words(finding, '`')} would explain it about as well; these drives cannot tell which it is."
         )
     measure = _PLAIN_GROUPS.get(finding.statistic, finding.measure)
-    change = f"{_cm(finding.error_before)} before, {_cm(finding.error_after)} now"
+    change = f"{_mm(finding.error_before)} before, {_mm(finding.error_after)} now"
     words.append(f"Error of the {measure} on held-out blocks: {change}.")
     return " ".join(word for word in words if word)
 
@@ -312,7 +318,42 @@ def _moves(shift: float, error: float, where: str, begins: str) -> str:
     return f"moves {abs(shift):.2f}{about}{GAP}m {'left' if shift > 0 else 'right'} {where}{begins}"
 
 
+def _moment_words(passage: Passage) -> str:
+    """When the car is farthest, against where the column begins to change."""
+    seconds = float(passage.time[passage.at])
+    when = (
+        "as it begins"
+        if seconds == 0.0
+        else f"{abs(seconds):.0f}{GAP}s {'before' if seconds < 0 else 'after'} it begins"
+    )
+    return f"{when} in a typical passage"
+
+
+def passage_words(passage: Passage, column: str) -> str:
+    """A typical passage of a column in numbers."""
+    unit = CONTEXT_UNITS.get(column, "").replace("-", "")
+    rises = f"from {passage.usual:.3g} to" if np.isfinite(passage.usual) else "from none to"
+    hint = f"; {HINTS[column]}" if column in HINTS else ""
+    return f"`{column}` {rises} {passage.high:.3g}{GAP}{unit}".rstrip() + f" for {passage.lasts_s:.0f}{GAP}s{hint}"
+
+
+def _passage_sentence(passage: Passage, column: str) -> str:
+    """How far to either side the car goes in a typical passage, and when."""
+    sides: list[str] = []
+    for at in dict.fromkeys((passage.at, int(np.argmax(-np.sign(passage.largest_shift[0]) * passage.path)))):
+        size, error = float(passage.path[at]), 2.0 * float(passage.error[at])
+        if not sides or abs(size) > error:
+            when = float(passage.time[at])
+            before = f"{abs(when):.0f}{GAP}s {'before' if when < 0 else 'after'} it begins"
+            sides.append(
+                f"{abs(size):.2f}{GAP}±{GAP}{error:.2f}{GAP}m to the {'left' if size > 0 else 'right'} {before}"
+            )
+    return f"In a typical passage ({passage_words(passage, column)}) the car is farthest out {', and '.join(sides)}."
+
+
 def _column_sentence(finding: Finding, effect: ColumnEffect, result: LoopResult) -> str:
+    if finding.over_time and finding.passage is not None:
+        return _passage_sentence(finding.passage, effect.columns[0])
     if words := beside_words(effect, _share_of_error(finding)):
         return f"The driver {words} (`{effect.columns[0]}`)."
     more = finding.size_m > (0.0 if effect.acts is Acts.LOCATION else 1.0)
@@ -357,10 +398,6 @@ def _over_values(effect: ColumnEffect, column: str, seen: NDArray[np.float64]) -
     unit = "" if unit in ("", "-") else f" {unit}"
     name += f" ({HINTS[column]})" if column in HINTS else ""
     return f"As {name} goes from {low:.3g} to {high:.3g}{unit} (5 % and 95 % quantile of these drives)"
-
-
-def _cm(value: float) -> str:
-    return f"{100.0 * value:.1f}{GAP}cm"
 
 
 def _mm(value: float) -> str:

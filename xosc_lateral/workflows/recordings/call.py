@@ -36,13 +36,13 @@ def reconstruct(
     Parameters
     ----------
     recording : str or Path
-        Tracks of several vehicles: DLR Highway Traffic, levelX, an OSI trace, CommonRoad, or a table.
+        Tracks of several vehicles: DLR Highway Traffic, levelX, OSI traces, CommonRoad, SUMO's FCD output, or a table.
     output : str or Path, optional
         Folder to write to, see `Reconstruction.write`; without it nothing is written.
     format : str, optional
-        "dlr-ht", "levelx", "osi", "commonroad" or "tracks"; without it, told from the file's name.
+        "dlr-ht", "levelx", "osi", "commonroad", "fcd" or "tracks"; without it, told from the file.
     road : str or Path, optional
-        OpenDRIVE file, for recordings that come without their lanes.
+        OpenDRIVE file, for recordings that come without their lanes; SUMO's network, for its FCD output.
     columns : dict, path or TableMapping, optional
         Name -> ``COLUMN[:UNIT]`` for tables of tracks, or a saved mapping's file.
     force : bool

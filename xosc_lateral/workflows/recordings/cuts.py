@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.drivers.drives.cleaning import RUN
+from xosc_lateral.drivers.drives.cuts import MAX_GAP
 
 RATE_WINDOW = 0.5  # [s]; the lateral speed is a central difference over this
 KEPT_ROWS = "kept"
@@ -84,13 +85,13 @@ def name_states(
     reasons: dict[str, BoolArray],
     lane: IntArray,
     vehicle: IntArray,
-    frame: IntArray,
+    time: FloatArray,
     step: float,
     settings: CutSettings,
 ) -> NDArray[np.str_]:
     """Per row `KEPT_ROWS`, or the first reason that cuts it; "edge" at the ends of what is left, "short" for crumbs."""
     state = np.select(list(reasons.values()), list(reasons), default=KEPT_ROWS)
-    run = _kept_runs(state, lane, vehicle, frame)
+    run = _kept_runs(state, lane, vehicle, time)
     count = np.bincount(run)
     place = np.arange(len(run)) - (np.cumsum(count) - count)[run]
     edge = round(settings.edge / step)
@@ -99,9 +100,9 @@ def name_states(
     return np.where(state == KEPT_ROWS, np.where(short, "short", np.where(at_edge, "edge", KEPT_ROWS)), state)
 
 
-def number_runs(state: NDArray[np.str_], lane: IntArray, vehicle: IntArray, frame: IntArray) -> IntArray:
+def number_runs(state: NDArray[np.str_], lane: IntArray, vehicle: IntArray, time: FloatArray) -> IntArray:
     """Number of the kept stretch of each row, counted from 0 in every vehicle; -1 for rows that are cut."""
-    run = _kept_runs(state, lane, vehicle, frame)
+    run = _kept_runs(state, lane, vehicle, time)
     kept = state == KEPT_ROWS
     begins = kept & np.r_[True, (run[1:] != run[:-1])]
     counted = np.cumsum(begins)
@@ -110,12 +111,12 @@ def number_runs(state: NDArray[np.str_], lane: IntArray, vehicle: IntArray, fram
 
 
 class Rows(NamedTuple):
-    """Whose rows they are, when and where; sorted by vehicle and frame, shape (n,)."""
+    """Whose rows they are, when and where; sorted by vehicle and time, shape (n,)."""
 
     vehicle: IntArray
-    frame: IntArray
+    time: FloatArray  # [s]
     lane: IntArray  # a number that changes with the lane
-    step: float  # between two frames [s]
+    step: float  # between two rows, usually [s]
 
 
 def cut_table(
@@ -132,18 +133,19 @@ def cut_table(
 
     `sideways`: lateral position, continuous through lane changes. [m] `reasons`: for cuts besides lane changes.
     """
-    vehicle, frame, lane, step = rows
+    vehicle, time, lane, step = rows
     changing = lane_changes(sideways, columns["offset"], lane, vehicle, step, settings)
-    state = name_states({**reasons, "lane change": changing}, lane, vehicle, frame, step, settings)
-    runs = number_runs(state, lane, vehicle, frame)
+    state = name_states({**reasons, "lane change": changing}, lane, vehicle, time, step, settings)
+    runs = number_runs(state, lane, vehicle, time)
     more = {"vehicle_class": kind, "is_truck": is_truck.astype(np.float64), RUN: runs, "state": state}
     return pd.DataFrame({**columns, **more})
 
 
-def _kept_runs(state: NDArray[np.str_], lane: IntArray, vehicle: IntArray, frame: IntArray) -> IntArray:
-    """Number of each row's stretch of equal fate, in one lane and without a gap."""
+def _kept_runs(state: NDArray[np.str_], lane: IntArray, vehicle: IntArray, time: FloatArray) -> IntArray:
+    """Number of each row's stretch of equal fate, in one lane and without a gap that `fit` would not bridge."""
     kept = state == KEPT_ROWS
-    new = (kept[1:] != kept[:-1]) | (vehicle[1:] != vehicle[:-1]) | (lane[1:] != lane[:-1]) | (np.diff(frame) != 1)
+    other = (kept[1:] != kept[:-1]) | (vehicle[1:] != vehicle[:-1]) | (lane[1:] != lane[:-1])
+    new = other | (np.diff(time) > MAX_GAP + 1e-9)
     return _runs(new)
 
 

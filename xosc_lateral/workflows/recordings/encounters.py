@@ -97,8 +97,7 @@ def _speed(plan: VehiclePlan, time: float) -> float:
 
 def _along(plan: VehiclePlan, time: FloatArray) -> FloatArray:
     """Planned s at some times, shape as the argument. [m]"""
-    recorded = np.interp(plan.speed.way(time), plan.way, plan.vehicle.time)
-    return np.interp(recorded, plan.vehicle.time, plan.vehicle.s)
+    return np.interp(plan.time_at(plan.speed.way(time)), plan.vehicle.time, plan.vehicle.s)
 
 
 def _beside(

@@ -10,25 +10,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.workflows.recordings.gate import LANE_AGREEMENT
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks
+from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
 from xosc_lateral.workflows.recordings.placed import PlacedTracks
-
-LEAST_AGREEMENT = 0.7
-"""Cosine between a vehicle's heading and the lane's that is taken to be driven along. [-]"""
 
 SMOOTHED = 20.0
 """Way over which a lane's turning is averaged into a curvature: bounds are polygons. [m]"""
 
 
+FACING_STEP = 5.0
+"""Of the places at which two lanes beside each other are compared: at R = 100 m a lane of 3.5 m is off by 2 mm. [m]"""
+
+
 class LaneShape(ABC):
     """A lane between two boundaries, in coordinates along and across its centre line.
 
-    `centre`: in the direction of travel, shape (n, 2) or (n, 3). [m] `boundaries`: lines about it. [m] `beyond`: so far
-    out of their box a point may lie in the lane. [m]
+    `centre`: in the direction of travel, shape (n, 2) or (n, 3). [m] `boundaries`: on its left and right. [m] `beyond`:
+    so far out of their box a point may lie in the lane. [m]
     """
 
     def __init__(self, centre: FloatArray, boundaries: Sequence[FloatArray], beyond: float = 0.0) -> None:
         self.centre = centre
+        self.left, self.right = boundaries
         self.step = np.diff(centre[:, :2], axis=0)
         self.size = np.hypot(*self.step.T)
         self.start = np.concatenate([[0.0], np.cumsum(self.size)])
@@ -50,7 +54,7 @@ class LaneShape(ABC):
 
 def place_in_shapes(tracks: Tracks, shapes: Sequence[LaneShape], left: IntArray) -> PlacedTracks:
     """Every row in the lane that it drives along; `left`: on the left of each lane, driven the same way, or -1."""
-    piece, along, offset, width, curvature = find_lanes(shapes, tracks.x, tracks.y, tracks.heading)
+    piece, along, offset, width, curvature, agreement = find_lanes(shapes, tracks.x, tracks.y, tracks.heading)
     index, count = lanes_beside(left)
     inside = piece >= 0
     road = {
@@ -58,28 +62,34 @@ def place_in_shapes(tracks: Tracks, shapes: Sequence[LaneShape], left: IntArray)
         "lane_index": np.where(inside, index[piece], np.nan),
         "lane_count": np.where(inside, count[piece], np.nan),
     }
-    return PlacedTracks(tracks, piece, along, offset, width, road)
+    return PlacedTracks(tracks, piece, along, offset, width, agreement, road)
 
 
 def find_lanes(
     shapes: Sequence[LaneShape], x: FloatArray, y: FloatArray, heading: FloatArray
-) -> tuple[IntArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Lanelet that every row drives along (-1: none), way in it, offset, width and curvature: the one it is amid."""
+) -> tuple[IntArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Lanelet that every row drives along (-1: none), way in it, offset, width and curvature: the one it is amid.
+
+    Last, the cosine of heading and lane; where the row lies in lanes that are driven another way only, of these; NaN
+    where it lies in none.
+    """
     n = len(x)
     piece = np.full(n, -1)
-    along, offset, width, curvature = (np.full(n, np.nan) for _ in range(4))
+    along, offset, width, curvature, agreement = (np.full(n, np.nan) for _ in range(5))
     nearest = np.full(n, np.inf)
     for number, shape in enumerate(shapes):
         near = np.flatnonzero(shape.may_hold(x, y))
         if not len(near):
             continue
         way, aside, wide, ahead, bend = shape.place(x[near], y[near])
-        inside = (np.abs(aside) <= 0.5 * wide) & np.isfinite(way) & (np.cos(heading[near] - ahead) > LEAST_AGREEMENT)
-        better = inside & (np.abs(aside) < nearest[near])
+        inside = (np.abs(aside) <= 0.5 * wide) & np.isfinite(way)
+        along_lane = np.cos(heading[near] - ahead)
+        agreement[near[inside]] = np.fmax(agreement[near[inside]], along_lane[inside])
+        better = inside & (along_lane > LANE_AGREEMENT) & (np.abs(aside) < nearest[near])
         rows = near[better]
         piece[rows], nearest[rows] = number, np.abs(aside[better])
         along[rows], offset[rows], width[rows], curvature[rows] = way[better], aside[better], wide[better], bend[better]
-    return piece, np.nan_to_num(along), offset, width, curvature
+    return piece, np.nan_to_num(along), offset, width, curvature, agreement
 
 
 def lanes_beside(left: IntArray) -> tuple[IntArray, IntArray]:
@@ -96,6 +106,20 @@ def lanes_beside(left: IntArray) -> tuple[IntArray, IntArray]:
                 steps[start] += 1
         counts.append(steps)
     return counts[0], counts[0] + counts[1] + 1
+
+
+def lane_graph(shapes: Sequence[LaneShape], left: IntArray, following: Sequence[Sequence[int]]) -> LaneGraph:
+    """Lanes and how they hang together; what lies side by side on a curve has the same station."""
+    facing = {}
+    for number in np.flatnonzero(left >= 0).tolist():
+        for one, other in ((number, int(left[number])), (int(left[number]), number)):
+            shape = shapes[one]
+            way = np.linspace(0.0, shape.length, int(np.ceil(shape.length / FACING_STEP)) + 1)
+            found = shapes[other].place(*(np.interp(way, shape.start, shape.centre[:, axis]) for axis in (0, 1)))[0]
+            known = np.isfinite(found)
+            if known.sum() > 1:
+                facing[one, other] = way[known], np.maximum.accumulate(found[known])
+    return LaneGraph(np.array([shape.length for shape in shapes]), left, following, facing)
 
 
 def curvature_along(start: FloatArray, direction: FloatArray, way: FloatArray) -> FloatArray:

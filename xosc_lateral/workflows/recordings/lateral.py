@@ -10,13 +10,15 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.rows import true_slices
-from xosc_lateral.workflows.recordings.recorded import RecordedVehicle
+from xosc_lateral.workflows.recordings.recorded import MOVING_SPEED, RecordedVehicle
 from xosc_lateral.workflows.recordings.transitions import SHAPES, Rough, Transition, fit_transition
 
 SETTLED = 0.7
 """Nobody has settled in a lane who is farther from its centre, see `recordings.cuts`. [m]"""
 CALM = 0.1
 """A lane change reaches to where the lateral speed falls below this, see there. [m/s]"""
+CROSSING_RATE = 0.3
+"""A side that crosses a marking faster is in a lane change, see there; one that returns, in an aborted one. [m/s]"""
 MAXIMUM_HALF_DURATION = 8.0
 """From the crossing to either end, see there. [s]"""
 STILL, STEADY = 1e-3, 0.5
@@ -48,10 +50,12 @@ class LateralPlan:
 
 def lateral_plan(vehicle: RecordedVehicle, begin: float) -> LateralPlan:
     """Find and fit all lateral maneuvers; none starts before `begin` [s]."""
-    course = _Course.of(vehicle)
+    course = Course.of(vehicle)
     y = course.y
     still = _still(course.time, course.rate)
-    is_played = bool(still.mean() > 0.5)
+    driven = np.hypot(lateral_speed(vehicle.time, vehicle.x), lateral_speed(vehicle.time, vehicle.y))
+    moving = driven >= MOVING_SPEED  # in a jam, people stand still sideways too
+    is_played = bool((still[moving] if moving.any() else still).mean() > 0.5)
     if is_played:
         rough = _between_levels(course, still)
         start = float(np.median(y[true_slices(still)[0]])) if still[0] else float(y[0])
@@ -87,7 +91,7 @@ def _still(time: FloatArray, rate: FloatArray) -> NDArray[np.bool_]:
 
 
 # ---- who stands still between maneuvers ------------------------------------------------------------------------------
-def _between_levels(course: _Course, still: NDArray[np.bool_]) -> list[Rough]:
+def _between_levels(course: Course, still: NDArray[np.bool_]) -> list[Rough]:
     y, base, lanes = course.y, course.base, course.lanes
     rough = []
     parts = true_slices(still)
@@ -127,7 +131,7 @@ def _reach(y: FloatArray, first: int, last: int, before: float, after: float) ->
 
 # ---- drivers ---------------------------------------------------------------------------------------------------------
 @dataclass(frozen=True, eq=False, slots=True)
-class _Course:
+class Course:
     """How a vehicle moves across its lanes, at the recorded rows; arrays of shape (n,)."""
 
     time: FloatArray  # [s]
@@ -135,15 +139,15 @@ class _Course:
     base: FloatArray  # the same of the centre of its lane [m]
     lanes: IntArray  # of its lane, from the first row's
     rate: FloatArray  # lateral speed [m/s]
-    room: FloatArray  # offset at which a side comes to a marking; `SETTLED` for who is as wide as the lane [m]
+    side: FloatArray  # offset at which a side comes to a marking; negative of a vehicle that is wider than its lane [m]
 
     @classmethod
-    def of(cls, vehicle: RecordedVehicle) -> _Course:
+    def of(cls, vehicle: RecordedVehicle) -> Course:
         """Of a recorded vehicle."""
         base, lanes = vehicle.levels
         y = vehicle.offset + base
-        room = np.maximum(0.5 * (vehicle.lane_width - vehicle.width), SETTLED)
-        return cls(vehicle.time, y, base, lanes, lateral_speed(vehicle.time, y), np.asarray(room))
+        side = 0.5 * (vehicle.lane_width - vehicle.width)
+        return cls(vehicle.time, y, base, lanes, lateral_speed(vehicle.time, y), np.asarray(side))
 
     def maneuvers(self) -> list[Rough]:
         """Changes between lanes that the vehicle settled in, and excursions from one of them."""
@@ -158,6 +162,8 @@ class _Course:
             rough.append(self._change(0, settled[0].start, settled[0].start, cut=True))
         else:
             rough += self._open_start(settled[0])
+        for part in settled:
+            rough += self._given_up(part)
         for one, other in pairwise(settled):
             if lanes[one.start] == lanes[other.start]:
                 rough += self._excursion(float(self.base[one.start]), one.stop, other.start)
@@ -172,7 +178,7 @@ class _Course:
 
     def _is_settled(self, part: slice, *, is_passing: bool) -> bool:
         """Near the lane's centre, and not just crossing it: between two crossings to one side, speed falls by half."""
-        near = np.abs(self.y[part] - self.base[part]) < self.room[part]
+        near = np.abs(self.y[part] - self.base[part]) < np.maximum(self.side[part], SETTLED)
         into, out = self.rate[part.start], self.rate[part.stop - 1]
         if not near.any() or not is_passing or into * out <= 0.0:
             return bool(near.any())
@@ -222,6 +228,17 @@ class _Course:
         first = part.start + (int(calm[-1]) if len(calm) else _nearest(self.y[part] - level))
         return [Rough(first, len(self.y) - 1, level, end, 0, end - level, cut=True)]
 
+    def _given_up(self, part: slice) -> list[Rough]:
+        """Excursions within a lane in which a side crosses a marking as in a lane change, and comes back."""
+        away, side = self.y[part] - self.base[part], self.side[part]
+        rough = list[Rough]()
+        for over in true_slices((np.abs(away) > side) & (side > 0.0)):
+            first, last = part.start + over.start, part.start + over.stop
+            is_within = over.start > 0 and over.stop < len(away)  # else it comes from another lane, or changes to it
+            if is_within and np.sign(away[over.start]) * self.rate[first] > CROSSING_RATE:
+                rough += self._excursion(float(self.base[first]), first, last)
+        return rough
+
     def _excursion(self, level: float, first: int, last: int) -> list[Rough]:
         """Out of a lane and back into it: two lane offsets."""
         peak = first + int(np.abs(self.y[first : last + 1] - level).argmax())
@@ -238,8 +255,11 @@ def _nearest(away: FloatArray) -> int:
 
 
 def _apart(rough: list[Rough]) -> list[Rough]:
-    """Without movement within a lane that is part of a lane change."""
+    """Without movement within a lane that is part of a lane change; both halves of an aborted one, or none."""
     changes = [(one.first, one.last) for one in rough if one.lanes]
-    return [
-        one for one in rough if one.lanes or not any(first < one.last and one.first < last for first, last in changes)
-    ]
+    inside = [any(first < one.last and one.first < last for first, last in changes) for one in rough]
+    halves = {one.first: k for k, one in enumerate(rough) if one.aborted}
+    for k, one in enumerate(rough):
+        if one.aborted and (other := halves.get(one.last, k)) != k:
+            inside[k] = inside[other] = inside[k] or inside[other]
+    return [one for one, is_part in zip(rough, inside, strict=True) if one.lanes or not is_part]

@@ -19,6 +19,7 @@ def find_neighbours(
     *,
     lane_on_left: BoolArray,
     lane_on_right: BoolArray,
+    scale: FloatArray | float = 1.0,
 ) -> dict[str, FloatArray]:
     """Leader in the same lane and nearest vehicle in the lanes beside: columns of the drive table, shape (n,) each.
 
@@ -28,6 +29,7 @@ def find_neighbours(
     `frame`: equal for rows of the same instant (and carriageway). `lane`: 0 = rightmost driving lane, counting up to
     the left; negative: in no lane. `s`: vehicle centres along the road, growing in the direction of travel. [m]
     `length`: of the vehicles. [m] `lane_on_left`, `lane_on_right`: whether there is such a lane, driven the same way.
+    `scale`: metres along the own lane per metre of `s`. [-]
     """
     known = lane >= 0
     group = np.where(known, frame * 64 + lane, -1)
@@ -44,7 +46,7 @@ def find_neighbours(
         for candidate in (after,) if ahead_only else (after, after - 1):
             inside = (candidate >= 0) & (candidate < len(axis)) & known
             who = order[np.clip(candidate, 0, len(axis) - 1)]
-            free = np.maximum(np.abs(s[who] - s) - 0.5 * (length[who] + length), 0.0)
+            free = np.maximum(scale * np.abs(s[who] - s) - 0.5 * (length[who] + length), 0.0)
             gap = np.where(inside & (group[who] == target), free, np.inf)
             closer = (gap < best) & (gap <= REACH)
             best, truck = np.where(closer, gap, best), np.where(closer, is_truck[who], truck)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -14,61 +14,10 @@ from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.workflows.recordings.cuts import CutSettings, Rows, cut_table
+from xosc_lateral.workflows.recordings.gate import MOVING_SPEED, require_lane_direction
 from xosc_lateral.workflows.recordings.importers.table import Imported, finished, hash_files, without_cut
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks, rate
-from xosc_lateral.workflows.recordings.neighbours import find_neighbours
-
-
-@dataclass(frozen=True, eq=False)
-class LaneGraph:
-    """Pieces of lanes and how they hang together."""
-
-    length: FloatArray  # of each piece, along the road, shape (n,) [m]
-    left: IntArray  # piece beside it on the left that is driven the same way; -1: none, shape (n,)
-    following: Sequence[Sequence[int]]  # pieces that it leads to
-
-    def layout(self) -> tuple[IntArray, FloatArray, IntArray]:
-        """Part of the network, way along it to the piece's start [m], and rank (growing to the left) of each piece.
-
-        Breadth first from the first piece of each part. Where ways meet that are of different length, as in a ring or
-        beyond a junction, the first one found counts; pieces that come to lie on one another there (two ways into one
-        place of a layout) get parts of their own.
-        """
-        n = len(self.length)
-        part, station, rank = np.full(n, -1), np.zeros(n), np.zeros(n, dtype=np.int64)
-        steps = self._steps()
-        taken: dict[tuple[int, int], list[tuple[float, float]]] = {}
-        count = 0
-        for first in range(n):
-            if part[first] >= 0:
-                continue
-            waiting = deque([(first, 0.0, 0)])
-            while waiting:
-                piece, at, level = waiting.popleft()
-                end, here = at + float(self.length[piece]), taken.setdefault((count, level), [])
-                if part[piece] >= 0 or any(at < other - 1e-3 and end > begin + 1e-3 for begin, other in here):
-                    continue
-                part[piece], station[piece], rank[piece] = count, at, level
-                here.append((at, end))
-                for other, side, where in steps[piece]:
-                    ahead = {0: 0.0, 1: float(self.length[piece]), -1: -float(self.length[other])}[where]
-                    waiting.append((other, at + ahead, level + side))
-            count += 1
-        return part, station, rank
-
-    def _steps(self) -> list[list[tuple[int, int, int]]]:
-        """From each piece to the pieces about it: (piece, lanes to the left, +1 ahead or -1 behind)."""
-        steps: list[list[tuple[int, int, int]]] = [[] for _ in self.length]
-        for piece, left in enumerate(self.left):
-            if left >= 0:
-                steps[piece].append((int(left), 1, 0))
-                steps[int(left)].append((piece, -1, 0))
-        for piece, after in enumerate(self.following):
-            for other in after:
-                steps[piece].append((other, 0, 1))
-                steps[other].append((piece, 0, -1))
-        return steps
-
+from xosc_lateral.workflows.recordings.lane_graph import LaneGraph, neighbour_columns
 
 TRUCKS = ("truck", "bus", "trailer", "semitrailer", "lorry", "van_trailer", "truck_trailer")
 
@@ -82,11 +31,14 @@ class PlacedTracks:
     along: FloatArray  # way of x, y from the piece's start, in the direction of travel [m]
     offset: FloatArray  # offset, lane_width: NaN in no lane [m]
     lane_width: FloatArray
+    agreement: FloatArray  # cosine of the way and the lane's direction; NaN in no lane [-]
     road: Mapping[str, FloatArray] = field(default_factory=dict)  # columns that it has there: curvature, lane_index ...
+    scale: FloatArray | float = 1.0  # metres along the lane per metre of `along` [-]
 
 
 def require_lanes(placed: PlacedTracks, where: str, path: Path) -> None:
-    """Refuse tracks that lie beside all lanes. Raises `FormatError`."""
+    """Refuse tracks that lie beside all lanes, or drive against them. Raises `FormatError`."""
+    require_lane_direction(placed.agreement, placed.tracks.speed, where, path)
     if not (placed.piece >= 0).any():
         x, y = placed.tracks.x, placed.tracks.y
         there = f"x from {x.min():.1f} to {x.max():.1f} m, y from {y.min():.1f} to {y.max():.1f} m"
@@ -135,21 +87,12 @@ def import_each(sources: Path | Sequence[Path], read: Callable[[Path], Imported]
 def _drive_table(placed: PlacedTracks, graph: LaneGraph, settings: CutSettings) -> pd.DataFrame:
     """The drive table with its column `state`."""
     tracks, inside = placed.tracks, placed.piece >= 0
-    part, station, rank = graph.layout()
-    piece = np.maximum(placed.piece, 0)
-    instant = np.round(tracks.time / tracks.step).astype(np.int64)
     is_truck = np.isin(tracks.kind, TRUCKS)
-    is_left = np.bincount(graph.left[graph.left >= 0], minlength=len(graph.left)) > 0  # of another piece
     middle = placed.along if tracks.rear is None else placed.along + tracks.rear  # gaps count from there
-    near = find_neighbours(
-        instant * (int(part.max()) + 1) + part[piece],
-        np.where(inside, rank[piece] - int(rank.min()), -1),
-        station[piece] + middle,
-        tracks.length,
-        is_truck,
-        lane_on_left=graph.left[piece] >= 0,
-        lane_on_right=is_left[piece],
-    )
+    near = neighbour_columns(
+        graph, placed.piece, middle, tracks.time, tracks.vehicle, tracks.step, tracks.speed, tracks.length, is_truck,
+        scale=placed.scale,
+    )  # fmt: skip
     # A number that changes with the lane, and lateral position without jumps: a new piece ahead is no new lane.
     step = np.diff(placed.offset, prepend=placed.offset[:1])
     same = np.r_[False, tracks.vehicle[1:] == tracks.vehicle[:-1]]
@@ -162,9 +105,11 @@ def _drive_table(placed: PlacedTracks, graph: LaneGraph, settings: CutSettings) 
         "offset": placed.offset,
         "lane_width": placed.lane_width,
         "speed": tracks.speed,
-        "acceleration": rate(tracks.speed, tracks.vehicle, tracks.step, 1.0),
+        "acceleration": rate(tracks.speed, tracks.vehicle, tracks.time, tracks.step, 1.0),
         **placed.road,
         **near,
     }
-    rows, reasons = Rows(tracks.vehicle, instant, lane, tracks.step), {"no lane": ~inside}
+    against = (tracks.speed > MOVING_SPEED) & (placed.agreement < 0.0)
+    rows = Rows(tracks.vehicle, tracks.time, lane, tracks.step)
+    reasons = {"no lane": ~inside, **({"against the lane": against & inside} if against.any() else {})}
     return cut_table(columns, rows, settings, sideways=sideways, reasons=reasons, kind=tracks.kind, is_truck=is_truck)

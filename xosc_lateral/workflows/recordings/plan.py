@@ -56,6 +56,10 @@ class VehiclePlan:
         """From when to when it is there; as recorded at the end, where it does not leave. [s]"""
         return 0.0 if self.appears is None else self.appears, float(self.vehicle.time[-1])
 
+    def time_at(self, way: FloatArray) -> FloatArray:
+        """When the recorded vehicle was as far, shape as the argument. [s]"""
+        return np.interp(way, np.maximum.accumulate(self.way), self.vehicle.time)
+
     @property
     def changes(self) -> tuple[Transition, ...]:
         """Lane changes alone."""
@@ -91,7 +95,9 @@ def _plan(name: str, vehicle: RecordedVehicle, network: RoadNetwork, length: flo
     begin = 0.0 if appears is None else appears
     lateral = lateral_plan(vehicle, begin if appears is None else begin + FRAME)
     poses = vehicle.poses(network, lateral.at(time) - vehicle.levels[0])
-    way = np.r_[0.0, np.cumsum(np.hypot(np.diff(poses.x), np.diff(poses.y)))]
+    dx, dy = np.diff(poses.x), np.diff(poses.y)
+    ahead_of_row = dx * np.cos(poses.heading[1:]) + dy * np.sin(poses.heading[1:])
+    way = np.r_[0.0, np.cumsum(np.copysign(np.hypot(dx, dy), ahead_of_row))]  # noise takes back what it moves ahead
     share = PLAYED if lateral.is_played else 1.0
     speed = fit_speed(time, way, error=share * error, apart=share * APART)
     ahead = float(speed.way(np.array([begin]))[0])
@@ -117,7 +123,7 @@ def planned_motion(plan: VehiclePlan, time: FloatArray, network: RoadNetwork) ->
     begin, end = plan.present
     held = np.clip(time, begin, end)
     way = plan.speed.way(held)
-    recorded = np.interp(way, plan.way, vehicle.time)  # when the recorded vehicle was as far
+    recorded = plan.time_at(way)
     row = np.clip(np.searchsorted(vehicle.time, recorded, side="right") - 1, 0, len(vehicle.time) - 2)
     share = (recorded - vehicle.time[row]) / (vehicle.time[row + 1] - vehicle.time[row])
     same = (vehicle.road[row] == vehicle.road[row + 1]) & (vehicle.lane[row] == vehicle.lane[row + 1])

@@ -43,6 +43,10 @@ AROUND = 100.0
 """Who comes as near as this to the vehicle in question, along or across, belongs to its surroundings. [m]"""
 
 
+NO_HOST = "none"
+"""Stands for no vehicle under test."""
+
+
 def _version(text: str) -> str:
     if text not in VERSIONS:
         raise ValueError(f"version {text!r}, expected {', '.join(VERSIONS)}")
@@ -62,7 +66,8 @@ class ReconstructSettings:
     around, window : str, float
         A vehicle and those who come near it, for so long in the middle of its passage. [s]
     host : str, optional
-        The vehicle under test: `convert` leaves it to the system that drives it.
+        The vehicle under test, which `convert` leaves to the system that drives it; by default the recording's own
+        host; "none": there is none.
     error : float
         Positions along the road are within this; smaller: more corners in the speeds. [m]
     version : str
@@ -94,7 +99,8 @@ class ReconstructSettings:
         60.0, float, kind=float, min=1, max=3600, help="Length of the part that --around takes [s].",
     )
     host: str | None = option(
-        None, str, kind=str | None, metavar="ID", show_default=False, help="The vehicle under test.",
+        None, str, kind=str | None, metavar="ID", show_default=False,
+        help="The vehicle under test; default: the host of an OSI trace; none: no vehicle.",
     )
     error: float = option(
         0.5, float, kind=float, min=0.01,
@@ -153,7 +159,7 @@ class Reconstructed:
     @property
     def host(self) -> str | None:
         """Entity that is the vehicle under test."""
-        wanted = self.settings.host
+        wanted = _host_name(self.traffic, self.settings)
         return next((plan.name for plan in self.plans if plan.vehicle.name == wanted), None)
 
     @property
@@ -172,7 +178,8 @@ def reconstruct_recording(traffic: RecordedTraffic, settings: ReconstructSetting
     recording = place_tracks(tracks, traffic.network, begin, end)
     plans = plan_vehicles(recording, traffic.network, error=settings.error)
     by_name = {plan.vehicle.name: plan.name for plan in plans}
-    if settings.host is not None and settings.host not in by_name:
+    host = _host_name(traffic, settings)
+    if settings.host is not None and host is not None and host not in by_name:
         raise FormatError(f"host {settings.host!r} is not among the reconstructed vehicles", path=traffic.sources[0])
     relative = {}
     if settings.relative and not settings.exact:
@@ -183,7 +190,7 @@ def reconstruct_recording(traffic: RecordedTraffic, settings: ReconstructSetting
         road_file=traffic.road_name,
         duration=end - begin,
         version=VERSIONS[settings.version],
-        host=None if settings.host is None else by_name[settings.host],
+        host=None if host is None else by_name.get(host),
         description=f"{traffic.name}: reconstructed from {traffic.sources[0].name}, {begin:g} to {end:g} s",
         relative=relative,
         exact=settings.exact,
@@ -194,6 +201,13 @@ def reconstruct_recording(traffic: RecordedTraffic, settings: ReconstructSetting
     return Reconstructed(
         traffic, recording, plans, scenario, residuals, met, relative, tuple(drivers), fitted, settings
     )
+
+
+def _host_name(traffic: RecordedTraffic, settings: ReconstructSettings) -> str | None:
+    """Recorded name of the vehicle under test."""
+    if settings.host == NO_HOST and all(track.name != NO_HOST for track in traffic.tracks):
+        return None
+    return settings.host or traffic.host
 
 
 def _drivers(
@@ -250,7 +264,8 @@ def chosen(traffic: RecordedTraffic, settings: ReconstructSettings) -> tuple[lis
     """
     by_name = {track.name: track for track in traffic.tracks}
     source = traffic.sources[0]
-    asked = {"vehicles": settings.vehicles or (), "around": [settings.around], "host": [settings.host]}
+    host = settings.host and _host_name(traffic, settings)
+    asked = {"vehicles": settings.vehicles or (), "around": [settings.around], "host": [host]}
     for word, names in asked.items():
         for name in names:
             if name is not None and name not in by_name:

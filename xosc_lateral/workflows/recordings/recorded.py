@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.base.rows import true_slices
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.road.positions import Poses
 
@@ -30,8 +28,12 @@ LEAP = 1.5
 [m]"""
 BACKWARDS = 0.5
 """Who falls back so far drives backwards; less is an error of standing vehicles' positions. [m]"""
-SLOW = 0.5
-"""Below this speed the direction of movement is none: that of the row before holds. [m/s]"""
+MOVING_SPEED = 0.25
+"""Below this a vehicle stands, and the direction of its movement is that of errors: half a walking pace. [m/s]"""
+VELOCITY_WINDOW = 2.0
+"""Rows whose positions a velocity is fitted to: 0.2 m of noise at 10 Hz are 0.08 m/s in it. [s]"""
+HEADING_WINDOW = 2.0
+"""Way over which a heading is averaged, so that positions' noise does not turn a slow vehicle. [m]"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -63,15 +65,8 @@ class RecordedVehicle:
 
     @property
     def levels(self) -> tuple[FloatArray, IntArray]:
-        """Lateral position of each row's lane centre from the first row's [m], and how many lanes to its left it is.
-
-        A step of the offset by more than half a lane is a new lane; one lane that goes over into another one ahead
-        has none. Shape (n,) each.
-        """
-        step = np.diff(self.offset)
-        width = 0.5 * (self.lane_width[1:] + self.lane_width[:-1])
-        lanes = np.where(np.abs(step) > 0.5 * width, -np.round(step / width), 0.0)
-        return np.r_[0.0, np.cumsum(lanes * width)], np.r_[0, np.cumsum(lanes)].astype(np.int64)
+        """See `lane_levels`."""
+        return lane_levels(self.offset, self.lane_width)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -82,6 +77,17 @@ class Recording:
     left_out: tuple[str, ...]
     start: float  # start, end: of the window [s]
     end: float
+
+
+def lane_levels(offset: FloatArray, lane_width: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Lateral position of each row's lane centre from the first row's [m], and how many lanes to its left it is.
+
+    A step of the offset by more than half a lane is a new lane; one lane that goes over into another one ahead has
+    none. Shape (n,) each, as the arguments.
+    """
+    step, width = np.diff(offset), 0.5 * (lane_width[1:] + lane_width[:-1])
+    lanes = np.where(np.abs(step) > 0.5 * width, -np.round(step / width), 0.0)
+    return np.r_[0.0, np.cumsum(lanes * width)], np.r_[0, np.cumsum(lanes)].astype(np.int64)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -123,7 +129,8 @@ def place_tracks(tracks: Sequence[Track], network: RoadNetwork, start: float, en
 
 def _place(track: Track, rows: NDArray[np.intp], network: RoadNetwork, left_out: list[str]) -> RecordedVehicle | None:
     time, x, y = track.time[rows], track.x[rows], track.y[rows]
-    heading = _held(time, x, y, track.heading[rows])
+    velocity = np.stack([_slope(time, x), _slope(time, y)])
+    heading = _steady_heading(time, x, y, velocity, track.heading[rows], network)
     x, y = x - track.ahead * np.cos(heading), y - track.ahead * np.sin(heading)
     found = network.world_to_lane(x, y, heading=heading)
     on_lane = (found.distance <= BESIDE) & (found.lane != 0)
@@ -137,15 +144,15 @@ def _place(track: Track, rows: NDArray[np.intp], network: RoadNetwork, left_out:
     width = np.full(len(x), np.nan)
     width[there] = network.lane_width(*place)
     way = np.where(np.cos(heading - lane_heading) < 0.0, -1, 1)
-    elsewhere = on_lane & _elsewhere(time, x, y, heading, lane_heading)
-    passages = _passages(time, x, y, on_lane & ~elsewhere)
+    elsewhere = on_lane & (_across(velocity, lane_heading) | _backwards(x, y, heading))
+    passages = _passages(time, x, y, np.flatnonzero(on_lane & ~elsewhere))
     reasons = {"off the lanes": int((~on_lane).sum()), "across a lane or backwards": int(elsewhere.sum())}
     if not passages:
         said = "".join(f", {rows} of {len(time)} rows {why}" for why, rows in reasons.items() if rows)
         left_out.append(f"{track.name}: no {MINIMUM_PASSAGE:g} s along a driving lane without a gap{said}")
         return None
-    best = max(passages, key=lambda part: time[part.stop - 1] - time[part.start])
-    lost = len(time) - (best.stop - best.start)
+    best = max(passages, key=lambda part: time[part[-1]] - time[part[0]])
+    lost = len(time) - len(best)
     if lost:
         reasons["beyond them, a gap or a leap"] = lost - sum(reasons.values())
         said = ", ".join(f"{rows} {why}" for why, rows in reasons.items() if rows > 0)
@@ -158,53 +165,79 @@ def _place(track: Track, rows: NDArray[np.intp], network: RoadNetwork, left_out:
     )
 
 
-def _held(time: FloatArray, x: FloatArray, y: FloatArray, heading: FloatArray) -> FloatArray:
-    """Headings where it moves; else that of the last row that does."""
+def _slope(time: FloatArray, values: FloatArray) -> FloatArray:
+    """Rate of change at each row, by least squares over `VELOCITY_WINDOW`; shape (n,)."""
     if len(time) < 2:
-        return heading
-    moving = np.hypot(np.gradient(x, time), np.gradient(y, time)) >= SLOW
-    if not moving.any():
-        return heading
-    last = np.maximum.accumulate(np.where(moving, np.arange(len(time)), -1))
-    return np.asarray(heading[np.where(last >= 0, last, int(np.argmax(moving)))])
+        return np.zeros(len(time))
+    half = 0.5 * VELOCITY_WINDOW + 1e-6
+    first = np.minimum(np.searchsorted(time, time - half), np.maximum(np.arange(len(time)) - 1, 0))
+    last = np.maximum(np.searchsorted(time, time + half), np.minimum(np.arange(len(time)) + 2, len(time)))
+    t, v = time - time.mean(), values - values.mean()
+
+    def total(terms: FloatArray) -> FloatArray:
+        sums = np.r_[0.0, np.cumsum(terms)]
+        return np.asarray(sums[last] - sums[first])
+
+    count = (last - first).astype(np.float64)
+    spread = count * total(t * t) - total(t) ** 2
+    return np.asarray((count * total(t * v) - total(t) * total(v)) / spread)
 
 
-def _elsewhere(
-    time: FloatArray, x: FloatArray, y: FloatArray, heading: FloatArray, lane_heading: FloatArray
-) -> NDArray[np.bool_]:
-    """Rows that do not follow a lane: it moves across it, as a person on foot, or drives backwards."""
-    if len(time) < 2:
-        return np.zeros(len(time), dtype=np.bool_)
-    dx, dy = np.gradient(x), np.gradient(y)
-    along, across = (
-        np.abs(dx * np.cos(lane_heading + turn) + dy * np.sin(lane_heading + turn)) for turn in (0, np.pi / 2)
-    )
-    driven = np.cumsum(np.r_[0.0, np.diff(x) * np.cos(heading[1:]) + np.diff(y) * np.sin(heading[1:])])
-    moves = np.hypot(dx, dy) >= SLOW * np.gradient(time)
-    return np.asarray((moves & (across > along)) | (driven < np.maximum.accumulate(driven) - BACKWARDS))
+def _steady_heading(
+    time: FloatArray,
+    x: FloatArray,
+    y: FloatArray,
+    velocity: FloatArray,
+    heading: FloatArray,
+    network: RoadNetwork,
+) -> FloatArray:
+    """Headings averaged over `HEADING_WINDOW` of way: those of a vehicle that stands are from when it last moved.
+
+    One that never moves points along its lane; against it only where its headings agree on that. They tell nothing
+    where all of them are 0, as differences of equal positions are.
+    """
+    speed = np.hypot(*velocity)
+    driven = np.where(speed >= MOVING_SPEED, speed, 0.0) * np.gradient(time) if len(time) > 1 else np.zeros(1)
+    way, half = np.cumsum(driven), 0.5 * HEADING_WINDOW
+    if way[-1] <= 0.0:
+        nearest = network.world_to_lane(x, y)
+        if not (nearest.lane != 0).all():
+            return heading
+        lane = network.lane_to_world(nearest.road, nearest.lane, nearest.s).heading
+        is_against = heading.any() and np.cos(heading - lane).mean() < -np.cos(0.25 * np.pi)
+        return np.asarray(lane + np.pi if is_against else lane)
+    middle, turns = way - 0.5 * driven, np.cumsum(np.exp(1j * heading) * driven)
+    edges, turned = np.r_[0.0, way], np.r_[0.0, turns]
+    mean = np.interp(middle + half, edges, turned) - np.interp(middle - half, edges, turned)
+    return np.asarray(np.angle(mean))
 
 
-def _passages(time: FloatArray, x: FloatArray, y: FloatArray, on_lane: NDArray[np.bool_]) -> list[slice]:
-    """Stretches of rows on a lane without a gap or a leap, `MINIMUM_PASSAGE` at least."""
+def _across(velocity: FloatArray, lane_heading: FloatArray) -> NDArray[np.bool_]:
+    """Rows at which it moves across its lane more than along it, as a person on foot does."""
+    turn = np.arctan2(velocity[1], velocity[0]) - lane_heading
+    return np.asarray((np.abs(np.sin(turn)) > np.abs(np.cos(turn))) & (np.hypot(*velocity) >= MOVING_SPEED))
+
+
+def _backwards(x: FloatArray, y: FloatArray, heading: FloatArray) -> NDArray[np.bool_]:
+    """Rows at which it is behind where it has been."""
+    steps = np.diff(x) * np.cos(heading[1:]) + np.diff(y) * np.sin(heading[1:])
+    driven = np.cumsum(np.r_[0.0, steps])
+    return np.asarray(driven < np.maximum.accumulate(driven) - BACKWARDS)
+
+
+def _passages(time: FloatArray, x: FloatArray, y: FloatArray, rows: NDArray[np.intp]) -> list[NDArray[np.intp]]:
+    """Stretches of the rows without a gap or a leap, `MINIMUM_PASSAGE` at least: a bad row or two end none."""
     from scipy.ndimage import median_filter
 
-    step = np.maximum(np.diff(time), 1e-9)
+    step = np.maximum(np.diff(time[rows]), 1e-9)
     broken = step > LONGEST_GAP
     if len(step):
-        moved = np.diff(x), np.diff(y)
+        moved = np.diff(x[rows]), np.diff(y[rows])
         vx, vy = (median_filter(each / step, 5, mode="nearest") for each in moved)
         about = np.maximum(np.hypot(vx, vy), 1.0)
         across = (moved[1] * vx - moved[0] * vy) / about
         # twice as far as about that time, or turned by more than 30 degrees
         broken |= np.hypot(*moved) > 2.0 * about * step + LEAP
         broken |= np.abs(across) > 0.5 * about * step + LEAP
-    parts = []
-    for part in true_slices(on_lane):
-        cuts = part.start + 1 + np.flatnonzero(broken[part.start : part.stop - 1])
-        edges = [part.start, *cuts.tolist(), part.stop]
-        parts += [slice(a, b) for a, b in pairwise(edges)]
-    return [
-        part
-        for part in parts
-        if time[part.stop - 1] - time[part.start] >= MINIMUM_PASSAGE and part.stop - part.start > 3
-    ]
+    parts = np.split(rows, np.flatnonzero(broken) + 1)
+    return [part for part in parts if len(part) > 3 and time[part[-1]] - time[part[0]] >= MINIMUM_PASSAGE]

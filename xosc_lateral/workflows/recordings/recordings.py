@@ -17,7 +17,11 @@ from xosc_lateral.files.opendrive.write import SHOULDER, WIDTH_PIECE, WrittenLan
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.workflows.recordings.importers import dlr_ht, levelx
 from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH, Tracks, read_tracks, tracks_of
+from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
+from xosc_lateral.workflows.recordings.lane_shapes import LaneShape
 from xosc_lateral.workflows.recordings.recorded import Track
+from xosc_lateral.workflows.recordings.roads_from_lanes import DrivenLane, roads_of_lanes
+from xosc_lateral.workflows.recordings.sumo import NET_ENDINGS, first_tag, read_fcd, read_net
 from xosc_lateral.world.road.network import RoadNetwork
 
 STEP = 0.1
@@ -47,6 +51,7 @@ class RecordedTraffic:
     road_name: str  # of the file
     sources: tuple[Path, ...]  # what was read
     notes: tuple[str, ...] = field(default=())
+    host: str | None = None  # vehicle that the recording calls its host
 
     @property
     def span(self) -> tuple[float, float]:
@@ -80,34 +85,61 @@ def format_of(source: Path) -> str:
         return "levelx"
     if name.endswith((".osi", ".mcap", ".osi.gz")):
         return "osi"
+    if name.endswith((".xml", ".xml.gz")) and first_tag(source) == "fcd-export":
+        return "fcd"
     return "commonroad" if name.endswith((".xml", ".pb")) else "tracks"
 
 
-# ---- tracks on a known road ------------------------------------------------------------------------------------------
+# ---- tracks on a known road, or on the recording's own lanes ---------------------------------------------------------
 def _tracks(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
     return _on_road(read_tracks(source, mapping=columns), source, road)
 
 
 def _osi(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
     from xosc_lateral.workflows.recordings.osi.read import read_osi
+    from xosc_lateral.workflows.recordings.osi.shapes import lanes_of
 
     recorded = read_osi(source)
-    traffic = _on_road(recorded.tracks, source, road)
-    return replace(traffic, notes=(*recorded.notes, *traffic.notes))
+    own = recorded.opendrive
+    if road is None and own is None and (lanes := lanes_of(recorded)) is not None:
+        own = roads_of_lanes(driven_lanes(*lanes), name_of(source)).encode()
+    traffic = _on_road(recorded.tracks, source, road, own)
+    host = recorded.hosts[0] if len(recorded.hosts) == 1 else None
+    return replace(traffic, notes=(*recorded.notes, *traffic.notes), host=host)
 
 
 def _commonroad(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
     from xosc_lateral.workflows.recordings.importers.commonroad import read_obstacles
 
-    tracks = read_obstacles(source)
-    own = tuple(name.removeprefix(f"{source.stem}:") for name in tracks.names)
-    return _on_road(replace(tracks, names=own), source, road)
+    tracks, shapes, graph = read_obstacles(source)
+    names = tuple(name.removeprefix(f"{source.stem}:") for name in tracks.names)
+    own = None if road is not None else roads_of_lanes(driven_lanes(shapes, graph), name_of(source)).encode()
+    return _on_road(replace(tracks, names=names), source, road, own)
 
 
-def _on_road(tracks: Tracks, source: Path, road: Path | None) -> RecordedTraffic:
-    if road is None:
+def _fcd(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
+    if road is None or not road.name.lower().endswith(NET_ENDINGS):
+        if road is None:
+            raise FormatError("comes without lanes: give its network with --road FILE.net.xml", path=source)
+        return _on_road(read_fcd(source), source, road)
+    lanes, left_handed = read_net(road)
+    own = roads_of_lanes(lanes, name_of(source), left_handed=left_handed).encode()
+    return replace(_on_road(read_fcd(source), source, None, own), sources=(source, road))
+
+
+def name_of(source: Path) -> str:
+    """Of what is made from a recording."""
+    return source.name.split(".")[0]
+
+
+def _on_road(tracks: Tracks, source: Path, road: Path | None, own: bytes | None = None) -> RecordedTraffic:
+    """`own`: OpenDRIVE of the recording's own lanes, for where no road is given."""
+    if road is not None:
+        network, data, road_name = read_opendrive(road), road.read_bytes(), road.name
+    elif own is not None:
+        network, data, road_name = read_road(own, name_of(source)), own, f"{name_of(source)}.xodr"
+    else:
         raise FormatError("comes without a road: give it with --road FILE.xodr", path=source)
-    network = read_opendrive(road)
     x, y = network.header_offset.undo(tracks.x, tracks.y)
     heading = tracks.heading - network.header_offset.heading
     found, notes = [], []
@@ -126,8 +158,16 @@ def _on_road(tracks: Tracks, source: Path, road: Path | None) -> RecordedTraffic
         ahead = 0.0 if tracks.is_reference or tracks.rear is not None else middle
         at = tracks.time[rows], x[rows], y[rows], heading[rows]
         found.append(Track(name, kind, length, width, USUAL_HEIGHT.get(kind, 1.5), ahead, middle, *at))
-    files = road.read_bytes(), road.name, (source, road), tuple(notes)
-    return RecordedTraffic(source.name.split(".")[0], tuple(found), network, *files)
+    sources = (source,) if road is None else (source, road)
+    return RecordedTraffic(name_of(source), tuple(found), network, data, road_name, sources, tuple(notes))
+
+
+def driven_lanes(shapes: Sequence[LaneShape], graph: LaneGraph) -> list[DrivenLane]:
+    """Lanes of a recording as lines."""
+    return [
+        DrivenLane(shape.left, shape.right, int(beside), following)
+        for shape, beside, following in zip(shapes, graph.left, graph.following, strict=True)
+    ]
 
 
 def _rows_of(vehicle: NDArray[np.int64]) -> list[NDArray[np.int64]]:
@@ -257,5 +297,6 @@ READERS: dict[str, Reader] = {
     "tracks": _tracks,
     "osi": _osi,
     "commonroad": _commonroad,
+    "fcd": _fcd,
 }
 """Format -> its reader."""

@@ -92,12 +92,20 @@ def reconstructed_scenario(
 
     root = etree.Element("OpenSCENARIO")
     major, minor = map(str, version)
-    sub(root, "FileHeader", revMajor=major, revMinor=minor, date=DATE, description=description, author="xosc-lateral")
+    sub(
+        root,
+        "FileHeader",
+        revMajor=major,
+        revMinor=minor,
+        date=DATE,
+        description=plain_text(description),
+        author="xosc-lateral",
+    )
     parameters = sub(root, "ParameterDeclarations")
     for name, value in values.items():
         sub(parameters, "ParameterDeclaration", name=name, parameterType="double", value=value)
     sub(root, "CatalogLocations")
-    sub(root, "RoadNetwork/LogicFile", filepath=road_file)
+    sub(root, "RoadNetwork/LogicFile", filepath=f"./{road_file}" if road_file.startswith("$") else road_file)
     root.append(entities)
     storyboard = sub(root, "Storyboard")
     sub(storyboard, "Init").append(actions)
@@ -106,6 +114,11 @@ def reconstructed_scenario(
     etree.indent(root, "  ")
     text = f"<?xml version='1.0' encoding='UTF-8'?>\n{etree.tostring(root, encoding='unicode')}\n"
     return text + template_mark(text)
+
+
+def plain_text(text: str) -> str:
+    """Text in quotes where it begins with $, which would make it a reference to a parameter."""
+    return f"'{text}'" if text.startswith("$") else text
 
 
 class _Vehicle:
@@ -154,7 +167,7 @@ class _Vehicle:
         for tag, steering, x in (("FrontAxle", "0.5", front), ("RearAxle", "0", "0")):
             sub(axles, tag, maxSteering=steering, wheelDiameter="0.7", trackWidth=track, positionX=x, positionZ="0.35")
         properties = sub(vehicle, "Properties")
-        sub(properties, "Property", name="recorded_as", value=one.name)
+        sub(properties, "Property", name="recorded_as", value=plain_text(one.name))
         if is_host:  # CARLA's ScenarioRunner hands the vehicle of this type to the system under test
             sub(properties, "Property", name="type", value="ego_vehicle")
 

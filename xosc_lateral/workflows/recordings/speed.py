@@ -67,7 +67,28 @@ def fit_speed(time: FloatArray, way: FloatArray, *, error: float, apart: float =
     knots = _moved(t, w, _thinned(t, w, knots, error), apart)
     spline = _spline(t, w, knots)
     corners = np.r_[t[0], knots, t[-1]]
-    return SpeedProfile(corners, np.maximum(spline(corners, 1), 0.0), float(spline(t[0])))
+    speed = spline(corners, 1)
+    if (speed < 0.0).any():
+        return _without_reversing(t, w, corners, max(error, float(np.abs(w - spline(t)).max())), apart)
+    return SpeedProfile(corners, speed, float(spline(t[0])))
+
+
+def _without_reversing(t: FloatArray, w: FloatArray, corners: FloatArray, error: float, apart: float) -> SpeedProfile:
+    """The least squared error of speeds that are not negative, with more corners where it is beyond the bound."""
+    from scipy.optimize import lsq_linear
+
+    while True:
+        ways = [SpeedProfile(corners, one, 0.0).way(t) for one in np.eye(len(corners))]
+        lowest = np.r_[-np.inf, np.zeros(len(corners))]
+        start, *speed = lsq_linear(np.column_stack([np.ones(len(t)), *ways]), w, (lowest, np.inf)).x
+        profile = SpeedProfile(corners, np.asarray(speed), float(start))
+        residual, wide = np.abs(w - profile.way(t)), np.diff(corners) >= 2.0 * apart
+        piece = np.clip(np.searchsorted(corners, t, side="right") - 1, 0, len(wide) - 1)
+        worst = int(np.where(wide[piece], residual, 0.0).argmax())
+        if residual[worst] <= error or not wide[piece[worst]]:
+            return profile
+        k = piece[worst] + 1
+        corners = np.insert(corners, k, 0.5 * (corners[k - 1] + corners[k]))
 
 
 def _spline(t: FloatArray, w: FloatArray, knots: FloatArray) -> BSpline[np.float64]:

@@ -40,6 +40,8 @@ class Activity(IntFlag):
     """Its reference point is on no road."""
     ROAD_END = 32
     """It stands at the end of its road."""
+    STEERED = 64
+    """A controller of its player has its lateral domain."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

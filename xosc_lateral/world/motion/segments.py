@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import Enum
+from math import inf
 
 import numpy as np
 from msgspec import Struct
@@ -10,8 +12,9 @@ from msgspec import Struct
 from xosc_lateral.base.arrays import BoolArray, IntArray
 from xosc_lateral.base.rows import blocks
 from xosc_lateral.base.segment import MINIMUM_SPEED
-from xosc_lateral.world.motion.nominal import Activity, EntityMotion
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
+from xosc_lateral.world.scenario.private_actions import LateralDistanceAction
 
 _ACROSS_LANE = np.pi / 4
 """Heading relative to the lane, whichever way it is driven, beyond which the vehicle does not follow it. [rad]"""
@@ -28,6 +31,7 @@ class SegmentKind(Enum):
     NOT_A_VEHICLE = "not a vehicle"
     TRAILER = "trailer"
     OFF_ROAD = "off the road"
+    STEERED = "steered by a controller"
     TRAJECTORY = "follows a trajectory"
     LATERAL_ACTION = "lateral action"
     NOT_DRIVING_LANE = "not in a driving lane"
@@ -71,15 +75,18 @@ class SegmentRow(Struct, frozen=True):
     """Where it begins; empty and 0 off the road."""
 
 
-def cut_segments(motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool = False) -> tuple[SegmentSpan, ...]:
+def cut_segments(
+    motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool = False, heeds_controllers: bool = True
+) -> tuple[SegmentSpan, ...]:
     """Cut an entity's whole motion into segments, each row into exactly one; teleports always cut.
 
-    `is_trailer`: the entity is pulled by another, and has no driver.
+    `is_trailer`: the entity is pulled by another, and has no driver; `heeds_controllers`: where one steers, no driver
+    does.
     """
     firsts: list[tuple[int, int]] = []  # rows at which segments begin, and their kinds
     before = -1
     for rows in blocks(len(motion.time)):
-        kinds = _row_kinds(motion, network, rows, is_trailer)
+        kinds = _row_kinds(motion, network, rows, is_trailer, heeds_controllers)
         placed_anew = (motion.activity[rows] & Activity.TELEPORTED) != 0
         cut = np.flatnonzero((np.diff(kinds, prepend=before) != 0) | placed_anew)
         firsts += zip((rows.start + cut).tolist(), kinds[cut].tolist(), strict=True)
@@ -91,16 +98,51 @@ def cut_segments(motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool
     )
 
 
-def _row_kinds(motion: EntityMotion, network: RoadNetwork, rows: slice, is_trailer: bool) -> IntArray:
+def movement_runs(
+    motion: NominalMotion, entity: EntityMotion, network: RoadNetwork, spans: Sequence[SegmentSpan]
+) -> tuple[tuple[SegmentSpan, ...], ...]:
+    """Road-following segments together with the lane changes and lane offsets between and beside them.
+
+    A driver does not hold still to change lanes: what moves him inside his lane goes on. Not where he keeps a distance
+    sideways from somebody, nor where he drives too slowly, is put elsewhere at once, or is on no driving lane.
+    """
+    runs: list[list[SegmentSpan]] = [[]]
+    for span in spans:
+        if span.is_road_following or _goes_on_through(motion, entity, network, span):
+            placed_anew = bool(entity.activity[span.first] & Activity.TELEPORTED)
+            runs += [[span]] if placed_anew else []
+            runs[-1] += [] if placed_anew else [span]
+        elif runs[-1]:
+            runs.append([])
+    return tuple(tuple(run) for run in runs if any(span.is_road_following for span in run))
+
+
+def _goes_on_through(motion: NominalMotion, entity: EntityMotion, network: RoadNetwork, span: SegmentSpan) -> bool:
+    if span.kind is not SegmentKind.LATERAL_ACTION:
+        return False
+    kept = (one for one in motion.actions if isinstance(one.action.content, LateralDistanceAction))
+    if any(one.actor == entity.name and one.start <= span.end and span.start <= (one.end or inf) for one in kept):
+        return False
+    ignored = (SegmentKind.LATERAL_ACTION, SegmentKind.ACROSS_LANE)
+    for rows in blocks(span.last + 1, span.first):
+        reasons = _reasons(entity, network, rows, is_trailer=False, heeds_controllers=True)
+        if any(np.any(applies) for kind, applies in reasons.items() if kind not in ignored):
+            return False
+    return True
+
+
+def _row_kinds(
+    motion: EntityMotion, network: RoadNetwork, rows: slice, is_trailer: bool, heeds_controllers: bool
+) -> IntArray:
     """Kind of each of these rows, as its index in `SegmentKind`; the first reason that applies, in the enum's order."""
     kinds = np.zeros(rows.stop - rows.start, dtype=np.int64)
-    for kind, applies in reversed(_reasons(motion, network, rows, is_trailer).items()):
+    for kind, applies in reversed(_reasons(motion, network, rows, is_trailer, heeds_controllers).items()):
         kinds[applies] = _KINDS.index(kind)
     return kinds
 
 
 def _reasons(
-    motion: EntityMotion, network: RoadNetwork, rows: slice, is_trailer: bool
+    motion: EntityMotion, network: RoadNetwork, rows: slice, is_trailer: bool, heeds_controllers: bool
 ) -> dict[SegmentKind, BoolArray | bool]:
     """Where in these rows each kind applies, by the enum's order."""
     activity, road, lane, s = motion.activity[rows], motion.road[rows], motion.lane[rows], motion.s[rows]
@@ -112,6 +154,7 @@ def _reasons(
         SegmentKind.NOT_A_VEHICLE: not motion.entity.is_vehicle,
         SegmentKind.TRAILER: is_trailer,
         SegmentKind.OFF_ROAD: ~on_road,
+        SegmentKind.STEERED: heeds_controllers and (activity & Activity.STEERED) != 0,
         SegmentKind.TRAJECTORY: (activity & Activity.TRAJECTORY) != 0,
         SegmentKind.LATERAL_ACTION: (activity & Activity.LATERAL) != 0,
         SegmentKind.NOT_DRIVING_LANE: on_road & ~in_driving_lane,

@@ -14,6 +14,7 @@ from xosc_lateral.world.player.unwatched import Unwatched
 from xosc_lateral.world.player.values import Values
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario import Action, Place, Scenario, TrafficSignalController
+from xosc_lateral.world.scenario.controllers import DrivingControllers
 from xosc_lateral.world.scenario.scenario import TrafficSignalPhase
 
 
@@ -104,7 +105,11 @@ class Simulation:
     def __init__(self, scenario: Scenario, network: RoadNetwork) -> None:
         self.scenario = scenario
         self.network = network
-        self.entities = tuple(EntityState(entity, network) for entity in scenario.entities)
+        for_carla = scenario.header.is_left_handed
+        self.entities = tuple(
+            EntityState(entity, network, controllers=DrivingControllers(entity.controllers, for_carla=for_carla))
+            for entity in scenario.entities
+        )
         self.unwatched = Unwatched(self.entities)
         self.by_name = {state.name: state for state in self.entities}
         self.parameters = Values(scenario.parameters)

@@ -14,6 +14,7 @@ from xosc_lateral.world.road import LaneLink, Pose, RoadNetwork, RouteStep
 from xosc_lateral.world.road.lanes import DRIVING, WALKED
 from xosc_lateral.world.road.places import turn_for_heading, turned_in_surface
 from xosc_lateral.world.scenario import Entity
+from xosc_lateral.world.scenario.controllers import DrivingControllers
 from xosc_lateral.world.scenario.enums import EntityCategory
 
 NO_ROAD = -1
@@ -137,6 +138,9 @@ class EntityState:
     _located: bool = True
     _pose: Pose | None = None
     activity: int = 0
+    controllers: DrivingControllers = field(default_factory=lambda: DrivingControllers((), for_carla=False))
+    steered: int = 0
+    """`Activity.STEERED` while a controller has its lateral domain."""
     longitudinal_taken: bool = False
     """An action has moved the entity along in this frame: the default driver does not."""
     speed_taken: bool = False
@@ -253,7 +257,7 @@ class EntityState:
     # ---- what happened to it -----------------------------------------------------------------------------------------
     def begin_frame(self) -> None:
         """Forget what happened in the frame before."""
-        self.activity = _ACTIVE if self.active else 0
+        self.activity = _ACTIVE | self.steered if self.active else 0
         self.longitudinal_taken = False
         self.speed_taken = False
         self.teleported = False

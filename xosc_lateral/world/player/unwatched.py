@@ -76,7 +76,7 @@ class Unwatched:
 def _follows_its_lane(state: EntityState) -> bool:
     return (
         not state.is_watched
-        and state.activity == _ACTIVE
+        and state.activity == _ACTIVE | state.steered
         and state.free_pose is None
         and state.tow is None
         and state.trailer is None

@@ -1,4 +1,4 @@
-"""What in a storyboard depends, directly or through others, on vehicles that somebody else drives.
+"""What in a storyboard depends, directly or through others, on vehicles that somebody else or a controller drives.
 
 A condition depends on them if it looks at such a vehicle, at somebody who depends on one, at a storyboard element whose
 start or end does, or at a value that is set by such an event; an event through its condition; a vehicle through an
@@ -28,7 +28,6 @@ from xosc_lateral.world.scenario.global_actions import TrafficSignalControllerAc
 from xosc_lateral.world.scenario.private_actions import APPEARANCE, TeleportAction
 from xosc_lateral.world.scenario.scenario import Scenario
 from xosc_lateral.world.scenario.storyboard import Act, Condition, Event, ManeuverGroup, Trigger
-from xosc_lateral.world.scenario.under_test import controlled_entities
 
 Path = tuple[str, ...]
 
@@ -47,12 +46,12 @@ _REFERENCES = frozenset({"entity_ref", "entity_refs", "master_entity_ref", "trai
 
 @dataclass(eq=False, slots=True)
 class Dependence:
-    """What depends on the vehicles under test; see `dependence`.
+    """What depends on vehicles that are unforeseeable; see `dependence`.
 
     Parameters
     ----------
     entities : set of str
-        Whose motion does, the vehicles under test included.
+        Whose motion does, those vehicles included.
     begins, ends : set of tuple of str
         Storyboard elements, by their names from the story down, whose start or end does.
     values : set of str
@@ -93,15 +92,11 @@ class Dependence:
         return len(self.entities) + len(self.begins) + len(self.ends) + len(self.values)
 
 
-def dependence(scenario: Scenario, under_test: Collection[str]) -> Dependence:
-    """What depends on vehicles under test; nothing if there are none.
-
-    A vehicle with a controller of its own depends on them: what it drives by can't be known.
-    """
-    found = Dependence(set(under_test))
-    if not under_test:
+def dependence(scenario: Scenario, unforeseeable: Collection[str]) -> Dependence:
+    """What depends on vehicles under test or with controllers of their own; nothing if there are none."""
+    found = Dependence(set(unforeseeable))
+    if not unforeseeable:
         return found
-    found.entities |= controlled_entities(scenario)
     size = -1
     while found.size() != size:
         size = found.size()

@@ -55,7 +55,7 @@ class Axles(Struct, frozen=True):
 
 
 class Controller(Struct, frozen=True):
-    """A controller by name. It is named and reported; playback uses the default driver instead."""
+    """A controller as assigned; what it drives is in `controllers`. Playback uses the default driver instead."""
 
     name: Name
     place: Place

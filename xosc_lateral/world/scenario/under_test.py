@@ -1,27 +1,22 @@
-"""Vehicles under test: those that a system outside of the scenario drives, as players' own words for it say."""
+"""Vehicles that the storyboard does not drive: those under test, and those of a player's own controllers."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 
+from xosc_lateral.world.scenario.controllers import AUTOPILOT, Domains, is_meant, kind_of, named, switches
+from xosc_lateral.world.scenario.dependence import actors_of
 from xosc_lateral.world.scenario.entity import Controller, Entity
-from xosc_lateral.world.scenario.private_actions import AssignControllerAction
+from xosc_lateral.world.scenario.private_actions import CONTROLLER, ActivateControllerAction, AssignControllerAction
 from xosc_lateral.world.scenario.scenario import Scenario
 from xosc_lateral.world.scenario.storyboard import Action
-
-EXTERNAL_CONTROLLERS: Mapping[str, frozenset[str]] = {
-    # esmini, Controllers.md: the application reports the vehicle's state through the library, or over UDP.
-    "esminicontroller": frozenset({"externalcontroller", "udpdrivercontroller"}),
-    # CARLA's ScenarioRunner, openscenario_support.md: the actor is controlled by another process.
-    "module": frozenset({"external_control"}),
-}
-"""Property of a controller -> values that leave the vehicle to somebody else; both in lower case."""
 
 EXTERNAL_ENTITIES: Mapping[str, frozenset[str]] = {
     # CARLA's ScenarioRunner, openscenario_configuration.py: ego vehicles are those of this type.
     "type": frozenset({"ego_vehicle"}),
 }
-"""The same for properties of the vehicle itself."""
+"""Property of a vehicle -> values that leave it to somebody else; both in lower case."""
 
 EXTERNAL_NAMES = frozenset({"hero", "ego_vehicle"})
 """Names by which CARLA's tools look for the vehicle that they drive (its `role_name`)."""
@@ -29,54 +24,87 @@ EXTERNAL_NAMES = frozenset({"hero", "ego_vehicle"})
 
 def vehicles_under_test(scenario: Scenario) -> dict[str, str]:
     """Vehicles that the scenario leaves to somebody else, in its order, and what says so."""
-    assigned = dict[str, list[Controller]]()
-    for actors, action in _private_actions(scenario):
-        content = action.content
-        if isinstance(content, AssignControllerAction) and content.controller is not None:
-            for actor in actors:
-                assigned.setdefault(actor, []).append(content.controller)
+    assigned = assigned_controllers(scenario)
     found = {}
     for entity in scenario.entities:
-        why = _why(entity, (*entity.controllers, *assigned.get(entity.name, ()))) if entity.is_vehicle else ""
+        why = _why(entity, assigned[entity.name]) if entity.is_vehicle else ""
         if why:
             found[entity.name] = why
     return found
 
 
-def controlled_entities(scenario: Scenario) -> frozenset[str]:
-    """Entities that have a controller of any kind, from the start or later."""
-    assigned = {
-        actor
-        for actors, action in _private_actions(scenario)
-        if isinstance(action.content, AssignControllerAction) and action.content.controller is not None
-        for actor in actors
-    }
-    return frozenset(assigned | {entity.name for entity in scenario.entities if entity.controllers})
+@dataclass(frozen=True, slots=True)
+class Control:
+    """Controllers that drive an entity at some time: their names, and the domains that they have then."""
+
+    controllers: tuple[str, ...]
+    domains: Domains
+
+    def __str__(self) -> str:
+        return f"{' and '.join(self.controllers)}: {self.domains.words()}"
 
 
-def _why(entity: Entity, controllers: tuple[Controller, ...]) -> str:
+def controlled_entities(scenario: Scenario) -> dict[str, Control]:
+    """Entities whose motion controllers decide at some time, in the scenario's order.
+
+    Those alone that some action makes active: an assigned one that nothing activates drives nobody.
+    """
+    assigned, actions = assigned_controllers(scenario), dict[str, list[object]]()
+    for actors, action in _private_actions(scenario):
+        for actor in actors if isinstance(action.content, CONTROLLER) else ():
+            actions.setdefault(actor, []).append(action.content)
+    found = {}
+    for entity in scenario.entities:
+        names, domains = dict[str, None](), Domains.NONE
+        contents = actions.get(entity.name, [])
+        for controller in assigned[entity.name]:
+            kind = kind_of(controller)
+            asked = Domains.BOTH if kind.at_once else Domains.NONE
+            for domain in _switched_on(content for content in contents if is_meant(controller, content)):
+                asked |= domain
+            if kind.active(asked):
+                names[named(controller)] = None
+                domains |= kind.active(asked)
+        activations = (content for content in contents if isinstance(content, ActivateControllerAction))
+        if scenario.header.is_left_handed and any(_switched_on(activations)):
+            names[AUTOPILOT.name] = None
+            domains = Domains.BOTH
+        if domains:
+            found[entity.name] = Control(tuple(names), domains)
+    return found
+
+
+def _switched_on(contents: Iterable[object]) -> Iterator[Domains]:
+    return (domain for content in contents for domain, on in switches(content) if on)
+
+
+def assigned_controllers(scenario: Scenario) -> dict[str, list[Controller]]:
+    """Controllers of each entity, from the start or later."""
+    assigned = {entity.name: list(entity.controllers) for entity in scenario.entities}
+    for actors, action in _private_actions(scenario):
+        content = action.content
+        if isinstance(content, AssignControllerAction) and content.controller is not None:
+            for actor in actors:
+                assigned.setdefault(actor, []).append(content.controller)
+    return assigned
+
+
+def _why(entity: Entity, controllers: Iterable[Controller]) -> str:
     for controller in controllers:
-        named = _named(controller.properties, EXTERNAL_CONTROLLERS)
-        if named:
-            return f"controller '{controller.name}': {named}"
-    named = _named(entity.properties, EXTERNAL_ENTITIES)
-    if named:
-        return named
-    return f"its name is '{entity.name}'" if entity.name in EXTERNAL_NAMES else ""
-
-
-def _named(properties: Mapping[str, str], table: Mapping[str, frozenset[str]]) -> str:
-    for name, value in properties.items():
-        if value.strip().lower() in table.get(name.strip().lower(), ()):
+        if kind_of(controller).is_external:
+            return f"controller {named(controller)}"
+    for name, value in entity.properties.items():
+        if value.strip().lower() in EXTERNAL_ENTITIES.get(name.strip().lower(), ()):
             return f"{name} {value}"
-    return ""
+    return f"its name is '{entity.name}'" if entity.name in EXTERNAL_NAMES else ""
 
 
 def _private_actions(scenario: Scenario) -> Iterator[tuple[tuple[str, ...], Action]]:
     for private in scenario.storyboard.init.privates:
         for action in private.actions:
             yield (private.entity_ref,), action
-    for _, _, group in scenario.storyboard.groups():
+    for _, act, group in scenario.storyboard.groups():
         for _, event in group.events():
+            actors = actors_of(act, group, event)
             for action in event.actions:
-                yield group.actors.entity_refs, action
+                yield actors, action

@@ -9,9 +9,9 @@ from scipy.signal import welch
 
 from tests.kit.core_models import STEADY
 from xosc_lateral.drivers.fitting.models.autoregressive.fit_coarse import (
-    _shaped,
     _typical_power,
     fit_spectrum,
+    shaped,
     window_of,
 )
 from xosc_lateral.drivers.fitting.models.autoregressive.settings import DEFAULT_SETTINGS
@@ -84,7 +84,7 @@ def test_the_kernel_has_the_wanted_gain_at_the_knots_although_it_is_short(shape:
         "falling": 0.02 * np.exp(-5.0 * knots),
         "bump": 0.001 + 0.02 * np.exp(-0.5 * ((knots - 0.4) / 0.1) ** 2),
     }[shape]
-    np.testing.assert_allclose(gain(_shaped(wanted, DEFAULT_SETTINGS))[3:-3], wanted[3:-3], rtol=0.05)
+    np.testing.assert_allclose(gain(shaped(wanted, DEFAULT_SETTINGS))[3:-3], wanted[3:-3], rtol=0.05)
 
 
 def test_movement_of_a_known_model_is_given_its_own_scale_and_noise_back() -> None:

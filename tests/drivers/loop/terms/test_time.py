@@ -22,7 +22,7 @@ from xosc_lateral.drivers.loop.model import Fitted, Removal
 from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.search import Search
 from xosc_lateral.drivers.loop.selection import ERROR_BUDGET
-from xosc_lateral.drivers.loop.terms.time import StepTerm, TimeMeanTerm, TimeSpreadTerm, penalised
+from xosc_lateral.drivers.loop.terms.time import StepTerm, TimeMeanTerm, TimeSpreadTerm, penalised_cosines
 from xosc_lateral.drivers.loop.timeline import Coarse
 from xosc_lateral.drivers.model.effects import Step, TimeSmooth
 
@@ -112,12 +112,12 @@ def test_the_best_of_many_steps_is_no_surer_than_chance_makes_it() -> None:
 
 
 def test_rough_sizes_are_penalised_more_than_smooth_ones() -> None:
-    sizes, errors = penalised(np.array([1.0, 0.1, 0.1, 0.1]), 0.01 * np.eye(4))
+    sizes, errors = penalised_cosines(np.array([1.0, 0.1, 0.1, 0.1]), 0.01 * np.eye(4))
     kept = sizes / np.array([1.0, 0.1, 0.1, 0.1])
     assert (np.diff(kept) < 0.0).all()
     assert kept[0] > 0.95
     assert (np.square(errors) <= 0.01).all()
-    assert penalised(np.zeros(3), np.eye(3))[0].tolist() == [0.0, 0.0, 0.0]
+    assert penalised_cosines(np.zeros(3), np.eye(3))[0].tolist() == [0.0, 0.0, 0.0]
 
 
 def fitted_with(term: object, offset: np.ndarray) -> Fitted:

@@ -19,6 +19,9 @@ from xosc_lateral.drivers.fitting.sensor.vehicle_bound import KNOTS, N_KNOTS, N_
 ABOVE = 1.0
 """No driver is seen above this in a sensor worth splitting: where white noise is estimated at first. [Hz]"""
 
+TOP_SHARE = 0.8
+"""Of the highest frequency, beyond which it is estimated where a recording counts up to less. [-]"""
+
 WHITE_SD = 3.0
 COLOUR_SD = 4.0
 """Of weak priors that keep parts that are not there from running off: of log density. [-]"""
@@ -116,7 +119,7 @@ class _Problem:
         self.integral = colour.integral(0.5 * known.rate) if colour.is_there and known else 0.0
         self.size = N_STATE + 1 + colour.is_there
         self.is_seen, self.is_low_passed = colour.view is not None, colour.order > 0
-        high = data.frequency > ABOVE
+        high = data.frequency > min(ABOVE, TOP_SHARE * float(data.frequency[-1]))
         self.top = float(np.log(np.average(data.density[high], weights=data.weight[high])))
         self.corner, self.alone = colour.corner, colour.alone
 

@@ -72,12 +72,12 @@ def windows_of(runs: Sequence[FloatArray], step: float) -> tuple[FloatArray, Flo
     return np.asarray(np.fft.rfftfreq(size, step), dtype=np.float64), density
 
 
-def periodogram(frequency: FloatArray, windows: FloatArray) -> Periodogram:
-    """Mean over windows, binned, from the second frequency (Hann smears the mean into the first) to `PASSED`.
+def periodogram(frequency: FloatArray, windows: FloatArray, highest: float = PASSED) -> Periodogram:
+    """Mean over windows, binned, from the second frequency (Hann smears the mean into the first) to a highest [Hz].
 
     `frequency` [Hz] of shape (n,), `windows` [m2/Hz] of shape (k, n).
     """
-    use = (frequency > 1.5 * frequency[1]) & (frequency <= PASSED)
+    use = (frequency > 1.5 * frequency[1]) & (frequency <= highest)
     known, density = frequency[use], windows[:, use].mean(axis=0)
     edges = [int(k) for k in np.flatnonzero(known < BINS_FROM)]
     at = len(edges)

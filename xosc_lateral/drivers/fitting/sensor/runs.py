@@ -8,23 +8,32 @@ from dataclasses import replace
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.digits import significant
 from xosc_lateral.drivers.drives.drive import Drive, Run
 from xosc_lateral.drivers.drives.resampling import STEP, resample
-from xosc_lateral.drivers.fitting.sensor.periodogram import WINDOWS
+from xosc_lateral.drivers.fitting.sensor.periodogram import PASSED, WINDOWS
 from xosc_lateral.drivers.fitting.sensor.separation import separate
 from xosc_lateral.drivers.model.sensor.model import SensorModel
+
+LEAST_BAND = 0.35
+"""A driver's corrections fall off from 0.27 Hz on: noise shows beyond. [Hz]"""
 
 
 def driver_runs(
     runs: Sequence[Run], drives: Sequence[Drive] = (), *, sensor_noise: float | None = None
 ) -> tuple[list[Run], SensorModel | None]:
-    """Runs with the sensor's part taken out, and what it was; as they are, and None, where all are too short.
+    """Runs with the sensor's part taken out, and what it was; as they are, and None, where all are too short; as they
+    are where they count below `LEAST_BAND` alone: no sensor shows there.
 
     With the drives that they were cut from, variances are those of the rows as recorded, of which the runs are a
     low-passed version. For `sensor_noise` see `separate`.
     """
     if max(map(len, runs), default=0) * STEP < WINDOWS[-1]:
         return list(runs), None
+    highest = min(run.valid_below or PASSED for run in runs)
+    if highest < LEAST_BAND:
+        variance = float(np.concatenate([run.offset for run in runs]).var())
+        return list(runs), SensorModel(0.0, driver_variance=significant(variance, 7), driver_share=(1.0, 1.0))
     rows, rate = rows_of(runs, drives)
     found = separate(
         [run.offset for run in runs],
@@ -35,6 +44,7 @@ def driver_runs(
         sensor_noise=sensor_noise,
         half_widths=half_widths_of(runs, drives),
         one_camera=all(drive.mended is not None for drive in drives),
+        highest=highest,
     )
     return [replace(run, offset=found.driver_part(run.offset, STEP)) for run in runs], found.sensor
 

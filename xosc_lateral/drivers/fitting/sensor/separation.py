@@ -21,7 +21,7 @@ from xosc_lateral.base.normal import NORMAL_95
 from xosc_lateral.drivers.drives.filters import scale_frequencies
 from xosc_lateral.drivers.fitting.sensor.explanations import Explanation, explanations
 from xosc_lateral.drivers.fitting.sensor.likelihood import Colour, Known, Measured, Solution, solve
-from xosc_lateral.drivers.fitting.sensor.periodogram import Periodogram, periodogram, windows_of
+from xosc_lateral.drivers.fitting.sensor.periodogram import PASSED, Periodogram, periodogram, windows_of
 from xosc_lateral.drivers.fitting.sensor.quantisation import (
     COARSEST,
     quantisation_step,
@@ -87,6 +87,7 @@ def separate(
     sensor_noise: float | None = None,
     half_widths: Sequence[FloatArray] | None = None,
     one_camera: bool = False,
+    highest: float = PASSED,
 ) -> Separation:
     """Separate driver and sensor.
 
@@ -111,7 +112,8 @@ def separate(
     measured = list(rows) if rows is not None else list(runs)
     variance = _variance(measured, durations)
     frequency, windows = windows_of(runs, step)
-    data = periodogram(frequency, windows)
+    of_windows = partial(periodogram, frequency, highest=highest)
+    data = of_windows(windows)
     per_second = rate or sum(map(len, measured)) / (step * sum(map(len, runs)))
     grain = quantisation_step(np.concatenate(measured))
     if sensor_noise is not None and 0.0 < variance <= sensor_noise**2 - uniform_variance(grain):
@@ -137,7 +139,7 @@ def separate(
     plausible = [(one.solution, one.colour) for one in found if one.criterion < least.criterion + PLAUSIBLE]
     if colour.view is not None:
         plausible += [(solve(asked, one, best), one) for one in _other_views(colour, colour.view)]
-    interval = (0.0, 1.0) if too_coarse else _interval(frequency, windows, least, asked, plausible, share)
+    interval = (0.0, 1.0) if too_coarse else _interval(of_windows, windows, least, asked, plausible, share)
     sensor = _sensor(best, colour, grain, share * variance, (1.0 - share) * variance, interval)
     return Separation(best.knots, sensor, beside)
 
@@ -231,7 +233,7 @@ def _in_band(found: Solution, colour: Colour, data: Periodogram) -> float:
 
 
 def _interval(
-    frequency: FloatArray,
+    of_windows: Callable[[FloatArray], Periodogram],
     windows: FloatArray,
     taken: Explanation,
     measured: Measured,
@@ -247,7 +249,7 @@ def _interval(
     for block in blocks:
         others = np.setdiff1d(np.arange(len(windows)), block)
         if len(others):
-            part = periodogram(frequency, windows[others])
+            part = of_windows(windows[others])
             left_out.append(_in_band(solve(replaced(measured, data=part), colour, best), colour, part))
     error = np.sqrt((len(blocks) - 1) * np.var(left_out)) if len(left_out) > 1 else seen
     if colour.view is not None:

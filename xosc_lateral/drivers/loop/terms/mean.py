@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -14,7 +14,8 @@ from xosc_lateral.drivers.loop.candidates import shapes_of
 from xosc_lateral.drivers.loop.column_search import SearchedTerm
 from xosc_lateral.drivers.loop.columns import Column, read_column
 from xosc_lateral.drivers.loop.dictionary import beside
-from xosc_lateral.drivers.loop.model import Fitted, Stage, Term
+from xosc_lateral.drivers.loop.model import Description, Fitted, Stage, Term
+from xosc_lateral.drivers.loop.passage import passage_of
 from xosc_lateral.drivers.loop.refinement import (
     FINE_RESPONSES,
     LAG_STEPS,
@@ -26,7 +27,8 @@ from xosc_lateral.drivers.loop.refinement import (
 )
 from xosc_lateral.drivers.loop.terms.column import driving_range
 from xosc_lateral.drivers.loop.timeline import Coarse, coarse_mean
-from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect, Product, Proximity
+from xosc_lateral.drivers.model.effects import Acts, Angular, ColumnEffect, Effect, Product, Proximity
+from xosc_lateral.drivers.model.effects.shapes import SingleColumnEffect
 
 NEAR_S = 2.0  # Lags that differ from the estimate by up to this are compared. [s]
 # Scales that are compared, as shares of the estimate, 7 % apart: between two that refinement tries, 40 % apart, the
@@ -70,6 +72,18 @@ class MeanTerm(SearchedTerm):
     def reweighted(cls, fitted: Fitted, after: Fitted) -> Problem:
         """Whitened by what is left in `after`: an effect that is still in the offsets looks like memory."""
         return Problem(after.whitener, fitted.coarse.offset, fitted.columns)
+
+    def matches(self, other: Term) -> bool:
+        """Whatever its course over time."""
+        return isinstance(other, MeanTerm) and self.columns == other.columns
+
+    def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
+        """Change over the driving range; of one column also what the car does in a typical passage."""
+        described, effect = super().describe(fitted, effects, key), effects[0]
+        if not isinstance(effect, SingleColumnEffect) or isinstance(effect, Angular):
+            return described
+        share = described.size_error / max(abs(described.size_m), 1e-12)
+        return replace(described, passage=passage_of(fitted.coarse, effect, share))
 
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """From the joint fit; shrunk as if timing and shape were known, with errors for what is not."""

@@ -148,7 +148,7 @@ class TimeMeanTerm(_MeanByTime):
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """Penalised sizes."""
         part = fitted.mean_part(self)
-        sizes, errors = penalised(fitted.sizes[part], fitted.covariance[part, part])
+        sizes, errors = penalised_cosines(fitted.sizes[part], fitted.covariance[part, part])
         return (_smooth(fitted.coarse, location=tuple(sizes), location_errors=tuple(errors)),)
 
     def quantity(self, coarse: Coarse, effects: tuple[Effect, ...]) -> FloatArray:
@@ -227,13 +227,13 @@ class TimeSpreadTerm(Term):
         columns = half_cosines_of(coarse, self.order)
         if self.slow:
             sizes, errors = log_sizes(slow_squares(fitted), columns)
-            sizes, errors = penalised(sizes, np.diag(np.square(errors) * SLOW_S))  # neighbouring sums overlap
+            sizes, errors = penalised_cosines(sizes, np.diag(np.square(errors) * SLOW_S))  # neighbouring sums overlap
             fine = np.zeros(len(sizes))
         else:
             part = fitted.scale_part(self)
-            sizes, errors = penalised(fitted.log_sizes[part], fitted.log_covariance[part, part])
+            sizes, errors = penalised_cosines(fitted.log_sizes[part], fitted.log_covariance[part, part])
             fine, fine_errors = log_sizes(fine_squares(fitted), columns)
-            fine = penalised(fine, np.diag(np.square(fine_errors)))[0]
+            fine = penalised_cosines(fine, np.diag(np.square(fine_errors)))[0]
         return (_smooth(coarse, spread=tuple(sizes), spread_errors=tuple(errors), fine=tuple(fine)),)
 
     def quantity(self, coarse: Coarse, effects: tuple[Effect, ...]) -> FloatArray:
@@ -256,22 +256,27 @@ class TimeSpreadTerm(Term):
         return Description("spread by time", shape, factor, factor * error, f"spread by effect: {key}")
 
 
-def penalised(sizes: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Sizes of half cosines and their errors, shape (k,), given that rougher ones are smaller beforehand.
+def penalised_cosines(sizes: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Sizes of half cosines and their errors, shape (k,), given that rougher ones are smaller beforehand."""
+    found, known = penalised(sizes, covariance, np.diag(np.arange(1, len(sizes) + 1, dtype=np.float64) ** -4.0))
+    return found, np.sqrt(np.diag(known))
+
+
+def penalised(sizes: FloatArray, covariance: FloatArray, prior: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Sizes, shape (k,), given how they vary beforehand but for a scale, shape (k, k), and their covariance.
 
     The prior's scale is the one under which the sizes are likeliest (restricted maximum likelihood).
     """
-    shape = np.arange(1, len(sizes) + 1, dtype=np.float64) ** -4.0
-    largest = float(np.max(np.square(sizes) / shape, initial=1e-300))
-    best, found = -np.inf, np.zeros(len(sizes))
+    largest = float(np.max(np.square(sizes) / np.diag(prior), initial=1e-300))
+    best, found = -np.inf, np.zeros_like(prior)
     for scale in largest * np.geomspace(1e-6, 10.0, 60):
-        total = covariance + np.diag(scale * shape)
+        total = covariance + scale * prior
         sign, volume = np.linalg.slogdet(total)
         likelihood = -0.5 * float(sizes @ np.linalg.solve(total, sizes)) - 0.5 * volume if sign > 0 else -np.inf
         if likelihood > best:
-            best, found = likelihood, scale * shape
-    gain = np.linalg.solve(covariance + np.diag(found), np.diag(found)).T
-    return gain @ sizes, np.sqrt(np.diag(gain @ covariance))
+            best, found = likelihood, scale * prior
+    gain = np.linalg.solve(covariance + found, found).T
+    return gain @ sizes, gain @ covariance
 
 
 def _smooth(coarse: Coarse, **sizes: tuple[float, ...]) -> TimeSmooth:

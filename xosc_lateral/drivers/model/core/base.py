@@ -62,6 +62,9 @@ class CoreModel(Record, frozen=True, tag_field="kind", tag=kebab, eq=False):
     State: ClassVar[type]
     """Type of its streams' state."""
 
+    fine_scales_with_lane: ClassVar[bool] = True
+    """Whether its fine part is a share of the lane's width, or as large in any lane."""
+
     def __init_subclass__(cls, **settings: Any) -> None:
         super().__init_subclass__(**settings)
         cls.kind = kebab(cls.__name__)

@@ -59,9 +59,12 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
     response_range : tuple of (float, float)
         Lowest and highest response, per component, that the effect was fitted on; responses beyond are taken as these.
         Empty: no bounds. [unit of the quantity]
+    course : tuple of (float, float)
+        Further delay [s] and weight [-] of each of several shifts in time that the response is the sum of, where one
+        delay does not do: into a bend, through it and out. Empty: one of weight 1.
     """
 
-    later = ("between_drivers", "response_range", "response_order")
+    later = ("between_drivers", "response_range", "response_order", "course")
 
     words: ClassVar[str] = ""
     """For the report, fields of the effect in braces: "linear", "proximity (fades over {0.scale:.3g})" ..."""
@@ -75,6 +78,7 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
     between_drivers: tuple[float, ...] = ()
     response_range: tuple[tuple[float, float], ...] = msgspec.field(name="answer_range", default=())
     response_order: int = 1
+    course: tuple[tuple[float, float], ...] = ()
 
     def __post_init__(self) -> None:
         tuples = ("coefficients", "errors", "reference", "between_drivers")
@@ -98,6 +102,9 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
                 f"effect {self.kind}: between_drivers {self.between_drivers}, expected none or a number >= 0 for each "
                 "coefficient"
             )
+        set_once(self, course=tuple((float(late), float(weight)) for late, weight in self.course))
+        if not np.isfinite(np.asarray(self.course)).all():
+            raise DriverProfileError(f"effect {self.kind}: course {self.course} has a number that is not finite")
         ranges = tuple((float(low), float(high)) for low, high in self.response_range)
         set_once(self, response_range=ranges)
         if ranges and (
@@ -165,14 +172,16 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
 
     def response(self, step: float, context: Mapping[str, FloatArray]) -> FloatArray:
         """Driving quantity as the driver responds to it, shape (n, k), on a grid of the given step [s]."""
-        return respond(self.known(context), step, self.lag_s, self.response_s, order=self.response_order)
+        known, order = self.known(context), self.response_order
+        return respond(known, step, self.lag_s, self.response_s, order=order, course=self.course)
 
     def response_in_blocks(self, step: float, state: ResponseState | None = None, *, delay: int = 0) -> Response:
         """The response block by block, shape (n, k) each, from the start of a drive or from a state.
 
         `step` in [s], `delay` in steps: see `Response`.
         """
-        return Response(step, self.lag_s, self.response_s, state, order=self.response_order, delay=delay)
+        timing = {"order": self.response_order, "delay": delay}
+        return Response(step, self.lag_s, self.response_s, state, **timing, course=self.course)
 
     def strength(self, step: float, context: Mapping[str, FloatArray]) -> FloatArray | None:
         """[m] or natural logarithm of a factor, shape (n,); None when a column is missing."""

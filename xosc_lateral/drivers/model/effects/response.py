@@ -8,6 +8,9 @@ References
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from functools import reduce
+from operator import add
 
 import msgspec
 import numpy as np
@@ -32,6 +35,8 @@ class ResponseState(msgspec.Struct):
 class Response:
     """A shift in time, then equal first-order lags of gain 1 one after the other, of a quantity given block by block.
 
+    Or a weighted sum of shifts in place of the one: a course over time.
+
     Row i of the response is due once all rows of its preview were given; before the first row and, at the end,
     beyond the last one, the outermost row holds. The lag starts settled.
 
@@ -49,6 +54,8 @@ class Response:
         Count of first-order lags: after two, a jump is a bend without a corner.
     delay : int
         Rows that everything comes later by, for who doesn't know what lies ahead.
+    course : sequence of (float, float)
+        Further delay [s] and weight [-] of each shift; none: one of weight 1.
     """
 
     def __init__(
@@ -60,13 +67,15 @@ class Response:
         *,
         order: int = 1,
         delay: int = 0,
+        course: Sequence[tuple[float, float]] = (),
     ) -> None:
         self.state = ResponseState() if state is None else state
         self._order = order
-        whole, self._share = split_shift(lag_s / step)
-        self._whole = whole - delay
+        shifts = [(*split_shift((lag_s + late) / step), weight) for late, weight in course or [(0.0, 1.0)]]
+        self._shifts = [(whole - delay, share, weight) for whole, share, weight in shifts]
+        self._earliest = min(whole for whole, _, _ in self._shifts)
         self._keep = float(np.exp(-step / response_s)) if response_s > 0 else None
-        self.ahead = max(0, self._whole + (1 if self._share else 0))
+        self.ahead = max(0, *(whole + (1 if share else 0) for whole, share, _ in self._shifts))
         """Rows of preview."""
 
     def take(self, values: FloatArray) -> FloatArray:
@@ -93,21 +102,14 @@ class Response:
         else:
             response = self._lagged(self._shifted(state.held, state.given, until))
         state.given = until
-        done = min(until + self._whole, state.taken - 1) - (state.taken - len(state.held))
+        done = min(until + self._earliest, state.taken - 1) - (state.taken - len(state.held))
         if done > 0:
             state.held = state.held[done:]
         return response
 
     def _single(self, held: FloatArray, row: int) -> FloatArray:
         """One row of the response, by the operations of many, without their cost; shape (1, k)."""
-        at = row + self._whole
-        if at < 0:
-            value = held[0]
-        elif at >= self.state.taken - 1:
-            value = held[-1]
-        else:
-            at -= self.state.taken - len(held)
-            value = held[at] if not self._share else held[at] * (1.0 - self._share) + self._share * held[at + 1]
+        value = reduce(add, (weight * self._row(held, row + whole, share) for whole, share, weight in self._shifts))
         if self._keep is not None:
             settled = self._settled(value)
             for own in settled.reshape(self._order, -1):
@@ -115,20 +117,35 @@ class Response:
             self.state.settled = settled
         return np.asarray(value[None, :])
 
+    def _row(self, held: FloatArray, at: int, share: float) -> FloatArray:
+        """One row of the quantity, `share` of a step later than the row `at`, shape (k,)."""
+        if at < 0:
+            return np.asarray(held[0])
+        if at >= self.state.taken - 1:
+            return np.asarray(held[-1])
+        at -= self.state.taken - len(held)
+        return np.asarray(held[at] if not share else held[at] * (1.0 - share) + share * held[at + 1])
+
     def _shifted(self, held: FloatArray, first: int, until: int) -> FloatArray:
         """Rows `first` to `until` of the shifted quantity, as an array of its own."""
+        parts = (
+            (weight, self._rows(held, first + whole, until + whole, share)) for whole, share, weight in self._shifts
+        )
+        return np.asarray(reduce(add, (weight * rows for weight, rows in parts)))
+
+    def _rows(self, held: FloatArray, begin: int, end: int, share: float) -> FloatArray:
+        """Rows `begin` to `end` of the quantity, each `share` of a step later, as an array of its own."""
         last = self.state.taken - 1
-        begin, end = first + self._whole, until + self._whole  # rows of the quantity, apart from the share
         at = last + 1 - len(held)
-        result = np.empty((until - first, held.shape[1]))
+        result = np.empty((end - begin, held.shape[1]))
         before, behind = min(max(-begin, 0), len(result)), min(max(end - last, 0), len(result))
         inside = slice(before, len(result) - behind)
         low = slice(begin + before - at, end - behind - at)
         if inside.start < inside.stop:
             result[inside] = held[low]
-            if self._share:
-                result[inside] *= 1.0 - self._share
-                result[inside] += self._share * held[low.start + 1 : low.stop + 1]
+            if share:
+                result[inside] *= 1.0 - share
+                result[inside] += share * held[low.start + 1 : low.stop + 1]
         result[:before], result[len(result) - behind :] = held[:1], held[-1:]
         return result
 
@@ -149,12 +166,20 @@ class Response:
         return np.tile(value, self._order) if self.state.settled is None else np.array(self.state.settled)
 
 
-def respond(values: FloatArray, step: float, lag_s: float, response_s: float, *, order: int = 1) -> FloatArray:
+def respond(
+    values: FloatArray,
+    step: float,
+    lag_s: float,
+    response_s: float,
+    *,
+    order: int = 1,
+    course: Sequence[tuple[float, float]] = (),
+) -> FloatArray:
     """Response to a whole drive's finite values, even in time, shape (n,) or (n, k), in their unit; see `Response`."""
     values = np.asarray(values, dtype=np.float64)
     if not len(values):
         return values.copy()
-    response = Response(step, lag_s, response_s, order=order)
+    response = Response(step, lag_s, response_s, order=order, course=course)
     return response.finish(values.reshape(len(values), -1)).reshape(values.shape)
 
 

@@ -10,14 +10,17 @@ from xosc_lateral.files.openscenario.actions import GROUPING
 from xosc_lateral.files.openscenario.element import at_node, children_of, local_name
 from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.draft import Draft
+from xosc_lateral.world.scenario.controllers import named
 from xosc_lateral.world.scenario.place import Unsupported
 from xosc_lateral.world.scenario.private_actions import CONTROLLER, MOTION
+from xosc_lateral.world.scenario.under_test import assigned_controllers, controlled_entities
 
 _REPLACED_TAGS = {kind.__name__ for kind in MOTION + CONTROLLER}
 
 
 def remove_controllers(draft: Draft, converted: Collection[str]) -> None:
     """Take the controllers off entities that follow trajectories: they would drive them elsewhere."""
+    note_controllers(draft, converted)
     for entity in draft.scenario.entities:
         if entity.name not in converted or not entity.controllers:
             continue
@@ -26,9 +29,22 @@ def remove_controllers(draft: Draft, converted: Collection[str]) -> None:
             continue  # described in a catalog
         for owner in item.findall("{*}ObjectController"):
             item.remove(owner)
-        for one in entity.controllers:
-            reason = f"'{one.name}' of '{entity.name}', which follows a trajectory"
-            draft.removed.append(Unsupported("ObjectController", one.place, reason))
+
+
+def note_controllers(draft: Draft, converted: Collection[str]) -> None:
+    """Once for each entity: what drove it, and no longer does."""
+    driving, assigned = controlled_entities(draft.scenario), assigned_controllers(draft.scenario)
+    for entity in draft.scenario.entities:
+        if entity.name not in converted:
+            continue
+        names = ", ".join(dict.fromkeys(map(named, assigned[entity.name])))
+        if control := driving.get(entity.name):
+            reason = f"'{entity.name}' follows a trajectory: controller {control}; now as the default driver would"
+        elif names:
+            reason = f"'{entity.name}' follows a trajectory: controller {names}, which was never active"
+        else:
+            continue
+        draft.removed.append(Unsupported("ObjectController", entity.place, reason))
 
 
 def rewrite_init(draft: Draft, starts: Mapping[str, tuple[build.Pose, float] | None]) -> None:

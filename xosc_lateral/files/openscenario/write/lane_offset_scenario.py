@@ -237,7 +237,9 @@ class _Acts:
                 continue
             trigger = build.sub(act, "StopTrigger") if trigger is None else trigger
             group = build.sub(trigger, "ConditionGroup")
-            build.state_condition(group, item.kind, item.reference, "runningState", 0.0)
+            # A controller is given its domain at once, and some players' assignments run for ever.
+            state = "runningState" if item.steers is None else "startTransition"
+            build.state_condition(group, item.kind, item.reference, state, 0.0)
             build.state_condition(group, "act", name, "runningState", LOOKING)
 
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from msgspec import Struct
 
 from xosc_lateral.world.scenario import Action, Scenario
+from xosc_lateral.world.scenario.controllers import Domains, gives_lateral
 from xosc_lateral.world.scenario.dependence import actors_of
 from xosc_lateral.world.scenario.global_actions import AddEntityAction
 from xosc_lateral.world.scenario.private_actions import LATERAL, LONGITUDINAL, TeleportAction
@@ -27,6 +28,8 @@ class LateralAction(Struct, frozen=True):
         It may run more than once.
     adds : bool
         It adds the entity.
+    steers : bool, optional
+        It gives the lateral domain to a controller; False: it takes it back.
     """
 
     path: tuple[str, ...]
@@ -34,16 +37,20 @@ class LateralAction(Struct, frozen=True):
     reference: str
     repeats: bool = False
     adds: bool = False
+    steers: bool | None = None
 
 
 def lateral_actions(scenario: Scenario) -> dict[str, tuple[LateralAction, ...]]:
     """Lateral actions of events, by entity, in file order."""
     names = Counter(_names(scenario))
+    steered = {name for name, one in controlled_entities(scenario).items() if Domains.LATERAL in one.domains}
     by_entity: dict[str, dict[LateralAction, None]] = {}
     for path, actors, action, repeats, is_alone in _actions(scenario):
-        adds = isinstance(action.content, AddEntityAction)
-        if adds or isinstance(action.content, (*LATERAL, TeleportAction)):
-            found = LateralAction(path, *_reference(path, is_alone, names), repeats, adds)
+        adds, steers = isinstance(action.content, AddEntityAction), gives_lateral(action.content)
+        if steers is not None:
+            actors = tuple(actor for actor in actors if actor in steered)
+        if adds or steers is not None or isinstance(action.content, (*LATERAL, TeleportAction)):
+            found = LateralAction(path, *_reference(path, is_alone, names), repeats, adds, steers)
             for actor in (action.content.entity_ref,) if isinstance(action.content, AddEntityAction) else actors:
                 by_entity.setdefault(actor, {})[found] = None
     return {entity: tuple(actions) for entity, actions in by_entity.items()}
@@ -57,7 +64,7 @@ def changing_speed(scenario: Scenario) -> set[str]:
         if isinstance(action.content, LONGITUDINAL)
         for actor in actors
     }
-    return own | controlled_entities(scenario)
+    return own | controlled_entities(scenario).keys()
 
 
 def _actions(scenario: Scenario) -> Iterator[tuple[tuple[str, ...], tuple[str, ...], Action, bool, bool]]:

@@ -74,13 +74,11 @@ def dropped_reason(action: Action, scenario: Scenario) -> str | None:
     return None
 
 
-def note_dropped(draft: Draft, played: Iterable[PlayedAction], moving: Collection[str]) -> None:
+def note_dropped(draft: Draft, played: Iterable[PlayedAction]) -> None:
     """Name the actions that are neither motion nor kept, with reasons, each place once."""
     found: dict[tuple[Place, str | None], Unsupported] = {}
     for item in played:
         reason = dropped_reason(item.action, draft.scenario) if item.path != ("Init",) else None
-        if isinstance(item.action.content, CONTROLLER) and item.actor in moving:
-            reason = f"'{item.actor}' follows a trajectory"
         if reason is not None:
             place = item.action.place
             found[place, item.actor] = Unsupported(type(item.action.content).__name__, place, reason)

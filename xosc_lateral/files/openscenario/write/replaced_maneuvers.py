@@ -180,7 +180,7 @@ class ReplacedManeuvers:
             return
         remove_controllers(self._draft, self._moving)
         theirs = [played for played in self._draft.motion.actions if self._is_theirs(played)]
-        note_dropped(self._draft, theirs, self._moving)
+        note_dropped(self._draft, theirs)
         notes = [note for note in map(self._freeze, self._frozen) if note]
         self._draft.notes += dict.fromkeys(notes)
         rewrite_init(self._draft, {name: item.start for name, item in self._moving.items()})

@@ -84,7 +84,7 @@ def write_trajectory_scenario(
     alone = target.adapts(scenario) and draft.version < TRAILERS_SINCE
     pulled = set() if alone else pulled_entities(scenario, motion)
     moving = moving_entities(draft, {name: path for name, path in trajectories.items() if name not in pulled})
-    note_dropped(draft, motion.actions, moving)
+    note_dropped(draft, motion.actions)
     remove_controllers(draft, moving)
     for_carla = target.player is Player.CARLA
     rewrite_init(draft, {name: start_of(item) if for_carla else item.start for name, item in moving.items()})

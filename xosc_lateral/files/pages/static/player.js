@@ -74,7 +74,7 @@
 
   class Player {
     constructor(root) {
-      const scene = JSON.parse(document.getElementById("scene").textContent);
+      const scene = JSON.parse(root.nextElementSibling.textContent);
       this.root = root;
       this.vehicles = scene.entities.map((each) => new Vehicle(each, scene.step));
       this.lanes = scene.lanes.map((each) => shape(each, true));
@@ -83,7 +83,7 @@
       Object.assign(this, { stretch: 1, scale: 0, center: [0, 0], course: 0, playing: false, speed: 1, showGhosts: true, boxes: [] });
       this.across = scene.across;
       this.sideBySide = this.vehicles.some((each) => each.enriched);
-      clock.end = (scene.frames - 1) * scene.step;
+      clock.end = Math.max(clock.end, (scene.frames - 1) * scene.step);
       this.build();
       this.readColors();
       this.listen();

@@ -23,6 +23,7 @@ Importer: TypeAlias = "Callable[..., Imported | pd.DataFrame]"
 IMPORTERS = {
     "dlr-ht": "xosc_lateral.workflows.recordings.importers.dlr_ht:import_dlr_ht",
     "levelx": "xosc_lateral.workflows.recordings.importers.levelx:import_levelx",
+    "openacc": "xosc_lateral.workflows.recordings.importers.openacc:import_openacc",
     "mf4": "xosc_lateral.workflows.recordings.importers.mf4:import_mf4",
     "tracks": "xosc_lateral.workflows.recordings.importers.tracks:import_tracks",
     "table": "xosc_lateral.workflows.recordings.importers.foreign_table:import_table",

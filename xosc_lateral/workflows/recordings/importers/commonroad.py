@@ -18,12 +18,14 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
+from xosc_lateral.files.labels import file_labels
 from xosc_lateral.files.xml import read_xml
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
 from xosc_lateral.workflows.recordings.importers.table import Imported, guarded
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks, ground_speed, travel_heading
-from xosc_lateral.workflows.recordings.lane_shapes import LaneShape, curvature_along, place_in_shapes
-from xosc_lateral.workflows.recordings.placed import LaneGraph, import_each, import_placed
+from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
+from xosc_lateral.workflows.recordings.lane_shapes import LaneShape, curvature_along, lane_graph, place_in_shapes
+from xosc_lateral.workflows.recordings.placed import import_each, import_placed, require_lanes
 
 LICENCE = "that of the CommonRoad scenario and of the recording that it was made from"
 
@@ -37,13 +39,16 @@ def import_commonroad(
     Raises `FormatError` if commonroad-io is not installed, or a file is no CommonRoad scenario; `NotEnoughDataError` if
     nothing is left once lane changes are cut.
     """
-    return import_each(sources, lambda file: _read(file, settings), keep_cut=keep_cut)
+    files = [sources] if isinstance(sources, Path) else list(sources)
+    labels = dict(zip(files, file_labels(files), strict=True))
+    return import_each(files, lambda file: _read(file, labels[file], settings), keep_cut=keep_cut)
 
 
-def _read(path: Path, settings: CutSettings) -> Imported:
+def _read(path: Path, label: str, settings: CutSettings) -> Imported:
     scenario = _opened(path)
     graph, shapes = _graph(scenario)
-    tracks = place_in_shapes(_tracks(scenario, path), shapes, graph.left)
+    tracks = place_in_shapes(_tracks(scenario, path, label), shapes, graph.left)
+    require_lanes(tracks, "its lanelets", path)
     about = {"format": "commonroad", "version": str(getattr(scenario, "scenario_id", "unknown")), "licence": LICENCE}
     return import_placed(tracks, graph, settings, keep_cut=True, sources=[path], **about)
 
@@ -56,8 +61,7 @@ def _graph(scenario: Any) -> tuple[LaneGraph, list[_Lanelet]]:
     beside = [one.adj_left if one.adj_left_same_direction else None for one in lanelets.values()]
     left = np.array([numbers.get(name, -1) for name in beside], dtype=int)
     following = [[numbers[name] for name in one.successor if name in numbers] for one in lanelets.values()]
-    graph = LaneGraph(np.array([shape.length for shape in shapes]), left, following)
-    return graph, shapes
+    return lane_graph(shapes, left, following), shapes
 
 
 def _opened(path: Path) -> Any:
@@ -78,12 +82,14 @@ def _opened(path: Path) -> Any:
     return scenario
 
 
-def read_obstacles(path: Path) -> Tracks:
-    """All obstacles that move along a recorded trajectory. Raises `FormatError`, `NotEnoughDataError`."""
-    return _tracks(_opened(path), path)
+def read_obstacles(path: Path) -> tuple[Tracks, list[_Lanelet], LaneGraph]:
+    """All obstacles that move along a recorded trajectory, and lanes. Raises `FormatError`, `NotEnoughDataError`."""
+    scenario = _opened(path)
+    graph, shapes = _graph(scenario)
+    return _tracks(scenario, path, path.stem), shapes, graph
 
 
-def _tracks(scenario: Any, path: Path) -> Tracks:
+def _tracks(scenario: Any, path: Path, label: str) -> Tracks:
     names: list[str] = []
     rows: list[tuple[float, ...]] = []
     lengths: list[float] = []
@@ -97,7 +103,7 @@ def _tracks(scenario: Any, path: Path) -> Tracks:
             if position.shape == (2,):
                 speed = getattr(state, "velocity", np.nan)
                 rows.append((len(names), state.time_step, *position, getattr(state, "orientation", np.nan), speed))
-        names.append(f"{path.stem}:{obstacle.obstacle_id}")
+        names.append(f"{label}:{obstacle.obstacle_id}")
         lengths.append(float(getattr(obstacle.obstacle_shape, "length", 4.6)))
         kinds.append(str(obstacle.obstacle_type.value).lower())
     if len(rows) < 2:
@@ -106,11 +112,10 @@ def _tracks(scenario: Any, path: Path) -> Tracks:
     values = values[np.lexsort((values[:, 1], values[:, 0]))]
     values = values[np.r_[True, (np.diff(values[:, :2], axis=0) != 0).any(axis=1)]]
     vehicle, step = values[:, 0].astype(np.int64), float(scenario.dt)
-    x, y = values[:, 2], values[:, 3]
-    heading = np.where(np.isfinite(values[:, 4]), values[:, 4], travel_heading(x, y, vehicle, step))
-    speed = np.where(np.isfinite(values[:, 5]), values[:, 5], ground_speed(x, y, vehicle, step))
+    x, y, time = values[:, 2], values[:, 3], step * values[:, 1]
+    heading = np.where(np.isfinite(values[:, 4]), values[:, 4], travel_heading(x, y, vehicle, time, step))
+    speed = np.where(np.isfinite(values[:, 5]), values[:, 5], ground_speed(x, y, vehicle, time, step))
     length, kind = np.array(lengths)[vehicle], np.array(kinds)[vehicle]
-    time = step * values[:, 1]
     return Tracks(tuple(names), vehicle, time, step, x, y, heading, np.abs(speed), length, kind)
 
 
@@ -118,9 +123,9 @@ class _Lanelet(LaneShape):
     """A lane whose bounds have as many points each, which face each other."""
 
     def __init__(self, lanelet: Any) -> None:
-        self.left = np.asarray(lanelet.left_vertices, dtype=np.float64)[:, :2]
-        self.right = np.asarray(lanelet.right_vertices, dtype=np.float64)[:, :2]
-        super().__init__(0.5 * (self.left + self.right), [self.left, self.right])
+        left = np.asarray(lanelet.left_vertices, dtype=np.float64)[:, :2]
+        right = np.asarray(lanelet.right_vertices, dtype=np.float64)[:, :2]
+        super().__init__(0.5 * (left + right), [left, right])
 
     def place(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, ...]:
         """See `LaneShape`."""

@@ -1,123 +1,175 @@
 """SUMO's FCD output ("floating car data"): where every vehicle of a run with the sublane model was.
 
-Lanes are SUMO's, so is `posLat`, the place in them: positive to the left. Widths and counts of lanes come from the net,
-where it is given; else lanes are 3.2 m wide, as SUMO has them.
+Lanes are SUMO's, so is `posLat`, the place in them; in left-hand networks SUMO counts both from the left kerb, and they
+are turned here. Widths and counts of lanes, and how edges hang together, come from the net, where it is given; else
+lanes are 3.2 m wide, as SUMO has them, and nobody is seen on another edge.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import NamedTuple
 
 import numpy as np
 
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.workflows.recordings.importers.table import guarded
-from xosc_lateral.workflows.recordings.neighbours import find_neighbours
+from xosc_lateral.files.clock import require_row_step
+from xosc_lateral.files.sumo import (
+    TRUCKS,
+    WIDTH,
+    SumoLane,
+    SumoNet,
+    elements,
+    number_of,
+    read_sumo_net,
+    read_vehicle_types,
+    usual_length,
+    wrong_element,
+)
+from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
+from xosc_lateral.workflows.recordings.gate import is_right_to_left
+from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
+from xosc_lateral.workflows.recordings.lane_graph import LaneGraph, neighbour_columns
 
-if TYPE_CHECKING:
-    from lxml import etree
+LICENCE = "that of the simulation"
 
-WIDTH = 3.2
-"""Of SUMO's lanes. [m]"""
 
-LENGTHS = {False: 5.0, True: 7.1}
-"""Of SUMO's passenger cars and trucks; FCD output has no lengths. [m]"""
-
-_TRUCKS = ("truck", "trailer", "bus", "coach", "lkw")
+class _Row(NamedTuple):
+    time: float
+    name: str
+    lane: str
+    pos: float
+    side: float
+    speed: float
+    kind: str
+    x: float
+    y: float
+    angle: float
 
 
 @guarded
-def import_fcd(source: Path, *, net: str | Path | None = None, lane_width: float = WIDTH) -> pd.DataFrame:
-    """A drive for every vehicle of what ``--fcd-output`` wrote; it is a truck when its type's name says so.
+def import_fcd(
+    source: Path, *, net: str | Path | None = None, types: str | Path | None = None, lane_width: float = WIDTH
+) -> Imported:
+    """A drive for every vehicle of what ``--fcd-output`` wrote; it is a truck when its type's name or class says so.
 
-    Raises `FormatError`, `NotEnoughDataError`: not such a file; one without `posLat`; one without vehicles.
+    Raises `FormatError`, `NotEnoughDataError`: not such a file; one without `posLat`; one without vehicles; one whose
+    positions are not those of the network's side of the road.
 
-    `net`: the road network, ``.net.xml``, for widths and counts of lanes. `lane_width`: without it. [m]
+    `net`: the road network, ``.net.xml``, for widths and counts of lanes, and for who is on the next edge. `types`:
+    file with the vehicle types, for lengths. `lane_width`: without a network. [m]
     """
-    widths = {} if net is None else _lanes(Path(net))
-    rows = list(_rows(source))
+    known = None if net is None else read_sumo_net(Path(net))
+    vehicle_types = read_vehicle_types(None if types is None else Path(types))
+    rows = [row for row in _rows(source) if known is not None or not row.lane.startswith(":")]
     if not rows:
         raise NotEnoughDataError(f"{source}: no vehicle")
-    time, name, lane, pos, offset, speed, kind = zip(*rows, strict=True)
-    edge, index = zip(*(one.rpartition("_")[::2] for one in lane), strict=True)
-    table = pd.DataFrame({"drive": name, "time": time, "offset": offset, "speed": speed})
-    table["lane_width"] = [widths.get(one, lane_width) for one in lane]
-    table["lane_index"] = np.array(index, dtype=np.int64)
-    top: dict[str, int] = {}
-    for one in widths or lane:
-        road, _, number = one.rpartition("_")
-        top[road] = max(top.get(road, 0), int(number) + 1)
-    table["lane_count"] = [top[one] for one in edge]
-    table["is_truck"] = [float(any(word in one.lower() for word in _TRUCKS)) for one in kind]
-    instant = pd.factorize(pd.Series(time).astype(str) + "\0" + pd.Series(edge))[0]
-    truck = table["is_truck"].to_numpy() > 0
-    length = np.where(truck, LENGTHS[True], LENGTHS[False])
-    number = table["lane_index"].to_numpy()
-    around = find_neighbours(
-        instant, number, np.array(pos) - 0.5 * length, length, truck,
-        lane_on_left=number + 1 < table["lane_count"].to_numpy(), lane_on_right=number > 0,
-    )  # fmt: skip
-    table = table.assign(**around)
-    return table.sort_values(["drive", "time"], kind="stable").reset_index(drop=True)
+    rows.sort(key=lambda row: (row.name, row.time))
+    used = _net_of(rows, lane_width) if known is None else known
+    if strange := next((row.lane for row in rows if row.lane not in used.lanes), None):
+        raise FormatError(f"lane {strange!r} is not in {net}", path=source)
+    lane = [used.lanes[row.lane] for row in rows]
+    left_hand = _left_hand(rows, lane, None if known is None else known.left_hand, source)
+    table = _table(rows, lane, used, vehicle_types, left_hand, source)
+    notes = ["left-hand traffic: lanes and sides are counted from the left kerb, and turned"] if left_hand else []
+    if known is None:
+        notes.append("without --net: lanes without a width, and nobody is seen on another edge")
+    sources = [source, *(Path(one) for one in (net, types) if one is not None)]
+    settings = {"lane_width": lane_width if net is None else None}
+    about = {"format": "fcd", "licence": LICENCE, "settings": settings, "notes": notes}
+    step = float(np.median(np.diff(np.unique(table["time"])))) if table["time"].nunique() > 1 else 0.0
+    return finished(table, keep_cut=False, sources=sources, step=step, **about)
 
 
-def _rows(source: Path) -> Iterator[tuple[float, str, str, float, float, float, str]]:
+def _table(
+    rows: Sequence[_Row],
+    lane: Sequence[SumoLane],
+    net: SumoNet,
+    types: Mapping[str, tuple[float, str]],
+    left_hand: bool,
+    source: Path,
+) -> pd.DataFrame:
+    """The drive table with its column `state`."""
+    vehicle, names = pd.factorize(np.array([row.name for row in rows], dtype=object))
+    time, pos, side, speed = (np.array([row[k] for row in rows]) for k in (0, 3, 4, 5))
+    kinds = [types.get(row.kind.partition("@")[0], (usual_length(row.kind), row.kind)) for row in rows]
+    length = np.array([size for size, _ in kinds])
+    is_truck = np.array([any(word in kind.lower() for word in TRUCKS) for _, kind in kinds])
+    numbers, graph, index, count = _graph(net, left_hand)
+    piece = np.array([numbers.get(row.lane, -1) for row in rows])
+    passed = np.diff(time)[np.diff(vehicle) == 0]
+    step = float(np.median(passed)) if len(passed) else 1.0
+    require_row_step(step, source)
+    near = neighbour_columns(graph, piece, pos - 0.5 * length, time, vehicle, step, speed, length, is_truck)
+    is_inner = [row.lane.startswith(":") for row in rows]
+    return pd.DataFrame({
+        "drive": names[vehicle], "time": time, "offset": (-side if left_hand else side) + 0.0, "speed": speed,
+        "lane_width": [one.width for one in lane], "lane_index": index[piece], "lane_count": count[piece],
+        "is_truck": is_truck.astype(np.float64), **near,
+        "state": np.where(is_inner, "junction", np.where(piece < 0, "no lane", KEPT_ROWS)),
+    })  # fmt: skip
+
+
+def _graph(net: SumoNet, left_hand: bool) -> tuple[dict[str, int], LaneGraph, np.ndarray, np.ndarray]:
+    """Numbers of the driving lanes, how they hang together, and of each its index from the right and their count."""
+    names = [name for name, lane in net.lanes.items() if lane.is_driving]
+    numbers = {name: k for k, name in enumerate(names)}
+    edges: dict[str, list[str]] = {}
+    for name in sorted(names, key=lambda name: net.lanes[name].index, reverse=left_hand):
+        edges.setdefault(net.lanes[name].edge, []).append(name)
+    left, index, count = (np.full(len(names), value) for value in (-1, 0, 1))
+    for own in edges.values():
+        for k, name in enumerate(own):
+            index[numbers[name]], count[numbers[name]] = k, len(own)
+            left[numbers[name]] = numbers[own[k + 1]] if k + 1 < len(own) else -1
+    following = [[numbers[one] for one in net.following.get(name, []) if one in numbers] for name in names]
+    length = np.array([net.lanes[name].length for name in names])
+    return numbers, LaneGraph(length, left, following), index, count
+
+
+def _net_of(rows: Sequence[_Row], width: float) -> SumoNet:
+    """What the output alone says of the lanes: those in which somebody was, and all on their right."""
+    net, top, end = SumoNet(), dict[str, int](), dict[str, float]()
+    for row in rows:
+        edge, _, index = row.lane.rpartition("_")
+        top[edge], end[edge] = max(top.get(edge, 0), int(index)), max(end.get(edge, 0.0), row.pos)
+    for edge, last in top.items():
+        net.lanes |= {f"{edge}_{k}": SumoLane(edge, k, width, end[edge], True) for k in range(last + 1)}
+    return net
+
+
+def _left_hand(rows: Sequence[_Row], lane: Sequence[SumoLane], said: bool | None, source: Path) -> bool:
+    """Whether sides are counted from the left kerb: as the network says, which positions must not contradict."""
+    across = np.array([one.index * one.width + row.side for one, row in zip(lane, rows, strict=True)])
+    x, y, angle = (np.array([row[k] for row in rows]) for k in (7, 8, 9))
+    seen = is_right_to_left(x, y, np.radians(90.0 - angle), across, pd.factorize(np.array([e.edge for e in lane]))[0])
+    if said is not None and seen is not None and seen is said:
+        hands = ("right", "left") if said else ("left", "right")
+        what = f"positions are of {hands[0]}-hand traffic, the network is of {hands[1]}-hand traffic: is it this run's?"
+        raise FormatError(what, path=source)
+    return bool(said) if said is not None else seen is False
+
+
+def _rows(source: Path) -> Iterator[_Row]:
     time, found = float("nan"), False
-    for event, element in _elements(source, ("timestep", "vehicle")):
+    for event, element in elements(source, ("timestep", "vehicle")):
         if element.tag == "timestep":
             if event == "start":
-                time, found = _number(element, "time", source), True
+                time, found = number_of(element, "time", source), True
             else:
                 element.clear()
-        elif event == "start" and not element.get("lane", "").startswith(":"):  # inside a junction
+        elif event == "start":
             if not found:
-                raise _wrong("a vehicle outside a timestep", element, source)
+                raise wrong_element("a vehicle outside a timestep", element, source)
             if element.get("posLat") is None:
                 what = "no posLat: it is written with the sublane model and --fcd-output.attributes all"
-                raise _wrong(what, element, source)
+                raise wrong_element(what, element, source)
             if element.get("lane") is None or element.get("id") is None:
-                raise _wrong("no id or lane", element, source)
-            place, side, speed = (_number(element, name, source) for name in ("pos", "posLat", "speed"))
-            yield time, str(element.get("id")), str(element.get("lane")), place, side, speed, element.get("type", "")
-
-
-def _lanes(net: Path) -> dict[str, float]:
-    """Widths of a net's lanes, by their ids. [m]"""
-    found = {}
-    for event, element in _elements(net, ("lane",)):
-        if event == "start" and element.get("id") and not str(element.get("id")).startswith(":"):
-            found[str(element.get("id"))] = WIDTH if element.get("width") is None else _number(element, "width", net)
-    if not found:
-        raise FormatError("no lane: not a SUMO network", path=net)
-    return found
-
-
-def _elements(path: Path, tags: tuple[str, ...]) -> Iterator[tuple[str, etree._Element]]:
-    from lxml import etree
-
-    try:
-        with path.open("rb") as file:
-            yield from etree.iterparse(
-                file, events=("start", "end"), tag=tags, resolve_entities=False, no_network=True, load_dtd=False
-            )
-    except etree.XMLSyntaxError as error:
-        raise FormatError(f"not XML: {error.msg}", path=path, line=error.lineno) from error
-
-
-def _wrong(what: str, element: etree._Element, path: Path) -> FormatError:
-    line: Any = element.sourceline  # int or None; its stubs say otherwise
-    return FormatError(what, path=path, line=line, element=str(element.tag))
-
-
-def _number(element: etree._Element, name: str, path: Path) -> float:
-    text = element.get(name, "")
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not np.isfinite(value):
-        raise _wrong(f"{name}={text!r}", element, path)
-    return value
+                raise wrong_element("no id or lane", element, source)
+            numbers = (number_of(element, name, source) for name in ("pos", "posLat", "speed"))
+            seen = (float(element.get(name, "nan")) for name in ("x", "y", "angle"))
+            name, lane = str(element.get("id")), str(element.get("lane"))
+            pos, side, speed = numbers
+            yield _Row(time, name, lane, pos, side, speed, element.get("type", ""), *seen)

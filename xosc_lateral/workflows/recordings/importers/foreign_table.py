@@ -13,6 +13,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.drives import drives_of_table, translated
+from xosc_lateral.files.labels import file_labels, labels_apart
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping, factor, spelled
 from xosc_lateral.files.tables import comma_numbers, read_table, text_encoding
 
@@ -58,13 +59,16 @@ def import_table(sources: Path | Sequence[Path], *, mapping: MappingLike | None 
     `files.drives.read_drives`: what is written here can be read.
     """
     known = as_mapping(mapping)
+    files = [sources] if isinstance(sources, Path) else list(sources)
     made = []
-    for path in [sources] if isinstance(sources, Path) else sources:
+    for path, label in zip(files, file_labels(files), strict=True):
         table = translated(read_table(path, known)[0], known, path)
         drives_of_table(table, TableMapping(), path)
         if "drive" not in table:
-            table.insert(0, "drive", path.name.partition(".")[0])
+            table.insert(0, "drive", label)
         made.append(table)
+    for table, names in zip(made, labels_apart(files, [table["drive"].unique() for table in made]), strict=True):
+        table["drive"] = table["drive"].map(names)
     return pd.concat(made, ignore_index=True)
 
 

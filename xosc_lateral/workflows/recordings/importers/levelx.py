@@ -162,7 +162,7 @@ def _from_highd(
         "lane_count": count.astype(np.int64),
         **near,
     }
-    rows, reasons = Rows(vehicle, frame, lane_number, step), {"no lane": lane_number < 0}
+    rows, reasons = Rows(vehicle, frame * step, lane_number, step), {"no lane": lane_number < 0}
     return cut_table(columns, rows, settings, sideways=left, reasons=reasons, kind=kind, is_truck=is_truck)
 
 
@@ -193,7 +193,7 @@ def _from_exid(
         "acceleration": tracks["lonAcceleration"].to_numpy(),
         **_exid_neighbours(tracks, is_truck),
     }
-    rows, reasons = Rows(vehicle, frame, lane, step), {"no vehicle": ~np.isin(kind, VEHICLES), "no lane": ~known}
+    rows, reasons = Rows(vehicle, frame * step, lane, step), {"no vehicle": ~np.isin(kind, VEHICLES), "no lane": ~known}
     return cut_table(columns, rows, settings, sideways=lateral, reasons=reasons, kind=kind, is_truck=is_truck)
 
 

@@ -5,8 +5,10 @@ No two cars name their signals alike, so the reader asks for a channel map: ``NA
 `lane_width`, or `distance_left` and `distance_right`; every other name becomes a context column. A unit in the map
 counts; else the one that the file gives with the channel does.
 
-Quantities are interpolated linearly between a channel's own stamps. Whole numbers and booleans without a physical unit
-(lane indices, flags) and words (``WET``, ``DRY``) take the nearest sample; words become categories.
+What is not continuous is found on a channel's own samples: the jump of a lane change, gaps, and where a channel begins
+and ends. Between these, quantities are interpolated to an even step, through a low-pass where they have more samples
+than that; whole numbers and booleans without a physical unit (lane indices, flags) and words (``WET``, ``DRY``) take
+the nearest sample; words become categories.
 """
 
 from __future__ import annotations
@@ -15,12 +17,13 @@ import gc
 import io
 import sys
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from difflib import get_close_matches
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +33,12 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.limits import CLOCK_ROWS, TIME
 from xosc_lateral.base.segment import CONTEXT_UNITS
+from xosc_lateral.drivers.drives.cuts import JUMP, MAX_GAP
+from xosc_lateral.drivers.drives.resampling import average, resample
+from xosc_lateral.files.drives import from_middle
+from xosc_lateral.files.labels import file_labels
 from xosc_lateral.files.mapping import ColumnSource, MappingLike, as_mapping, factor, is_measured, parse_map, spelled
+from xosc_lateral.files.rows import refuse_marker
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import LONGEST_MESSAGE, foreign_errors
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
@@ -44,8 +52,15 @@ _NO_MDF = "not an MDF file that asammdf can read"
 LISTED = 40
 """Channel names in a message, at most."""
 
-STAYS_AWAY = 1.0
-"""Messages of the position that are further apart leave a gap. [s]"""
+MAX_CHANNEL_DISTANCE = 0.2
+"""Median distance of two channels of one name, as a share of the standard deviation, that is not one of rates. [-]"""
+
+SPARSE_STEPS = 2.5
+"""A channel of few samples has a gap where more than two in a row are missing: of its own median steps. [-]"""
+
+
+Resampler: TypeAlias = "Callable[[FloatArray, FloatArray, FloatArray], FloatArray]"
+"""Times, values and an even grid into values there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,14 +71,39 @@ class Channel:
     values: NDArray[Any]  # numbers in the unit of the standard table, or words, shape (n,)
     unit: str  # that they were read in; empty where neither map nor file names one
     is_stepwise: bool  # whether the nearest sample counts
+    notes: tuple[str, ...] = ()  # what a user has to know
 
-    def at(self, time: FloatArray) -> NDArray[Any]:
-        """Values at these times. [s]"""
+    def breaks(self, jump: float = np.inf) -> NDArray[np.bool_]:
+        """Steps from sample to sample across which nothing is known, shape (n - 1,): gaps, and jumps by more than so
+        much."""
+        step = np.diff(self.time)
+        broken = step > max(MAX_GAP, SPARSE_STEPS * float(np.median(step))) + 1e-9
         if not self.is_stepwise:
-            return np.asarray(np.interp(time, self.time, self.values))
+            broken |= np.abs(np.diff(self.values)) > jump
+        return np.asarray(broken)
+
+    def at(self, time: FloatArray, broken: NDArray[np.bool_], low_pass: Resampler) -> NDArray[Any]:
+        """Values at these times, evenly spaced [s]; NaN (None of words) before the first and past the last sample, and
+        within steps that are broken. A sample stands for its step, so that the last one is not the end."""
         after = np.clip(np.searchsorted(self.time, time), 1, len(self.time) - 1)
-        before = after - 1
-        return np.asarray(self.values[np.where(time - self.time[before] <= self.time[after] - time, before, after)])
+        held = min(float(np.median(np.diff(self.time))), MAX_GAP) + 1e-9
+        known = (time >= self.time[0] - held) & (time <= self.time[-1] + held)
+        if self.is_stepwise:  # these are sent where they change: no gap ends them
+            nearest = np.where(time - self.time[after - 1] <= self.time[after] - time, after - 1, after)
+            values = self.values[nearest].astype(object if self.values.dtype == object else np.float64)
+            values[~known] = None if values.dtype == object else np.nan
+            return values
+        found = np.full(len(time), np.nan)
+        edges = [0, *(np.flatnonzero(broken) + 1).tolist(), len(self.time)]
+        for first, end in pairwise(edges):
+            own = slice(first, end)
+            before, past = (1e-9 if edge in edges[1:-1] else held for edge in (first, end))
+            rows = np.flatnonzero((time >= self.time[first] - before) & (time <= self.time[end - 1] + past))
+            if len(rows) and end - first > 1:
+                found[rows] = low_pass(self.time[own], self.values[own], time[rows])
+            elif len(rows):
+                found[rows] = self.values[first]
+        return found
 
 
 @guarded
@@ -80,24 +120,31 @@ def import_mf4(
     in it, or the unit in the file measures something else.
 
     `sources`: each log is a drive of its own, called after its file. `channels`: words ``NAME=CHANNEL[:UNIT]``.
-    `mapping`: more of them, saved. `step`: of the table [s]. Messages that stay away for longer than a second leave
-    a gap.
+    `mapping`: more of them, saved. `step`: of the table [s]. Messages that stay away for longer than `fit` bridges
+    leave a gap.
     """
     files = [sources] if isinstance(sources, Path) else list(sources)
-    sources_of = {**as_mapping(mapping).columns, **parse_map(channels)}
+    saved = as_mapping(mapping)
+    sources_of = {**saved.columns, **parse_map(channels)}
     if not any(set(pair) <= sources_of.keys() for pair in POSITIONS):
         raise FormatError(f"{channels_wanted(files[0])}; mapped: {', '.join(sources_of) or 'nothing'}", path=files[0])
     read = {}
     for file in files:
         with _opened(file) as log:
-            read[file] = {name: _read_channel(log, name, wanted, file) for name, wanted in sources_of.items()}
-    named = zip(read.items(), _drive_names(files), strict=True)
-    table = pd.concat([_table(signals, file, name, step) for (file, signals), name in named], ignore_index=True)
+            read[file] = {
+                name: _read_channel(log, name, wanted, file, saved.missing) for name, wanted in sources_of.items()
+            }
+    named = zip(read.items(), file_labels(files), strict=True)
+    tables, notes = zip(*(_table(signals, file, name, step) for (file, signals), name in named), strict=True)
+    table = pd.concat([from_middle(own, saved, file) for own, file in zip(tables, files, strict=True)])
+    table = table.reset_index(drop=True)
     # column -> unit that it was read in; several where logs differ
     every = {name: {signals[name].unit for signals in read.values()} for name in sources_of}
     units = {name: " | ".join(sorted(found)) for name, found in every.items()}
     settings = {"step": step, "channels": list(channels), "units": units}
-    about = {"format": "mf4", "licence": LICENCE, "settings": settings, "step": step}
+    said = [note for signals in read.values() for channel in signals.values() for note in channel.notes]
+    every_note = tuple(dict.fromkeys([*said, *(note for own in notes for note in own)]))
+    about = {"format": "mf4", "licence": LICENCE, "settings": settings, "step": step, "notes": every_note}
     return finished(table, keep_cut=False, sources=files, **about)
 
 
@@ -120,14 +167,6 @@ def _names(log: Any) -> list[str]:
     # Every group's time base is a channel as well; names such as CAN1.Speed repeat others with their bus.
     masters = {log.groups[group].channels[index].name for group, index in log.masters_db.items()}
     return sorted(set(log.channels_db) - masters)
-
-
-def _drive_names(files: Sequence[Path]) -> list[str]:
-    """Stems, with the folder's name before those that occur twice."""
-    stems = [file.stem for file in files]
-    if twice := [file for file in files if files.count(file) > 1]:
-        raise FormatError("the log is named twice", path=twice[0])
-    return [file.stem if stems.count(file.stem) == 1 else str(file.with_suffix("")) for file in files]
 
 
 @contextmanager
@@ -162,15 +201,19 @@ def _stated_unit(error: Exception) -> str:
     return reason
 
 
-def _read_channel(log: Any, name: str, wanted: ColumnSource, source: Path) -> Channel:
+def _read_channel(
+    log: Any, name: str, wanted: ColumnSource, source: Path, missing: Sequence[float | str] | None
+) -> Channel:
     def wrong(what: str) -> FormatError:
         return FormatError(f"channel {wanted.column}{what}", path=source, element=name)
 
-    places = log.channels_db.get(wanted.column)
+    channel, at, number = wanted.column.rpartition("@")
+    named, only = (channel, number) if at and number.isdigit() else (wanted.column, "")
+    places = [place for place in log.channels_db.get(named, ()) if only in ("", str(place[0]))]
     if not places:
-        raise FormatError(f"no channel {wanted.column}{_alike(log, wanted.column)}", path=source, element=name)
-    # The same channel may lie in several groups (one per bus): the one with the most samples counts.
+        raise FormatError(f"no channel {wanted.column}{_alike(log, named)}", path=source, element=name)
     signals = [log.get(group=group, index=index) for group, index in places]
+    notes = _of_one_name(signals, [group for group, _ in places], name, named, wrong)
     signal = max(signals, key=lambda one: len(one.samples))
     samples, stamps = signal.samples, np.asarray(signal.timestamps, dtype=np.float64)
     kind = samples.dtype.kind
@@ -187,15 +230,44 @@ def _read_channel(log: Any, name: str, wanted: ColumnSource, source: Path) -> Ch
         except ValueError as error:
             more = f"name the unit with --map {name}={wanted.column}:UNIT"
             raise wrong(f" is in {str(signal.unit or '')!r}: {error}; {more}") from error
-        values = np.asarray(samples, dtype=np.float64) * by
+        raw = np.asarray(samples, dtype=np.float64)
+        if missing is None:
+            refuse_marker(raw, name, source)
+        values = np.where(np.isin(raw, [one for one in missing or () if not isinstance(one, str)]), np.nan, raw) * by
         if len(stamps) != len(values) or np.abs(stamps).max(initial=0.0) > TIME.value or (np.diff(stamps) < 0).any():
             raise wrong(f": times that do not increase, or are beyond {TIME}")
-        finite = np.isfinite(values) & np.isfinite(stamps)
+        finite = np.isfinite(values) & np.isfinite(stamps) & np.r_[True, np.diff(stamps) > 0.0]
         stepwise = kind in "iub" and not _is_quantity(name, unit)
-        found = Channel(stamps[finite], values[finite], unit, stepwise)
+        if not unit and _is_quantity(name, ""):
+            notes = [*notes, f"{name}: channel {wanted.column} has no unit, {_standard_unit(name)} is taken"]
+        found = Channel(stamps[finite], values[finite], unit, stepwise, tuple(notes))
     if len(found.values) < 2:
         raise wrong(f" has {len(found.values)} values; two are needed")
     return found
+
+
+def _of_one_name(
+    signals: Sequence[Any], groups: Sequence[int], name: str, channel: str, wrong: Callable[[str], FormatError]
+) -> list[str]:
+    """What to say of channels of one name in several groups; refuse those that contradict each other."""
+    known = [one for one in signals if len(one.samples)]
+    if len(known) < 2:
+        return []
+    there = ", ".join(f"{channel}@{group}" for group in groups)
+    if all(one.samples.dtype.kind in "fiub" and one.samples.ndim == 1 for one in known):
+        first = max(known, key=lambda one: len(one.samples))
+        spread = max(float(np.std(first.samples.astype(np.float64))), 1e-9)
+        for one in known:
+            both = (one.timestamps >= first.timestamps[0]) & (one.timestamps <= first.timestamps[-1])
+            other = np.interp(one.timestamps[both], first.timestamps, first.samples.astype(np.float64))
+            apart = np.abs(one.samples[both].astype(np.float64) - other)
+            if both.any() and float(np.median(apart)) > MAX_CHANNEL_DISTANCE * spread:
+                raise wrong(f" is in several groups, which differ: name one of {there}")
+    return [f"{name}: channel {channel} is in several groups ({there}): the one with most samples is taken"]
+
+
+def _standard_unit(name: str) -> str:
+    return CONTEXT_UNITS.get(name, "m")
 
 
 def _alike(log: Any, wanted: str) -> str:
@@ -223,7 +295,8 @@ def _is_quantity(name: str, unit: str) -> bool:
     return name in known or CONTEXT_UNITS.get(name, "-") != "-" or is_measured(spelled(unit.lstrip("-")) or "")
 
 
-def _table(signals: dict[str, Channel], source: Path, drive: str, step: float) -> pd.DataFrame:
+def _table(signals: dict[str, Channel], source: Path, drive: str, step: float) -> tuple[pd.DataFrame, list[str]]:
+    """Rows at an even step with their `state`, and what a user has to know."""
     position = [name for pair in POSITIONS for name in pair if name in signals]
     start = max(float(signals[name].time[0]) for name in position)
     end = min(float(signals[name].time[-1]) for name in position)
@@ -232,11 +305,28 @@ def _table(signals: dict[str, Channel], source: Path, drive: str, step: float) -
     if (rows := (end - start) / step) > CLOCK_ROWS.value:
         raise FormatError(CLOCK_ROWS.refusal(rows), path=source)
     time = np.asarray(start + step * np.arange(int((end - start) / step) + 1), dtype=np.float64)
-    columns = {name: channel.at(time) for name, channel in signals.items()}
-    missing = np.zeros(len(time), dtype=np.bool_)  # instants between two messages that are too far apart
-    for name in position:
-        stamps = signals[name].time
-        after = np.clip(np.searchsorted(stamps, time), 1, len(stamps) - 1)
-        missing |= stamps[after] - stamps[after - 1] > STAYS_AWAY
-    state = np.where(missing, "gap", KEPT_ROWS)
-    return pd.DataFrame({"drive": drive, "time": np.round(time - start, 6), **columns, "state": state})
+    width = _lane_width(signals)
+    columns: dict[str, NDArray[Any]] = {}
+    for name, channel in signals.items():
+        is_position = name in position
+        broken = channel.breaks(JUMP * width if is_position and name != "lane_width" else np.inf)
+        columns[name] = channel.at(time, broken, resample if is_position else average)
+    missing = {name: np.isnan(columns[name]) for name in position}
+    unknown = np.any(list(missing.values()), axis=0)
+    if "distance_left" in missing:  # one side has jumped, the other not yet
+        unknown |= np.abs(columns["distance_left"] + columns["distance_right"] - width) > JUMP * width
+    state = np.where(unknown, "gap", KEPT_ROWS)
+    if "speed" in columns:
+        state = np.where((state == KEPT_ROWS) & np.isnan(columns["speed"]), "no speed", state)
+    others = [name for name, values in columns.items() if name not in missing and pd.isna(values).any()]
+    notes = [
+        f"{drive}: {name} is known in {100 * (~pd.isna(columns[name])).mean():.0f} % of the time" for name in others
+    ]
+    return pd.DataFrame({"drive": drive, "time": np.round(time - start, 6), **columns, "state": state}), notes
+
+
+def _lane_width(signals: dict[str, Channel]) -> float:
+    """Median. [m]"""
+    if "lane_width" in signals:
+        return float(np.median(signals["lane_width"].values))
+    return sum(float(np.median(signals[name].values)) for name in POSITIONS[1])

@@ -15,15 +15,16 @@ from dataclasses import replace
 from pathlib import Path
 
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.files.labels import file_labels
 from xosc_lateral.files.opendrive import read_opendrive, read_road
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
 from xosc_lateral.workflows.recordings.importers.table import Imported, guarded
 from xosc_lateral.workflows.recordings.importers.tracks import place_on_road
+from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
 from xosc_lateral.workflows.recordings.lane_shapes import place_in_shapes
 from xosc_lateral.workflows.recordings.osi.read import Recorded, read_osi
 from xosc_lateral.workflows.recordings.osi.shapes import lanes_of
 from xosc_lateral.workflows.recordings.placed import (
-    LaneGraph,
     PlacedTracks,
     import_each,
     import_placed,
@@ -54,17 +55,18 @@ def import_osi(
     `host`: keep this vehicle alone: its identifier or name in the trace; "host": the trace's host vehicle. `road`:
     OpenDRIVE file to take lanes from. `channel`: topic of an MCAP file with several.
     """
-    several = not isinstance(sources, Path) and len(sources) > 1
+    files = [sources] if isinstance(sources, Path) else list(sources)
+    labels = dict(zip(files, file_labels(files), strict=True))
 
     def read(path: Path) -> Imported:
         recorded = read_osi(path, channel)
         only = None if host is None else _named(recorded, host, path)
-        if several:
-            names = tuple(f"{path.stem}:{name}" for name in recorded.tracks.names)
+        if len(files) > 1:
+            names = tuple(f"{labels[path]}:{name}" for name in recorded.tracks.names)
             recorded = replace(recorded, tracks=replace(recorded.tracks, names=names))
-            only = None if only is None else {f"{path.stem}:{name}" for name in only}
-        placed, graph, files = _placed(recorded, path, None if road is None else Path(road))
-        about = {"format": "osi", "sources": files, "licence": LICENCE, "notes": recorded.notes}
+            only = None if only is None else {f"{labels[path]}:{name}" for name in only}
+        placed, graph, read_from = _placed(recorded, path, None if road is None else Path(road))
+        about = {"format": "osi", "sources": read_from, "licence": LICENCE, "notes": recorded.notes}
         return import_placed(placed, graph, settings, keep_cut=True, only=only, **about)
 
     return import_each(sources, read, keep_cut=keep_cut)
@@ -94,9 +96,7 @@ def _placed(recorded: Recorded, path: Path, road: Path | None) -> tuple[PlacedTr
     elif recorded.opendrive is not None:
         network, where = read_road(recorded.opendrive, path.stem), "the road in it"
     if network is not None:
-        x, y = network.header_offset.undo(tracks.x, tracks.y)
-        heading = tracks.heading - network.header_offset.heading
-        placed, graph = place_on_road(replace(tracks, x=x, y=y, heading=heading), network)
+        placed, graph = place_on_road(tracks, network)
     elif (lanes := lanes_of(recorded)) is not None:
         (strips, graph), where = lanes, "the trace"
         placed = place_in_shapes(tracks, strips, graph.left)

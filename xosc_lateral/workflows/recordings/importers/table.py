@@ -18,6 +18,7 @@ from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.drives.cleaning import LANE_WIDTHS, MAX_OUTSIDE
 from xosc_lateral.drivers.model.plausibility import implausible_rows
 from xosc_lateral.files.hashes import parsed_hash
+from xosc_lateral.files.labels import file_label
 from xosc_lateral.files.output_tables import harmless_frame, write_table
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
@@ -150,13 +151,13 @@ def as_imported(
     """What an importer gave: all of it, or a drive table alone, which gets its record here."""
     if isinstance(made, Imported):
         return made
-    table = made if "drive" in made.columns else made.assign(drive=sources[0].name.split(".")[0])
+    table = made if "drive" in made.columns else made.assign(drive=file_label(sources[0]))
     record = make_provenance(
         table.assign(state=KEPT_ROWS),
         format=format,
         sources=[source for source in sources if source.is_file()],
         licence=str(options.get("licence", "your own recording")),
-        settings=options,
+        settings={name: str(value) if isinstance(value, Path) else value for name, value in options.items()},
         step=float(table.groupby("drive", sort=False)["time"].diff().median()),
     )
     return Imported(table, record)

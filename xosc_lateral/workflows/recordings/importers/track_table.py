@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,10 +15,13 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping, parse_map
+from xosc_lateral.files.clock import require_row_step, seconds_of_stamps
+from xosc_lateral.files.mapping import UNITS, MappingLike, TableMapping, as_mapping, parse_map
+from xosc_lateral.files.rows import chosen_rows, without_markers
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.states import COLUMNS
 from xosc_lateral.files.tables import foreign_errors, listed, numbers_of, read_table, unpacked_text
+from xosc_lateral.workflows.recordings.gate import MOVING_SPEED, require_headings
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -41,6 +45,10 @@ USUAL_LENGTH = {"truck": 16.5, "bus": 12.0, "trailer": 12.0, "motorcycle": 2.2, 
 """Where no length is given; 4.6 m for the rest (EU new cars, 2023: mean 4.4 m). [m]"""
 
 
+BEHIND_MIDDLE = {"centre": 0.0, "front": -0.5, "rear": 0.5, "rear axle": 0.3}
+"""How far a point that recordings refer to lies behind a vehicle's middle, as a share of its length. [-]"""
+
+
 @dataclass(frozen=True, eq=False)
 class Tracks:
     """Rows sorted by vehicle and time; each array of shape (n,), in m, s, rad, m/s."""
@@ -62,28 +70,31 @@ class Tracks:
     """How far x and y lie behind the vehicle's middle; None: they are the middle. [m]"""
 
 
+MAX_SPEED_RATIO = 1.39
+"""A speed off by more is in another unit: the nearest, knots, are 1.94 times as many, and this is its root. [-]"""
+
 SPEED_WINDOW = 0.4
 """Positions are differenced over this where no speed was recorded. [s]"""
 
 
-def ground_speed(x: FloatArray, y: FloatArray, vehicle: IntArray, step: float) -> FloatArray:
+def ground_speed(x: FloatArray, y: FloatArray, vehicle: IntArray, time: FloatArray, step: float) -> FloatArray:
     """Speed from positions, shape (n,). [m/s]"""
-    return np.hypot(rate(x, vehicle, step, SPEED_WINDOW), rate(y, vehicle, step, SPEED_WINDOW))
+    return np.hypot(*(rate(each, vehicle, time, step, SPEED_WINDOW) for each in (x, y)))
 
 
-def travel_heading(x: FloatArray, y: FloatArray, vehicle: IntArray, step: float) -> FloatArray:
+def travel_heading(x: FloatArray, y: FloatArray, vehicle: IntArray, time: FloatArray, step: float) -> FloatArray:
     """Heading from positions, shape (n,). [rad]"""
-    return np.arctan2(rate(y, vehicle, step, SPEED_WINDOW), rate(x, vehicle, step, SPEED_WINDOW))
+    return np.arctan2(*(rate(each, vehicle, time, step, SPEED_WINDOW) for each in (y, x)))
 
 
-def rate(values: FloatArray, vehicle: IntArray, step: float, window: float) -> FloatArray:
+def rate(values: FloatArray, vehicle: IntArray, time: FloatArray, step: float, window: float) -> FloatArray:
     """Difference over a window about each row, within a vehicle's rows."""
     first = np.searchsorted(vehicle, vehicle, side="left")
     last = np.searchsorted(vehicle, vehicle, side="right") - 1
     half = max(1, round(0.5 * window / step))
     rows = np.arange(len(values))
     low, high = np.maximum(rows - half, first), np.minimum(rows + half, last)
-    return np.asarray((values[high] - values[low]) / (np.maximum(high - low, 1) * step))
+    return np.asarray((values[high] - values[low]) / np.where(high > low, time[high] - time[low], step))
 
 
 def read_tracks(path: Path, columns: Sequence[str] = (), mapping: MappingLike | None = None) -> Tracks:
@@ -114,11 +125,18 @@ def tracks_of(
     if not same.any():
         raise NotEnoughDataError(f"{path}: no vehicle has two rows")
     step = float(np.median(np.diff(time)[same]))
+    require_row_step(step, path)
     vehicle = codes.astype(np.int64)
     x, y = order["x"].to_numpy(dtype=np.float64), order["y"].to_numpy(dtype=np.float64)
+    way, driven = travel_heading(x, y, vehicle, time, step), ground_speed(x, y, vehicle, time, step)
+    heading, speed = _given_columns(order, "heading", way), np.abs(_given_columns(order, "speed", driven))
+    require_headings(heading, way, driven, path)
+    _require_speed(speed, driven, path)
     kind = order["vehicle_class"].astype(str).str.lower().to_numpy(dtype=str) if "vehicle_class" in order else None
     kinds = np.full(len(order), "") if kind is None else kind
-    usual = np.array([USUAL_LENGTH.get(one, 4.6) for one in kinds])
+    length = _given_columns(order, "length", np.array([USUAL_LENGTH.get(one, 4.6) for one in kinds]))
+    ahead = BEHIND_MIDDLE["centre" if saved is None else saved.reference] * length
+    x, y = x + ahead * np.cos(heading), y + ahead * np.sin(heading)
     return Tracks(
         tuple(f"{name}" for name in names),
         vehicle,
@@ -126,14 +144,27 @@ def tracks_of(
         step,
         x,
         y,
-        _given_columns(order, "heading", travel_heading(x, y, vehicle, step)),
-        np.abs(_given_columns(order, "speed", ground_speed(x, y, vehicle, step))),
-        _given_columns(order, "length", usual),
+        heading,
+        speed,
+        length,
         kinds,
         order["width"].to_numpy(dtype=np.float64) if "width" in order else None,
         is_reference=is_played,
         rear=_given_columns(order, "rear", np.zeros(len(order))) if "rear" in order else None,
     )
+
+
+def _require_speed(speed: FloatArray, driven: FloatArray, path: Path) -> None:
+    """Refuse speeds as recorded that are not those of x and y. [m/s]"""
+    moving = (driven > MOVING_SPEED) & (speed > 0.0)
+    ratio = float(np.median(speed[moving] / driven[moving])) if moving.any() else 1.0
+    if 1.0 / MAX_SPEED_RATIO <= ratio <= MAX_SPEED_RATIO:
+        return
+    units = {unit: abs(np.log(ratio * by)) for unit, (kind, by) in UNITS.items() if kind == "speed"}
+    unit = min(units, key=lambda name: units[name])
+    close = units[unit] < np.log(MAX_SPEED_RATIO) and unit != "m/s"
+    cause = f"it may be in {unit}: speed=COLUMN:{unit}" if close else "or time, x or y are in another unit"
+    raise FormatError(f"is {ratio:.3g} times as fast as x and y move; {cause}", path=path, element="column 'speed'")
 
 
 def _given_columns(table: pd.DataFrame, name: str, otherwise: FloatArray) -> FloatArray:
@@ -149,7 +180,8 @@ def _columns(table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequen
     if unknown := mapping.keys() - HEADERS.keys():
         raise FormatError(f"--map {min(unknown)}: tracks have {', '.join(HEADERS)}", path=path)
     by_lower = {str(name).strip().lower(): name for name in reversed(list(table.columns))}
-    found = {}
+    found: dict[str, pd.Series] = {}
+    table = chosen_rows(without_markers(table, saved.missing, path), saved.rows, path)
     for name, headers in HEADERS.items():
         source = mapping.get(name)
         header = next((by_lower[one] for one in headers if one in by_lower), None) if source is None else source.column
@@ -159,11 +191,17 @@ def _columns(table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequen
                 raise FormatError(f"no column {header or name!r}; {there}", path=path, line=1)
             continue
         column = table[header]
-        if name in ("vehicle", "vehicle_class"):
+        if name == "vehicle":
             found[name] = column
+        elif name == "vehicle_class":
+            found[name] = saved.class_names(column, path)
         else:
             by = 1.0 if source is None else source.factor
-            found[name] = pd.Series(numbers_of(column, path, name) * by, index=column.index)
+            stamps = None
+            if name == "time" and not pd.api.types.is_numeric_dtype(column):
+                stamps = seconds_of_stamps(column, path, saved.time_zone, found["vehicle"])
+            numbers = numbers_of(column, path, name) * by if stamps is None else stamps
+            found[name] = pd.Series(numbers, index=column.index)
     made = pd.DataFrame(found).replace([np.inf, -np.inf], np.nan)
     return made.dropna(subset=["vehicle", "time", "x", "y"])
 
@@ -200,6 +238,7 @@ def is_esmini_log(path: Path) -> bool:
 def read_esmini_log(path: Path) -> pd.DataFrame:
     """Rows of all vehicles, one below the other: the columns of `_LOGGED`, and `time`.
 
+    A line holds a group of columns for every vehicle that is there at that time, the head those for the first line.
     Raises `FormatError`: a column is missing, or the table is damaged.
     """
     with open_source(path) as source, foreign_errors(path, "can't be read as a log of esmini"):
@@ -208,19 +247,19 @@ def read_esmini_log(path: Path) -> pd.DataFrame:
         names = next((line.rstrip().rstrip(",").split(",") for line in head if line.startswith(HEAD)), None)
         if names is None:
             raise FormatError(f"a log of esmini without a line that begins with '{HEAD}'", path=path)
-        table = pd.read_csv(text, header=None, names=range(len(names)), skipinitialspace=True, index_col=False)
-    places: dict[str, dict[str, int]] = {}
-    for column, name in enumerate(names):
-        if found := _NAME.match(name):
-            places.setdefault(found[1], {})[found[2]] = column
-    frames = []
-    for number, mine in places.items():
-        if missing := sorted(set(_LOGGED.values()) - mine.keys()):
-            raise FormatError(f"vehicle #{number}: no column {missing[0]}", path=path)
-        frame = pd.DataFrame({name: table[mine[theirs]] for name, theirs in _LOGGED.items()})
-        frames.append(frame.assign(time=table[1]).dropna(subset=["vehicle"]))  # one that has not come yet is empty
-    if not frames:
+        lines = text.read()
+        width = max((line.count(b",") + 1 for line in lines.splitlines()), default=len(names))
+        table = pd.read_csv(BytesIO(lines), header=None, names=range(width), skipinitialspace=True, index_col=False)
+    matches = [_NAME.match(name) for name in names]
+    group = {match[2]: column for column, match in enumerate(matches) if match and match[1] == "1"}
+    if not group:
         raise FormatError("no vehicle in the table's head", path=path)
+    if missing := sorted(set(_LOGGED.values()) - group.keys()):
+        raise FormatError(f"vehicle #1: no column {missing[0]}", path=path)
+    frames = []
+    for shift in range(0, width - max(group.values()), len(group)):
+        frame = pd.DataFrame({name: table[group[theirs] + shift] for name, theirs in _LOGGED.items()})
+        frames.append(frame.assign(time=table[1]).dropna(subset=["vehicle"]))  # fewer vehicles: empty
     rows = pd.concat(frames, ignore_index=True)
     rows["vehicle"] = rows["vehicle"].astype(str).str.strip()
     return rows

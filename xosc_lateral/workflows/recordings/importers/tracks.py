@@ -17,11 +17,15 @@ from xosc_lateral.files.opendrive import read_opendrive
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
 from xosc_lateral.workflows.recordings.importers.table import Imported, guarded
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks, read_tracks
-from xosc_lateral.workflows.recordings.placed import LaneGraph, PlacedTracks, import_placed, require_lanes
+from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
+from xosc_lateral.workflows.recordings.placed import PlacedTracks, import_placed, require_lanes
 from xosc_lateral.world.road.lanes import DRIVING, beside
 from xosc_lateral.world.road.network import RoadNetwork
 
 LICENCE = "your own recording"
+
+LANE_VALUES = ("lane_width", "agreement", "scale")
+"""What is found of a lane, and is no column of its road."""
 
 INTO_NEXT = 1e-3
 """Step beyond a section's end that brings one into the next. [m]"""
@@ -58,14 +62,16 @@ def import_tracks(
 
 
 def place_on_road(tracks: Tracks, network: RoadNetwork) -> tuple[PlacedTracks, LaneGraph]:
-    """Every row's driving lane, and what the road is like there; x and y in the coordinates of the road's file.
+    """Every row's driving lane, and what the road is like there. x and y are inertial: the header's offset is undone.
 
     Raises `FormatError`: the road has no driving lane.
     """
     pieces, graph = lane_graph(network)
     if not pieces:
         raise FormatError("the road has no driving lane that tracks could lie in", path=network.path)
-    found = network.world_to_lane(tracks.x, tracks.y, heading=tracks.heading)
+    x, y = network.header_offset.undo(tracks.x, tracks.y)
+    heading = tracks.heading - network.header_offset.heading
+    found = network.world_to_lane(x, y, heading=heading)
     piece, along = np.full(len(tracks.x), -1), np.zeros(len(tracks.x))
     inside = np.flatnonzero((found.distance <= 0.0) & (found.lane != 0))
     road, lane, s = found.road[inside], found.lane[inside], found.s[inside]
@@ -78,7 +84,10 @@ def place_on_road(tracks: Tracks, network: RoadNetwork) -> tuple[PlacedTracks, L
     there = np.flatnonzero(piece >= 0)
     where = found.road[there], found.lane[there], found.s[there]
     lane_index, lane_count = network.lane_index(*where)
+    bend = network.curvature(where[0], where[2])
     values = {
+        "agreement": np.cos(heading[there] - network.lane_to_world(*where).heading),
+        "scale": 1.0 - bend * network.lane_centre_t(*where),
         "lane_width": network.lane_width(*where),
         "curvature": network.lane_curvature(*where),
         "lane_index": lane_index,
@@ -89,8 +98,8 @@ def place_on_road(tracks: Tracks, network: RoadNetwork) -> tuple[PlacedTracks, L
     columns = {name: np.full(len(piece), np.nan) for name in values}
     for name, known in values.items():
         columns[name][there] = known
-    offset, width = np.where(piece >= 0, found.offset, np.nan), columns.pop("lane_width")
-    return PlacedTracks(tracks, piece, along, offset, width, columns), graph
+    offset, (width, agreement, scale) = np.where(piece >= 0, found.offset, np.nan), map(columns.pop, LANE_VALUES)
+    return PlacedTracks(tracks, piece, along, offset, width, agreement, columns, np.nan_to_num(scale, nan=1.0)), graph
 
 
 def lane_graph(network: RoadNetwork) -> tuple[dict[Piece, int], LaneGraph]:

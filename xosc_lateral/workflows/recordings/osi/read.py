@@ -16,6 +16,7 @@ from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.files.osi.extra import osi
 from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH, Tracks, ground_speed, travel_heading
+from xosc_lateral.workflows.recordings.osi.horizon import extend_thing
 from xosc_lateral.workflows.recordings.osi.trace import Trace
 from xosc_lateral.world.motion.nominal import axes
 
@@ -42,7 +43,7 @@ class Recorded:
     # tracks: x and y are those of the ground below the rear axle where the trace says where that is, else below
     # the middle
     tracks: Tracks
-    things: Mapping[str, Mapping[int, Any]]  # of `THINGS`: messages by identifier, as first said
+    things: Mapping[str, Mapping[int, Any]]  # of `THINGS`: by identifier, as far as all messages show them
     hosts: tuple[str, ...]  # names of all host vehicles
     numbers: dict[str, str]  # name -> identifier
     notes: list[str]
@@ -69,6 +70,7 @@ class _Collected:
     names: dict[int, str] = field(default_factory=dict)
     kinds: dict[int, str] = field(default_factory=dict)
     things: dict[str, dict[int, Any]] = field(default_factory=lambda: {name: {} for name in THINGS})
+    latest: dict[tuple[str, int], Any] = field(default_factory=dict)  # of `things`, as last seen
     hosts: dict[int, None] = field(default_factory=dict)
     left_out: Counter[str] = field(default_factory=Counter)
     messages: int = 0
@@ -88,9 +90,18 @@ class _Collected:
             self._vehicle(one, 1e-9 * (nanoseconds - self.zero), number)
         for name, known in self.things.items():
             for thing in getattr(message, name):
-                if thing.id.value not in known:
-                    kept = known[thing.id.value] = type(thing)()
-                    kept.CopyFrom(thing)  # a part would keep the whole message
+                number_of = thing.id.value
+                latest = self.latest.get((name, number_of))
+                if latest == thing:
+                    continue
+                copy = type(thing)()
+                copy.CopyFrom(thing)  # a part would keep the whole message
+                self.latest[name, number_of] = copy
+                if latest is None:
+                    known[number_of] = type(thing)()
+                    known[number_of].CopyFrom(thing)
+                else:
+                    extend_thing(known[number_of], thing)
 
     def _vehicle(self, one: Any, time: float, number: int) -> None:
         name = one.id.value
@@ -168,8 +179,8 @@ class _Collected:
         _, time, x, y, yaw, speed, length, pitch, roll, *rear = rows.T
         kinds = np.array([self.kinds[int(number)] for number in rows[:, 0]])
         usual = np.array([USUAL_LENGTH.get(kind, 4.6) for kind in kinds])
-        heading = np.where(np.isfinite(yaw), yaw, travel_heading(x, y, vehicle, step))
-        speed = np.where(np.isfinite(speed), speed, ground_speed(x, y, vehicle, step))
+        heading = np.where(np.isfinite(yaw), yaw, travel_heading(x, y, vehicle, time, step))
+        speed = np.where(np.isfinite(speed), speed, ground_speed(x, y, vehicle, time, step))
         arm = sum(part[:, None] * axis for part, axis in zip(rear, axes(heading, pitch, roll), strict=True))
         length, behind = np.where(np.isfinite(length), length, usual), -rear[0] if rear[0].any() else None
         when, place = (time - float(time.min()), step), (x + arm[:, 0], y + arm[:, 1], heading)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,9 +10,13 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.files.osi.extra import osi
-from xosc_lateral.workflows.recordings.lane_shapes import Strip, middle
+from xosc_lateral.workflows.recordings.gate import MOVING_SPEED
+from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
+from xosc_lateral.workflows.recordings.lane_shapes import Strip, lane_graph, middle
 from xosc_lateral.workflows.recordings.osi.read import Recorded
-from xosc_lateral.workflows.recordings.placed import LaneGraph
+
+SHOWING_ROWS = 20_000
+"""So many rows of a trace show which way its lanes are driven. [-]"""
 
 
 @dataclass(frozen=True)
@@ -43,7 +47,7 @@ def lanes_of(recorded: Recorded) -> tuple[list[Strip], LaneGraph] | None:
             if other in numbers and _way(strips[k]) @ _way(strips[numbers[other]]) > 0.0:
                 left[k] = numbers[other]
     following = [[numbers[one] for one in lane.following if one in numbers] for lane in lanes]
-    return strips, LaneGraph(np.array([strip.length for strip in strips]), left, following)
+    return strips, lane_graph(strips, left, following)
 
 
 def _way(strip: Strip) -> FloatArray:
@@ -53,8 +57,10 @@ def _way(strip: Strip) -> FloatArray:
 def _physical(recorded: Recorded) -> Iterable[_Lane]:
     kinds = osi("osi3.osi_lane_pb2").Lane.Classification
     lanes, edges = recorded.things["lane"], recorded.things["lane_boundary"]
-    # writers of proto3 leave out what is false: a lane that says nothing is driven backwards, unless none says anything
+    # writers of proto3 leave out what is false: a lane that says nothing is driven backwards; where none says anything,
+    # vehicles show it
     known = any(lane.classification.HasField("centerline_is_driving_direction") for lane in lanes.values())
+    found = []
     for number, lane in lanes.items():
         about = lane.classification
         if about.type not in (kinds.TYPE_DRIVING, kinds.TYPE_INTERSECTION):
@@ -66,17 +72,49 @@ def _physical(recorded: Recorded) -> Iterable[_Lane]:
         if left is None or right is None:
             continue
         centre = np.array([(p.x, p.y, p.z) for p in about.centerline], dtype=np.float64).reshape(-1, 3)
-        ahead = about.centerline_is_driving_direction or not known
         if len(centre) > 1:
             left, right = _aligned(left, centre), _aligned(right, centre)
         else:
             right = _aligned(right, left)
             centre = middle(left, right)
+        found.append((number, about, centre, left, right))
+    beside = {number: [*about.left_adjacent_lane_id, *about.right_adjacent_lane_id] for number, about, *_ in found}
+    shown = {} if known else _driven_ahead({lane[0]: lane[2:] for lane in found}, beside, recorded)
+    for number, about, centre, left, right in found:
+        ahead = about.centerline_is_driving_direction if known else shown.get(number, True)
         pairs = [(pair.antecessor_lane_id.value, pair.successor_lane_id.value) for pair in about.lane_pairing]
-        beside = about.left_adjacent_lane_id if ahead else about.right_adjacent_lane_id
+        on_left = about.left_adjacent_lane_id if ahead else about.right_adjacent_lane_id
         following = tuple(dict.fromkeys(pair[1 if ahead else 0] for pair in pairs))
         lines = (centre, left, right) if ahead else (centre[::-1], right[::-1], left[::-1])
-        yield _Lane(number, *lines, tuple(one.value for one in beside), following)
+        yield _Lane(number, *lines, tuple(other.value for other in on_left), following)
+
+
+def _driven_ahead(
+    lines: Mapping[int, Sequence[FloatArray]], beside: Mapping[int, Sequence[Any]], recorded: Recorded
+) -> dict[int, bool]:
+    """Whether lanes, by number, are driven along their lines: as their vehicles do, else as the nearest lane beside."""
+    tracks, found = recorded.tracks, dict[int, bool]()
+    rows = np.arange(0, len(tracks.x), max(1, len(tracks.x) // SHOWING_ROWS))
+    rows = rows[tracks.speed[rows] > MOVING_SPEED]
+    for number, (centre, left, right) in lines.items():
+        strip = Strip(centre, left, right)
+        near = rows[strip.may_hold(tracks.x[rows], tracks.y[rows])]
+        if len(near):
+            way, aside, width, direction, _ = strip.place(tracks.x[near], tracks.y[near])
+            inside = np.isfinite(way) & (np.abs(aside) <= 0.5 * width)
+            agreement = float(np.cos(tracks.heading[near] - direction)[inside].sum())
+            if agreement != 0.0:
+                found[number] = agreement > 0.0
+    unseen = [number for number in lines if number not in found]
+    if unseen:
+        said = ", ".join(map(str, unseen))
+        recorded.notes.append(f"lanes {said}: no direction, and no vehicle that shows it: taken as the lane beside")
+    for _ in unseen:
+        for number in [number for number in unseen if number not in found]:
+            ways = [found[other.value] for other in beside[number] if other.value in found]
+            if ways:
+                found[number] = ways[0]
+    return found
 
 
 def _logical(recorded: Recorded) -> Iterable[_Lane]:
@@ -86,6 +124,7 @@ def _logical(recorded: Recorded) -> Iterable[_Lane]:
         for name in ("NORMAL", "EXIT", "ENTRY", "ONRAMP", "OFFRAMP", "CONNECTINGRAMP", "UNKNOWN")
     }
     lanes, edges = recorded.things["logical_lane"], recorded.things["logical_lane_boundary"]
+    found = []
     for number, lane in lanes.items():
         if lane.type not in driven:
             continue
@@ -93,9 +132,17 @@ def _logical(recorded: Recorded) -> Iterable[_Lane]:
             _chained([_points(edges[i.value].boundary_line, lane.start_s, lane.end_s) for i in ids if i.value in edges])
             for ids in (lane.left_boundary_id, lane.right_boundary_id)
         )
-        if left is None or right is None:
-            continue
-        ahead = lane.move_direction != kinds.MOVE_DIRECTION_DECREASING_S
+        if left is not None and right is not None:
+            found.append((number, lane, left, right))
+    directed = (kinds.MOVE_DIRECTION_INCREASING_S, kinds.MOVE_DIRECTION_DECREASING_S)
+    open_lanes = [entry for entry in found if entry[1].move_direction not in directed]
+    sides = {
+        number: [other.other_lane_id for other in (*lane.left_adjacent_lane, *lane.right_adjacent_lane)]
+        for number, lane, _, _ in open_lanes
+    }
+    shown = _driven_ahead({n: (middle(left, right), left, right) for n, _, left, right in open_lanes}, sides, recorded)
+    for number, lane, left, right in found:
+        ahead = shown.get(number, lane.move_direction != kinds.MOVE_DIRECTION_DECREASING_S)
         beside = lane.left_adjacent_lane if ahead else lane.right_adjacent_lane
         onward = lane.successor_lane if ahead else lane.predecessor_lane
         if not ahead:

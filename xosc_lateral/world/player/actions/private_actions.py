@@ -8,6 +8,7 @@ from xosc_lateral.world.player.actions.global_actions import recorded
 from xosc_lateral.world.player.positions.resolve import resolve, route_guide
 from xosc_lateral.world.player.state import guide
 from xosc_lateral.world.player.trailers import align_trailers, connect, disconnect
+from xosc_lateral.world.scenario.controllers import Domains
 from xosc_lateral.world.scenario.enums import RouteStrategy
 from xosc_lateral.world.scenario.private_actions import (
     AcquirePositionAction,
@@ -60,11 +61,14 @@ def acquire_position(content: AcquirePositionAction, action: AtOnce) -> None:
 def controller(
     content: ActivateControllerAction | AssignControllerAction | OverrideControllerValueAction, action: AtOnce
 ) -> None:
-    """Assigning, activating or overriding a controller changes nothing here: the default driver drives."""
-    name = ""
-    if isinstance(content, AssignControllerAction) and content.controller is not None:
-        name = f" '{content.controller.name}'"
-    action.note(f"controller{name} of '{action.actor.name}': the default driver drives instead")
+    """Who drives which domain from now on is written down; the default driver drives all the same."""
+    state, controllers = action.actor, action.actor.controllers
+    controllers.follow(content)
+    state.steered = int(Activity.STEERED) if Domains.LATERAL in controllers.domains else 0
+    state.activity = state.activity & ~int(Activity.STEERED) | state.steered
+    if words := controllers.words():
+        since = f"from {action.simulation.time:.2f} s on"
+        action.note(f"'{state.name}' is driven by controller {words} {since}: the default driver drives instead")
     action.end()
 
 

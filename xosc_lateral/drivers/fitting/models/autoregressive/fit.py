@@ -38,6 +38,10 @@ MAXIMUM_LOG_POWER_CHANGE = 2e-3
 """Largest change of the coarse movement's log power that rounding may make at any frequency: 0.01 dB. Coefficients of
 an autoregression nearly add up to one, and what they lack of it decides how far a driver wanders. [-]"""
 
+LIMIT_SPREADS = 4.0
+"""Standard deviations from the mean to the limits at least: the extremes of few drivers' minutes lie nearer, and their
+drivers would sit at them (17.7 % of two-minute runs for 3 s and more; so 0.7 %). The markings bound either. [-]"""
+
 MOST_DIGITS = 17
 """That a number has. [-]"""
 
@@ -92,7 +96,9 @@ def fit_autoregressive(
     bands = [split_bands(run, settings.step) for run in runs]
     coarse, between = fit_coarse([slow - mean for slow, _ in bands], drives, settings)
     coarse, fine = fit_spectrum(runs, coarse, settings)
-    low, high = max(-0.5, float(everything.min())), min(0.5, float(everything.max()))
+    reach = LIMIT_SPREADS * float(everything.std())
+    low = max(-0.5, min(float(everything.min()), mean - reach))
+    high = min(0.5, max(float(everything.max()), mean + reach))
     model = AutoregressiveModel(
         mean=mean,
         between_drivers=float(np.sqrt(between)),

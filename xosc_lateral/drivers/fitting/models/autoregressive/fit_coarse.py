@@ -191,17 +191,17 @@ def fit_spectrum(
     """
     frequency, power = _typical_power(runs, settings)
     knots = np.linspace(0.0, 0.5, settings.n_knots)  # in cycles per sample
-    coarse_power = _coarse_power(coarse, knots)
+    slow_power = coarse_power(coarse, knots)
     measured = np.exp(np.interp(knots, frequency, np.log(power)))
     hertz = knots / settings.step
     shared = (hertz >= settings.scale_band[0]) & (hertz <= settings.scale_band[1])
-    scale = float(np.exp(np.log(measured[shared] / coarse_power[shared]).mean()))
-    lacking = np.maximum(measured - scale * coarse_power, 0.0)
-    noise = _shaped(np.sqrt(lacking / NOISE_VARIANCE) * rise(hertz, settings), settings)
+    scale = float(np.exp(np.log(measured[shared] / slow_power[shared]).mean()))
+    lacking = np.maximum(measured - scale * slow_power, 0.0)
+    noise = shaped(np.sqrt(lacking / NOISE_VARIANCE) * rise(hertz, settings), settings)
     return replace(coarse, scale=coarse.scale * np.sqrt(scale)), noise
 
 
-def _coarse_power(coarse: Autoregression, knots: FloatArray) -> FloatArray:
+def coarse_power(coarse: Autoregression, knots: FloatArray) -> FloatArray:
     """Of the coarse movement at 5 Hz, shape of `knots` [cycles per sample]. [lane widths squared]"""
     kernel = building_low_pass()
     gain = np.abs(np.exp(-2j * np.pi * np.outer(knots, np.arange(len(kernel)))) @ kernel)
@@ -225,7 +225,7 @@ def window_of(runs: Sequence[FloatArray], lengths: Sequence[float], settings: Fi
     return sizes[-1]
 
 
-def _shaped(wanted: FloatArray, settings: FitSettings) -> ShapedNoise:
+def shaped(wanted: FloatArray, settings: FitSettings) -> ShapedNoise:
     """Noise whose kernel has the wanted gain at the knots, although it is short and faded out."""
     half = settings.n_taps // 2
     knots = np.linspace(0.0, 0.5, len(wanted))

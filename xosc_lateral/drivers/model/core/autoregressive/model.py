@@ -92,6 +92,7 @@ class AutoregressiveModel(AutoregressiveParameters, frozen=True, eq=False, dict=
     """
 
     State: ClassVar[type] = AutoregressiveState
+    fine_scales_with_lane: ClassVar[bool] = False
 
     def stream(
         self, seed: np.random.SeedSequence, start: Start | None = None, *, drivers: int | None = None

@@ -1,1 +1,0 @@
-"""Cut-in alarms and verdicts under lifelike movement, on the public ALKS scenarios."""

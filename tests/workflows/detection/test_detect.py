@@ -1,0 +1,118 @@
+"""`detect` from file to table: scenarios, lifelike variants, drive tables, recordings; the same numbers each time."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import xosc_lateral as xl
+from tests.workflows.detection.made import lane_change, weave
+from xosc_lateral.cli import main
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    xl.write_template("cut-in", tmp_path)
+    return tmp_path
+
+
+def row(result: xl.Detection, source: str, detector: str) -> dict:
+    return next(one for one in result.rows() if one["source"] == source and one["detector"].startswith(detector))
+
+
+def test_nominal_traffic_raises_no_false_alarm_and_the_text_says_what_that_means(folder):
+    result = xl.detect("cut-in.xosc", ego="none", variants=2)
+    assert result.sources == ("cut-in", "cut-in, motorway")
+    assert all(one["false_alarms"] == 0 for one in result.rows() if one["source"] == "cut-in")
+    assert result.still == {"cut-in"} and "no false alarms by construction" in str(result)
+    nominal, lifelike = (row(result, source, "time-to-line") for source in result.sources)
+    assert nominal["cut_ins"] == 1 and lifelike["cut_ins"] == 2
+    assert lifelike["hours"] == pytest.approx(2.0 * nominal["hours"], rel=0.2)
+
+
+def test_a_variant_is_what_convert_writes_and_play_plays(folder):
+    result = xl.detect("cut-in.xosc", detectors="wandering-zone:threshold=0.1", ego="none", variants=1, seed=4)
+    xl.convert("cut-in.xosc", "lifelike.xosc", ego="none", profile="motorway", seed=4)
+    written = xl.detect("lifelike.xosc", detectors="wandering-zone:threshold=0.1", ego="none")
+    names = ("hours", "false_alarms", "cut_ins", "lead_median")
+    one, other = row(result, "cut-in, motorway", "wandering"), row(written, "lifelike", "wandering")
+    assert one["false_alarms"] > 0
+    assert [one[name] for name in names] == pytest.approx([other[name] for name in names])
+
+
+def test_a_table_of_states_on_its_road_gives_what_the_scenario_gives(folder):
+    xl.play("cut-in.xosc").write("states.csv")
+    one = row(xl.detect("cut-in.xosc", ego="Ego"), "cut-in", "lateral-speed")
+    states = xl.detect("states.csv", road="cut-in.xodr", ego="Ego")
+    other = row(states, "states", "lateral-speed")
+    assert one["cut_ins"] == other["cut_ins"] == 1
+    assert other["lead_median"] == pytest.approx(one["lead_median"], abs=0.11)
+
+
+def test_a_lane_change_in_a_drive_table_is_found_by_its_markings(folder):
+    time = 0.1 * np.arange(1200)
+    lateral = weave(120.0, 0.3, 9.0) + lane_change(time, 60.0, 6.0)
+    offset = lateral - 3.5 * np.round(lateral / 3.5)
+    table = pd.DataFrame({
+        "time": time, "distance_left": 1.75 - offset, "distance_right": 1.75 + offset, "speed": 30.0
+    })  # fmt: skip
+    table.to_csv("drive.csv", index=False)
+    result = xl.detect("drive.csv", detectors=["lateral-speed", "fuzzy"])
+    found = row(result, "drive", "lateral-speed")
+    assert found["cut_ins"] == 1 and found["seen"] == 1.0 and found["lead_median"] > 0.0
+    assert "Needs other vehicles, which are not there: fuzzy on drive." in str(result)
+
+
+def test_the_same_inputs_and_seed_give_the_same_bytes(folder):
+    for name in ("a", "b"):
+        words = f"cut-in.xosc --sensor usual --ego none --variants 1 -o {name}.csv --report {name}.html -q"
+        assert main(["detect", *words.split()]) == 0
+    assert Path("a.csv").read_bytes() == Path("b.csv").read_bytes()
+    assert Path("a.html").read_bytes() == Path("b.html").read_bytes()
+
+
+def test_the_page_plays_its_worst_cases(folder):
+    xl.detect("cut-in.xosc", ego="none", variants=2).write_report("page.html")
+    page = Path("page.html").read_text()
+    assert page.count('class="player"') == page.count('href="#case-') > 0
+    for number in range(1, 1 + page.count('class="player"')):
+        assert f'<h3 id="case-{number}">' in page
+        scene = json.loads(page.split(f'id="scene-{number}">')[1].split("</script>")[0])
+        assert scene["entities"] and scene["lanes"]
+
+
+def test_a_folder_is_read_without_its_catalogs_and_trains_what_another_source_tests(folder):
+    for number in range(3):
+        xl.convert("cut-in.xosc", f"many/{number}.xosc", ego="none", seed=number)
+    catalog = '<OpenSCENARIO><FileHeader/><Catalog name="c"/></OpenSCENARIO>'
+    (folder / "many" / "catalog.xosc").write_text(catalog)
+    result = xl.detect("many", detectors="logistic:threshold=0.9", train="cut-in.xosc", ego="none")
+    found = row(result, "many", "logistic")
+    assert found["cut_ins"] == 3 and found["threshold"] == 0.9 and found["seen"] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "what"),
+    [
+        (["nowhere.xosc"], 1, "nowhere.xosc: no such file or folder"),
+        (["cut-in.xosc", "--detector", "logistic"], 2, "logistic has to be trained: name a source with --train"),
+        (["cut-in.xosc", "--detector", "lateral-speed:speed=1"], 2, "lateral-speed has threshold=VALUE, hold=VALUE"),
+        (["cut-in.xosc", "--detector", "lateral-speed:hold=x"], 2, "expected a number from 0 to 10"),
+        (["cut-in.xosc", "--sensor", "rate=100"], 2, "expected a number from 0.5 to 20"),
+        (["cut-in.xosc", "--ego", "Nobody"], 1, "cut-in.xosc: has no vehicle 'Nobody' to be the ego"),
+        (["cut-in.xosc", "-o", "cut-in.xosc"], 1, "can't write .xosc"),
+        (["cut-in.xosc", "-p", "nobody", "--variants", "1"], 1, "nobody"),
+        (["empty.csv"], 1, "empty.csv"),
+    ],
+)
+def test_what_can_t_be_meant_is_one_line(words, code, what, folder, capsys):
+    (folder / "empty.csv").write_text("time,offset,lane_width\n")
+    before = sorted(folder.iterdir())
+    assert main(["detect", *words]) == code
+    assert what in " ".join(capsys.readouterr().err.split())
+    assert sorted(folder.iterdir()) == before

@@ -1,0 +1,206 @@
+"""What a detector sees: vehicles beside a lane, through a sensor that is as good as wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from zlib import crc32
+
+import numpy as np
+
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.workflows.detection.tracks import STEP, Scene, Track
+from xosc_lateral.workflows.detection.truth import Truth, truth_of
+
+RATE_WINDOW = 0.5
+"""Lateral speed is the change of position over the last so many seconds, lateral acceleration that of the lateral
+speed: what is known of one second, as a tracker knows it. [s]"""
+REACH = 150.0
+"""Vehicles farther ahead are not watched: 5 s at 30 m/s, as in `recordings.encounters`. [m]"""
+ACROSS = 30.0
+"""Vehicles of different roads farther apart across are on other carriageways. [m]"""
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """What worsens the lateral position that a detector sees; as it is, nothing does.
+
+    Notes
+    -----
+    `USUAL_SENSOR` is a long-range radar with a camera: 0.05 m is 0.1 deg at 30 m, the azimuth accuracy on the data
+    sheet of Continental's ARS 408-21 (cycle 72 ms); 0.1 s is a cycle or two of 50 ms until an object list is out.
+    """
+
+    noise: float = 0.0  # standard deviation of each measured position, white [m]
+    delay: float = 0.0  # until it is known [s]
+    rate: float = 1.0 / STEP  # positions a second, held in between [Hz]
+
+    def taken(self, first: int, n: int) -> IntArray:
+        """Row that is known at each of n rows from instant number `first` on; -1 before the first one. Shape (n,)."""
+        known = STEP * (first + np.arange(n)) - self.delay
+        sampled = np.floor(known * self.rate + 1e-6) / self.rate
+        return np.asarray(np.floor(sampled / STEP + 1e-6).astype(np.int64) - first)
+
+
+USUAL_SENSOR = Sensor(noise=0.05, delay=0.1, rate=20.0)
+PERFECT = Sensor()
+
+
+def read_sensor(text: str) -> Sensor:
+    """A sensor from ``noise=0.05,delay=0.1,rate=20`` or ``usual``; raises `ValueError`."""
+    if text == "usual":
+        return USUAL_SENSOR
+    limits = {"noise": (0.0, 2.0), "delay": (0.0, 5.0), "rate": (0.5, 1.0 / STEP)}
+    return Sensor(**read_numbers(text, limits, "a sensor"))
+
+
+def read_numbers(text: str, limits: Mapping[str, tuple[float, float]], what: str) -> dict[str, float]:
+    """``NAME=VALUE,...`` with names and inclusive limits; raises `ValueError`."""
+    found = dict[str, float]()
+    for word in filter(None, text.split(",")):
+        name, equals, value = word.partition("=")
+        if not equals or name not in limits:
+            raise ValueError(f"{word!r}: {what} has {', '.join(f'{one}=VALUE' for one in limits) or 'no options'}")
+        low, high = limits[name]
+        try:
+            found[name] = float(value)
+        except ValueError:
+            found[name] = np.nan
+        if not low <= found[name] <= high:
+            raise ValueError(f"{word!r}: expected a number from {low:g} to {high:g}")
+    return found
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Measured:
+    """A track as the sensor gives it; arrays of shape (n,). What was not yet measured is as at the first moment."""
+
+    taken: IntArray  # row that each row knows
+    offset: FloatArray  # from its lane's centre, positive left [m]
+    speed: FloatArray  # lateral, positive left [m/s]
+    acceleration: FloatArray  # lateral, positive left [m/s2]
+
+
+def measure(track: Track, sensor: Sensor, rng: np.random.Generator) -> Measured:
+    """What a sensor gives of a track."""
+    taken = np.maximum(sensor.taken(track.first, len(track)), 0)
+    position = track.lateral
+    if sensor.noise > 0.0:
+        position = position + sensor.noise * rng.standard_normal(len(track))
+    lateral = position[taken]
+    speed = _change(lateral)
+    return Measured(taken, lateral - track.base[taken], speed, _change(speed))
+
+
+def _change(values: FloatArray) -> FloatArray:
+    """Change over the last `RATE_WINDOW`, a second; shape as the argument."""
+    rows = round(RATE_WINDOW / STEP)
+    return np.asarray((values - values[np.maximum(np.arange(len(values)) - rows, 0)]) / RATE_WINDOW)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Observer:
+    """The vehicle in the next lane that would be cut in on; arrays of shape (n,), NaN where there is none."""
+
+    gap: FloatArray  # from its front to the other's rear, negative side by side [m]
+    closing: FloatArray  # its speed minus the other's [m/s]
+    clearance: FloatArray  # between the sides of both, negative where they overlap across [m]
+    speed: FloatArray  # [m/s]
+    length: FloatArray  # [m]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class View:
+    """A vehicle seen from the lane on one side of it; arrays of shape (n,)."""
+
+    number: int  # of the track in its scene
+    track: Track
+    side: int  # of that lane: 1: left, -1: right
+    truth: Truth
+    measured: Measured
+    watched: BoolArray  # there is such a lane and, with an ego, the ego in it
+    observer: Observer | None  # None: the source has no other vehicles
+
+    @property
+    def towards(self) -> FloatArray:
+        """From its lane's centre towards that lane. [m]"""
+        return self.side * self.measured.offset
+
+    @property
+    def lateral_speed(self) -> FloatArray:
+        """Towards that lane. [m/s]"""
+        return self.side * self.measured.speed
+
+    @property
+    def lateral_acceleration(self) -> FloatArray:
+        """Towards that lane. [m/s2]"""
+        return self.side * self.measured.acceleration
+
+    @property
+    def room(self) -> FloatArray:
+        """From the vehicle's side to the marking, negative beyond it. [m]"""
+        width = self.track.rows.lane_width[self.measured.taken]
+        return np.asarray(0.5 * (width - self.track.size.width) - self.towards)
+
+
+def views_of(scene: Scene, sensor: Sensor, seed: int, *, with_observers: bool = True) -> list[View]:
+    """Every vehicle but the ego, from both sides where it is ever watched from there."""
+    root = (seed, crc32(scene.name.encode()))
+    several = len({track.name for track in scene.tracks}) > 1
+    found = []
+    for number, track in enumerate(scene.tracks):
+        if track.name == scene.ego:
+            continue
+        truth = truth_of(track)
+        measured = measure(track, sensor, np.random.default_rng((*root, number)))
+        for side in (1, -1):
+            watched, observer = track.has_lane(side), None
+            if scene.ego is not None or (with_observers and several):
+                observer = _observer(scene, track, side, measured.taken)
+            if scene.ego is not None:
+                assert observer is not None
+                watched = watched & np.isfinite(observer.gap)
+            if watched.any():
+                found.append(View(number, track, side, truth, measured, watched, observer))
+    return found
+
+
+def _observer(scene: Scene, track: Track, side: int, taken: IntArray) -> Observer:
+    """The ego where it is in the next lane, not ahead; else the nearest vehicle behind in that lane."""
+    n = len(track)
+    nearest = np.full(n, np.inf)
+    values = np.full((5, n), np.nan)
+    for other, mine, theirs in _together(scene, track):
+        a, b = track.rows, other.rows
+        dx, dy = a.x[mine] - b.x[theirs], a.y[mine] - b.y[theirs]
+        cos, sin = np.cos(b.heading[theirs]), np.sin(b.heading[theirs])
+        ahead = dx * cos + dy * sin + track.size.ahead - other.size.ahead
+        across = np.abs(dy * cos - dx * sin)
+        lengths = 0.5 * (track.size.length + other.size.length)
+        same_way = np.cos(a.heading[mine] - b.heading[theirs]) > 0.5
+        beside = b.lane_index[theirs] - a.lane_index[mine] == side
+        near = (a.road[mine] == b.road[theirs]) | (across < ACROSS)
+        better = same_way & beside & near & (ahead > -lengths) & (ahead < np.minimum(nearest[mine], REACH))
+        rows = np.flatnonzero(better)
+        at = mine.start + rows
+        nearest[at] = ahead[rows]
+        widths = 0.5 * (a.lane_width[mine] + b.lane_width[theirs])
+        apart = widths - side * (a.offset[mine] - b.offset[theirs]) - 0.5 * (track.size.width + other.size.width)
+        speed = b.speed[theirs]
+        columns = ahead - lengths, speed - a.speed[mine], apart, speed, np.full(len(speed), other.size.length)
+        values[:, at] = np.array(columns)[:, rows]
+    return Observer(*values[:, taken])
+
+
+def _together(scene: Scene, track: Track) -> Iterator[tuple[Track, slice, slice]]:
+    """Tracks that exist at the same time, the ego's alone if there is one, with the rows of both."""
+    for other in scene.tracks:
+        if other is not track and scene.ego in (None, other.name):
+            first = max(track.first, other.first)
+            last = min(track.first + len(track), other.first + len(other))
+            if last > first:
+                yield (
+                    other,
+                    slice(first - track.first, last - track.first),
+                    slice(first - other.first, last - other.first),
+                )

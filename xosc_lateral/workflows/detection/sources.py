@@ -1,0 +1,231 @@
+"""Sources of `detect`, scene by scene: scenarios as written and lifelike, drive tables, recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.errors import FormatError, NotEnoughDataError
+from xosc_lateral.base.segment import MINIMUM_SPEED
+from xosc_lateral.drivers.drives.cuts import HALF_WIDTH
+from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.files.mapping import TableMapping, as_mapping
+from xosc_lateral.files.tables import TABLE_SUFFIXES
+from xosc_lateral.workflows.batch.request import SCENARIO_SUFFIX, DocumentKind, document_kind
+from xosc_lateral.workflows.conversion.convert import convert_scenario
+from xosc_lateral.workflows.conversion.load import Played, play_scenario
+from xosc_lateral.workflows.conversion.modes import chosen_egos
+from xosc_lateral.workflows.conversion.settings import ConvertSettings
+from xosc_lateral.workflows.detection.tracks import STEP, Rows, Scene, Size, Track, tracks_of
+from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH
+from xosc_lateral.workflows.recordings.recorded import RecordedVehicle, place_tracks
+from xosc_lateral.workflows.recordings.recordings import REAR_AXLE, USUAL_WIDTH, read_recording
+from xosc_lateral.workflows.result import given_drives
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion
+from xosc_lateral.world.road.network import RoadNetwork
+
+EVERY = 2
+"""Rows of a played scenario that are taken, 0.1 s apart as in recordings; between them motion is smooth. [rows]"""
+ACROSS_LANE = np.pi / 4
+"""Heading from the lane's, beyond which a vehicle does not follow it, as in `motion.segments`. [rad]"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Source:
+    """Scenes that are counted together, made one after another, and the files that they come from."""
+
+    label: str
+    scenes: Callable[[], Iterator[Scene]]
+    files: tuple[Path, ...] = ()
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class SourceSettings:
+    """How sources are read; `variants` lifelike ones of each scenario with each of the profiles, beside it."""
+
+    convert: ConvertSettings = field(default_factory=ConvertSettings)
+    variants: int = 0
+    profiles: tuple[str, ...] = ()
+    ego: str | None = None  # None: as found in a scenario; "none": there is none
+    road: Path | None = None
+    columns: TableMapping = field(default_factory=lambda: as_mapping(None))
+
+
+def sources_of(path: Path, settings: SourceSettings) -> list[Source]:
+    """Sources that a path stands for: one, or with lifelike variants one more for each profile.
+
+    Raises `FormatError`, `NotEnoughDataError`: there is nothing of that name, or nothing in it.
+    """
+    if not path.exists():
+        raise FormatError("no such file or folder", path=path)
+    scenarios = _scenarios(path)
+    if not scenarios:
+        return [_measured(path, settings)]
+    base = path if path.is_dir() else path.parent
+    named = [(scenario, scenario.relative_to(base).with_suffix("").as_posix()) for scenario in scenarios]
+    found = [Source(path.stem, lambda: _written(named, settings), tuple(scenarios))]
+    profiles = settings.profiles if settings.variants else ()
+    return [*found, *(_lifelike(path.stem, named, profile, settings) for profile in profiles)]
+
+
+def _scenarios(path: Path) -> list[Path]:
+    if path.is_dir():
+        every = sorted(one for one in path.rglob(f"*{SCENARIO_SUFFIX}") if one.is_file())
+        return [one for one in every if document_kind(one) in (DocumentKind.SCENARIO, DocumentKind.CONVERTED)]
+    return [path] if path.name.lower().endswith(SCENARIO_SUFFIX) else []
+
+
+def _measured(path: Path, settings: SourceSettings) -> Source:
+    name = path.name.lower()
+    is_table = (
+        name.endswith(TABLE_SUFFIXES) and not name.endswith("_tracks.csv") and not name.startswith("trajectories")
+    )
+    if is_table and settings.road is None:
+        return Source(
+            path.stem.split(".")[0], lambda: drive_scenes(given_drives(path, settings.columns).drives), (path,)
+        )
+    return Source(path.name.split(".")[0], lambda: _recorded(path, settings), (path,))
+
+
+# ---- scenarios -------------------------------------------------------------------------------------------------------
+def _written(named: Sequence[tuple[Path, str]], settings: SourceSettings) -> Iterator[Scene]:
+    """Each scenario as it is."""
+    for scenario, name in named:
+        yield played_scene(_play(scenario, settings), name, settings.ego)
+
+
+def _lifelike(label: str, named: Sequence[tuple[Path, str]], profile: str, settings: SourceSettings) -> Source:
+    """Each scenario's variants, converted and played as what is written plays."""
+    ego = None if settings.ego is None else frozenset({settings.ego} - {"none"})
+    convert = replace(settings.convert, profile=profile, ego=ego)
+
+    def scenes() -> Iterator[Scene]:
+        for scenario, name in named:
+            given = _play(scenario, settings).scenario
+            around = [path.parent for path in (*given.input_files, given.road_file or scenario)]
+            for variant in range(settings.variants):
+                with TemporaryDirectory() as folder:
+                    output = Path(folder) / scenario.name
+                    made = convert_scenario(scenario, output, convert, variant=variant)
+                    played = _play(output, replace(settings, convert=replace(convert, allow=(*convert.allow, *around))))
+                    ego = settings.ego or next(iter(made.provenance.ego), "none")
+                    yield played_scene(played, f"{name} #{variant + 1}", ego, cluster=name)
+
+    return Source(f"{label}, {profile}", scenes, tuple(scenario for scenario, _ in named))
+
+
+def _play(scenario: Path, settings: SourceSettings) -> Played:
+    given = settings.convert
+    roads = given.roads
+    return play_scenario(scenario, step=STEP, time_limit=given.time_limit, allowed=given.allow, roads=roads)
+
+
+def played_scene(played: Played, name: str, ego: str | None, *, cluster: str = "") -> Scene:
+    """Tracks of a scenario's vehicles. `ego`: None: its vehicle under test, if it has one; "none": there is none."""
+    vehicles = [entity for entity in played.motion.entities if entity.entity.is_vehicle]
+    vehicles = [entity for entity in vehicles if entity.name not in played.trailers]
+    if ego is None:
+        ego = next(iter(chosen_egos(played.scenario, ConvertSettings())), "none")
+    elif ego != "none" and ego not in {entity.name for entity in vehicles}:
+        raise FormatError(f"has no vehicle {ego!r} to be the ego", path=played.scenario.path)
+    tracks = list[Track]()
+    for entity in vehicles:
+        box = entity.entity.bounding_box
+        size = Size(box.length, box.width, box.center_x)
+        for rows, cuts in _present(entity, played.network):
+            tracks += tracks_of(entity.name, rows, size, cluster=f"{cluster or name}:{entity.name}", cuts=cuts)
+    return Scene(name, tuple(tracks), None if ego == "none" else ego, played.network)
+
+
+def _present(motion: EntityMotion, network: RoadNetwork) -> Iterator[tuple[Rows, list[int]]]:
+    """Rows of an entity on roads, and those at which it was placed anew."""
+    placed = np.cumsum((motion.activity & Activity.TELEPORTED) != 0)
+    there = ((motion.activity & Activity.ACTIVE) != 0) & (motion.road >= 0)
+    rows = np.flatnonzero(there)[::EVERY]
+    if len(rows) > 1:
+        road, lane, s = motion.road[rows], motion.lane[rows], motion.s[rows]
+        turned = np.abs(np.sin(motion.heading_relative[rows])) < np.sin(ACROSS_LANE)
+        yield _on_road(
+            network, motion.time[rows], (road, lane, s), motion.offset[rows], motion.speed[rows],
+            (motion.x[rows], motion.y[rows], motion.heading[rows]), turned,
+        ), (np.flatnonzero(np.diff(placed[rows])) + 1).tolist()  # fmt: skip
+
+
+def _on_road(
+    network: RoadNetwork,
+    time: FloatArray,
+    where: tuple[np.ndarray, np.ndarray, np.ndarray],
+    offset: FloatArray,
+    speed: FloatArray,
+    pose: tuple[FloatArray, FloatArray, FloatArray],
+    along: np.ndarray,
+) -> Rows:
+    road, lane, s = where
+    index, count = network.lane_index(road, lane, s)
+    following = along & (index >= 0) & (speed >= MINIMUM_SPEED * (1.0 - 1e-6))
+    indices, counts = index.astype(np.float64), count.astype(np.float64)
+    width, x, y, heading = network.lane_width(road, lane, s), *pose
+    road, lane = road.astype(np.int64), lane.astype(np.int64)
+    return Rows(time, offset, width, speed, indices, counts, following, x, y, heading, road, lane, s)
+
+
+# ---- measured traffic ------------------------------------------------------------------------------------------------
+def _recorded(path: Path, settings: SourceSettings) -> Iterator[Scene]:
+    """Tracks of several vehicles, one scene."""
+    traffic = read_recording(path, road=settings.road, columns=settings.columns)
+    first, last = traffic.span
+    recording = place_tracks(traffic.tracks, traffic.network, first, last)
+    ego = None if settings.ego == "none" else settings.ego
+    if ego is not None and ego not in {vehicle.name for vehicle in recording.vehicles}:
+        raise FormatError(f"has no vehicle {ego!r} to be the ego", path=path)
+    tracks = list[Track]()
+    for vehicle in recording.vehicles:
+        size = Size(vehicle.length, vehicle.width, vehicle.centre)
+        tracks += tracks_of(vehicle.name, _rows_of(vehicle, traffic.network), size, cluster=vehicle.name)
+    yield Scene(traffic.name, tuple(tracks), ego, traffic.network)
+
+
+def _rows_of(vehicle: RecordedVehicle, network: RoadNetwork) -> Rows:
+    step = np.maximum(np.gradient(vehicle.time), 1e-6)
+    vx, vy = np.gradient(vehicle.x) / step, np.gradient(vehicle.y) / step
+    centre = network.lane_to_world(vehicle.road, vehicle.lane, vehicle.s)
+    heading = centre.heading + np.where(vehicle.way < 0, np.pi, 0.0)
+    where, pose = (vehicle.road, vehicle.lane, vehicle.s), (vehicle.x, vehicle.y, heading)
+    return _on_road(network, vehicle.time, where, vehicle.offset, np.hypot(vx, vy), pose, vehicle.way > 0)
+
+
+def drive_scenes(drives: Sequence[Drive]) -> Iterator[Scene]:
+    """Each drive of a table, alone: the lane is where its markings are."""
+    for drive in drives:
+        n = len(drive)
+        context, nothing = drive.context, np.full(n, np.nan)
+        speed = context.get("speed", nothing)
+        index, count = context.get("lane_index", nothing), context.get("lane_count", nothing)
+        truck = context.get("is_truck", nothing)
+        kind = "truck" if np.isfinite(truck).any() and np.nanmean(truck) > 0.5 else ""
+        length = USUAL_LENGTH.get(kind, 4.6)
+        size = Size(length, USUAL_WIDTH.get(kind, 2.0 * HALF_WIDTH), REAR_AXLE * length)
+        following = np.isnan(speed) | (speed >= MINIMUM_SPEED * (1.0 - 1e-6))
+        none = np.full(n, -1), np.zeros(n, dtype=np.int64), nothing
+        rows = Rows(
+            drive.time, drive.offset, drive.lane_width, speed, index, count, following, nothing, nothing, nothing, *none
+        )
+        cuts = [] if drive.run is None else (np.flatnonzero(np.diff(drive.run)) + 1).tolist()
+        tracks = tuple(tracks_of(drive.name, rows, size, cluster=drive.name, cuts=cuts))
+        if tracks:
+            yield Scene(drive.name, tracks)
+
+
+def checked(source: Source) -> Iterator[Scene]:
+    """Its scenes; raises `NotEnoughDataError` where there are none."""
+    count = 0
+    for scene in source.scenes():
+        count += bool(scene.tracks)
+        yield scene
+    if not count:
+        raise NotEnoughDataError(f"{source.label}: no vehicle drives for 5 s without a gap")

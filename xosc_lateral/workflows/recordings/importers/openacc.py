@@ -1,0 +1,319 @@
+"""OpenACC, AstaZero campaign (Joint Research Centre of the European Commission): cars of a platoon on a closed loop.
+
+Files have a column `Time`, and for each car k `Speed{k}`, `E{k}`, `N{k}`; `IVS{k}` is the gap from car k to the next
+one, bumper to bumper. Positions are those of differential GNSS (OxTS RT-Range S), with noise of about 1 mm. There is no
+lane geometry: the lane's centre is the mean path of all passes of all files, so that the mean over all of them is 0 by
+construction, and each drive's own mean is kept.
+
+- The centre line follows the mean path by a Gaussian of 12 m, in rounds: what all passes share at any length becomes
+  the lane, what a pass adds is movement. A loop that is closed badly would raise the power at 0.5 Hz tenfold, so lines
+  are periodic from the first round on.
+- The width of the lane is not measured: 3.5 m is assumed.
+
+References
+----------
+.. [1] M. Makridis, K. Mattas, A. Anesiadou, B. Ciuffo, "OpenACC. An open database of car-following experiments to study
+       the properties of commercial ACC systems", Transportation Research Part C 125, 2021, 103047.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from xosc_lateral.base.arrays import BoolArray, FloatArray
+from xosc_lateral.base.errors import FormatError, NotEnoughDataError
+from xosc_lateral.base.lazy import pd
+from xosc_lateral.drivers.drives.cleaning import RESOLUTION, RUN, VALID_BELOW
+from xosc_lateral.files.source import open_source
+from xosc_lateral.files.tables import unpacked_text
+from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
+from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
+
+LICENCE = (
+    "OpenACC, AstaZero campaign: (c) European Union, Joint Research Centre, CC BY 4.0 (doi:10.1016/j.trc.2021.103047). "
+    "No tracks are passed on with a profile, only fitted parameters."
+)
+LANE_WIDTH = 3.5
+"""Assumed: usual on rural roads; the campaign gives none. [m]"""
+
+HIGHEST_FREQUENCY = 1.5
+"""Runs at 5 Hz keep what is slower; the noise there (2e-8 m2/Hz at most) is a tenth of the movement. [Hz]"""
+
+POSITION_RESOLUTION = 1e-3
+"""Noise of the positions. [m]"""
+
+GRID_STEP = 1.0
+"""Points of the centre line are so far apart. [m]"""
+
+SMOOTHING, ROUNDS = 12.0, 5
+"""Standard deviation of the Gaussian by which the centre line follows the mean path [m], and how often."""
+
+RETURN_DISTANCE = 5.0
+"""A lap is over where a car is as near to where it began [m] ..."""
+
+MINIMUM_LAP = 500.0
+"""... and has come so far since. [m]"""
+
+MINIMUM_SPEED = 5.0
+"""Slower rows (standing start, end of a test) say nothing about the lane's centre. [m/s]"""
+
+LANE_SHARE = 0.5
+"""Of the lane's width: rows further from its centre are elsewhere. [-]"""
+
+MAXIMUM_STEP = 0.25
+"""Rows further apart in time are no longer one run. [s]"""
+
+HEADER_LINES = 50
+"""Lines before the header, at most: the campaign's files have five. [-]"""
+
+
+@guarded
+def import_openacc(
+    source: Path | Sequence[Path], *, lane_width: float = LANE_WIDTH, keep_cut: bool = False
+) -> Imported:
+    """AstaZero's files, one or several, as they are in the catalogue (.csv, .csv.gz): a drive for each car and file.
+
+    `lane_width`: of the road, which nobody measured. [m]
+    """
+    paths = [source] if isinstance(source, Path) else list(source)
+    cars = [car for path in paths for car in _cars(path)]
+    if not cars:
+        raise NotEnoughDataError(f"{paths[0]}: no car moves")
+    frames = []
+    for side in (1.0, -1.0):  # counter-clockwise, clockwise: two lanes
+        same = [car for car in cars if car.turn == side]
+        if same:
+            frames += _placed(same, _centre_line(same), lane_width)
+    table = pd.concat(frames, ignore_index=True)
+    note = "lane centre: mean path of all passes; lane width assumed; steering by hand assumed throughout"
+    return finished(
+        table, keep_cut=keep_cut, sources=paths, format="openacc", version="AstaZero 2019", licence=LICENCE,
+        settings={"lane_width": lane_width}, step=float(np.median(np.diff(cars[0].time))), notes=(note,),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Car:
+    """One car in one file, arrays of shape (n,)."""
+
+    name: str
+    time: FloatArray
+    x: FloatArray
+    y: FloatArray
+    speed: FloatArray
+    lead: FloatArray
+    """Gap to the car ahead; NaN: there is none. [m]"""
+
+    @property
+    def turn(self) -> float:
+        """1 for a loop driven counter-clockwise, else -1."""
+        area = float(np.sum(self.x[:-1] * np.diff(self.y) - self.y[:-1] * np.diff(self.x)))
+        return 1.0 if area >= 0.0 else -1.0
+
+
+def _cars(path: Path) -> list[_Car]:
+    frame, first = _read(path)
+    numbers = sorted(int(name[1:]) for name in frame.columns if re.fullmatch(r"E\d+", name))
+    wanted = [f"{name}{k}" for k in numbers for name in ("E", "N", "Speed")]
+    missing = [name for name in ("Time", *wanted) if name not in frame]
+    if missing or not numbers:
+        what = f"no column {missing[0] if missing else 'E1'}; is this a file of OpenACC's AstaZero campaign?"
+        raise FormatError(what, path=path, line=first)
+    gaps = [f"IVS{k}" for k in numbers if f"IVS{k}" in frame]
+    values = {name: _numbers(frame[name], path, first) for name in ("Time", *wanted, *gaps)}
+    nobody = np.full(len(frame), np.nan)
+    stem = path.name.split(".")[0]
+    cars = []
+    for k in numbers:
+        speed = values[f"Speed{k}"]
+        if np.isfinite(speed).any() and np.nanmax(speed) > MINIMUM_SPEED:
+            ahead = values.get(f"IVS{k - 1}", nobody)
+            there = np.isfinite(values[f"E{k}"]) & np.isfinite(values[f"N{k}"]) & np.isfinite(speed)
+            columns = (values["Time"], values[f"E{k}"], values[f"N{k}"], speed, ahead)
+            cars.append(_Car(f"{stem}:{k}", *(column[there] for column in columns)))
+    return cars
+
+
+def _read(path: Path) -> tuple[pd.DataFrame, int]:
+    """The table below whatever stands above its header, and the header's line."""
+    with open_source(path) as opened:
+        lines = unpacked_text(opened).read().decode("utf-8", "replace").splitlines(keepends=True)
+    heads = [k for k, line in enumerate(lines[:HEADER_LINES]) if line.split(",")[0].strip().lower() == "time"]
+    if not heads:
+        raise FormatError("no header that begins with Time; is this a file of OpenACC?", path=path, line=1)
+    frame = pd.read_csv(io.StringIO("".join(lines[heads[0] :])), low_memory=False)
+    return frame.rename(columns=lambda name: str(name).strip()), heads[0] + 1
+
+
+def _numbers(column: pd.Series, path: Path, first: int) -> FloatArray:
+    numbers = pd.to_numeric(column, errors="coerce").to_numpy(dtype=np.float64)
+    wrong = np.isnan(numbers) & column.notna().to_numpy()
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise FormatError(
+            f"no number: {column.iloc[row]!r}", path=path, line=first + 1 + row, element=f"column {column.name!r}"
+        )
+    return numbers
+
+
+@dataclass(frozen=True, eq=False)
+class _Loop:
+    """A closed line with points about `GRID_STEP` apart, shape (n, 2). [m]"""
+
+    points: FloatArray
+
+    @property
+    def length(self) -> float:
+        """[m]"""
+        return float(self._sizes.sum())
+
+    @property
+    def _steps(self) -> FloatArray:
+        return np.asarray(np.roll(self.points, -1, axis=0) - self.points)
+
+    @property
+    def _sizes(self) -> FloatArray:
+        return np.asarray(np.hypot(*self._steps.T))
+
+    def normals(self) -> FloatArray:
+        """To the left at each point, shape (n, 2). [-]"""
+        along = np.roll(self.points, -1, axis=0) - np.roll(self.points, 1, axis=0)
+        along /= np.hypot(*along.T)[:, None]
+        return np.stack([-along[:, 1], along[:, 0]], axis=1)
+
+    def curvature(self) -> FloatArray:
+        """At each point, positive to the left, shape (n,). [1/m]"""
+        first = 0.5 * (np.roll(self.points, -1, axis=0) - np.roll(self.points, 1, axis=0))
+        second = np.roll(self.points, -1, axis=0) - 2.0 * self.points + np.roll(self.points, 1, axis=0)
+        cross = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+        return np.asarray(cross / np.hypot(*first.T) ** 3)
+
+    def place(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Index along the points, with its fraction, and distance to the left, shape (n,) each. [-], [m]
+
+        Across the line it is as between the normals of both neighbours, so that nothing jumps from point to point.
+        """
+        from scipy.spatial import cKDTree
+
+        points, normals = self.points, self.normals()
+        where = np.stack([x, y], axis=1)
+        near = cKDTree(points).query(where)[1]
+        along = np.stack([normals[:, 1], -normals[:, 0]], axis=1)
+        index: FloatArray = np.asarray(near, dtype=np.float64)
+        for _ in range(PLACING_STEPS):
+            centre, _, tangent = self._at(index, points, normals, along)
+            index = index + np.einsum("ij,ij->i", where - centre, tangent) / GRID_STEP
+        centre, normal, _ = self._at(index, points, normals, along)
+        return np.asarray(index % len(points)), np.einsum("ij,ij->i", where - centre, normal)
+
+    @staticmethod
+    def _at(index: FloatArray, *columns: FloatArray) -> list[FloatArray]:
+        """Periodic cubic interpolation (Catmull-Rom) of columns, shape (n, 2) each."""
+        low = np.floor(index).astype(np.int64)
+        share = (index - low)[:, None]
+        found = []
+        for column in columns:
+            a, b, c, d = (column[(low + k) % len(column)] for k in (-1, 0, 1, 2))
+            found.append(
+                b + 0.5 * share * (c - a + share * (2 * a - 5 * b + 4 * c - d + share * (3 * (b - c) + d - a)))
+            )
+        return found
+
+
+PLACING_STEPS = 4
+"""Steps of the search for the point of a line that lies abreast: each leaves less than a tenth of the last. [-]"""
+
+
+def _centre_line(cars: Sequence[_Car]) -> _Loop:
+    """The mean path of all passes."""
+    loop = _even(_smooth(_first_lap(cars)))
+    x, y = (np.concatenate([getattr(car, name)[_moves(car)] for car in cars]) for name in ("x", "y"))
+    for _ in range(ROUNDS):
+        index, offset = loop.place(x, y)
+        near = np.abs(offset) < LANE_SHARE * LANE_WIDTH
+        at, n = np.round(index[near]).astype(np.int64) % len(loop.points), len(loop.points)
+        sums, counts = (
+            np.bincount(at, each, minlength=n).astype(np.float64) for each in (offset[near], np.ones(len(at)))
+        )
+        shift = _smooth(sums) / np.maximum(_smooth(counts), 1e-9)
+        loop = _even(loop.points + shift[:, None] * loop.normals())
+    return loop
+
+
+def _moves(car: _Car) -> BoolArray:
+    return np.asarray(car.speed > MINIMUM_SPEED)
+
+
+def _first_lap(cars: Sequence[_Car]) -> FloatArray:
+    """The first closed lap of the car that goes furthest, shape (n, 2), points `GRID_STEP` apart, its ends met. [m]"""
+    car = max(cars, key=lambda one: float(np.hypot(np.diff(one.x), np.diff(one.y)).sum()))
+    moves = _moves(car)
+    path = np.stack([car.x[moves], car.y[moves]], axis=1)
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+    for begin in range(0, len(path), max(1, len(path) // 100)):  # the very first metres may lie beside the loop
+        gone = way - way[begin]
+        back = np.hypot(*(path - path[begin]).T)
+        returned = np.flatnonzero((gone > MINIMUM_LAP) & (back < RETURN_DISTANCE))
+        if len(returned):
+            end = returned[0] + int(np.argmin(back[returned[0] : returned[0] + 50]))
+            return _resampled(path[begin:end])
+    raise NotEnoughDataError(f"{car.name} drives {way[-1]:.0f} m and never comes back to where it was: no closed loop")
+
+
+def _resampled(path: FloatArray) -> FloatArray:
+    """A closed line at even steps of about `GRID_STEP`, what is missing between its ends spread over all of it."""
+    closed = np.concatenate([path, path[:1]])
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
+    even = np.linspace(0.0, way[-1], round(way[-1] / GRID_STEP) + 1)[:-1]
+    return np.stack([np.interp(even, way, closed[:, k]) for k in range(2)], axis=1)
+
+
+def _even(points: FloatArray) -> _Loop:
+    """With points at even steps again: arc lengths by cubics, so that corners don't get between points."""
+    from scipy.interpolate import CubicSpline
+
+    closed = np.concatenate([points, points[:1]])
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
+    even = np.linspace(0.0, way[-1], round(way[-1] / GRID_STEP) + 1)[:-1]
+    return _Loop(np.asarray(CubicSpline(way, closed, bc_type="periodic")(even)))
+
+
+def _smooth(values: FloatArray) -> FloatArray:
+    """Periodic columns through the Gaussian, shape of the values, (n,) or (n, 2)."""
+    frequency = np.fft.rfftfreq(len(values), GRID_STEP)
+    gain = np.exp(-0.5 * (2.0 * np.pi * SMOOTHING * frequency) ** 2)
+    spectrum = np.fft.rfft(values, axis=0)
+    return np.asarray(np.fft.irfft((spectrum.T * gain).T, len(values), axis=0))
+
+
+def _placed(cars: Sequence[_Car], loop: _Loop, lane_width: float) -> list[pd.DataFrame]:
+    bends = _smooth(loop.curvature())
+    frames = []
+    for car in cars:
+        index, offset = loop.place(car.x, car.y)
+        inside = np.abs(offset) <= LANE_SHARE * lane_width
+        new = np.r_[True, (np.diff(car.time) > MAXIMUM_STEP) | (np.diff(inside.astype(np.int8)) != 0)]
+        frames.append(
+            pd.DataFrame(
+                {
+                    "drive": car.name,
+                    "time": car.time.round(6),
+                    "offset": offset.round(5),
+                    "lane_width": lane_width,
+                    "speed": car.speed.round(4),
+                    "curvature": bends[np.floor(index).astype(np.int64) % len(bends)].round(7),
+                    "lead_distance": np.where(car.lead > 0.0, car.lead, np.nan).round(3),
+                    VALID_BELOW: HIGHEST_FREQUENCY,
+                    RESOLUTION: POSITION_RESOLUTION,
+                    RUN: np.cumsum(new),
+                    "state": np.where(inside, KEPT_ROWS, "outside the lane"),
+                }
+            )
+        )
+    return frames

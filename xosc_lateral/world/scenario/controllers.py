@@ -1,0 +1,228 @@
+"""Controllers: which of a vehicle's domains each drives, by the names that players know it by, and since when."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from enum import IntFlag
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from xosc_lateral.world.scenario.entity import Controller
+from xosc_lateral.world.scenario.private_actions import (
+    ActivateControllerAction,
+    AssignControllerAction,
+    OverrideControllerValueAction,
+)
+
+
+class Domains(IntFlag):
+    """Domains of a vehicle's motion, as the standard calls them."""
+
+    NONE = 0
+    LONGITUDINAL = 1
+    LATERAL = 2
+    BOTH = 3
+
+    def words(self) -> str:
+        """In words."""
+        return _WORDS[int(self)]
+
+
+_WORDS = ("nothing", "along the road", "across the road", "along and across the road")
+
+
+class ControllerKind(Struct, frozen=True):
+    """What a controller is.
+
+    Parameters
+    ----------
+    name : str
+        As its player calls it; as the file does where nobody knows it.
+    drives : Domains
+        It can drive these, and does in those in which it is active.
+    is_external : bool
+        A program outside of the scenario drives.
+    as_a_whole : bool
+        Active in one domain, it drives all of its own.
+    at_once : bool
+        Active from its assignment on.
+    """
+
+    name: str
+    drives: Domains = Domains.BOTH
+    is_external: bool = False
+    as_a_whole: bool = False
+    at_once: bool = False
+
+    def active(self, asked: Domains) -> Domains:
+        """What it drives where it was activated in these domains."""
+        return self.drives if asked & self.drives and self.as_a_whole else asked & self.drives
+
+
+def _by_name(*kinds: ControllerKind) -> dict[str, ControllerKind]:
+    return {kind.name.lower(): kind for kind in kinds}
+
+
+ESMINI: Mapping[str, ControllerKind] = _by_name(
+    # esmini 3.6.0, EnvironmentSimulator/Modules/Controllers: names from the headers, domains from `operating_domains_`
+    # and from what each `Step` writes, whatever it is active in.
+    ControllerKind("ACCController", Domains.LONGITUDINAL),
+    ControllerKind("ALKSController"),
+    # Keeps the offset that it finds, and takes a speed sideways of its own for the other's (`dv_t`).
+    ControllerKind("ALKS_R157SM_Controller", as_a_whole=True),
+    ControllerKind("ECE_ALKS_RefDriverController"),
+    ControllerKind("ExternalController", is_external=True),
+    ControllerKind("FollowGhostController", as_a_whole=True),
+    ControllerKind("FollowReferenceController", as_a_whole=True),
+    ControllerKind("FollowRouteController", as_a_whole=True),  # stops and changes lanes on its own
+    ControllerKind("HIDController", as_a_whole=True),  # a person
+    ControllerKind("InteractiveController"),  # a person
+    ControllerKind("LoomingController", as_a_whole=True),  # is registered as longitudinal, and steers
+    ControllerKind("NaturalDriver", as_a_whole=True),  # is registered as longitudinal, and changes lanes
+    ControllerKind("OffroadFollower", as_a_whole=True),
+    ControllerKind("SloppyDriverController"),
+    ControllerKind("SumoController", as_a_whole=True, at_once=True),
+    ControllerKind("UDPDriverController", is_external=True, as_a_whole=True),
+    ControllerKind("ControllerRel2Abs", Domains.NONE),  # exchanges actions for others of the same motion
+    ControllerKind("DefaultController", Domains.NONE),
+)
+"""By the value of the property `esminiController`, or by the controller's own name."""
+
+SCENARIO_RUNNER: Mapping[str, ControllerKind] = _by_name(
+    # CARLA's ScenarioRunner, srunner/scenariomanager/actorcontrols: an assigned module drives from then on.
+    ControllerKind("external_control", is_external=True, at_once=True),
+    ControllerKind("carla_autopilot", at_once=True),
+    ControllerKind("vehicle_longitudinal_control", Domains.LONGITUDINAL, at_once=True),
+    # They go where the storyboard says: actor_control.py gives the first and the last to whoever has no controller.
+    ControllerKind("npc_vehicle_control", Domains.NONE, at_once=True),
+    ControllerKind("simple_vehicle_control", Domains.NONE, at_once=True),
+    ControllerKind("vehicle_velocity_control", Domains.NONE, at_once=True),
+    ControllerKind("vehicle_teleport_control", Domains.NONE, at_once=True),
+    ControllerKind("pedestrian_control", Domains.NONE, at_once=True),
+)
+"""By the value of the property `module`."""
+
+OBSTACLES = frozenset({"consider_obstacles", "consider_trafficlights"})
+LIMITS = frozenset({"max_acceleration", "max_deceleration"})
+"""Properties with which a `simple_vehicle_control` has a speed of its own: truth values, and numbers."""
+
+AUTOPILOT = ControllerKind("CARLA's autopilot", as_a_whole=True)
+"""What an ActivateControllerAction turns on and off in ScenarioRunner (openscenario_support.md)."""
+
+
+def kind_of(controller: Controller) -> ControllerKind:
+    """By the property of its player, else by its own name; a controller that nobody knows drives both domains."""
+    properties = {name.strip().lower(): value.strip() for name, value in controller.properties.items()}
+    if name := properties.get("esminicontroller", ""):
+        return ESMINI.get(name.lower(), ControllerKind(name))
+    if "module" in properties:
+        module = properties["module"].replace("\\", "/").rpartition("/")[2].removesuffix(".py").rpartition(".")[2]
+        kind = SCENARIO_RUNNER.get(module.lower(), ControllerKind(module, at_once=True))
+        on = any(properties.get(name, "").lower() in ("1", "true", "yes", "y", "t", "on") for name in OBSTACLES)
+        if kind.name == "simple_vehicle_control" and (on or LIMITS & properties.keys()):
+            return replace(kind, drives=Domains.LONGITUDINAL)
+        return kind
+    return ESMINI.get(controller.name.strip().lower(), ControllerKind(controller.name))
+
+
+def switches(content: object) -> Iterator[tuple[Domains, bool]]:
+    """Domains that an action switches on or off; to override pedals or the wheel is to drive, too."""
+    found: tuple[tuple[Domains, bool | None], ...] = ()
+    match content:
+        case AssignControllerAction():
+            found = (
+                (Domains.LONGITUDINAL, content.activate_longitudinal),
+                (Domains.LATERAL, content.activate_lateral),
+            )
+        case ActivateControllerAction():
+            found = (Domains.LONGITUDINAL, content.longitudinal), (Domains.LATERAL, content.lateral)
+        case OverrideControllerValueAction():
+            found = tuple(
+                (Domains.LATERAL if "steering" in name.lower() else Domains.LONGITUDINAL, active)
+                for name, active, _ in content.overrides
+            )
+    return ((domain, on) for domain, on in found if on is not None)
+
+
+def gives_lateral(content: object) -> bool | None:
+    """Whether an action gives the lateral domain to a controller, or takes it back; None: neither."""
+    found = next((on for domain, on in switches(content) if domain is Domains.LATERAL), None)
+    if isinstance(content, AssignControllerAction) and content.controller is not None:
+        kind = kind_of(content.controller)
+        return Domains.LATERAL in kind.drives if kind.at_once else found
+    return found
+
+
+def is_meant(controller: Controller, content: object) -> bool:
+    """Whether an activation may be of this controller: it names it, or none."""
+    name = content.controller_ref if isinstance(content, ActivateControllerAction) else None
+    return not name or name in (controller.object_name, controller.name)
+
+
+@dataclass(slots=True)
+class _Assigned:
+    controller: Controller
+    kind: ControllerKind
+    asked: Domains = Domains.NONE
+
+
+class DrivingControllers:
+    """Controllers of one entity in the course of a run.
+
+    `controllers`: assigned from the start; `for_carla`: an activation turns CARLA's autopilot on and off.
+    """
+
+    def __init__(self, controllers: Iterable[Controller], *, for_carla: bool) -> None:
+        self._for_carla = for_carla
+        self._assigned = list[_Assigned]()
+        self._overridden = Domains.NONE
+        for controller in controllers:
+            self._assign(controller)
+
+    def follow(self, content: object) -> None:
+        """An action on controllers has begun."""
+        if isinstance(content, AssignControllerAction) and content.controller is not None:
+            self._assign(content.controller)
+        if isinstance(content, OverrideControllerValueAction):
+            self._overridden = Domains.NONE
+            for domain, on in switches(content):
+                self._overridden |= domain if on else Domains.NONE
+            return
+        if self._for_carla and isinstance(content, ActivateControllerAction):
+            self._assigned = [one for one in self._assigned if one.kind is not AUTOPILOT]
+            self._assigned.append(_Assigned(Controller(AUTOPILOT.name, content.place), AUTOPILOT))
+        meant = next((one for one in reversed(self._assigned) if is_meant(one.controller, content)), None)
+        if meant is None:
+            return
+        for domain, on in switches(content):
+            for one in self._assigned if on else [meant]:  # a domain has one driver
+                one.asked &= ~domain
+            meant.asked |= domain if on else Domains.NONE
+
+    @property
+    def domains(self) -> Domains:
+        """What they drive now."""
+        found = Domains.NONE
+        for one in self._assigned:
+            found |= one.kind.active(one.asked | self._overridden)
+        return found
+
+    def words(self) -> str:
+        """Who drives what now; empty: nobody."""
+        driving = ((one, one.kind.active(one.asked | self._overridden)) for one in self._assigned)
+        return ", ".join(f"{named(one.controller)} {domains.words()}" for one, domains in driving if domains)
+
+    def _assign(self, controller: Controller) -> None:
+        kind = kind_of(controller)
+        self._assigned = [one for one in self._assigned if one.controller != controller]
+        for one in self._assigned if kind.at_once else ():
+            one.asked = Domains.NONE
+        self._assigned.append(_Assigned(controller, kind, Domains.BOTH if kind.at_once else Domains.NONE))
+
+
+def named(controller: Controller) -> str:
+    """By its own name, and as its player calls it."""
+    kind = kind_of(controller).name
+    return f"'{controller.name}'" + ("" if kind.lower() == controller.name.strip().lower() else f" ({kind})")
