@@ -47,7 +47,7 @@ AFTER_ALL = 2.0
 
 STORY = "xosc-lateral ego"
 
-LASTING = 3.0
+LONGEST_RUN = 3.0
 """Times the nominal run, or what happens in one that does not end by itself, each run is played: beyond, all
 movement is again what it was. [-]"""
 LEAST_DURATION = 20.0
@@ -89,7 +89,7 @@ class Meaning:
         self._is_cut_off = motion.cut_off is not None
         last = max((one.start if one.end is None else one.end for one in motion.actions), default=0.0)
         until = last if self._is_cut_off else motion.end_time
-        self.limit = min(inf if time_limit is None else time_limit, LASTING * max(until, LEAST_DURATION))
+        self.limit = min(inf if time_limit is None else time_limit, LONGEST_RUN * max(until, LEAST_DURATION))
         self._before = list(self._runs(played.scenario))
 
     @property

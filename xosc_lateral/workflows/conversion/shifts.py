@@ -37,7 +37,7 @@ PASSED_ON = 3.0
 speed. What is later by more is told. [-]"""
 LEAST_WAY = 1e-3
 """A lateral action over less than this has no duration to compare. [m]"""
-OURS = "xosc-lateral"
+STORY_PREFIX = "xosc-lateral"
 """Begins the names of stories that we add."""
 
 Path = tuple[str, ...]
@@ -128,7 +128,7 @@ def _runs(actions: Sequence[PlayedAction]) -> dict[Key, PlayedAction]:
     found: dict[Key, PlayedAction] = {}
     numbers: dict[tuple[Path, str | None], int] = {}
     for played in actions:
-        if played.path != ("Init",) and not played.path[0].startswith(OURS):
+        if played.path != ("Init",) and not played.path[0].startswith(STORY_PREFIX):
             number = numbers.get((played.path, played.actor), 0)
             numbers[played.path, played.actor] = number + 1
             found[played.path, played.actor, number] = played
