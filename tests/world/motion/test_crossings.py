@@ -13,7 +13,9 @@ from tests.kit.scenario_files import entity, private, scenario_text, speed_actio
 from tests.workflows.conversion.test_vehicle_under_test import CHANGE, EXTERNAL
 from tests.world.scenario.test_under_test import at, event, headway, stories
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.workflows.conversion.page import conversion_page
 from xosc_lateral.workflows.conversion.result import EntityResult
+from xosc_lateral.workflows.playing.figures import lane_changes_over_time
 from xosc_lateral.world.motion.crossings import ALPHA, BETA, NINE_TENTHS, PEAK_SHARE, TENTH
 
 WIDTH = 3.5
@@ -108,3 +110,14 @@ def test_the_choice_is_recorded_and_made_again(tmp_path: Path) -> None:
     again = tmp_path / "again.xosc"
     xl.reproduce(tmp_path / "out.xosc", again)
     assert again.read_bytes() == (tmp_path / "out.xosc").read_bytes()
+
+
+def test_the_report_draws_lane_changes_before_and_after(tmp_path: Path) -> None:
+    made = xl.convert(scenario(tmp_path), seed=2, lane_changes="lifelike")
+    page = conversion_page(made._made)
+    assert "Speed towards the new lane" in page
+    entity_result = made._made.enriched.entity("A")
+    figure = lane_changes_over_time(made._made.enriched, [(entity_result, entity_result.crossings[0])])
+    written, enriched = (np.asarray(mark.y) for mark in figure.panels[0].curves())
+    assert written.max() == pytest.approx(0.5 * np.pi * WIDTH / 5.0, abs=0.02) and written.min() > -0.01
+    assert 0.7 * written.max() < enriched.max() < 1.5 * written.max()
