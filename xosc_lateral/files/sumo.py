@@ -40,6 +40,7 @@ class SumoLane:
     width: float  # [m]
     length: float  # [m]
     is_driving: bool
+    shape: str = ""  # points of its middle, as written
 
 
 @dataclass(slots=True)
@@ -63,8 +64,9 @@ def read_sumo_net(path: Path) -> SumoNet:
             edge, _, index = name.rpartition("_")
             allowed, denied = (set(element.get(key, "").split()) for key in ("allow", "disallow"))
             is_driving = not (allowed and allowed <= ON_FOOT) and "all" not in denied
+            shape = element.get("shape", "")
             width = WIDTH if element.get("width") is None else number_of(element, "width", path)
-            net.lanes[name] = SumoLane(edge, int(index), width, number_of(element, "length", path), is_driving)
+            net.lanes[name] = SumoLane(edge, int(index), width, number_of(element, "length", path), is_driving, shape)
         elif element.tag == "connection" and element.get("from") is not None:
             here, there = (f"{element.get(end)}_{element.get(f'{end}Lane')}" for end in ("from", "to"))
             links.append((element.get("dir") != "s", here, element.get("via") or there))
