@@ -12,6 +12,7 @@ import numpy as np
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import unpacked_text
+from xosc_lateral.files.xml import root_tag
 
 if TYPE_CHECKING:
     from lxml import etree
@@ -75,6 +76,13 @@ def read_sumo_net(path: Path) -> SumoNet:
     for _, here, there in sorted(links):
         net.following.setdefault(here, []).append(there)
     return net
+
+
+def require_fcd(path: Path) -> None:
+    """Refuse what is no FCD output. Raises `FormatError`."""
+    if (tag := root_tag(path)) != "fcd-export":
+        what = f"its root element is {tag!r}" if tag else "it is no XML"
+        raise FormatError(f"no FCD output of SUMO: {what}", path=path)
 
 
 def is_left_handed(path: Path) -> bool:

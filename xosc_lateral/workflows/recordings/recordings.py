@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.texts import composed
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping
 from xosc_lateral.files.opendrive import parse_opendrive, read_opendrive
 from xosc_lateral.files.opendrive.write import SHOULDER, WIDTH_PIECE, WrittenLane, WrittenRoad, curved_plan
@@ -75,7 +76,9 @@ def read_recording(
     if not source.exists():
         raise FormatError("no such file or folder", path=source)
     with foreign_errors(source, "can't be read as a recording"), np.errstate(all="ignore"):
-        return READERS[kind](source, road, as_mapping(columns))
+        traffic = READERS[kind](source, road, as_mapping(columns))
+    tracks = tuple(replace(track, name=composed(track.name)) for track in traffic.tracks)
+    return replace(traffic, tracks=tracks, host=composed(traffic.host))
 
 
 def format_of(source: Path) -> str:

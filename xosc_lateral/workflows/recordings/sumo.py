@@ -14,7 +14,16 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
-from xosc_lateral.files.sumo import TRUCKS, SumoLane, SumoNet, elements, number_of, usual_length, wrong_element
+from xosc_lateral.files.sumo import (
+    TRUCKS,
+    SumoLane,
+    SumoNet,
+    elements,
+    number_of,
+    require_fcd,
+    usual_length,
+    wrong_element,
+)
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks
 from xosc_lateral.workflows.recordings.roads_from_lanes import DrivenLane
 
@@ -62,6 +71,7 @@ def read_fcd(path: Path) -> Tracks:
 
     Raises `FormatError`: no such file; `NotEnoughDataError`: no vehicle in it.
     """
+    require_fcd(path)
     rows, names, types = list[tuple[float, ...]](), dict[str, int](), list[str]()
     time = np.nan
     for event, element in elements(path, ("timestep", "vehicle")):
