@@ -38,5 +38,8 @@ def test_lines_of_a_simulation_are_answered_in_one_line_and_refused_ones_change_
     for package in NEEDS.get(door, ()):
         pytest.importorskip(package, reason="its extra is not installed")
     tally = Count()
-    assert not [f"{fault.seed}: {fault.what}" for fault in attack_door(door, (5 if door in NEEDS else 20) * COUNT, 1, tmp_path, tally)]
+    assert not [
+        f"{fault.seed}: {fault.what}"
+        for fault in attack_door(door, (5 if door in NEEDS else 20) * COUNT, 1, tmp_path, tally)
+    ]
     assert min(tally.refused, tally.accepted) > 0
