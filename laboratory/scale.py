@@ -110,7 +110,7 @@ def hours(n: int, folder: Path) -> float:
     hour = simulate_drive(3600.0, 3).table.iloc[::2][["time", "distance_left", "distance_right", "speed"]]
     tables = [hour.assign(drive=f"d{k}") for k in range(n)]
     pd.concat(tables).to_parquet(folder / "d.parquet")
-    return _timed(lambda: xl.fit(folder / "d.parquet"))
+    return _timed(lambda: xl.fit(folder / "d.parquet", name="all"))
 
 
 def columns(n: int, folder: Path) -> float:
