@@ -22,6 +22,7 @@ import numpy as np
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.limits import ANY_CONTEXT
 from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.base.texts import composed
 from xosc_lateral.files.rows import as_word, parse_condition
@@ -318,6 +319,6 @@ def _numbers(name: str, entry: Any, path: Path) -> dict[str, float]:
     if not isinstance(entry, dict) or not entry:
         raise FormatError("expected texts and the numbers that they stand for", path=path, element=where)
     for text, number in entry.items():
-        if isinstance(number, str | dict | list) or not np.isfinite(float(number)):
+        if not isinstance(number, int | float) or not abs(number) <= ANY_CONTEXT.high:
             raise FormatError(f"{text} = {number!r}, expected a number", path=path, element=where)
     return {text: float(number) for text, number in entry.items()}
