@@ -29,7 +29,7 @@ from xosc_lateral.workflows.conversion.drivers import choose_drivers
 from xosc_lateral.workflows.conversion.enrich import enrich
 from xosc_lateral.workflows.conversion.lane_changes import refuse_steps, stay_as_written
 from xosc_lateral.workflows.conversion.load import Played, input_hashes, play_scenario, play_until
-from xosc_lateral.workflows.conversion.meaning import Kept, keep_meaning, meaning_of
+from xosc_lateral.workflows.conversion.meaning import KeptChains, keep_meaning, meaning_of
 from xosc_lateral.workflows.conversion.modes import (
     WritingPlan,
     chosen_egos,
@@ -251,7 +251,7 @@ class _Reactive:
     warnings: tuple[str, ...]
 
 
-def _words(kept: Kept, left: Collection[str], shifts: Sequence[EventShift]) -> Iterator[str]:
+def _words(kept: KeptChains, left: Collection[str], shifts: Sequence[EventShift]) -> Iterator[str]:
     """A line each: who stays as it is, whose moves are smaller, what comes much later, what is left."""
     for name in sorted(left):
         yield f"'{name}' stays as it is: {CHANGES}"

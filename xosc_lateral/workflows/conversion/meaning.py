@@ -177,7 +177,7 @@ def with_speeds(scenario: Scenario, motion: NominalMotion, egos: Collection[str]
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class KeptChains:
     """Chains that leave what happens as it was, the runs with them, and what is left that could not be mended.
 
     `smaller`: entity -> least factor of its moves, and whether that is in all of its chains.
@@ -193,7 +193,7 @@ def keep_meaning(
     chains: Sequence[OffsetChain],
     motion: NominalMotion,
     attempt: Callable[[Sequence[OffsetChain]], list[Comparison]],
-) -> Kept:
+) -> KeptChains:
     """Chains as large as leave what happens as it was.
 
     Parameters
@@ -234,7 +234,7 @@ def keep_meaning(
         own = [j for j, chain in enumerate(chains) if chain.entity == name]
         before = least.get(name, (1.0, False))[0]
         least[name] = min(before, factor), all(j in factors for j in own)
-    return Kept(tuple(applied(factors)), tuple(comparisons), tuple(changes), least)
+    return KeptChains(tuple(applied(factors)), tuple(comparisons), tuple(changes), least)
 
 
 def _changes(comparisons: Sequence[Comparison]) -> list[Change]:
