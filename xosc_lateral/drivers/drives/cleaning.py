@@ -11,6 +11,7 @@ import numpy as np
 from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.limits import DRIVE_SPAN, TIME
+from xosc_lateral.drivers.drives.cuts import MAX_GAP
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.drives.frozen import frozen_rows
 from xosc_lateral.drivers.drives.markings import both_markings
@@ -71,6 +72,8 @@ def clean_drive(
         What messages call the source.
     """
     columns = _in_order(columns, name, path)
+    if RUN not in columns:
+        columns = {key: _bridged(key, columns, levels) for key in columns}
     offset, lane_width = _position(columns)
     _check_units(name, columns, offset, lane_width, path)
     narrow = (lane_width < LANE_WIDTHS[0] / 2) | (lane_width > 2 * LANE_WIDTHS[1])
@@ -112,6 +115,22 @@ def _stated(column: str, columns: Mapping[str, FloatArray], good: BoolArray, pat
         )
         raise FormatError(what, path=path, element=f"column {column!r}")
     return float(values[0])
+
+
+def _bridged(name: str, columns: Mapping[str, FloatArray], levels: frozenset[str]) -> FloatArray:
+    """A context column without gaps that are as short as those of the offset that are bridged: of another rate, or a
+    message that was lost, which is no absence."""
+    values, time = columns[name], columns["time"]
+    known = np.flatnonzero(~np.isnan(values))
+    if name in DRIVE_COLUMNS or len(known) in (0, len(values)):
+        return values
+    after = np.searchsorted(known, np.arange(len(values)))
+    before, after = known[np.maximum(after - 1, 0)], known[np.minimum(after, len(known) - 1)]
+    short = np.isnan(values) & (before < after) & (time[after] - time[before] <= MAX_GAP + 1e-9)
+    if name in levels or not np.isfinite(values[known]).all():
+        nearest = np.where(time - time[before] <= time[after] - time, before, after)
+        return np.where(short, values[nearest], values)
+    return np.where(short, np.interp(time, time[known], values[known]), values)
 
 
 def _seen_through(drive: Drive) -> Drive:
