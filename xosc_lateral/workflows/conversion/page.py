@@ -27,6 +27,9 @@ ROUGH_SHARE = 0.01
 LONGEST_HEADWAY = 5.0
 """Pairs that stay farther apart do not follow one another: UN R157 and ALKS scenarios look at 2 s and less. [s]"""
 
+MOST_LANE_CHANGES = 4
+"""Lane changes that are drawn. [-]"""
+
 MOST_FOLLOWINGS = 20
 """Pairs in the table of headways."""
 
@@ -67,7 +70,9 @@ def conversion_page(conversion: ConvertedScenario) -> str:
     _add_paths(page, enriched)
     _add_offsets(page, enriched, done)
     _add_dynamics(page, enriched, done)
+    _add_lane_changes(page, enriched, done)
     _add_gaps(page, enriched)
+    _add_shifts(page, conversion)
     page.section(
         "Segments",
         "Offsets are sampled where a vehicle simply follows its road. Everywhere else the table gives the reason why "
@@ -168,6 +173,21 @@ def _add_dynamics(page: Page, enriched: Enriched, done: Sequence[EntityResult]) 
         )
 
 
+def _add_lane_changes(page: Page, enriched: Enriched, done: Sequence[EntityResult]) -> None:
+    """Those of vehicles on trajectories: the player draws the others."""
+    found = [(entity, one) for entity in done for one in entity.crossings if one.is_lane_change]
+    if not found:
+        return
+    page.section("Lane changes")
+    more = f" The first {MOST_LANE_CHANGES} of {len(found)}." if len(found) > MOST_LANE_CHANGES else ""
+    page.figure(
+        figures.lane_changes_over_time(enriched, found[:MOST_LANE_CHANGES]),
+        "Speed towards the new lane. Coloured: enriched, with the movement in the lane. Dashed: as written. Band: the "
+        f"largest speed of 90 % of 323 lane changes of 6 to 13 s on one motorway.{more}",
+        "Lateral speed over time of each lane change",
+    )
+
+
 def _add_gaps(page: Page, enriched: Enriched) -> None:
     page.section(
         "Gaps",
@@ -207,6 +227,31 @@ def _add_followings(page: Page, enriched: Enriched) -> None:
         f"speed of the vehicle behind, and over the closing speed. Pairs within {LONGEST_HEADWAY:g} s."
         + (f" {len(rows) - MOST_FOLLOWINGS} more pairs are left out." if len(rows) > MOST_FOLLOWINGS else ""),
         formats=dict.fromkeys(FOLLOWING_COLUMNS, ".2f"),
+    )
+
+
+def _add_shifts(page: Page, conversion: ConvertedScenario) -> None:
+    """Events that come at other times with the offsets than without them."""
+    if not conversion.shifts:
+        return
+    rows = [
+        {
+            "event": shift.event,
+            "of": shift.entity or "",
+            "at [s]": shift.time,
+            "lasts [s]": shift.duration,
+            "starts later by [s]": shift.start,
+            "ends later by [s]": shift.end,
+        }
+        for shift in conversion.shifts
+    ]
+    page.heading("Events")
+    page.table(
+        rows,
+        "How much later events start and end with the offsets than without them (negative: earlier), the largest under "
+        "egos at 0.8, 1.0 and 1.2 of their initial speed and one that brakes to a stop. An action by an acceleration "
+        "or a rate takes longer or shorter from beside the middle.",
+        formats=dict.fromkeys(("at [s]", "lasts [s]", "starts later by [s]", "ends later by [s]"), ".2f"),
     )
 
 
