@@ -41,14 +41,10 @@ from xosc_lateral.workflows.conversion.modes import (
 )
 from xosc_lateral.workflows.conversion.result import ConversionProvenance, ConvertedScenario, Enriched, EventShift
 from xosc_lateral.workflows.conversion.settings import ConvertSettings, OutputMode, relative
-<<<<<<< HEAD
-from xosc_lateral.workflows.conversion.validity import validity_warnings, without_proving_grounds
-from xosc_lateral.world.motion.nominal import Activity
-=======
 from xosc_lateral.workflows.conversion.shifts import Comparison, largest_of
+from xosc_lateral.workflows.conversion.validity import validity_warnings, without_proving_grounds
 from xosc_lateral.world.motion.nominal import Activity, NominalMotion
 from xosc_lateral.world.motion.offset_chain import OffsetChain
->>>>>>> main
 from xosc_lateral.world.scenario import Scenario
 from xosc_lateral.world.scenario.dependence import Dependence, dependence
 
