@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from functools import lru_cache
 from pathlib import Path
@@ -92,6 +93,11 @@ def read_xml(path: Path) -> tuple[etree._Element, bytes]:
     """Root element and bytes of a file; see `read_document`."""
     document = read_document(path)
     return document.root, document.data
+
+
+def document_of(data: bytes, path: Path) -> XmlDocument:
+    """From bytes, as if they were that file's."""
+    return XmlDocument(parse_xml(data, path), data, hashlib.sha256(data).hexdigest())
 
 
 def root_tag(path: Path) -> str:
