@@ -79,9 +79,7 @@ JOB_TIMEOUT = Limit(
 )
 JOB_MEMORY = Limit(4000, "MB", "memory for one scenario", "500 entities for a minute take 1.5 GB")
 
-LIVE_PAUSE = Limit(
-    600, "s", "time between two steps of a running simulation", "drivers catch up within a second or two"
-)
+LIVE_PAUSE = Limit(60, "s", "time between two steps of a running simulation", "300 steps of a driver: a second or two")
 LIVE_LINE = Limit(100, "MB", "a line of live stdio", "100 000 vehicles; one that sends no end of line fills any memory")
 
 OFFSET_LANES = Limit(
@@ -111,7 +109,7 @@ class Range:
 CONTEXT_RANGES: Mapping[str, Range] = MappingProxyType(
     {
         "speed": Range(-50, 150, "540 km/h; cars reverse more slowly than that"),
-        "acceleration": Range(-100, 100, "10 g: a crash"),
+        "acceleration": Range(-100, 100, "10 g; a car brakes with 1 g"),
         "curvature": Range(-1, 1, "a radius of 1 m; cars turn in 5 m"),
         "lane_width": Range(0, 20, "the widest toll plaza lane; 0 where a lane begins"),
         "lane_index": Range(-1, 50, "lanes of one direction; -1: none"),

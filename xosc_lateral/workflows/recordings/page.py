@@ -35,7 +35,8 @@ VEHICLES = {
 }  # fmt: skip
 MANEUVERS = {
     "entity": "entity", "kind": "maneuver", "side": "side", "start": "start [s]", "duration": "duration [s]",
-    "shape": "shape", "lanes": "lanes", "residual": "residual, rms [m]", "cut_off": "cut off", "begins": "begins",
+    "shape": "shape", "lanes": "lanes", "residual": "residual, rms [m]", "bell_residual": "of a bell [m]",
+    "cut_off": "cut off", "begins": "begins",
 }  # fmt: skip
 ENCOUNTERS = {
     "entity": "entity", "kind": "maneuver", "time": "time [s]", "side": "side", "ahead": "ahead",
@@ -114,6 +115,7 @@ def maneuver_rows(plans: Sequence[VehiclePlan], relative: Any) -> list[dict[str,
                     "shape": one.shape.value,
                     "lanes": abs(one.lanes),
                     "residual": round(one.residual, 4),
+                    "bell_residual": round(one.bell_residual, 4) if np.isfinite(one.bell_residual) else None,
                     "cut_off": one.cut,
                     "begins": "by the clock" if trigger is None else f"{trigger.distance:.1f} m from {trigger.other}",
                 }
@@ -151,6 +153,12 @@ def not_expressed(plans: Sequence[VehiclePlan], residuals: Sequence[Residuals], 
             if len(values) and (worst := float(np.abs(values).max())) > WORTH_NAMING:
                 row = int(np.abs(values).argmax())
                 lines.append(f"{plan.name}: up to {worst:.2f} m {word}, at {one.time[row]:.1f} s")
+    fitted = [one for plan in plans for one in plan.lateral.transitions if np.isfinite(one.bell_residual)]
+    if bells := sum(one.is_bell for one in fitted):
+        lines.append(
+            f"{bells} of {len(fitted)} lane changes are nearer to the bell of drivers than to a maneuver's shape: "
+            "convert --lane-changes lifelike has it"
+        )
     return lines
 
 

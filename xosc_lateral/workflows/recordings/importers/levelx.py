@@ -30,6 +30,7 @@ from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.tables import read_table
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings, Rows, cut_table
+from xosc_lateral.workflows.recordings.gate import require_lane_direction
 from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
 from xosc_lateral.workflows.recordings.neighbours import REACH, find_neighbours
 
@@ -82,6 +83,8 @@ def read_recording_files(path: Path) -> tuple[pd.DataFrame, pd.DataFrame, pd.Dat
             what = "missing; a recording is XX_tracks.csv, XX_tracksMeta.csv and XX_recordingMeta.csv"
             raise FormatError(what, path=file)
         tables.append(read_table(file)[0])
+        if tables[-1].empty:
+            raise NotEnoughDataError(f"{file}: has no rows")
     return tables[0], tables[1], tables[2]
 
 
@@ -127,6 +130,8 @@ def _from_highd(
     meta = tracks_meta.set_index("id").reindex(tracks["id"])
     rightwards = meta["drivingDirection"].to_numpy() == 2
     way = np.where(rightwards, 1.0, -1.0)
+    velocity = tracks["xVelocity"].to_numpy(dtype=np.float64)
+    require_lane_direction(way * np.sign(velocity), np.abs(velocity), "the recording's drivingDirection", path)
     # y points down: for traffic towards +x the left is at smaller y.
     x = way * (tracks["x"] + 0.5 * tracks["width"]).to_numpy()
     left = -way * (tracks["y"] + 0.5 * tracks["height"]).to_numpy()
