@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 import xosc_lateral as xl
-from tests.workflows.detection.made import lane_change, weave
+from tests.kit.lane_tracks import lane_change, weave
 from xosc_lateral.cli import main
 
 
