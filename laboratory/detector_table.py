@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.files.pages.chart import BLUE, MUTED, VERMILLION
+from xosc_lateral.files.pages.chart import BLUE, DASHED, GREEN, MUTED, VERMILLION
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.workflows.detection.detectors import NO_DANGER, Detector
 from xosc_lateral.workflows.detection.logistic import Logistic
@@ -22,6 +22,7 @@ Views = list[tuple[Scene, list[View]]]
 TUNED_RATE = 5.0
 """False alarms that a detector is tuned to at most. [1/h]"""
 TUNED = ("lateral-speed", "wandering-zone", "time-to-line")
+ASIDE = ("paper", "single")
 EQUAL_SHARE = 0.95
 """Cut-ins seen before the marking at which trained detectors are compared. [-]"""
 DRAWS = 500
@@ -182,12 +183,21 @@ def alarm_figure(pools: Sequence[Pool]) -> Figure:
     """False alarms by threshold of lateral speed: nominal, lifelike, real."""
     figure = Figure(1, 1, height=210.0, legend=True)
     panel = figure.row(0)[0]
-    for kind, color in (("real", MUTED), ("lifelike", BLUE)):
-        chosen = [pool for pool in pools if pool.name.startswith(kind) and not pool.name.endswith("paper")]
-        chosen = [pool for pool in chosen if "vehicle" not in pool.name]
+    drawn = [
+        ("real", MUTED, "", lambda name: name.startswith("real")),
+        (
+            "lifelike",
+            BLUE,
+            "",
+            lambda name: name.startswith("lifelike") and "paper" not in name and "single" not in name,
+        ),
+        ("the paper's model", GREEN, DASHED, lambda name: "paper" in name),
+    ]
+    for kind, color, dashes, belongs in drawn:
+        chosen = [pool for pool in pools if belongs(pool.name)]
         for pool in chosen:
-            curve = pool.curves[0]
-            panel.line(*_course(curve), color, label=kind if pool is chosen[0] else "", width=1.6)
+            label = kind if pool is chosen[0] else ""
+            panel.line(*_course(pool.curves[0]), color, label=label, width=1.6, dashes=dashes)
     nominal = next(pool for pool in pools if pool.name == "nominal").curves[0]
     panel.line(
         nominal.detector.thresholds, np.full(len(nominal.rate), LEAST), VERMILLION, label="nominal: none", width=2.4

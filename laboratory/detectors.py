@@ -34,6 +34,8 @@ from xosc_lateral.workflows.detection.tracks import Scene
 Views = list[tuple[Scene, list[View]]]
 
 SEED = 55
+SWERVE = "4_1_2"
+"""The ALKS scenario whose leader swerves in its lane as written: no lane keeping, and left out."""
 SHORTCUT_VARIANTS = 8
 """Of each scenario for the shortcut test, times --variants: six scenarios have eight lane changes."""
 SPEEDS = (0.10, 0.15, 0.20, 0.25)
@@ -49,6 +51,11 @@ class Given:
     runs: Sequence[Path]
     templates: Path
     variants: int
+
+    @property
+    def scenarios(self) -> list[Path]:
+        """Our templates and the ALKS scenarios."""
+        return [self.templates, *(path for path in sorted(self.alks.glob("*.xosc")) if SWERVE not in path.name)]
 
 
 def half_of(scenes: Iterable[Scene], half: int) -> Iterator[Scene]:
@@ -98,7 +105,7 @@ def run_scenes(path: Path) -> list[Scene]:
 
 def pools(given: Given, folder: Path) -> dict[str, Views]:
     """Traffic by what it is: nominal, lifelike by profile, the paper's model, real."""
-    scenarios = [given.templates, given.alks]
+    scenarios = given.scenarios
     paper = xl.write_profile(xl.fit(drive_table(given.wheel), name="paper", model="two-level"), folder / "paper.json")
     shipped = [profile.stem for profile in sorted(shipped_folder("driver_profiles").glob("*.json"))]
     single = [name for name in shipped if "-vehicle-" in name]
@@ -119,7 +126,7 @@ def pools(given: Given, folder: Path) -> dict[str, Views]:
 # ---- trained on one, tested on another -------------------------------------------------------------------------------
 def training(given: Given, folder: Path) -> dict[str, list[Scene]]:
     """Scenes by what they are; no vehicle of the recording's other half had a part in any of them."""
-    table, scenarios = drive_table(given.wheel), [given.templates, given.alks]
+    table, scenarios = drive_table(given.wheel), given.scenarios
     half = xl.write_profile(
         xl.fit(table[[_half(name) == 0 for name in table["drive"]]], name="half"), folder / "half.json"
     )
