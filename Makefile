@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 DEV_STAMP := $(VENV)/.installed-dev
 DOCS_STAMP := $(VENV)/.installed-docs
 
-.PHONY: laboratory fuzz lock install-locked sbom reproducible licences test-matrix demo test fast style lint format docs schema profiles refined templates loop-dlr picture map clean
+.PHONY: laboratory mutants fuzz lock install-locked sbom reproducible licences test-matrix demo test fast style lint format docs schema profiles refined templates loop-dlr picture map clean
 
 # Python compiles what it imports when it does: a fifth of what is installed. What is installed is not listed.
 QUICK := --disable-pip-version-check --quiet --progress-bar on --no-compile
@@ -69,6 +69,11 @@ fuzz: $(DEV_STAMP)
 format: $(DEV_STAMP)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+# A seeded sample of small changes to our own code, and the share that the tests of their room notice; an hour.
+mutants: $(DEV_STAMP)
+	$(BIN)/python -m pip install $(QUICK) 'cosmic-ray>=8.7,<9' 'coverage>=7' 'pytest-cov>=7'
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 nice $(BIN)/python -m laboratory.mutants --count 200 --seed $(or $(SEED),1)
 
 # The documentation site, into out/site: references from the code, pages from docs/. A warning is an error.
 docs: $(DOCS_STAMP)

@@ -74,6 +74,8 @@ def test_every_schema_is_one_and_is_listed():
         ("profiles-tag", "profiles tag mine --library lib --tag night --set country=DE"),
         ("profiles-export", "profiles export mine motorway --library lib -o exported/"),
         ("profiles-check", "profiles check --library lib"),
+        ("profiles-rename", "profiles rename mine ours --library lib"),
+        ("profiles-remove", "profiles remove ours --library lib"),
     ],
     ids=lambda value: value.replace(" ", "_")[:40],
 )
@@ -91,6 +93,9 @@ def test_a_batch_is_json_lines(folder, monkeypatch, capsys):
         holds(value, "batch-output")
     holds(summary, "batch-summary")
     assert (summary["failed"], summary["written"]) == (1, 1)
+    (value,) = objects(capsys, 0, "profiles", "uses", "motorway", "batch")
+    holds(value, "profiles-uses")
+    assert [use["is_current"] for use in value["outputs"]] == [True]
 
 
 @pytest.mark.parametrize(

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import xosc_lateral as xl
+from xosc_lateral.base.shipped import shipped_folder
 from xosc_lateral.cli import main
 from xosc_lateral.workflows.profiles.profiles import add_profile
 
@@ -162,3 +164,71 @@ def test_an_unknown_field_in_a_profile_is_refused_by_its_name(team, tmp_path):
     (tmp_path / "odd.json").write_text(json.dumps(values | {"colour": "red"}))
     with pytest.raises(xl.FormatError, match="colour"):
         xl.read_profile(tmp_path / "odd.json")
+
+
+@pytest.fixture
+def own(team: Path, tmp_path: Path) -> Path:
+    """A copy that may be changed."""
+    return Path(shutil.copytree(team, tmp_path / "own"))
+
+
+def test_a_profile_gets_another_id_in_its_file_and_as_its_name(own, capsys):
+    assert run(capsys, "profiles", "rename", "driver-09", "calm", "--library", own)[0] == 0
+    assert not (own / "driver-09.json").exists()
+    assert xl.read_profile("calm", own).name == "calm"
+    assert xl.read_profile("calm", own).metadata.driver == "d09"
+    code, _, err = run(capsys, "profiles", "rename", "calm", "driver-10", "--library", own)
+    assert code == 1 and "there is a profile of this id" in err and (own / "calm.json").exists()
+    assert run(capsys, "profiles", "rename", "calm", "driver-10", "--library", own, "--force")[0] == 0
+    assert xl.read_profile("driver-10", own).metadata.driver == "d09"
+    for wrong in ("../out", "a/b", ""):
+        code, _, err = run(capsys, "profiles", "rename", "driver-10", wrong, "--library", own)
+        assert code == 1 and err.count("\n") == 1 and (own / "driver-10.json").exists(), wrong
+
+
+def test_a_file_that_is_not_called_like_its_id_is_put_right(tmp_path, capsys):
+    path = add_profile("motorway-vehicle-1", tmp_path)
+    path.rename(tmp_path / "other.json")
+    assert run(capsys, "profiles", "check", "--library", tmp_path)[0] == 1
+    assert run(capsys, "profiles", "rename", "other", "other", "--library", tmp_path)[0] == 0
+    assert run(capsys, "profiles", "check", "--library", tmp_path)[0] == 0
+
+
+def test_profiles_are_removed_all_or_none_and_those_shipped_never(own, tmp_path, capsys):
+    code, _, err = run(capsys, "profiles", "remove", "driver-11", "nobody", "--library", own)
+    assert code == 1 and "nobody" in err and (own / "driver-11.json").exists()
+    for shipped in ("motorway", str(shipped_folder("driver_profiles") / "motorway.json")):
+        code, _, err = run(capsys, "profiles", "remove", shipped, "--library", own)
+        assert code == 1 and "comes with the package" in err
+    foreign = tmp_path / "settings.json"
+    foreign.write_text("{}")
+    code, _, err = run(capsys, "profiles", "remove", foreign)
+    assert code == 1 and foreign.exists()  # a path has to be a profile's
+    assert run(capsys, "profiles", "remove", "driver-11", "half", "--library", own)[0] == 0  # a broken one by its id
+    assert not (own / "driver-11.json").exists() and not (own / "half.json").exists()
+
+
+def test_outputs_say_which_profile_they_used(tmp_path, capsys):
+    """Two scenarios, one of them with a profile of our own for one vehicle, which changes afterwards."""
+    add_profile("motorway-vehicle-1", tmp_path / "lib", name="mine")
+    scenario, _ = xl.write_template("cut-in", tmp_path / "in")
+    for name in ("one", "two"):
+        shutil.copy(scenario, tmp_path / f"in/{name}.xosc")
+    table = tmp_path / "jobs.csv"
+    table.write_text("scenario,profile:Truck,ego\nin/one.xosc,mine,none\nin/two.xosc,,none\n")
+    xl.convert_many([table], tmp_path / "out", library=[tmp_path / "lib"], time_limit=5.0)
+
+    def uses(name, *words):
+        found = run(capsys, "profiles", "uses", name, tmp_path / "out", "--library", tmp_path / "lib", "--json", *words)
+        assert found[0] == 0
+        return [(Path(o["output"]).name, o["entities"], o["is_current"]) for o in json.loads(found[1])["outputs"]]
+
+    assert [(name, entities, True) for name, entities, _ in uses("mine")] == uses("mine")
+    assert [entities for _, entities, _ in uses("mine")] == [["Truck"]]
+    assert len(uses("motorway")) == 2 and uses("motorway-refined") == []
+    assert run(capsys, "profiles", "tag", "mine", "--library", tmp_path / "lib", "--tag", "new")[0] == 0
+    assert [is_current for _, _, is_current in uses("mine")] == [False]
+    assert run(capsys, "profiles", "remove", "mine", "--library", tmp_path / "lib")[0] == 0
+    assert [is_current for _, _, is_current in uses("mine")] == [None]
+    code, _, err = run(capsys, "profiles", "uses", "mine", tmp_path / "in")
+    assert code == 1 and "manifest.parquet" in err

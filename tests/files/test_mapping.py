@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -147,3 +148,33 @@ def test_from_raw_files_to_a_tagged_library_in_five_commands(
     assert [main(command) for command in commands] == [0, 0, 0], capsys.readouterr().err
     assert main(["fit", *names, "--mapping", "company.toml", "-o", "other.json"]) == 0
     assert Path("team/anna.json").exists()
+
+
+HEADERS_IN_USE = {
+    "offset": (
+        "LaneOffset [m]", "lane_offset", "Lane_LatOffset", "lat_offset_m", "LateralPosition", "lateral deviation",
+        "LatDev",
+        "Lane_Deviation", "vtti.lane_distance_off_center", "DistToLaneCenter", "offset_from_lane_centre", "laneGap",
+        "Car.Road.Path.DevDist", "deltaLaneCenter", "Querablage", "Querabweichung [cm]", "Querversatz", "Spurversatz",
+        "Abstand_Fahrspurmitte", "Abweichung Fahrstreifenmitte", "Laterale Position", "Lateralabweichung", "LatPos",
+        "Ablage_Spurmitte", "Spurposition",
+    ),
+    "lane_width": ("LaneWidth", "Lane_Width_m", "Fahrstreifenbreite [m]", "Spurbreite"),
+    "distance_left": (
+        "LnMrkLeft_Dist", "LnMrkLe_Dist", "ME_LeftLane_Distance", "Dist_Left", "DistLeftMarking", "left_line_distance",
+        "lane_left_c0", "Abstand_links", "Abstand linke Markierung", "Abstand_Markierung_links", "LnLft_Dist",
+    ),
+    None: ("GPS_Lat", "gps_lat_pos", "lane_index_left", "steering_offset_time", "odometer", "left_indicator",
+           "yaw_dev"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "header"), [(name, one) for name, every in HEADERS_IN_USE.items() for one in every])
+def test_headers_of_the_usual_systems_are_proposed(name: str | None, header: str, tmp_path: Path) -> None:
+    from xosc_lateral.workflows.recordings.importers.foreign_table import propose_mapping
+
+    path = tmp_path / "t.csv"
+    path.write_text(f"time,{header}\n" + "".join(f"{0.1 * k},{1.7 + 0.01 * k}\n" for k in range(50)))
+    columns = tomllib.loads(propose_mapping([path]))["columns"]
+    found = {key for key, value in columns.items() if key != "time"}
+    assert found == ({name} if name else set()), columns

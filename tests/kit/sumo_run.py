@@ -16,7 +16,15 @@ CONFIG = """<configuration><input><net-file value="run.net.xml"/><route-files va
 <processing><lateral-resolution value="{sublane}"/><collision.action value="warn"/></processing></configuration>"""
 
 
-def write_run(folder: Path, *, end: float = 40.0, cars: int = 1200, trucks: int = 240, sublane: float = 4.0) -> Path:
+def write_run(
+    folder: Path,
+    *,
+    end: float = 40.0,
+    cars: int = 1200,
+    trucks: int = 240,
+    sublane: float = 4.0,
+    left_hand: bool = False,
+) -> Path:
     """Its configuration."""
     import sumo
 
@@ -32,5 +40,6 @@ def write_run(folder: Path, *, end: float = 40.0, cars: int = 1200, trucks: int 
     (folder / "run.sumocfg").write_text(CONFIG.format(end=end, sublane=sublane))
     program = Path(sumo.SUMO_HOME) / "bin" / "netconvert"
     words = [str(program), "-n", "run.nod.xml", "-e", "run.edg.xml", "-o", "run.net.xml"]
+    words += ["--lefthand"] if left_hand else []
     subprocess.run(words, cwd=folder, check=True, capture_output=True)
     return folder / "run.sumocfg"

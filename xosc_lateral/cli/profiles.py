@@ -181,6 +181,43 @@ def tag(
     said.say_words(", ".join(f"{key} {value}" for key, value in facts.items() if value), facts, err=False)
 
 
+@command(group, "remove", "Delete profiles from a library.", "profiles remove mine --library team/")
+def remove(names: Names, *, library: Library = None, said: Printing) -> None:
+    """Delete the files of profiles of your own, all or none; `profiles uses` says which outputs used them."""
+    from xosc_lateral.workflows.profiles.keeping import remove_profiles
+
+    said.say_written(remove_profiles(names, library or ()))
+
+
+@command(group, "rename", "Give a profile another id.", "profiles rename mine night-driver --library team/")
+def rename(
+    name: Name,
+    new: Annotated[str, typer.Argument(metavar="NEW", help="Its new id.", show_default=False)],
+    *,
+    library: Library = None,
+    said: Written,
+) -> None:
+    """Change a profile's id, in its file and as the file's name. Its hash changes with it."""
+    from xosc_lateral.workflows.profiles.keeping import rename_profile
+
+    path = rename_profile(name, new, library or (), force=said.force)
+    said.say_written(path, id=path.stem)
+
+
+@command(group, "uses", "Find outputs that used a profile.", "profiles uses mine out/ --library team/")
+def uses(
+    name: Annotated[str, typer.Argument(metavar="ID", help="Profile, in the library or no longer.")],
+    outputs: Annotated[list[Path], typer.Argument(metavar="FOLDER...", help="Of batches, or their manifests.")],
+    *,
+    library: Library = None,
+    said: Printing,
+) -> None:
+    """Which outputs of batches have offsets of a profile, of which vehicles, and whether it is the same now."""
+    from xosc_lateral.workflows.profiles.keeping import find_uses
+
+    said.say(find_uses(name, outputs, library or ()))
+
+
 @command(
     group, "export", "Copy profiles, to pass them on.", "profiles export motorway motorway-vehicle-1 -o for-a-friend/"
 )

@@ -312,9 +312,11 @@ def described(
 
 
 def own_path(name: str, folders: Iterable[Path]) -> Path:
-    """Path of a profile that may be changed. Raises `FormatError` if it comes with the package."""
+    """Path of a profile that may be changed. Raises `FormatError` if it comes with the package or a plug-in."""
     path = find_profile(name, folders)
-    if path.parent == SHIPPED:
-        what = f"comes with the package: profiles add {path.stem} --library FOLDER copies it to where it can be changed"
+    offered = {one.resolve() for one in _from_plugins().values()}
+    if path.parent.resolve() == SHIPPED.resolve() or path.resolve() in offered:
+        whose = "a plug-in" if path.resolve() in offered else "the package"
+        what = f"comes with {whose}: profiles add {path.stem} --library FOLDER copies it to where it can be changed"
         raise FormatError(what, path=path)
     return path

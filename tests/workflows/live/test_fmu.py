@@ -85,3 +85,40 @@ def test_a_state_brings_it_back(tmp_path: Path, unit: Path) -> None:
     assert on(7, 30) == after
     one.terminate()
     one.freeInstance()
+
+
+def test_what_a_driver_can_not_do_is_refused_with_a_reason_and_the_next_step_goes_on(
+    tmp_path: Path, unit: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    from fmpy import extract, instantiate_fmu
+
+    described = fmpy.read_model_description(str(unit))
+    is_2 = described.fmiVersion.startswith("2")
+    assert "Needs a host with Python" in described.description
+    one = instantiate_fmu(extract(str(unit), str(tmp_path)), described, "CoSimulation", debug_logging=not is_2)
+    number = {variable.name: [variable.valueReference] for variable in described.modelVariables}
+    write = one.setReal if is_2 else one.setFloat64
+
+    def step(time: float) -> str:
+        try:
+            one.doStep(currentCommunicationPoint=time, communicationStepSize=0.1)
+        except Exception:
+            found = capfd.readouterr()
+            return found.err + found.out
+        return ""
+
+    assert "before the end of initialization" in step(0.0)
+    if is_2:
+        one.setupExperiment(startTime=30_000.0)
+        one.enterInitializationMode()
+    else:
+        one.enterInitializationMode(startTime=30_000.0)
+    one.exitInitializationMode()
+    assert step(30_000.0) == ""
+    for name, value, usual in (("speed", -10.0, 30.0), ("speed", 1e9, 30.0), ("lane_width", -1.0, 3.6)):
+        write(number[name], [value])
+        assert name.replace("_", " ") in step(30_000.1)
+        write(number[name], [usual])
+    assert step(30_000.1) == ""
+    one.terminate()
+    one.freeInstance()

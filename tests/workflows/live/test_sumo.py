@@ -49,6 +49,27 @@ def test_in_sumos_own_output_vehicles_are_where_their_drivers_say(run: Path) -> 
     assert set(table.is_truck) == {0.0, 1.0}
 
 
+def test_left_hand_traffic_keeps_its_sides(tmp_path: Path) -> None:
+    """Along x, offsets to the left are at larger y, in SUMO's output and in ours."""
+    import pandas as pd
+
+    config = write_run(tmp_path, end=30.0, cars=1800, left_hand=True)
+    words = ["live", "sumo", str(config), "--seed", "1", "-q", "--fcd-output", str(tmp_path / "fcd.xml")]
+    assert main([*words, "--states", str(tmp_path / "states.csv")]) == 0
+    states = pd.read_csv(tmp_path / "states.csv")
+    own = states[states.steered & (states.road == "e0")]
+    away = np.abs(own.offset - own.driver)
+    assert len(own) > 500 and np.quantile(away, 0.9) < 0.02
+    centre = {0: 5.625, 1: 1.875}  # of SUMO's lanes, counted from the left kerb: left of the edge's line
+    np.testing.assert_allclose(own.offset, own.y - own.lane.map(centre), atol=0.02)
+    table = xl.import_drives("fcd", tmp_path / "fcd.xml", net=tmp_path / "run.net.xml").to_frame()
+    states["time"] = (states.time - 0.1).round(2)
+    both = states.merge(table, left_on=["name", "time"], right_on=["drive", "time"])
+    assert len(both) > 0.9 * len(states)
+    np.testing.assert_allclose(both.offset_x, both.offset_y, atol=0.011)
+    np.testing.assert_array_equal(both.lane_index, 1 - both.lane)
+
+
 def test_a_trace_shows_the_lanes_and_where_everybody_was(run: Path, tmp_path: Path) -> None:
     pytest.importorskip("osi_utilities", reason="the extra osi is not installed")
     words = ["live", "sumo", str(run / "run.sumocfg"), "--duration", "10", "--states", str(tmp_path / "states.csv")]

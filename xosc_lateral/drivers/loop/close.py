@@ -16,7 +16,8 @@ from xosc_lateral.drivers.loop.core_model import (
     compare_spectrum_shapes,
     test_population,
 )
-from xosc_lateral.drivers.loop.cross_validation import Progress, held_out_words
+from xosc_lateral.drivers.loop.cross_validation import Progress, folds_of, held_out_words
+from xosc_lateral.drivers.loop.explained import Explained, explained_share
 from xosc_lateral.drivers.loop.held_out import HeldOut, Scorecard, Setting, fit_without, score_held_out, score_runs
 from xosc_lateral.drivers.loop.identify import Identified, identify, initial_terms
 from xosc_lateral.drivers.loop.model import Description, Fitted, Term
@@ -27,7 +28,7 @@ from xosc_lateral.drivers.loop.residual import LackOfFit, lack_of_fit_of, size_o
 from xosc_lateral.drivers.loop.selection import Accepted, Gain, Selection
 from xosc_lateral.drivers.loop.significance import LoopSeed
 from xosc_lateral.drivers.loop.terms.between import between_shift
-from xosc_lateral.drivers.loop.timeline import Coarse, join_drives
+from xosc_lateral.drivers.loop.timeline import Coarse, coarse_middle, join_drives
 from xosc_lateral.drivers.model.core.base import ModelKind
 from xosc_lateral.drivers.model.effects import Effect
 from xosc_lateral.drivers.model.profile import DriverProfile, Provenance
@@ -90,6 +91,7 @@ class LoopResult:
     scored: HeldOut  # Both profiles on held-out blocks.
     lack_of_fit: LackOfFit  # What is left.
     remainder: Omnibus  # Whether any column predicts it.
+    explained: Explained | None  # Of what columns can explain, on held-out blocks; None: nothing can be held out.
     scores: Scorecard  # The ten metrics.
     seed: int
 
@@ -206,6 +208,7 @@ def close_loop(
         identified=found,
         scored=scored,
         lack_of_fit=lack_of_fit_of(scored.real, scored.before, scored.after, scored.halves),
+        explained=_explained(setting, found),
         remainder=check_remainder(selection.final, found.quantities, root),
         scores=score_runs(timeline, scored.runs_before, scored.runs_after, setting.blocks, rng),
         seed=seed,
@@ -246,6 +249,18 @@ def _most_harmful(selection: Selection, scored: HeldOut) -> Term | None:
             loss = (after**2 - before**2) / max(float(chance), 1e-300)
             worst = max(worst, (loss, one.term), key=lambda pair: pair[0])
     return worst[1]
+
+
+def _explained(setting: Setting, found: Identified) -> Explained | None:
+    """Share of the explainable; where nothing is kept, the effects explain nothing."""
+    coarse, blocks = setting.coarse, coarse_middle(setting.blocks)[: len(setting.coarse)]
+    if found.nested is not None:
+        folds = found.nested.scored
+        starts, finals = [one.start for one in folds], [one.final for one in folds]
+    else:
+        number, terms = folds_of(blocks), found.selection.start.terms
+        starts = finals = [fit_model(coarse.only(blocks % number != fold), terms) for fold in range(number)]
+    return explained_share(starts, finals, found.quantities, coarse, blocks)
 
 
 def _accepted(selection: Selection) -> list[tuple[Accepted, str, tuple[Effect, ...]]]:

@@ -70,6 +70,12 @@ def tents(values: FloatArray, delays: tuple[float, ...], drive: IndexArray) -> F
     return np.asarray(shifted @ weights_of(delays).T)
 
 
+def smooth_covariance(number: int) -> FloatArray:
+    """Of weights whose second differences are independent, and which end at zero on either side."""
+    second = np.diff(np.eye(number + 2), 2, axis=0)[:, 1:-1]
+    return np.asarray(np.linalg.inv(second.T @ second), dtype=np.float64)
+
+
 def amid_runs(valid: BoolArray) -> BoolArray:
     """Rows whose delays stay within their own run, shape (n,).
 

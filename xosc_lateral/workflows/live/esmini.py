@@ -281,7 +281,7 @@ class EsminiTraffic:
                     known = _Lane(
                         place, True, bool(network.lane_index(index, state.lane, s)[0] >= 0) and width > 0.0,
                         network.travel_direction(index, state.lane), max(width, 1e-3),
-                        network.pose_at(index, state.lane, s).heading,
+                        network.pose_at(index, state.lane, s).heading + network.header_offset.heading,  # x, y are inertial
                     )  # fmt: skip
                 self._lane_of[name] = known
             found.append(known)

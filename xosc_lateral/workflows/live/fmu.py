@@ -37,6 +37,12 @@ UNITS: dict[str, dict[str, float]] = {
 OUTPUTS = {"offset": "m", "rate": "m/s", "heading": "rad"}
 """What the driver says; positive to the LEFT of travel."""
 
+NEEDS = (
+    f"Needs a host with Python {sys.version_info.major}.{sys.version_info.minor} in its process, and xosc-lateral in "
+    "that; others can't load it (undefined symbol: _Py_NoneStruct)"
+)
+"""Of a unit that calls Python: without one in the process, no code of it runs that could say so."""
+
 SCRIPT = '''"""A driver of xosc-lateral."""
 from {package} import {base}
 
@@ -118,7 +124,7 @@ def unit_methods(fmi: str, script: str) -> dict[str, Any]:
     own = read_profile(Path(script).with_name("profile.json"))
     columns = ("speed", "lane_width", *sorted(set(own.columns) - {"speed", "lane_width"}))
 
-    description = f"Driver {own.name} of xosc-lateral {__version__}: lateral offset in the lane, positive left"
+    description = f"Driver {own.name} of xosc-lateral {__version__}: lateral offset in the lane, positive left. {NEEDS}"
 
     def begin(self: Any, **settings: Any) -> None:
         base.__init__(self, **settings)
@@ -128,7 +134,7 @@ def unit_methods(fmi: str, script: str) -> dict[str, Any]:
         self.profile, self.seed = "", 0
         self.following, self.position = True, 0.0
         self.offset = self.rate = self.heading = 0.0
-        self._traffic = None
+        self._traffic, self._has_begun = None, False
         for name in columns:
             setattr(self, name, _start(name, own))
         fixed = {"causality": causality.parameter, "variability": variability.fixed}
@@ -165,6 +171,7 @@ def unit_methods(fmi: str, script: str) -> dict[str, Any]:
 
     def exit_initialization_mode(self: Any) -> None:
         self.start_at(0.0)
+        self._has_begun = False
 
     def start_at(self: Any, time: float) -> None:
         chosen = read_profile(self.profile) if self.profile else own
@@ -187,31 +194,40 @@ def unit_methods(fmi: str, script: str) -> dict[str, Any]:
 
     def go_on(self: Any, current_time: float, step_size: float) -> Any:
         """Where the driver is at the end of the step."""
-        if self._traffic is None:
-            self.start_at(current_time)
         done = True
         try:
+            if self._traffic is None:
+                raise SimulationError("a step before the end of initialization mode")
+            if self.speed < 0.0:
+                raise SimulationError(f"speed {self.speed:g} m/s: a driver who follows the road drives forwards")
+            if not self._has_begun and current_time != 0.0:  # not every loader says before when it all begins
+                self.start_at(current_time)
+            self._has_begun = True
             self.look(current_time + step_size)
         except SimulationError as error:
             self.log(str(error), status.error)
+            if Unit is None:  # whoever switched logging off would hear of a step that failed, and not why
+                print(f"xosc-lateral: {error}", file=sys.stderr, flush=True)
             done = False
         return package.Fmi3StepResult(status=status.ok if done else status.error) if Unit is not None else done
 
     def _get_fmu_state(self: Any) -> dict[str, Any]:
         names = (*columns, "position", "following", *OUTPUTS, "seed", "profile")
         traffic = None if self._traffic is None else self._traffic.to_dict()
-        return {"values": {name: getattr(self, name) for name in names}, "traffic": traffic}
+        values = {name: getattr(self, name) for name in names}
+        return {"values": values, "traffic": traffic, "has_begun": self._has_begun}
 
     def _set_fmu_state(self: Any, state: Mapping[str, Any]) -> None:
         for name, value in state["values"].items():
             setattr(self, name, value)
-        self._traffic = None
+        self._traffic, self._has_begun = None, state["has_begun"]
         if state["traffic"] is not None:
             self._traffic = _OneDriver(read_profile(self.profile) if self.profile else own)
             self._traffic.restore(state["traffic"])
 
     return {
-        "__init__": begin, "to_xml": to_xml, "exit_initialization_mode": exit_initialization_mode, "go_on": go_on,
+        "__init__": begin, "to_xml": to_xml, "go_on": go_on,
+        "exit_initialization_mode": exit_initialization_mode,
         "start_at": start_at, "look": look, "_get_fmu_state": _get_fmu_state, "_set_fmu_state": _set_fmu_state,
     }  # fmt: skip
 

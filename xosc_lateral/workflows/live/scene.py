@@ -57,7 +57,11 @@ def motion_of(rows: pd.DataFrame, scene: Scene, network: RoadNetwork) -> Nominal
             "road": [index.get(str(road), -1) for road in own["road"]],
             "lane": own["lane"].to_numpy(dtype=np.int32),
         }
-        if len(own) and not scene.is_road:
+        if scene.is_road:  # a player says inertial places, a motion those of the road's file
+            seen["x"], seen["y"] = network.header_offset.undo(seen["x"], seen["y"])
+            seen["z"] = seen["z"] - network.header_offset.z
+            seen["heading"] = seen["heading"] - network.header_offset.heading
+        elif len(own):
             there = network.world_to_lane(*(seen[name] for name in ("x", "y", "z", "heading")))
             seen |= {"road": there.road, "lane": there.lane, "s": there.s}
         columns: dict[str, Any] = {name: np.zeros(len(times)) for name in (*SEEN, "heading_relative")}

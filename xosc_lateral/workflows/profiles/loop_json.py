@@ -44,6 +44,7 @@ def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
         "unused": [{"column": column, "why": why} for column, why in result.identified.usable.unused.items()],
         "error": {"measure": MEASURE, **error},
         "held_out_gain": _gain(result.identified.total),
+        "explained": _explained(result),
         "returned_base": result.identified.returned_base or None,
         "unexplained": _unexplained(result),
         "residual": [
@@ -79,6 +80,16 @@ def _feedback(item: Feedback) -> dict[str, Any]:
         "predicted_share": item.predicted_share,
         "function_of_offset": item.function,
     }
+
+
+def _explained(result: LoopResult) -> dict[str, Any] | None:
+    known = result.explained
+    if known is None:
+        return None
+    gains = {"after_nat_per_block": known.after, "free_nat_per_block": known.free}
+    if not known.is_known:
+        return {"share": None, "interval": None} | gains
+    return {"share": known.share, "interval": list(known.interval)} | gains
 
 
 def _unexplained(result: LoopResult) -> dict[str, Any]:

@@ -24,6 +24,7 @@ from xosc_lateral.workflows.profiles.loop_words import (
     CERTAIN,
     COMPONENT_WORDS,
     SPREAD,
+    explained_words,
     feedback_words,
     group_words,
     lack_of_fit_words,
@@ -55,7 +56,7 @@ def loop_text(result: LoopResult) -> str:
     lines.append(
         f"held-out error {before:.1f} mm before, {after:.1f} mm after ({halves:.1f} mm between halves of the drives)"
     )
-    lines.append(lack_of_fit_words(result))
+    lines += [words for words in (explained_words(result), lack_of_fit_words(result)) if words]
     return "\n".join(lines)
 
 
@@ -76,7 +77,7 @@ def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] 
     page = Page(f"Closed loop: {names}")
     page.lead(outcome(result))
     page.key_figures(_numbers(result))
-    page.lead(lack_of_fit_words(result))
+    page.lead(f"{explained_words(result)} {lack_of_fit_words(result)}".strip())
     _add_findings(page, result, proofs)
     _add_residuals(page, result)
     _add_movement(page, result)

@@ -227,6 +227,20 @@ def lack_of_fit_words(result: LoopResult) -> str:
     )
 
 
+def explained_words(result: LoopResult) -> str:
+    """Share of the explainable, in a sentence; empty where nothing can be held out."""
+    known = result.explained
+    if known is None:
+        return ""
+    if not known.is_known:
+        return "On held-out blocks no free linear response to the columns predicts the mean better than the base."
+    share, low, high = (f"{100.0 * max(one, 0.0):.0f}" for one in (known.share, *known.interval))
+    return (
+        f"On held-out blocks, chosen and fitted without them, the effects explain {share}{GAP}% (95{GAP}% interval "
+        f"{low} to {high}{GAP}%) of what a free linear response to all columns explains of the mean."
+    )
+
+
 def _total_words(left: LackOfFit) -> str:
     """What the summary statistics say where they say nothing clear."""
     if left.unexplained == 0.0:

@@ -22,7 +22,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.loop.candidates import Family
 from xosc_lateral.drivers.loop.column_search import grows
 from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage
-from xosc_lateral.drivers.loop.omnibus import DELAYS, check_remainder, tents, weights_of
+from xosc_lateral.drivers.loop.omnibus import DELAYS, check_remainder, smooth_covariance, tents, weights_of
 from xosc_lateral.drivers.loop.passage import Passage, typical_passage
 from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.search import Search
@@ -119,7 +119,7 @@ class CourseTerm(MeanTerm):
     def _weights(self, fitted: Fitted) -> tuple[FloatArray, FloatArray]:
         """Gain at each delay and its covariance, smooth as far as the rows leave it open. [m] per unit"""
         part = fitted.mean_part(self)
-        return penalised(fitted.sizes[part], fitted.covariance[part, part], _smooth_prior(len(DELAYS)))
+        return penalised(fitted.sizes[part], fitted.covariance[part, part], smooth_covariance(len(DELAYS)))
 
     def _passage(self, fitted: Fitted, sizes: FloatArray, covariance: FloatArray) -> Passage:
         passage = typical_passage(fitted.coarse, self.effect)
@@ -133,12 +133,6 @@ class CourseTerm(MeanTerm):
 
 def _shifted(values: FloatArray, coarse: Coarse) -> FloatArray:
     return tents(values[:, 0], DELAYS, coarse.drive)
-
-
-def _smooth_prior(number: int) -> FloatArray:
-    """Covariance of weights whose second differences are independent, and which end at zero on either side."""
-    second = np.diff(np.eye(number + 2), 2, axis=0)[:, 1:-1]
-    return np.asarray(np.linalg.inv(second.T @ second), dtype=np.float64)
 
 
 def _plain_shapes(search: Search, columns: tuple[str, ...]) -> list[ColumnEffect]:

@@ -35,6 +35,29 @@ HEADERS = {
 }
 """What the headers of a column look like, without their unit; English and German."""
 
+
+def _words(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+LATERAL = _words("lat lateral laterale quer lane spur fahrspur fahrstreifen ln")
+PLACE = _words("offset pos position dev deviation ablage abweichung versatz abstand dist distance lage delta gap")
+MIDDLE = _words("center centre mitte mid middle spurmitte fahrspurmitte fahrstreifenmitte")
+MARKING = _words("lane line marking mrk ln lm markierung linie spur fahrstreifen begrenzung edge c0")
+SIDES = {
+    "distance_left": _words("left le lft lh links linke linker linken"),
+    "distance_right": _words("right ri rgt rh rechts rechte rechter rechten"),
+}
+FILLERS = _words("from to off of im in der zu zur von the vehicle ego car")
+SATELLITE = _words("gps gnss wgs lon")
+ELSEWHERE = SATELLITE | _words("time zeit heading yaw speed")
+"""Words of headers for the place in the lane, in any order: bus logs, simulators and trackers combine them alike."""
+
+COMPOUND = re.compile(
+    r"(quer|spur|lateral|lane|lat)_?(ablage|abweichung|versatz|position|lage|dev|pos|offset)|dev_?dist"
+)
+"""What means the offset, as one word."""
+
 TRUCKS = re.compile(r"truck|lorry|lkw|bus|semi|trailer|hgv|sattel", re.IGNORECASE)
 
 BY_SIZE = {
@@ -85,7 +108,10 @@ def propose_mapping(files: Sequence[Path]) -> str:
     found: dict[str, str] = {}
     for header in shared:
         bare, _ = _parts_of(header)
-        name = next((name for name, words in HEADERS.items() if name not in found and _fits(words, bare)), None)
+        placed = _place_named(bare)
+        known = {} if set(bare.split("_")) & SATELLITE else HEADERS
+        usual = (name for name, words in known.items() if name not in found and _fits(words, bare))
+        name = placed if placed is not None and placed not in found else next(usual, None)
         if name is not None:
             found[name] = header
     sides = {"distance_left", "distance_right"} <= found.keys()
@@ -123,6 +149,23 @@ def _parts_of(header: str) -> tuple[str, str]:
 def _plain(text: str) -> str:
     spaced = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", text)
     return re.sub(r"[\s.:\-_/]+", "_", spaced).strip("_").lower()
+
+
+def _place_named(bare: str) -> str | None:
+    """Offset or distance to a marking, by a header's words; at most one of them may be of the system's own."""
+    words = set(bare.split("_"))
+    sides = [name for name, own in SIDES.items() if words & own]
+    if words & ELSEWHERE or "width" in words or len(sides) > 1:
+        return None
+    known = LATERAL | PLACE | MIDDLE | MARKING | FILLERS | frozenset().union(*SIDES.values())
+    if len(words - known) > 1:
+        return "offset" if COMPOUND.search(bare) and not sides else None
+    if sides:
+        return (
+            sides[0] if words & MARKING and (words & PLACE or words & {"c0"} or words & {"marking", "line"}) else None
+        )
+    means_offset = COMPOUND.search(bare) or (words & PLACE and (words & LATERAL or words & MIDDLE))
+    return "offset" if means_offset else None
 
 
 def _fits(words: str, bare: str) -> bool:
