@@ -23,7 +23,7 @@ from laboratory.markers import show
 from xosc_lateral.drivers.drives.cuts import all_runs
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.evaluation.classifier import TwoSampleResult, classifier_two_sample_test, context_features
-from xosc_lateral.drivers.evaluation.filters import below_half_hertz, thinned
+from xosc_lateral.drivers.evaluation.filters import slow_movement, thinned
 from xosc_lateral.drivers.evaluation.snippets import Snippets, sample_runs, snippets_of
 from xosc_lateral.drivers.fitting.fitting import fit_population, fit_profile
 from xosc_lateral.drivers.model.profile import DriverProfile
@@ -59,8 +59,8 @@ def slow_test(
 def areas(profile: DriverProfile, runs: Sequence[Run], seed: int) -> FloatArray:
     """Area under the ROC curve for each of `MEASURES`. [-]"""
     step = profile.model.step
-    real = [below_half_hertz(run.offset, step) for run in runs]
-    made = [below_half_hertz(path, step) for path in sample_runs(profile, runs, seed, same_start=False)]
+    real = [slow_movement(run.offset, step) for run in runs]
+    made = [slow_movement(path, step) for path in sample_runs(profile, runs, seed, same_start=False)]
     cuts = [(snippets_of(runs, seconds, step), jointly) for seconds, jointly in MEASURES]
     return np.array([slow_test(cut, real, made, step, jointly=jointly, seed=seed).auc for cut, jointly in cuts])
 

@@ -18,7 +18,7 @@ from laboratory.markers import show
 from xosc_lateral.drivers.drives.cuts import all_runs
 from xosc_lateral.drivers.drives.filters import filtered, low_pass_between
 from xosc_lateral.drivers.drives.resampling import STEP
-from xosc_lateral.drivers.evaluation.filters import STOP_FREQUENCY, below_half_hertz
+from xosc_lateral.drivers.evaluation.filters import STOP_FREQUENCY, slow_movement
 from xosc_lateral.drivers.evaluation.snippets import snippets_of
 from xosc_lateral.files.drives import read_drives
 
@@ -38,8 +38,8 @@ def main() -> None:
     runs = all_runs(read_drives(args.table))
     lines = ["| snippets | AUC | 95 % interval |", "|---|---|---|"]
     kernel = low_pass_between(STOP_FREQUENCY, STOP_FREQUENCY + TRANSITION, STEP, ATTENUATION)
-    own = [below_half_hertz(run.offset, STEP) for run in runs]
-    slow = [below_half_hertz(filtered(run.offset, kernel), STEP) for run in runs]
+    own = [slow_movement(run.offset, STEP) for run in runs]
+    slow = [slow_movement(filtered(run.offset, kernel), STEP) for run in runs]
     for seconds in LENGTHS:
         found = slow_test(snippets_of(runs, seconds, STEP), own, slow, STEP)
         lines.append(f"| {seconds:g} s | {found.auc:.3f} | {found.low:.3f} to {found.high:.3f} |")

@@ -23,7 +23,7 @@ from laboratory.fair_null import slow_test
 from laboratory.markers import show
 from laboratory.reconstruction import WINDOW, write
 from xosc_lateral.drivers.drives.drive import Run
-from xosc_lateral.drivers.evaluation.filters import below_half_hertz
+from xosc_lateral.drivers.evaluation.filters import slow_movement
 from xosc_lateral.drivers.evaluation.snippets import Snippets, snippets_of
 from xosc_lateral.files.profiles import read_profile
 from xosc_lateral.workflows.conversion.consequences import Gap, gaps_of
@@ -84,8 +84,8 @@ def told_apart(cut: Snippets, one: Sequence[FloatArray], other: Sequence[FloatAr
 def movement_lines(twins: Twins) -> list[str]:
     runs, paths = in_lane_runs(twins)
     cut = snippets_of(runs, SECONDS, STEP)
-    real = [below_half_hertz(run.offset, STEP) for run in runs]
-    made_up = [[below_half_hertz(path, STEP) for path in variant] for variant in paths]
+    real = [slow_movement(run.offset, STEP) for run in runs]
+    made_up = [[slow_movement(path, STEP) for path in variant] for variant in paths]
     areas = [told_apart(cut, real, one, seed) for seed, one in enumerate(made_up)]
     null = [told_apart(cut, one, made_up[seed - 1], seed) for seed, one in enumerate(made_up)]
     spreads = [float(np.std(np.concatenate(one))) for one in (real, *made_up)]

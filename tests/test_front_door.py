@@ -172,7 +172,9 @@ def test_a_column_that_tables_lack_is_said_once_and_one_that_a_drive_never_met_i
     bare = xl.read_profile("motorway-vehicle-1")
     time = 0.2 * np.arange(100.0)
     drives = [
-        pd.DataFrame({"drive": k, "time": time, "offset": 0.1 * np.sin(time), "lane_width": 3.5, "left_distance": d})
+        pd.DataFrame(
+            {"drive": k, "time": time, "offset": 0.1 * np.sin(time), "lane_width": 3.5, "left_distance": d}
+        ).assign(speed=30.0)
         for k, d in enumerate((np.nan, np.inf, 12.0))
     ]
     table = pd.concat(drives)

@@ -254,3 +254,52 @@ def _lanes(message: Any, case: Case, lines: list[Any], centres: list[Any], direc
         for x, y in line:
             point = about.centerline.add()
             point.x, point.y = x, y
+
+
+# ---- CommonRoad ------------------------------------------------------------------------------------------------------
+def commonroad_file(case: Case, folder: Path) -> Path:
+    """Four lanes of two lanelets each, in their directions of travel."""
+    cut = 0.5 * ROAD
+    s = [np.arange(0.0, cut + 1.0, 10.0), np.arange(cut, ROAD + 1.0, 10.0)]
+    text = []
+    for k in range(-2, 2):  # from the right of the reference line to its left
+        ahead = (k < 0) == (case.hand == "right")
+        for part in (0, 1):
+            edges = [np.stack(case.place(s[part], (k + j) * WIDTH)[:2], axis=1) for j in (1, 0)]
+            left, right = edges if ahead else (edges[1][::-1], edges[0][::-1])
+            bounds = "".join(
+                f"<{side}Bound>" + "".join(f"<point><x>{x:.6f}</x><y>{y:.6f}</y></point>" for x, y in line)
+                + f"</{side}Bound>" for side, line in (("left", left), ("right", right))
+            )  # fmt: skip
+            links = f'<successor ref="{_lanelet(k, 1 - part)}"/>' if part == (0 if ahead else 1) else ""
+            for side, step in (("Left", 1 if ahead else -1), ("Right", -1 if ahead else 1)):
+                if -2 <= k + step < 2 and ((k + step < 0) == (k < 0)):
+                    links += f'<adjacent{side} ref="{_lanelet(k + step, part)}" drivingDir="same"/>'
+            text.append(
+                f'<lanelet id="{_lanelet(k, part)}">{bounds}{links}<laneletType>highway</laneletType></lanelet>'
+            )
+    for number, name in enumerate(LENGTHS, 1):
+        states = [
+            f"<position><point><x>{row.x:.6f}</x><y>{row.y:.6f}</y></point></position><orientation><exact>{row.heading:.6f}"
+            f"</exact></orientation><time><exact>{k}</exact></time><velocity><exact>{SPEED}</exact></velocity>"
+            for k, row in enumerate(case.rows(name).itertuples())
+        ]
+        moved = "".join(f"<state>{one}</state>" for one in states[1:])
+        text.append(
+            f'<dynamicObstacle id="{900 + number}"><type>{"truck" if name == "ahead" else "car"}</type><shape>'
+            "<rectangle>"
+            f"<length>{LENGTHS[name]}</length><width>2.0</width></rectangle></shape><initialState>{states[0]}"
+            f"</initialState><trajectory>{moved}</trajectory></dynamicObstacle>"
+        )
+    path = folder / "made.xml"
+    path.write_text(
+        f'<?xml version="1.0"?><commonRoad timeStepSize="{1 / case.rate}" commonRoadVersion="2020a" author="" '
+        'affiliation="" source="" benchmarkID="ZAM_Made-1_1_T-1" date="2026-01-01"><location>'
+        "<geoNameId>-999</geoNameId><gpsLatitude>999</gpsLatitude><gpsLongitude>999</gpsLongitude></location><scenarioTags/>"
+        + "".join(text) + "</commonRoad>"
+    )  # fmt: skip
+    return path
+
+
+def _lanelet(k: int, part: int) -> int:
+    return 100 + 10 * (k + 2) + part

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from xosc_lateral.drivers.evaluation.classifier import classifier_two_sample_test
-from xosc_lateral.drivers.evaluation.filters import PASS_FREQUENCY, STOP_FREQUENCY, below_half_hertz, thinned
+from xosc_lateral.drivers.evaluation.filters import PASS_FREQUENCY, STOP_FREQUENCY, slow_movement, thinned
 
 STEP = 0.2
 
@@ -17,24 +17,24 @@ STEP = 0.2
 )
 def test_movement_above_half_a_hertz_is_gone(frequency: float, left: float) -> None:
     wave = np.sin(2.0 * np.pi * frequency * STEP * np.arange(800) + 0.4)
-    found = below_half_hertz(wave, STEP)[100:-100]
+    found = slow_movement(wave, STEP)[100:-100]
     np.testing.assert_allclose(found, left * wave[100:-100], atol=0.012)
 
 
 def test_a_straight_path_stays_to_its_very_ends() -> None:
     path = 0.3 + 0.01 * np.arange(200.0)
-    np.testing.assert_allclose(below_half_hertz(path, STEP), path, atol=1e-12)
+    np.testing.assert_allclose(slow_movement(path, STEP), path, atol=1e-12)
 
 
 @pytest.mark.parametrize("path", [[], [0.4], [0.4, 0.4]])
 def test_paths_of_nothing_stay_as_they_are(path: list[float]) -> None:
-    np.testing.assert_allclose(below_half_hertz(np.array(path), STEP), path, atol=1e-15)
+    np.testing.assert_allclose(slow_movement(np.array(path), STEP), path, atol=1e-15)
 
 
 @pytest.mark.parametrize("step", [1.0, 2.0])
 def test_where_a_rate_shows_nothing_faster_nothing_is_taken(step: float) -> None:
     path = np.random.default_rng(0).normal(size=50)
-    np.testing.assert_array_equal(below_half_hertz(path, step), path)
+    np.testing.assert_array_equal(slow_movement(path, step), path)
 
 
 @pytest.mark.parametrize(("step", "every"), [(0.2, 5), (0.04, 25), (2.0, 1)])
@@ -50,7 +50,7 @@ def test_a_classifier_sees_nothing_of_what_is_faster() -> None:
     drives = np.array([f"d{number}" for number in range(150)])
     middle = slice(675, 825)  # 30 s, as far from the ends as the filter sees
     apart = classifier_two_sample_test(slow[:, middle], (slow + fast)[:, middle], drives, drives, fast=True, seed=0)
-    one, other = (np.array([below_half_hertz(path, STEP)[middle] for path in paths]) for paths in (slow, slow + fast))
+    one, other = (np.array([slow_movement(path, STEP)[middle] for path in paths]) for paths in (slow, slow + fast))
     result = classifier_two_sample_test(thinned(one, STEP), thinned(other, STEP), drives, drives, seed=0)
     assert apart is not None and apart.auc > 0.9
     assert result is not None and result.auc == pytest.approx(0.5, abs=0.03)

@@ -14,6 +14,7 @@ from xosc_lateral.cli import main
 from xosc_lateral.workflows.recordings.importers.track_table import read_esmini_log
 from xosc_lateral.workflows.recordings.importers.tracks import import_tracks
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
+from xosc_lateral.workflows.recordings.lane_shapes import Strip, lane_graph
 
 WIDTH = 3.5
 HEADING = 0.3
@@ -120,6 +121,35 @@ def test_a_layout_of_lanes_puts_the_next_piece_ahead_and_the_left_one_beside():
     assert station.tolist() == [0.0, 0.0, 100.0, 100.0] and rank.tolist() == [0, 1, 0, 1]
     ring = LaneGraph(np.array([10.0, 20.0]), np.array([-1, -1]), [[1], [0]])
     assert ring.stations(np.arange(2), np.zeros(2))[1].tolist() == [0.0, 10.0]
+
+
+def test_what_lies_side_by_side_on_a_curve_has_one_station_in_whatever_order_lanes_are_listed():
+    radius, quarter = 800.0, np.pi / 4
+
+    def strip(inner: float, part: int) -> Strip:
+        angle = np.linspace(part * quarter, (part + 1) * quarter, 400)
+        line = lambda r: np.stack([r * np.sin(angle), radius - r * np.cos(angle), 0.0 * angle], axis=1)  # noqa: E731
+        return Strip(line(inner + 0.5 * WIDTH), line(inner), line(inner + WIDTH))  # a left curve: inside is left
+
+    for order in ([0, 1, 2, 3], [1, 0, 3, 2], [3, 1, 2, 0]):
+        places = [(k, part) for k in (0, 1) for part in (0, 1)]  # lane from the outside, part
+        where = {places[number]: at for at, number in enumerate(order)}
+        shapes = [strip(radius - places[number][0] * WIDTH, places[number][1]) for number in order]
+        left, following = np.full(4, -1), [list[int]() for _ in range(4)]
+        for part in (0, 1):
+            left[where[0, part]] = where[1, part]
+        for k in (0, 1):
+            following[where[k, 0]] = [where[k, 1]]
+        graph = lane_graph(shapes, left, following)
+        middles = np.array([0.3, 1.2])  # of the angle, one in each part
+        stations = {}
+        for k in (0, 1):
+            pieces = np.array([where[k, part] for part in (0, 1)])
+            r = radius + (0.5 - k) * WIDTH
+            _, stations[k], _, scale = graph.stations(pieces, r * (middles - np.array([0.0, quarter])))
+            own = r * np.diff(middles) / np.diff(stations[k])
+            assert np.mean(scale) == pytest.approx(float(own[0]), rel=1e-3)
+        assert stations[0] == pytest.approx(stations[1], abs=0.05)
 
 
 @pytest.mark.filterwarnings("default")

@@ -17,6 +17,7 @@ from tests.kit.recordings import (
     TYPES,
     WIDTH,
     Case,
+    commonroad_file,
     fleet_table,
     road_file,
     sumo_files,
@@ -184,6 +185,22 @@ def test_osi_lanes_that_are_shown_piece_by_piece_and_without_a_direction(case: C
     found = import_drives("osi", path, keep_cut=True).to_frame()
     assert not (found["state"] == "no lane")[found["drive"] != "4"].any()  # the oncoming car comes from beyond
     holds_truth(case, import_drives("osi", path).to_frame(), rows=400, accuracy=0.02)
+
+
+@pytest.mark.parametrize("case", OSI, ids=str)
+@pytest.mark.filterwarnings("default")
+def test_commonroad(case: Case, tmp_path: Path) -> None:
+    pytest.importorskip("commonroad", reason="extra `commonroad` is not installed")
+    case = replace(case, rate=10.0)
+    table = import_drives("commonroad", commonroad_file(case, tmp_path)).to_frame()
+    holds_truth(case, table.replace({"drive": {"made:901": "car"}}), rows=400, accuracy=0.02)
+    mirrored = replace(case, hand="left" if case.hand == "right" else "right")
+    lanes, cars = (commonroad_file(one, tmp_path).read_text() for one in (case, mirrored))
+    (tmp_path / "mixed.xml").write_text(
+        lanes.partition("<dynamicObstacle")[0] + "<dynamicObstacle" + cars.partition("<dynamicObstacle")[2]
+    )
+    with pytest.raises(FormatError, match="drive against the direction of their lanes in its lanelets"):
+        import_drives("commonroad", tmp_path / "mixed.xml")
 
 
 CLOCKS = {

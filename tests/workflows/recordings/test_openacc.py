@@ -40,7 +40,7 @@ def platoon(path: Path, *, turn: int = 1, laps: float = 5.2, head: str = "", pha
         s = 20.0 * time - 40.0 * k
         offset = 0.2 * np.sin(2.0 * np.pi * (0.1 * time + 0.37 * k) + phase) + 0.1 * (-1) ** k
         x, y = oval(s, turn * offset, turn)
-        columns |= {f"Speed{k}": np.full(len(time), 20.0), f"E{k}": x, f"N{k}": y}
+        columns |= {f"Speed{k}": 20.0 + 1e-3 * np.sin(0.7 * np.arange(len(time))), f"E{k}": x, f"N{k}": y}
         offsets.append(offset)
     columns["IVS1"] = np.full(len(time), 35.0)
     text = head + pd.DataFrame(columns).to_csv(index=False)
@@ -96,3 +96,16 @@ def test_a_road_without_a_loop_is_refused(tmp_path: Path) -> None:
     platoon(tmp_path / "half.csv", laps=0.6)
     with pytest.raises(NotEnoughDataError, match=r"never comes back to where it was: no closed loop"):
         import_openacc(tmp_path / "half.csv")
+
+
+def test_rows_whose_speed_stands_frozen_are_left_out_and_counted(tmp_path: Path) -> None:
+    platoon(tmp_path / "one.csv")
+    frame = pd.read_csv(tmp_path / "one.csv")
+    frame.loc[500:599, "Speed1"] = 20.0  # 9.9 s: by chance
+    frame.loc[900:1199, "Speed1"] = 20.0
+    frame.to_csv(tmp_path / "one.csv", index=False)
+    imported = import_openacc(tmp_path / "one.csv")
+    assert imported.provenance.rows["speed frozen"] == 300
+    first = imported.table[imported.table["drive"] == "one:1"]
+    missing = set(frame["Time"].round(6)) - set(first["time"])
+    assert missing == set(frame["Time"][900:1200].round(6))

@@ -196,7 +196,7 @@ def _check_units(
             "as in offset=COLUMN:cm",
             path=path,
         )
-    speed = columns.get("speed")
+    speed = None if RUN in columns else columns.get("speed")  # an import knows its units
     if speed is not None and np.isfinite(speed).any() and float(np.nanmedian(speed)) > MAX_MEDIAN_SPEED:
         raise FormatError(
             f"drive {name}: speed is {float(np.nanmedian(speed)):.4g} m/s (median), more than {MAX_MEDIAN_SPEED:g}; "

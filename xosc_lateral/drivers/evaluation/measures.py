@@ -77,7 +77,7 @@ def band_power(offset: FloatArray, step: float, *, highest: float = float(BANDS[
     power = tapered_powers(without_line(offset), window, size=4 * m) * 2.0 * step / (window**2).sum()
     frequency = np.fft.rfftfreq(4 * m, step)
     bands = [(frequency >= low) & (frequency < high) for low, high in resolved_bands(m * step, highest)]
-    return np.column_stack([power[:, inside].mean(axis=1) for inside in bands])
+    return np.array([power[:, inside].mean(axis=1) for inside in bands]).reshape(len(bands), len(offset)).T
 
 
 def resolved_bands(seconds: float, highest: float = float(BANDS[-1])) -> list[tuple[float, float]]:
@@ -106,11 +106,16 @@ def differences(real: Features, other: Features, rows: IntArray, other_rows: Int
         "metrics": float(np.mean(column_distances(real.metrics[rows], other.metrics[other_rows]))),
         "lane_keeping": float(np.mean(column_distances(real.indicators[rows], other.indicators[other_rows]))),
     }
+    if not real.power.shape[1]:  # too short for any band
+        return found | _memory_difference(real, other, rows, other_rows)
     level, beside = real.power[rows].mean(axis=0) + MINIMUM_POWER, other.power[other_rows].mean(axis=0) + MINIMUM_POWER
     found["spectrum"] = float(np.sqrt(np.mean((10.0 * np.log10(beside / level)) ** 2)))
+    return found | _memory_difference(real, other, rows, other_rows)
+
+
+def _memory_difference(real: Features, other: Features, rows: IntArray, other_rows: IntArray) -> dict[str, float]:
     own, others = autocorrelation_of(real, rows), autocorrelation_of(other, other_rows)
-    found["memory"] = float(np.sqrt(np.mean((own - others) ** 2)))
-    return found
+    return {"memory": float(np.sqrt(np.mean((own - others) ** 2)))}
 
 
 def autocorrelation_of(features: Features, rows: IntArray) -> FloatArray:

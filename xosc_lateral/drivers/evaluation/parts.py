@@ -8,6 +8,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.evaluation.distances import Distances, metric_distances
+from xosc_lateral.drivers.evaluation.filters import STOP_FREQUENCY
 from xosc_lateral.drivers.evaluation.metrics import snippet_metrics
 from xosc_lateral.drivers.evaluation.snippets import Snippets, sample_parts
 from xosc_lateral.drivers.fitting.models.two_level.fit import split_levels
@@ -25,13 +26,14 @@ class SnippetCondition:
     # A sampled snippet starts where its real one starts, and stands beside other drivers' snippets that start there
     # too. Else neither knows the start: sampled ones are cut from free runs.
     same_start: bool
-    slow: bool = False  # Movement below 0.5 Hz alone, see `filters`; else everything that was recorded.
+    slow: bool = False  # Movement below a frequency alone, see `filters`; else everything that was recorded.
+    below: float = STOP_FREQUENCY  # That frequency. [Hz]
 
     @property
     def name(self) -> str:
         """In words."""
         start = "same start" if self.same_start else "free"
-        return f"{self.seconds:g} s, {start}" + (", below 0.5 Hz" if self.slow else "")
+        return f"{self.seconds:g} s, {start}" + (f", below {self.below:g} Hz" if self.slow else "")
 
 
 FINE_SHIFT = 5.0  # Real fine parts are shifted round by this, to part them from their coarse parts. [s]

@@ -18,7 +18,15 @@ from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.evaluation.classifier import TwoSampleResult, classifier_two_sample_test, context_features
 from xosc_lateral.drivers.evaluation.distances import SCORE_UNITS, proper_scores, split_groups
-from xosc_lateral.drivers.evaluation.filters import PASS_FREQUENCY, below_half_hertz, thinned
+from xosc_lateral.drivers.evaluation.filters import (
+    PASS_FREQUENCY,
+    STOP_FREQUENCY,
+    comparison_band,
+    dithered,
+    resolution_of,
+    slow_movement,
+    thinned,
+)
 from xosc_lateral.drivers.evaluation.measures import (
     FLOOR_DRAWS,
     UNITS,
@@ -120,7 +128,8 @@ class Realism:
 
     def of(self, condition: SnippetCondition) -> ConditionScores | None:
         """Scores under a condition, None where there were too few snippets."""
-        return next((one for one in self.conditions if one.condition == condition), None)
+        wanted = replace(condition, below=0.0)
+        return next((one for one in self.conditions if replace(one.condition, below=0.0) == wanted), None)
 
 
 def score_realism(profile: DriverProfile, runs: Sequence[Run], *, seed: int, classify: bool = True) -> Realism:
@@ -128,30 +137,38 @@ def score_realism(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
 
     `runs`: measured, at the profile's step; `classify`: whether to train classifiers too, most of the work.
     """
-    step = profile.model.step
+    step, below, resolution = profile.model.step, comparison_band(runs), resolution_of(runs)
     driver = sample_runs(profile, runs, seed, same_start=False)
     noise = sensor_noise(profile, driver, seed)
+    real = dithered([run.offset for run in runs], resolution, seed + 2)
+    driver = dithered(driver, resolution, seed + 3)
     recorded = [path + error for path, error in zip(driver, noise, strict=True)]
-    slow_real = [below_half_hertz(run.offset, step) for run in runs]
-    slow_driver = [below_half_hertz(path, step) for path in driver]
+    slow_real, slow_driver = ([slow_movement(path, step, below) for path in paths] for paths in (real, driver))
     found = []
     for seconds in LENGTHS:
         cut = snippets_of(runs, seconds, step)
         if len(cut) < MINIMUM_GROUPS or len(np.unique(cut.group)) < 2:
             continue
-        same = sample_snippets(profile, cut, seed + 1, with_sensor=True)
-        slow = cut.cut_from(slow_real), cut.cut_from(slow_driver)
-        for condition, real, sampled in (
-            (SnippetCondition(seconds, True), cut.offset, same),
-            (SnippetCondition(seconds, False), cut.offset, cut.cut_from(recorded)),
-            (SnippetCondition(seconds, False, slow=True), *slow),
-        ):
-            found.append(_under(condition, cut, real, sampled, profile, seed, classify))
+        slow = SnippetCondition(seconds, False, slow=True, below=below)
+        pairs = [(slow, cut.cut_from(slow_real), cut.cut_from(slow_driver))]
+        if below == STOP_FREQUENCY:  # a recording that is valid to less shows nothing else
+            same = np.array(
+                dithered(list(sample_snippets(profile, cut, seed + 1, with_sensor=True)), resolution, seed + 4)
+            )
+            pairs.insert(0, (SnippetCondition(seconds, False), cut.cut_from(real), cut.cut_from(recorded)))
+            pairs.insert(0, (SnippetCondition(seconds, True), cut.cut_from(real), same))
+        found += [
+            _under(condition, cut, measured, sampled, profile, seed, classify) for condition, measured, sampled in pairs
+        ]
     short = snippets_of(runs, LENGTHS[0], step)
     whose = np.array([str(number) for number, _ in short.place])
     if found and found[0].condition == SnippetCondition(LENGTHS[0], True):
         found[0] = _with_proper_scores(found[0], profile, short, seed)
     return Realism(tuple(found), variance_parts(short.offset, whose), variance_parts(short.cut_from(recorded), whose))
+
+
+MINIMUM_ROWS = 6
+"""Of a snippet that a classifier is shown. [-]"""
 
 
 def _under(
@@ -165,13 +182,15 @@ def _under(
 ) -> ConditionScores:
     """Scores of one condition; `real` and `sampled` of shape (n, m). [m]"""
     step = profile.model.step
-    highest = PASS_FREQUENCY if condition.slow else np.inf
+    highest = PASS_FREQUENCY / STOP_FREQUENCY * condition.below if condition.slow else np.inf
     own = features_of(real, cut.lane_width, step, highest=highest)
     made = features_of(sampled, cut.lane_width, step, highest=highest)
     families, named = _distances(condition, own, made, real, cut.group, seed)
     alone = jointly = floor = None
-    shown = (thinned(real, step), thinned(sampled, step)) if condition.slow else (real, sampled)
-    if classify:
+    shown = (real, sampled)
+    if condition.slow:
+        shown = thinned(real, step, condition.below), thinned(sampled, step, condition.below)
+    if classify and shown[0].shape[1] >= MINIMUM_ROWS:
         fast, group = not condition.slow, cut.group
         alone = classifier_two_sample_test(*shown, group, group, fast=fast, seed=seed)
         if not condition.same_start:

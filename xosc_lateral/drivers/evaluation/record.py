@@ -7,7 +7,6 @@ from math import isfinite
 from typing import Any
 
 from xosc_lateral.base.digits import all_significant
-from xosc_lateral.drivers.evaluation.filters import STOP_FREQUENCY
 from xosc_lateral.drivers.evaluation.lane_keeping import UNITS, Margins
 from xosc_lateral.drivers.evaluation.realism import Beside, ConditionScores, VarianceParts
 from xosc_lateral.drivers.evaluation.scores import LAGS, ProfileScores, SnippetScores
@@ -72,7 +71,7 @@ def _condition_to_dict(one: ConditionScores) -> dict[str, Any]:
     return {
         "seconds": one.condition.seconds,
         "start": "same" if one.condition.same_start else "free",
-        "band": f"below {STOP_FREQUENCY:g} Hz" if one.condition.slow else "all",
+        "band": f"below {one.condition.below:g} Hz" if one.condition.slow else "all",
         "sampled": "driver and sensor" if one.with_sensor else "driver",
         "count": one.count,
         "families": {name: {**_beside_to_dict(value), "unit": value.unit} for name, value in one.families.items()},

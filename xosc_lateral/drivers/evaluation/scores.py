@@ -17,6 +17,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.evaluation.distances import Distances, mean_distances, metric_distances, split_groups
+from xosc_lateral.drivers.evaluation.filters import STOP_FREQUENCY, comparison_band, slow_movement
 from xosc_lateral.drivers.evaluation.lane_keeping import Margins, margins
 from xosc_lateral.drivers.evaluation.metrics import METRICS, snippet_metrics
 from xosc_lateral.drivers.evaluation.parts import PartEvaluation, SnippetCondition, evaluate_parts
@@ -114,6 +115,8 @@ class ProfileScores:
     margins_sampled: Margins
     traces: tuple[Trace, ...]  # The longest run of each of the first `TRACES` drives, for the eye.
     seed: int
+    # Movement below this alone was compared in `snippets` and `realism`: 0.5 Hz or, of free runs, less. [Hz]
+    below: float = STOP_FREQUENCY
 
     @property
     def classifier_auc(self) -> float | None:
@@ -126,9 +129,10 @@ class ProfileScores:
 
     @property
     def spectrum_error(self) -> float:
-        """Root mean square of the spectra's difference over the bands. [dB]"""
-        common = len(self.spectrum_real.density)
-        ratio = self.spectrum_sampled.density[:common] / self.spectrum_real.density
+        """Root mean square of the spectra's difference over the bands that the recording is valid in. [dB]"""
+        real = self.spectrum_real
+        common = len(real.density) if self.below == STOP_FREQUENCY else int((real.frequency < self.below).sum())
+        ratio = self.spectrum_sampled.density[:common] / real.density[:common]
         return float(np.sqrt(np.mean((10.0 * np.log10(ratio)) ** 2)))
 
 
@@ -140,7 +144,7 @@ def score_profile(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
     `runs`: at the profile's step; `classify`: whether to train the classifiers (a minute or two for some hours of
     driving).
     """
-    step = profile.model.step
+    step, below = profile.model.step, comparison_band(runs)
     short = _has_enough_snippets(snippets_of(runs, SNIPPET, step))
     long = snippets_of(runs, LONG_SNIPPET, step)
     sampled = sample_snippets(profile, short, seed)
@@ -148,17 +152,27 @@ def score_profile(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
     widths = [run.lane_width for run in runs]
     offsets = [run.offset for run in runs]
     lags = [round(lag / step) for lag in LAGS]
+    slow = None
+    if below < STOP_FREQUENCY:
+        unbound = sample_runs(profile, runs, seed + 2, same_start=False)
+        slow = tuple([slow_movement(path, step, below) for path in paths] for paths in (offsets, unbound))
+
+    def scored(cut: Snippets, made: FloatArray, seconds: float) -> SnippetScores:
+        real = cut.offset
+        if slow is not None:
+            real, made = (cut.cut_from(paths) for paths in slow)
+        return score_snippets(real, made, cut.group, seed=seed, seconds=seconds)
+
     long_scores = None
     if len(long) >= MIN_SNIPPETS and len(np.unique(long.group)) >= 2:
-        long_sampled = sample_snippets(profile, long, seed + 2)
-        long_scores = score_snippets(long.offset, long_sampled, long.group, seed=seed, seconds=LONG_SNIPPET)
+        long_scores = scored(long, sample_snippets(profile, long, seed + 2), LONG_SNIPPET)
     return ProfileScores(
         profile=profile.name,
         drives=len({run.drive for run in runs}),
         runs=len(runs),
         hours=sum(map(len, runs)) * step / 3600.0,
         realism=score_realism(profile, runs, seed=seed + 4, classify=classify),
-        snippets=score_snippets(short.offset, sampled, short.group, seed=seed, seconds=SNIPPET),
+        snippets=scored(short, sampled, SNIPPET),
         long_snippets=long_scores,
         evaluations=evaluate_parts(profile, short, sampled, seed=seed + 3),
         spectrum_real=spectrum(offsets, step),
@@ -170,6 +184,7 @@ def score_profile(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
         margins_sampled=margins(free, widths, step),
         traces=_traces(runs, free, step),
         seed=seed,
+        below=below,
     )
 
 

@@ -140,7 +140,7 @@ either side. [-]"""
 
 
 def smoothed_above(profile: DriverProfile, reference: DriverProfile) -> float | None:
-    """Frequency above which a profile's power is less than `MINIMUM_POWER_SHARE` of that of real drivers at its speed. [Hz]
+    """Frequency above which a profile has less than `MINIMUM_POWER_SHARE` of real drivers' power at its speed. [Hz]
 
     None where it is not, up to `KEEPING_BAND`. `reference`: profile of those.
     """

@@ -24,6 +24,7 @@ from xosc_lateral.files.profiles import profile_hash
 from xosc_lateral.files.source import edit_in_place, guarding_inputs
 from xosc_lateral.workflows.conversion.drivers import choose_drivers
 from xosc_lateral.workflows.conversion.enrich import enrich, with_offsets
+from xosc_lateral.workflows.conversion.lane_changes import refuse_steps, stay_as_written
 from xosc_lateral.workflows.conversion.load import Played, input_hashes, play_scenario, play_until
 from xosc_lateral.workflows.conversion.meaning import Shift, keep_meaning, meaning_of
 from xosc_lateral.workflows.conversion.modes import (
@@ -108,6 +109,8 @@ def _convert(
         end = min(max(runs.end, LEAST_LONGER * played.motion.end_time), LONGER * played.motion.end_time)
         end = min(end, runs.limit)
         lasting = play_until(played, end, step=settings.step) if end > played.motion.end_time else played
+    through = follow_trajectories(played.scenario, settings, depends, drivers)
+    refuse_steps(played.scenario, settings, through)
     try:
         enriched = enrich(
             lasting.motion,
@@ -123,7 +126,8 @@ def _convert(
             neighbours=settings.neighbours,
             uncertain=depends.entities,
             heeds_controllers=heeds_controllers(settings),
-            through=follow_trajectories(played.scenario, settings, depends, drivers),
+            through=through,
+            lane_changes=settings.lane_changes,
             at_least=0.0 if is_replay(settings, depends) else SUPPLY,
         )
     except DriverProfileError as error:  # found in the movement: who sampled knows the profile by its name alone
@@ -141,7 +145,7 @@ def _convert(
         f"{removed.place.element}: left out ({removed.reason})" for removed in written.removed
     )
     warnings += tuple(f"'{name}' follows a trajectory, too: {why}" for name, why in sampled.items()) + written.notes
-    warnings += plan.frozen + changes
+    warnings += plan.frozen + changes + stay_as_written(enriched, settings, through)
     if played.motion.cut_off is not None:
         warnings = (str(played.motion.cut_off), *warnings)
     data = b"" if save else written.data

@@ -19,8 +19,9 @@ from xosc_lateral.drivers.model.sampled_offsets import known_sensor, sensor_erro
 from xosc_lateral.drivers.model.sampling import OffsetSampler
 from xosc_lateral.workflows.conversion.consequences import HalfWidths, gaps_of, lane_departures
 from xosc_lateral.workflows.conversion.give_way import SampledVehicle, give_way
-from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, Neighbours, SampledSegment
+from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, LaneChanges, Neighbours, SampledSegment
 from xosc_lateral.workflows.conversion.seen import NOTHING_SEEN, SAMPLE_STEP, Contexts, Seen, going_on, seen_by
+from xosc_lateral.world.motion.crossings import Crossing, beside_written, crossings
 from xosc_lateral.world.motion.deviation import SETTLING_TIME, SampledDeviation, deviation_through
 from xosc_lateral.world.motion.gaps import Gap
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
@@ -48,6 +49,7 @@ def enrich(
     uncertain: Collection[str] = (),
     heeds_controllers: bool = True,
     through: Collection[str] = (),
+    lane_changes: LaneChanges = LaneChanges.WRITTEN,
     at_least: float = 0.0,
 ) -> Enriched:
     """Enrich a played scenario.
@@ -85,6 +87,8 @@ def enrich(
     through : collection of str
         Entities whose movement goes on through lane changes and lane offsets (`movement_runs`); that of the others
         leads from the segment before to the one behind.
+    lane_changes : LaneChanges
+        The way across of those lane changes and lane offsets.
     at_least : float
         Time for which each segment is sampled, should it last longer in another run. [s]
 
@@ -98,6 +102,8 @@ def enrich(
     run = (_run if few else _run.__wrapped__)(
         motion, network, frozenset(trailers), frozenset(uncertain), neighbours, heeds_controllers, frozenset(through)
     )
+
+    lifelike = lane_changes is LaneChanges.LIFELIKE
 
     def drawn_for(index: int, attempt: int) -> _Drawn:
         entity = motion.entities[index]
@@ -113,7 +119,14 @@ def enrich(
         own = np.random.SeedSequence(
             [seed, variant, attempt, zlib.crc32(entity.name.encode()), *words.get(entity.name, ())]
         )
-        return _draw(_Drawn(entity, spans, driver, seen), driver, own, with_sensor, round(at_least / SAMPLE_STEP))
+        crossed = run.crossings[index]
+        return _draw(
+            _Drawn(entity, spans, driver, seen, crossed, lifelike),
+            driver,
+            own,
+            with_sensor,
+            round(at_least / SAMPLE_STEP),
+        )
 
     best: Enriched | None = None
     for attempt in range(max(1, attempts)):
@@ -184,6 +197,8 @@ class _Drawn:
     spans: tuple[SegmentSpan, ...]
     profile: DriverProfile | None = None
     seen: Seen = NOTHING_SEEN  # without its segments once they are sampled: they are large
+    crossings: tuple[Crossing, ...] = ()
+    lifelike: bool = False  # where they can be
     samples: tuple[_Sample, ...] = ()
     why: str = ""
 
@@ -196,9 +211,17 @@ class _Drawn:
                 for one in self.samples
             ]
         )
+        aside = [beside_written(self.motion, one) for one in self.crossings if self.lifelike and not one.stays]
         if rows is not None:
-            return through(distance[rows])
-        return columns(len(distance), ([through(distance[part])] for part in blocks(len(distance))))[0]
+            found = through(distance[rows])
+            for part, values in aside:
+                inside = (rows >= part.start) & (rows < part.stop)
+                found[inside] += values[rows[inside] - part.start]
+            return found
+        found = columns(len(distance), ([through(distance[part])] for part in blocks(len(distance))))[0]
+        for part, values in aside:
+            found[part] += values
+        return found
 
 
 KEPT_ROWS = 100_000
@@ -213,6 +236,8 @@ class _Run(NamedTuple):
     """Of each entity."""
     runs: tuple[tuple[tuple[SegmentSpan, ...], ...], ...]
     """Those that are sampled, one after another without a break, of each entity."""
+    crossings: tuple[tuple[Crossing, ...], ...]
+    """Lane changes and lane offsets in them."""
     gaps: tuple[Gap, ...]
     """Of the nominal motion."""
     certain: NominalMotion
@@ -245,7 +270,8 @@ def _run(
         else tuple((span,) for span in own if span.is_road_following)
         for entity, own in zip(motion.entities, spans, strict=True)
     )
-    return _Run(spans, runs, gaps, replace(motion, entities=certain), {}, {})
+    crossed = tuple(tuple(crossings(motion, entity, own)) for entity, own in zip(motion.entities, runs, strict=True))
+    return _Run(spans, runs, crossed, gaps, replace(motion, entities=certain), {}, {})
 
 
 def _draw(blank: _Drawn, driver: DriverProfile, seed: np.random.SeedSequence, with_sensor: bool, least: int) -> _Drawn:
@@ -325,6 +351,7 @@ def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:
         displace(entity, network, deviation),
         drawn.seen.neutral,
         max(filter(None, bounds), key=lambda bound: bound.before.excess, default=None),
+        drawn.crossings,
     )
 
 

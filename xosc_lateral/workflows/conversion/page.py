@@ -27,6 +27,9 @@ ROUGH_SHARE = 0.01
 LONGEST_HEADWAY = 5.0
 """Pairs that stay farther apart do not follow one another: UN R157 and ALKS scenarios look at 2 s and less. [s]"""
 
+MOST_LANE_CHANGES = 4
+"""Lane changes that are drawn. [-]"""
+
 MOST_FOLLOWINGS = 20
 """Pairs in the table of headways."""
 
@@ -67,6 +70,7 @@ def conversion_page(conversion: ConvertedScenario) -> str:
     _add_paths(page, enriched)
     _add_offsets(page, enriched, done)
     _add_dynamics(page, enriched, done)
+    _add_lane_changes(page, enriched, done)
     _add_gaps(page, enriched)
     page.section(
         "Segments",
@@ -159,6 +163,21 @@ def _add_dynamics(page: Page, enriched: Enriched, done: Sequence[EntityResult]) 
             "Added lateral acceleration over time",
             over_time=True,
         )
+
+
+def _add_lane_changes(page: Page, enriched: Enriched, done: Sequence[EntityResult]) -> None:
+    """Those of vehicles on trajectories: the player draws the others."""
+    found = [(entity, one) for entity in done for one in entity.crossings if one.is_lane_change]
+    if not found:
+        return
+    page.section("Lane changes")
+    more = f" The first {MOST_LANE_CHANGES} of {len(found)}." if len(found) > MOST_LANE_CHANGES else ""
+    page.figure(
+        figures.lane_changes_over_time(enriched, found[:MOST_LANE_CHANGES]),
+        "Speed towards the new lane. Coloured: enriched, with the movement in the lane. Dashed: as written. Band: the "
+        f"largest speed of 90 % of 323 lane changes of 6 to 13 s on one motorway.{more}",
+        "Lateral speed over time of each lane change",
+    )
 
 
 def _add_gaps(page: Page, enriched: Enriched) -> None:

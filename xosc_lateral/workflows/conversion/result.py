@@ -13,6 +13,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.model.drivability import Bound
 from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.world.motion.crossings import Crossing
 from xosc_lateral.world.motion.gaps import Gap
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.world.motion.segments import SegmentSpan
@@ -27,6 +28,13 @@ class Neighbours(StrEnum):
     PROFILE = "profile"
     BORROW = "borrow"
     NONE = "none"
+
+
+class LaneChanges(StrEnum):
+    """The way across of lane changes and lane offsets of vehicles on trajectories."""
+
+    WRITTEN = "written"
+    LIFELIKE = "lifelike"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -60,6 +68,8 @@ class EntityResult:
     neutral: tuple[str, ...] = ()
     # bound: that sampled movement was smoothed since nobody could have driven it: the worst segment's
     bound: Bound | None = None
+    # crossings: lane changes and lane offsets that its movement goes on through
+    crossings: tuple[Crossing, ...] = ()
 
     @property
     def name(self) -> str:

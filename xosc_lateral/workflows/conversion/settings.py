@@ -19,7 +19,7 @@ from xosc_lateral.files.openscenario.read import RoadSearch
 from xosc_lateral.files.openscenario.write.target import Player, TargetPlayer, target
 from xosc_lateral.workflows.conversion import options as say
 from xosc_lateral.workflows.conversion.options import Option, PathLike, Paths, ProfileLike, option
-from xosc_lateral.workflows.conversion.result import Neighbours
+from xosc_lateral.workflows.conversion.result import LaneChanges, Neighbours
 
 if TYPE_CHECKING:
     from xosc_lateral.drivers.model.profile import DriverProfile
@@ -62,6 +62,9 @@ class ConvertSettings:
     neighbours : {"profile", "borrow", "none"}
         How drivers answer to vehicles beside them: as the profile alone says; by a population's law, too, where the
         profile's answer is not known; not at all. Without: as configured, else "borrow".
+    lane_changes : {"written", "lifelike"}
+        The way across of lane changes and lane offsets of 3 to 13 s, where a vehicle follows a trajectory: as written,
+        or as drivers take it (a bell that is slightly early); start, duration and lane stay the file's.
     context : str or Path
         Table of context over time that the scenario doesn't state: `time` [s], and a column each.
     parameters : mapping
@@ -122,6 +125,10 @@ class ConvertSettings:
         Neighbours.BORROW, say.one_of(Neighbours), kind=Neighbours | None, cell=say.as_it_is, show_default=False,
         help="How drivers answer to vehicles beside them: as their profile alone says; borrow: by a population's law "
         "where that is not known (default); none: not at all.",
+    )
+    lane_changes: LaneChanges = option(
+        LaneChanges.WRITTEN, say.one_of(LaneChanges), kind=LaneChanges, cell=say.as_it_is,
+        help="The way across of lane changes on a trajectory: as written, or lifelike: as drivers take it.",
     )
     context: Path | None = option(
         None, Path, kind=Path | None, cell=say.beside,
@@ -237,6 +244,7 @@ class ConvertKeywords(TypedDict, total=False):
     only: Collection[str] | None
     ego: Collection[str] | None
     neighbours: Literal["profile", "borrow", "none"] | None
+    lane_changes: Literal["written", "lifelike"]
     context: PathLike | None
     parameters: Mapping[str, object] | None
     library: Paths

@@ -276,12 +276,13 @@ class EsminiTraffic:
             if known is None or anew or known.place != (index, state.lane):
                 place, s = (index, state.lane), state.s
                 known = _Lane(place, False, False, 1, 1.0, state.h)
+                turned = network.header_offset.heading  # x and y are inertial
                 if index >= 0 and state.lane != 0 and network.has_lane_at(index, state.lane, s):
                     width = float(network.lane_width(index, state.lane, s))
                     known = _Lane(
                         place, True, bool(network.lane_index(index, state.lane, s)[0] >= 0) and width > 0.0,
                         network.travel_direction(index, state.lane), max(width, 1e-3),
-                        network.pose_at(index, state.lane, s).heading + network.header_offset.heading,  # x, y are inertial
+                        network.pose_at(index, state.lane, s).heading + turned,
                     )  # fmt: skip
                 self._lane_of[name] = known
             found.append(known)

@@ -12,6 +12,7 @@ from xosc_lateral.files.pages.chart import DASHED, GRID, MUTED, NOMINAL, SHADE, 
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.workflows.conversion.result import Enriched, EntityResult
 from xosc_lateral.workflows.playing.road_lines import lane_surfaces, markings
+from xosc_lateral.world.motion.crossings import Crossing
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import DRIVING
 
@@ -201,6 +202,30 @@ def accelerations_over_time(enriched: Enriched, entities: Sequence[EntityResult]
         for bound in (-COMFORTABLE, COMFORTABLE):
             panel.level(bound, color=NOMINAL, dashes=DASHED)
         panel.line(time, added, color_of(_number_of(enriched, entity)), label="added")
+    return figure
+
+
+PEAKS = (0.52, 0.95)
+"""Largest lateral speed of real lane changes, 5 and 95 % of 323 on one motorway. [m/s]"""
+
+SHOWN_BESIDE = 3.0
+"""Time before and after a lane change that is drawn with it. [s]"""
+
+
+def lane_changes_over_time(enriched: Enriched, chosen: Sequence[tuple[EntityResult, Crossing]]) -> Figure:
+    """Lateral speed towards the new lane of each of these lane changes, as written and enriched."""
+    figure = Figure(1, len(chosen), height=120.0, share_y="all")
+    for panel, (entity, crossing) in zip(figure.panels, chosen, strict=True):
+        time, side = entity.motion.time, np.sign(crossing.way[-1])
+        begin, end = time[crossing.first], time[crossing.last]
+        rows = slice(*np.searchsorted(time, (begin - SHOWN_BESIDE, end + SHOWN_BESIDE)))
+        way = np.interp(time[rows], time[crossing.first : crossing.last + 1], crossing.way)
+        panel.band(time[rows], PEAKS[0], PEAKS[1], SHADE)
+        for added, style in ((0.0, {"dashes": DASHED}), (entity.deviation[rows], {})):
+            color = color_of(_number_of(enriched, entity)) if not style else NOMINAL
+            panel.line(time[rows], side * np.gradient(way + added, time[rows]), color, **style)
+        panel.title, panel.x.label = label_of(entity.name), "time [s]"
+    figure.panels[0].y.label = "across [m/s]"
     return figure
 
 

@@ -53,7 +53,7 @@ def condition_groups(realism: Realism) -> dict[str, list[ConditionScores]]:
     groups: dict[str, list[ConditionScores]] = {}
     for one in sorted(realism.conditions, key=lambda one: (not one.condition.slow, one.condition.same_start)):
         start = "same start" if one.condition.same_start else "free runs"
-        band = "below 0.5 Hz" if one.condition.slow else "all that was recorded"
+        band = f"below {one.condition.below:g} Hz" if one.condition.slow else "all that was recorded"
         what = "driver and sensor" if one.with_sensor else "driver"
         groups.setdefault(f"{start}, {band} ({what})", []).append(one)
     return groups

@@ -53,7 +53,8 @@ class LaneGraph:
                     start = {0: at, 1: end, -1: at - float(self.length[other])}[where]
                     faced = self.facing.get((other, piece)) if where == 0 else None
                     other_line = self._straight(other, start) if faced is None else (faced[0], follow(faced[1], line))
-                    waiting.append((other, other_line, level + side))
+                    put = waiting.appendleft if where == 0 else waiting.append  # what lies beside, before what follows
+                    put((other, other_line, level + side))
             count += 1
         return part, lines, rank
 

@@ -12,7 +12,7 @@ What a reader of the table has to know:
 - The provider smoothed the tracks by cubics of one second, whose slopes jump where two of them meet. Above 0.5 Hz, half
   a jump a period, tracks show hardly anything else: what is faster is taken out here, once, before lanes are found.
 - The smoothing takes more than that: beside tracks of differential GNSS the power is 0.90 of what it should be at
-  0.08 Hz, 0.56 at 0.10, 0.17 at 0.16 Hz, for trucks, slow and fast cars alike. What is faster than `HIGHEST_FREQUENCY` is not how
+  0.08 Hz, 0.56 at 0.10, 0.17 at 0.16 Hz, for trucks, slow and fast cars alike. What is faster than 0.1 Hz is not how
   people drive, and the table says so.
 - Between two cameras the provider interpolated. Bridges up to `max_gap` are kept (0.3 Hz content hardly changes in
   that time), longer ones are cut.

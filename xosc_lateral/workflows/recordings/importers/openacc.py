@@ -22,6 +22,7 @@ import io
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -68,6 +69,10 @@ LANE_SHARE = 0.5
 
 MAXIMUM_STEP = 0.25
 """Rows further apart in time are no longer one run. [s]"""
+
+FROZEN_TIME = 10.0
+"""A speed of a moving car that stands to the last digit for so long is none that was measured: in some recordings of
+the campaigns it does for minutes, the engine's too; measured ones here repeat for 1.6 s at most. [s]"""
 
 HEADER_LINES = 50
 """Lines before the header, at most: the campaign's files have five. [-]"""
@@ -292,12 +297,23 @@ def _smooth(values: FloatArray) -> FloatArray:
     return np.asarray(np.fft.irfft((spectrum.T * gain).T, len(values), axis=0))
 
 
+def frozen_rows(time: FloatArray, speed: FloatArray) -> BoolArray:
+    """Rows of a moving car whose speed stands for `FROZEN_TIME` or more, shape (n,). [s], [m/s]"""
+    frozen = np.zeros(len(speed), dtype=np.bool_)
+    edges = np.r_[0, np.flatnonzero(np.diff(speed) != 0.0) + 1, len(speed)]
+    for first, stop in pairwise(edges.tolist()):
+        if speed[first] > MINIMUM_SPEED and time[stop - 1] - time[first] >= FROZEN_TIME:
+            frozen[first:stop] = True
+    return frozen
+
+
 def _placed(cars: Sequence[_Car], loop: _Loop, lane_width: float) -> list[pd.DataFrame]:
     bends = _smooth(loop.curvature())
     frames = []
     for car in cars:
         index, offset = loop.place(car.x, car.y)
         inside = np.abs(offset) <= LANE_SHARE * lane_width
+        state = np.where(inside, KEPT_ROWS, "outside the lane")
         new = np.r_[True, (np.diff(car.time) > MAXIMUM_STEP) | (np.diff(inside.astype(np.int8)) != 0)]
         frames.append(
             pd.DataFrame(
@@ -312,7 +328,7 @@ def _placed(cars: Sequence[_Car], loop: _Loop, lane_width: float) -> list[pd.Dat
                     VALID_BELOW: HIGHEST_FREQUENCY,
                     RESOLUTION: POSITION_RESOLUTION,
                     RUN: np.cumsum(new),
-                    "state": np.where(inside, KEPT_ROWS, "outside the lane"),
+                    "state": np.where(frozen_rows(car.time, car.speed), "speed frozen", state),
                 }
             )
         )
