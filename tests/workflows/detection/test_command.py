@@ -37,7 +37,7 @@ for line in sys.stdin:
 AWK = r"""{
   time = $0; sub(/^\{"time": /, "", time); sub(/,.*/, "", time)
   if (!match($0, /"CutIn": \{"offset": [-0-9.e]+/)) { printf "{\"vehicles\": {}}\n"; fflush(); next }
-  offset = substr($0, RSTART, RLENGTH); sub(/.*: /, "", offset)
+  offset = substr($0, RSTART, RLENGTH); sub(/.*: /, "", offset); offset += 0
   side = offset > 0 ? "left" : "right"; size = offset > 0 ? offset : -offset
   printf "{\"time\": %s, \"vehicles\": {\"CutIn\": {\"score\": %d, \"side\": \"%s\"}}}\n", time, (size > 0.3), side
   fflush()
