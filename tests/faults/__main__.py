@@ -7,10 +7,11 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 
 from tests.faults.attack import Count, Fault, attack
-from tests.faults.doors import DOORS, attack_door
+from tests.faults.doors import DOORS, NEEDS, attack_door
 from tests.faults.mutants import mutate
 from tests.faults.readers import READERS
 from tests.faults.structured import mutate_structure
@@ -34,6 +35,7 @@ def main() -> int:
     given = parser.parse_args()
     faults = 0
     attacks: dict[str, Attack]
+    needs = NEEDS | {reader.name: (reader.needs,) for reader in READERS if reader.needs}
     if given.how == "doors":
         attacks = {name: partial(attack_door, name, given.count, given.seed) for name in DOORS}
     else:
@@ -41,6 +43,9 @@ def main() -> int:
         attacks = {reader.name: partial(attack, reader, given.count, given.seed, change=change) for reader in READERS}
     for name, attacked in attacks.items():
         if given.readers and name not in given.readers:
+            continue
+        if missing := [package for package in needs.get(name, ()) if find_spec(package) is None]:
+            print(f"{name}: left out, {missing[0]} is not installed", flush=True)
             continue
         tally, begin = Count(), time.monotonic()
         with tempfile.TemporaryDirectory() as folder:

@@ -16,10 +16,13 @@ from tests.faults.attack import Count, Fault
 from tests.faults.mutants import HOSTILE_NUMBERS, HOSTILE_WORDS, Rng, mutate
 from tests.faults.structured import mutate_structure
 from tests.kit.motion import two_roads
+from tests.kit.sumo_run import write_run
 from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.drivers.model.stream import sealed
 from xosc_lateral.files.profiles import read_profile
+from xosc_lateral.workflows.live.fmu import export_fmu
 from xosc_lateral.workflows.live.stdio import Pipe
+from xosc_lateral.workflows.live.sumo import SumoTraffic, start
 from xosc_lateral.workflows.live.traffic import FORMAT, Moment, Traffic
 
 SLOW = 20.0
@@ -123,11 +126,92 @@ def _moment(rng: Rng) -> Moment:
     return Moment(tuple(names[:n]), **columns, **flags, context=context)
 
 
-DOORS: dict[str, Callable[[int, int, Path, Count], Iterator[Fault]]] = {"pipe": attack_pipe, "traffic": attack_traffic}
+def attack_fmu(count: int, seed: int, folder: Path, tally: Count) -> Iterator[Fault]:
+    """So many inputs and steps, good and bad in turn, of a unit; after a refusal the next good step goes on."""
+    import fmpy
+
+    unit, at = folder / "driver.fmu", 0.0
+    export_fmu(read_profile("motorway"), unit)
+    described = fmpy.read_model_description(str(unit))
+    one = fmpy.instantiate_fmu(fmpy.extract(str(unit), str(folder / "unit")), described, "CoSimulation")
+    numbers = [v for v in described.modelVariables if v.causality == "input" and v.type == "Real"]
+    usual = {v.name: float(v.start) for v in numbers}
+    outputs = [v.valueReference for v in described.modelVariables if v.causality == "output"]
+    one.setupExperiment()
+    one.enterInitializationMode()
+    one.exitInitializationMode()
+    for k in range(count):
+        words = (seed, k)
+        rng = np.random.default_rng(words)
+        given, length = dict(usual), 0.05
+        if rng.random() < 0.4:
+            given[str(rng.choice(list(usual)))] = float(rng.choice(ODD))
+            length = float(rng.choice([*ODD, 0.05, 0.05]))
+        one.setReal([v.valueReference for v in numbers], [given[v.name] for v in numbers])
+        before = one.getReal(outputs)
+        try:
+            one.doStep(currentCommunicationPoint=at, communicationStepSize=length)
+        except fmpy.fmi1.FMICallException:
+            tally.refused += 1
+            what = "changes its outputs" if one.getReal(outputs) != before else ""
+            what = "refuses what is usual" if given == usual and length == 0.05 else what
+        else:
+            tally.accepted, at = tally.accepted + 1, at + length
+            what = "" if np.isfinite(one.getReal(outputs)).all() else "gives no numbers"
+        if what:
+            yield Fault("fmu", "step.txt", words, what, f"{at} {length} {given}".encode())
+
+
+class _Lying:
+    """SUMO, some of whose vehicles say odd numbers now and then, vanish, or sit on lanes that are not there."""
+
+    def __init__(self, connection: Any) -> None:
+        self.connection, self.vehicle, self.rng = connection, self, np.random.default_rng(0)
+
+    def __getattr__(self, name: str) -> Any:
+        ask = getattr(self.connection if hasattr(self.connection, name) else self.connection.vehicle, name)
+        if name not in ("getSpeed", "getLanePosition", "getLateralLanePosition", "getAngle", "getLaneID", "getIDList"):
+            return ask
+        return lambda *words: self._said(name, ask(*words))
+
+    def _said(self, name: str, said: Any) -> Any:
+        if self.rng.random() > 0.02:
+            return said
+        return said[:-1] if name == "getIDList" else "nowhere_0" if name == "getLaneID" else float(self.rng.choice(ODD))
+
+
+def attack_sumo(count: int, seed: int, folder: Path, tally: Count) -> Iterator[Fault]:
+    """So many steps of a SUMO that does not always say the truth."""
+    folder.mkdir(parents=True, exist_ok=True)
+    lying = _Lying(start(["-c", str(write_run(folder, end=0.1 * count + 10.0, cars=1800))]))
+    traffic = SumoTraffic(lying, read_profile("motorway"), seed=1)
+    for k in range(count):
+        lying.rng = np.random.default_rng((seed, k))
+        before, what = json.dumps(traffic.traffic.to_dict()), ""
+        try:
+            traffic.steer()
+            tally.accepted += 1
+        except SimulationError as error:
+            tally.refused += 1
+            what = "" if json.dumps(traffic.traffic.to_dict()) == before else f"changes the state: {error}"
+        except Exception as error:
+            what = f"raises {error!r}"
+        lying.connection.simulationStep()
+        if what:
+            yield Fault("sumo", "step.txt", (seed, k), what, b"")
+    lying.connection.close()
+
+
+NEEDS = {"fmu": ("fmpy", "pythonfmu"), "sumo": ("libsumo", "sumo")}
+"""Packages that a door needs."""
+
+DOORS: dict[str, Callable[[int, int, Path, Count], Iterator[Fault]]] = {
+    "pipe": attack_pipe, "traffic": attack_traffic, "fmu": attack_fmu, "sumo": attack_sumo,
+}  # fmt: skip
 
 
 def attack_door(name: str, count: int, seed: int, folder: Path, tally: Count) -> Iterator[Fault]:
     """So many lines at one of the doors; a warning on standard error counts as a fault."""
     with warnings.catch_warnings():
-        warnings.simplefilter("error")
+        warnings.simplefilter("ignore" if name in NEEDS else "error")  # of foreign packages
         yield from DOORS[name](count, seed, folder, tally)

@@ -20,12 +20,14 @@ from tests.faults.reader import NonsenseError, Reader, sane
 from tests.faults.recordings import RECORDINGS
 from tests.kit.profiles import simulated_profile
 from tests.kit.scenario_files import ROAD, declarations, entity, parameter, scenario_text, vehicle
-from xosc_lateral.base.errors import DriverProfileError
+from xosc_lateral.base.errors import DriverProfileError, FormatError
 from xosc_lateral.base.limits import context_range
 from xosc_lateral.drivers.drives.cuts import all_runs
+from xosc_lateral.drivers.loop.columns import Role
 from xosc_lateral.drivers.model.sampled_offsets import sample_free
 from xosc_lateral.drivers.model.stream import OffsetStream
 from xosc_lateral.files.context_table import read_context
+from xosc_lateral.files.mapping import read_mapping
 from xosc_lateral.files.openscenario.distribution import read_distribution
 from xosc_lateral.files.openscenario.provenance import facts_in, without_provenance
 from xosc_lateral.files.openscenario.read import read_scenario
@@ -208,9 +210,12 @@ def _use_output(path: Path) -> None:
         if without_provenance(good) != without_provenance(now):
             raise NonsenseError("called good")
         return
-    for again in reproduce(path, path.with_name("again.xosc"), ConvertSettings()):
-        if not again.problems and facts_in(path.read_bytes()) is None:
-            raise NonsenseError("made again from nothing")
+    try:
+        (again,) = reproduce(path, path.with_name("again.xosc"), ConvertSettings())
+    except FormatError as error:  # it names the scenario that the provenance states
+        raise FormatError(str(error), path=path) from error
+    if not again.problems and facts_in(path.read_bytes()) is None:
+        raise NonsenseError("made again from nothing")
 
 
 def _configuration_files(folder: Path) -> Iterable[Path]:
@@ -224,6 +229,20 @@ def _use_configuration(path: Path) -> None:
     with mock.patch("xosc_lateral.files.configuration.configuration_file", return_value=path):
         ConvertSettings.of()
         list_profiles()
+
+
+def _mapping_files(folder: Path) -> Iterable[Path]:
+    lines = ['separator = ";"', 'decimal = ","', "[columns]", 'time = "t"', 'speed = "v:km/h"', "[values.rain]"]
+    lines += ['"on" = 1.0', '"off" = 0.0', "[roles]", 'rain = "weather"']
+    (folder / "m.toml").write_text("\n".join(lines) + "\n")
+    yield folder / "m.toml"
+
+
+def _use_mapping(path: Path) -> None:
+    mapping = read_mapping(path)
+    sane([source.factor for source in mapping.columns.values()], -1e9, 1e9, "factor")
+    if mapping.separator == mapping.decimal or not set(mapping.roles.values()) <= {*map(str, Role)}:
+        raise NonsenseError("a mapping that no table is read by")
 
 
 # ---- what a batch leaves ---------------------------------------------------------------------------------------------
@@ -260,6 +279,7 @@ READERS = (
     Reader("scenario", _scenario_files, _use_scenario),
     Reader("distribution", _distribution_files, _use_distribution),
     Reader("output", _output_files, _use_output, share=0.5),
+    Reader("mapping", _mapping_files, _use_mapping),
     Reader("configuration", _configuration_files, _use_configuration),
     Reader("state", _state_files, _use_state),
 )

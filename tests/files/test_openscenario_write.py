@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from lxml import etree
+from msgspec import structs
 
 from tests.kit.scenario_files import (
     action,
@@ -36,7 +37,7 @@ from xosc_lateral.files.openscenario.write.lane_offset_scenario import write_lan
 from xosc_lateral.files.openscenario.write.lateral_actions import lateral_actions
 from xosc_lateral.files.openscenario.write.trajectory_scenario import write_trajectory_scenario
 from xosc_lateral.world.motion.nominal import NominalMotion
-from xosc_lateral.world.motion.offset_chain import OffsetChain, ring_along
+from xosc_lateral.world.motion.offset_chain import OffsetChain, OffsetPath, ring_along
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.player.player import play
 from xosc_lateral.world.scenario import Scenario
@@ -377,6 +378,43 @@ def test_offsets_come_out_when_the_lane_offset_scenario_is_played_and_go_on(tmp_
         rows = (ego.time >= begin) & (ego.time < begin + 20.0)
         assert np.ptp(ego.offset[rows]) == pytest.approx(0.4, abs=0.03)
     assert np.sqrt(np.mean(np.diff(ego.offset) ** 2)) / STEP == pytest.approx(0.2 * 2 * np.pi / 8.0 / 2**0.5, rel=0.05)
+
+
+def test_a_path_by_distance_stands_still_with_its_car_and_goes_on_with_it(tmp_path: Path) -> None:
+    """Braking with 8 m/s2 to a stop, for 4 s, and on: no sliding, no turn that anybody sees; then the ring."""
+
+    def change(value: float, rate: float) -> str:
+        return speed_action(str(value)).replace(
+            'dynamicsShape="step" dynamicsDimension="time" value="0"',
+            f'dynamicsShape="linear" dynamicsDimension="rate" value="{rate}"',
+        )
+
+    stories = story(
+        event("brake", action("brake", change(0.0, 8.0)), time=5.0),
+        event("go", action("go", change(25.0, 4.0)), time=12.0),
+    )
+    init = private("Ego", teleport(), speed_action("25"))
+    scenario = made(tmp_path, stop=time_condition(35), init=init, stories=stories)
+    distance = np.arange(0.0, 400.0, 2.5)
+    offset = 0.2 * np.cos(2 * np.pi * distance / 200.0)
+    chain = sine_chain("Ego")
+    path = OffsetPath(tuple(distance.tolist()), tuple(np.round(offset, 4).tolist()))
+    chain = structs.replace(chain, placed_t=0.2, path=path)
+    motion = played(scenario, 40.0)
+    write_lane_offset_scenario(
+        scenario, motion, [chain], tmp_path / "out.xosc", provenance=provenance(scenario), summary="seed 3"
+    )
+    run = played(read_scenario(tmp_path / "out.xosc"), 40.0)
+    ego, nominal_ego = run.entities[0], motion.entities[0]
+    driven = ego.s - ego.s[0]
+    on_path = (ego.time > 0.2) & (driven < 390.0)
+    assert np.abs(ego.offset - np.interp(driven - 0.12 * 25.0, distance, offset))[on_path].max() < 0.003
+    still = ego.speed == 0.0
+    assert still.sum() > 100 and np.ptp(ego.offset[still]) < 1e-9
+    assert np.abs(ego.heading_relative[on_path]).max() < 0.010
+    assert np.abs(ego.s - nominal_ego.s).max() < 0.01
+    after = driven > 420.0
+    assert after.sum() > 200 and np.ptp(ego.offset[after]) > 0.05
 
 
 LANE_CHANGE = (

@@ -111,7 +111,7 @@ class Range:
 CONTEXT_RANGES: Mapping[str, Range] = MappingProxyType(
     {
         "speed": Range(-50, 150, "540 km/h; cars reverse more slowly than that"),
-        "acceleration": Range(-100, 100, "10 g: a crash"),
+        "acceleration": Range(-100, 100, "10 g; a car brakes with 1 g"),
         "curvature": Range(-1, 1, "a radius of 1 m; cars turn in 5 m"),
         "lane_width": Range(0, 20, "the widest toll plaza lane; 0 where a lane begins"),
         "lane_index": Range(-1, 50, "lanes of one direction; -1: none"),

@@ -22,7 +22,9 @@ import numpy as np
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.limits import ANY_CONTEXT
 from xosc_lateral.base.segment import CONTEXT_UNITS
+from xosc_lateral.base.texts import composed
 from xosc_lateral.files.rows import as_word, parse_condition
 from xosc_lateral.files.source import read_toml
 
@@ -199,7 +201,7 @@ def parse_map(words: Iterable[str]) -> dict[str, ColumnSource]:
     Raises `FormatError`: when a word has no ``=`` or its unit does not fit the column.
     """
     mapping: dict[str, ColumnSource] = {}
-    for word in words:
+    for word in map(composed, words):
         name, equals, rest = word.partition("=")
         if not equals or not name or not rest:
             raise FormatError(f"--map {word!r}: expected NAME=COLUMN or NAME=COLUMN:UNIT")
@@ -217,7 +219,7 @@ def _source(name: str, words: str) -> ColumnSource:
 
 def read_mapping(path: Path) -> TableMapping:
     """Read a mapping's file. Raises `FormatError`: it is no TOML, or holds what no mapping has; names the entry."""
-    values = read_toml(path, "no mapping in TOML and UTF-8")
+    values = composed(read_toml(path, "no mapping in TOML and UTF-8"))
     if unknown := values.keys() - set(KEYS):
         raise FormatError(f"unknown entry {min(unknown)!r}; there are {', '.join(KEYS)}", path=path)
     for key in ("columns", "values", "roles"):
@@ -317,6 +319,6 @@ def _numbers(name: str, entry: Any, path: Path) -> dict[str, float]:
     if not isinstance(entry, dict) or not entry:
         raise FormatError("expected texts and the numbers that they stand for", path=path, element=where)
     for text, number in entry.items():
-        if isinstance(number, str | dict | list) or not np.isfinite(float(number)):
+        if not isinstance(number, int | float) or not abs(number) <= ANY_CONTEXT.high:
             raise FormatError(f"{text} = {number!r}, expected a number", path=path, element=where)
     return {text: float(number) for text, number in entry.items()}

@@ -16,6 +16,7 @@ from xosc_lateral.base.errors import DriverProfileError, FormatError, XoscLatera
 from xosc_lateral.base.limits import PROFILE_SIZE
 from xosc_lateral.base.plugins import plugins
 from xosc_lateral.base.shipped import shipped_folder
+from xosc_lateral.base.texts import composed
 from xosc_lateral.drivers.model.plausibility import check_profile
 from xosc_lateral.drivers.model.profile import DriverProfile, Metadata
 from xosc_lateral.drivers.model.records import plain
@@ -55,6 +56,9 @@ def find_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -
         found = folder / f"{text}{SUFFIX}"
         if found.is_file():
             return found
+        for other in () if text.isascii() else sorted(folder.glob(f"*{SUFFIX}")):
+            if composed(other.stem) == composed(text):
+                return other
     if (offered := _from_plugins().get(text)) is not None:
         return offered
     known = sorted({path.stem for path in list_profiles(folders)})
@@ -257,7 +261,7 @@ def read_library(folders: Iterable[Path] = ()) -> list[Entry]:
         profile, problem = None, ""
         try:
             profile = read_profile(path)
-            if profile.name != path.stem:
+            if composed(profile.name) != composed(path.stem):
                 what = f"holds the profile {profile.name!r}, but is looked up as {path.stem!r}"
                 problem = f"{path}: {what}: rename one of them"
         except (XoscLateralError, OSError) as error:

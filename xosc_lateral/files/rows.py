@@ -12,6 +12,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.texts import composed
 
 USUAL_MARKERS = (32767.0, 32768.0, 65535.0, 2147483647.0, 4294967295.0)
 """Greatest whole numbers of two and four bytes: besides 999, 9999, ... what loggers write where there is no value."""
@@ -29,7 +30,7 @@ COMPARED = {
 def as_word(cell: object) -> str:
     """A cell as a text that can be compared: whole numbers without a point, in lower case."""
     whole = isinstance(cell, float) and cell.is_integer()
-    return str(int(cell) if whole else cell).strip().lower()  # type: ignore[call-overload]
+    return str(composed(str(int(cell) if whole else cell))).strip().lower()  # type: ignore[call-overload]
 
 
 def parse_condition(text: str, path: Path) -> tuple[str, str, float | str]:

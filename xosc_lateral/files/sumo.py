@@ -12,6 +12,7 @@ import numpy as np
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import unpacked_text
+from xosc_lateral.files.xml import root_tag
 
 if TYPE_CHECKING:
     from lxml import etree
@@ -40,6 +41,7 @@ class SumoLane:
     width: float  # [m]
     length: float  # [m]
     is_driving: bool
+    shape: str = ""  # points of its middle, as written
 
 
 @dataclass(slots=True)
@@ -63,8 +65,9 @@ def read_sumo_net(path: Path) -> SumoNet:
             edge, _, index = name.rpartition("_")
             allowed, denied = (set(element.get(key, "").split()) for key in ("allow", "disallow"))
             is_driving = not (allowed and allowed <= ON_FOOT) and "all" not in denied
+            shape = element.get("shape", "")
             width = WIDTH if element.get("width") is None else number_of(element, "width", path)
-            net.lanes[name] = SumoLane(edge, int(index), width, number_of(element, "length", path), is_driving)
+            net.lanes[name] = SumoLane(edge, int(index), width, number_of(element, "length", path), is_driving, shape)
         elif element.tag == "connection" and element.get("from") is not None:
             here, there = (f"{element.get(end)}_{element.get(f'{end}Lane')}" for end in ("from", "to"))
             links.append((element.get("dir") != "s", here, element.get("via") or there))
@@ -73,6 +76,13 @@ def read_sumo_net(path: Path) -> SumoNet:
     for _, here, there in sorted(links):
         net.following.setdefault(here, []).append(there)
     return net
+
+
+def require_fcd(path: Path) -> None:
+    """Refuse what is no FCD output. Raises `FormatError`."""
+    if (tag := root_tag(path)) != "fcd-export":
+        what = f"its root element is {tag!r}" if tag else "it is no XML"
+        raise FormatError(f"no FCD output of SUMO: {what}", path=path)
 
 
 def is_left_handed(path: Path) -> bool:

@@ -6,6 +6,7 @@ import codecs
 import gzip
 import io
 import json
+import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,6 +18,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.limits import TABLE_CELLS, TABLE_COLUMNS
+from xosc_lateral.base.texts import composed
 from xosc_lateral.files.clock import seconds_of_stamps
 from xosc_lateral.files.hashes import parsed_hash
 from xosc_lateral.files.source import Source, open_source
@@ -67,7 +69,8 @@ def numbers_of(column: pd.Series, path: Path, name: str) -> FloatArray:
     strange = numbers.isna() & column.notna()
     if strange.any():
         row = int(np.flatnonzero(strange)[0])
-        raise FormatError(f"{column.iloc[row]!r} is not a number", path=path, line=row + 2, element=f"column {name!r}")
+        what = "is neither a number nor a time" if name == "time" else "is not a number"
+        raise FormatError(f"{column.iloc[row]!r} {what}", path=path, line=row + 2, element=f"column {name!r}")
     return np.array(numbers.to_numpy(dtype=np.float64, na_value=np.nan))
 
 
@@ -123,11 +126,11 @@ def read_text_table(path: Path) -> pd.DataFrame:
 def _read(path: Path, encoding: str | None = None, separator: str | None = None, **csv: Any) -> pd.DataFrame:
     with open_source(path) as source, foreign_errors(path, "can't be read as a table"):
         if path.name.lower().endswith(PARQUET):
-            return _read_parquet(source)
+            return _read_parquet(source).rename(columns=composed)
         text = _in_utf8(unpacked_text(source), path, encoding)
         separator = separator or _separator(text, path)
         table: pd.DataFrame = pd.read_csv(text, sep=separator, encoding="utf-8-sig", index_col=False, **csv)
-        return table
+        return table.rename(columns=composed)
 
 
 def as_text(table: pd.DataFrame) -> pd.DataFrame:
@@ -148,8 +151,25 @@ def foreign_errors(path: Path, what: str) -> Iterator[None]:
     except MemoryError as error:
         raise FormatError(f"{what}: not enough memory to read it", path=path) from error
     except Exception as error:  # readers of binary formats raise anything, damaged bytes being what they are
-        reason = " ".join(str(error).split())[:LONGEST_MESSAGE]
-        raise FormatError(f"{what}: {reason or type(error).__name__}", path=path) from error
+        raise FormatError(f"{what}: {_plain_reason(error)}", path=path) from error
+
+
+_FIELDS = re.compile(r"Expected (\d+) fields in line (\d+), saw (\d+)")
+_OPEN_QUOTE = re.compile(r"EOF inside string starting at row (\d+)")
+
+
+def _plain_reason(error: Exception) -> str:
+    """What a library says about a file, in words that need no knowledge of the library."""
+    reason = " ".join(str(error).split())[:LONGEST_MESSAGE]
+    if match := _FIELDS.search(reason):
+        return f"line {match[2]} has {match[3]} cells, the head has {match[1]}"
+    if match := _OPEN_QUOTE.search(reason):
+        return f"a quotation mark in line {int(match[1]) + 1} is not closed"
+    if isinstance(error, LookupError | TypeError | AttributeError | ArithmeticError) and not isinstance(
+        error, UnicodeError
+    ):
+        return f"it is empty, damaged, or laid out otherwise ({type(error).__name__}: {reason})"
+    return reason or type(error).__name__
 
 
 def unpacked_text(source: Source) -> IO[bytes]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from functools import lru_cache
 from pathlib import Path
@@ -12,7 +13,8 @@ from msgspec import Struct
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.limits import XML_TREE
-from xosc_lateral.files.source import check_regular, guard_input, read_source, state_key
+from xosc_lateral.files.source import check_regular, guard_input, open_source, read_source, state_key
+from xosc_lateral.files.tables import unpacked_text
 
 MAX_CACHED_BYTES = 1_000_000
 """Larger files are read anew each time: catalogs are small, and 16 trees are kept."""
@@ -91,6 +93,23 @@ def read_xml(path: Path) -> tuple[etree._Element, bytes]:
     """Root element and bytes of a file; see `read_document`."""
     document = read_document(path)
     return document.root, document.data
+
+
+def document_of(data: bytes, path: Path) -> XmlDocument:
+    """From bytes, as if they were that file's."""
+    return XmlDocument(parse_xml(data, path), data, hashlib.sha256(data).hexdigest())
+
+
+def root_tag(path: Path) -> str:
+    """Name of a file's root element, without its namespace; empty: it is no XML. The file may be packed with gzip."""
+    try:
+        with open_source(path) as source:
+            begin = etree.iterparse(
+                unpacked_text(source), events=("start",), resolve_entities=False, no_network=True, load_dtd=False
+            )
+            return next((etree.QName(element).localname for _, element in begin), "")
+    except (etree.XMLSyntaxError, ValueError):
+        return ""
 
 
 def read_document(path: Path) -> XmlDocument:

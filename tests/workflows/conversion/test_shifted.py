@@ -1,22 +1,86 @@
-"""Events that the offsets move are told of."""
+"""Events of two runs: what is explained by a lateral action's way, what is another meaning."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+from msgspec.structs import replace
+
 from tests.kit.stage import Stage, after, event, lane_change, maneuvers, speed, state_of, to_lane, when
-from xosc_lateral.workflows.conversion.meaning import shifts
+from xosc_lateral.workflows.conversion.load import Played
+from xosc_lateral.workflows.conversion.meaning import keep_meaning
+from xosc_lateral.workflows.conversion.shifts import Change, Comparison, compare_runs
+from xosc_lateral.world.motion.nominal import NominalMotion
+from xosc_lateral.world.motion.offset_chain import Move, OffsetChain, Ring
+
+
+def _compare(before: Played, after_: Played) -> Comparison:
+    return compare_runs(before.scenario, before.network, before.motion, after_.motion)
 
 
 def test_an_event_that_comes_later_or_not_at_all_is_named(tmp_path: Path) -> None:
-    def run(moment: float, *, last: float) -> object:
+    def run(moment: float, *, last: float) -> Played:
         first = event(lane_change(to_lane(-2), over=2.0), name="change", trigger=after(moment))
         then = event(speed(25.0), name="then", trigger=when(state_of("change", "completeState")))
-        return Stage(tmp_path).play(maneuvers(first, then), last=last).motion
+        return Stage(tmp_path).play(maneuvers(first, then), last=last)
 
-    assert shifts(run(1.0, last=8.0), run(1.04, last=8.0)) == []
-    said = list(map(str, shifts(run(1.0, last=8.0), run(1.5, last=3.0))))
-    assert said[0] == "event 'change' of 'Ego' at 1.00 s happens 0.50 s later with the offsets"
-    sooner = list(map(str, shifts(run(1.5, last=8.0), run(1.0, last=8.0))))
+    assert _compare(run(1.0, last=8.0), run(1.04, last=8.0)).changes == ()
+    found = list(map(str, _compare(run(1.0, last=8.0), run(1.5, last=8.0)).changes))
+    # What waits for it comes later by as much, and is not named again.
+    assert found == ["event 'change' of 'Ego' at 1.00 s happens 0.50 s later with the offsets"]
+    sooner = list(map(str, _compare(run(1.5, last=8.0), run(1.0, last=8.0)).changes))
     assert sooner[0] == "event 'change' of 'Ego' at 1.50 s happens 0.50 s earlier with the offsets"
-    assert said[1] == "event 'then' of 'Ego' at 3.00 s no longer happens with the offsets"
+    shorter = list(map(str, _compare(run(1.0, last=8.0), run(1.0, last=2.5)).changes))
+    assert not [line for line in shorter if "then" in line]  # due after that run's end
+
+
+def test_an_event_that_is_missing_is_named(tmp_path: Path) -> None:
+    def run(state: str) -> Played:
+        first = event(lane_change(to_lane(-2), over=2.0), name="change", trigger=after(1.0))
+        then = event(speed(25.0), name="then", trigger=when(state_of("change", state)))
+        return Stage(tmp_path).play(maneuvers(first, then), last=8.0)
+
+    (change,) = _compare(run("completeState"), run("skipTransition")).changes
+    assert str(change) == "event 'then' of 'Ego' at 3.00 s no longer happens with the offsets"
+
+
+def _chain(entity: str, after: tuple[str, ...] | None) -> OffsetChain:
+    return OffsetChain(entity, after, Ring(0.1, (Move(0.0, 3.0, -0.2), Move(0.0, 3.0, 0.2))))
+
+
+def _nobody() -> NominalMotion:
+    return NominalMotion(0.02, (), (), 20.0, "stop trigger", ())
+
+
+def test_the_smallest_change_that_helps_is_one_chain_of_one_vehicle() -> None:
+    """Planted: what A does before its maneuver changes an event if it is larger than a third of what was sampled."""
+    change = Comparison((), (Change("event 'cut in' of 'A' at 8.00 s", "A", 8.0, "no longer happens"),))
+    chains = [_chain("A", None), _chain("A", ("late",)), _chain("B", None)]
+
+    def attempt(some: list[OffsetChain]) -> list[Comparison]:
+        large = [one for one in some if one.entity == "A" and one.after is None and one.ring.origin > 0.034]
+        return [change if large else Comparison((), ())]
+
+    kept = keep_meaning(chains, _nobody(), attempt)
+    assert kept.changes == ()
+    assert [chain.ring.origin for chain in kept.chains] == [pytest.approx(0.025), 0.1, 0.1]
+    assert kept.smaller == {"A": (0.25, False)}
+
+
+def test_what_no_change_of_offsets_helps_against_is_told_and_costs_nobody_offsets() -> None:
+    change = Comparison((), (Change("event 'cut in' of 'A' at 8.00 s", "A", 8.0, "no longer happens"),))
+    chains = [_chain("A", None), _chain("B", None)]
+    kept = keep_meaning(chains, _nobody(), lambda _: [change])
+    assert kept.chains == tuple(chains) and kept.smaller == {}
+    assert kept.changes == change.changes
+
+
+def test_moves_of_another_size_lead_back_to_where_they_began() -> None:
+    from xosc_lateral.world.motion.offset_chain import scaled
+
+    chain = replace(_chain("A", None), placed_t=-1.9, side=-1.0)
+    half = scaled(chain, 0.5)
+    assert [move.change for move in half.ring.moves] == [-0.1, 0.1]
+    assert half.placed_t == pytest.approx(-1.85)
+    assert scaled(chain, 0.0).ring.moves == ()

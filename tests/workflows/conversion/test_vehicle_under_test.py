@@ -88,7 +88,7 @@ def test_a_vehicle_under_test_is_left_byte_for_byte_and_each_other_written_by_wh
     assert not made.is_replay
     assert "under test, left as written: Ego" in str(made)
     text = (tmp_path / "out.xosc").read_text()
-    assert text.count("<FollowTrajectoryAction>") == 2
+    assert text.count("<Timing ") == 2 and text.count("<None/>") == 1  # B, C; A brakes: a path without times
     assert "<TimeHeadwayCondition" in text and "<LaneChangeAction>" not in text
     again = {one.name: one for one in play_scenario(tmp_path / "out.xosc").motion.entities}
     for name in ("B", "C"):
@@ -143,7 +143,7 @@ def test_lane_offsets_go_on_for_as_long_as_the_segment_lasts(scenario: Path, tmp
     xl.convert(scenario, tmp_path / "out.xosc", mode="lane-offset", seed=1)
     played = play_scenario(tmp_path / "out.xosc")
     endless = replace(played.scenario, storyboard=structs.replace(played.scenario.storyboard, stop_trigger=None))
-    slower = with_speeds(endless, played.motion, ["Ego"], 0.8)
+    slower = with_speeds(endless, played.motion, ["Ego"], ((1.0, 0.8, 3.0),))
     motion = play(slower, played.network, step=0.02, time_limit=22.0)
     for one in motion.entities:
         for start in () if one.name == "Ego" else (12, 17):
@@ -174,8 +174,11 @@ def test_a_longer_run_is_not_one_that_was_cut_off_and_a_replay_ends_when_it_did(
         assert made.end_time == pytest.approx(1.3 * nominal.end_time, abs=0.02)
 
 
-def test_offsets_that_change_what_happens_are_left_out_by_name(tmp_path: Path) -> None:
-    """An own lane offset action lasts as long as the way to its target is: what waits for its end would move."""
+def test_an_own_action_that_lasts_longer_from_beside_the_middle_is_explained_and_said(tmp_path: Path) -> None:
+    """An own lane offset action lasts as long as the way to its target asks for; what waits for its end moves by that.
+
+    By its acceleration: as the root of the way. Nothing is left out for it.
+    """
     text = scenario_text(
         entities=entity("Ego", controller=EXTERNAL) + entity("A"),
         init=private("Ego") + private("A", teleport("200"), speed_action("25")),
@@ -186,11 +189,20 @@ def test_offsets_that_change_what_happens_are_left_out_by_name(tmp_path: Path) -
     )
     path = write_scenario(tmp_path, text)
     made = xl.convert(path, tmp_path / "out.xosc", mode="lane-offset", profile="motorway", seed=5)
-    assert made.modes == {}
-    assert [line for line in made.warnings if line.startswith("'A' stays as it is")]
-    assert _of(tmp_path / "out.xosc", "A") == _of(path, "A")
+    assert made.modes == {"A": "lane-offset"}
+    swerve, then = (next(one for one in made.shifts if one.event == name) for name in ("swerve", "then"))
+    run = play_scenario(tmp_path / "out.xosc").motion
+    start = next(one.start for one in run.actions if one.path[-2:-1] == ("swerve",))
+    own = next(one for one in run.entities if one.name == "A")
+    way = 0.4 - own.offset[np.searchsorted(own.time, start)]
+    assert swerve.end == pytest.approx(swerve.duration * (np.sqrt(way / 0.4) - 1.0), abs=0.05)
+    assert then.start == pytest.approx(swerve.end, abs=0.05)
+    assert abs(swerve.unexplained_end) <= 0.05 and abs(then.unexplained_start) <= 0.05
+    assert abs(swerve.end) > 0.05
+    assert made.to_dict()["shifts"][0]["event"] == "swerve"
     # Also where nothing is written.
-    assert xl.convert(path, mode="lane-offset", profile="motorway", seed=5).modes == {}
+    again = xl.convert(path, mode="lane-offset", profile="motorway", seed=5)
+    assert again.shifts == made.shifts and again.data == (tmp_path / "out.xosc").read_bytes()
 
 
 def _near(tmp_path: Path, speed: str, *events: str) -> Path:
@@ -206,7 +218,7 @@ def _near(tmp_path: Path, speed: str, *events: str) -> Path:
 
 def _driven(source: Path, output: Path, factor: float) -> NominalMotion:
     played = play_scenario(output)
-    faster = with_speeds(played.scenario, play_scenario(source).motion, ["Ego"], factor)
+    faster = with_speeds(played.scenario, play_scenario(source).motion, ["Ego"], ((1.0, factor, 3.0),))
     return play(faster, played.network, step=0.01)
 
 

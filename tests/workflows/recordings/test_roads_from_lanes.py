@@ -11,7 +11,7 @@ import pytest
 
 import xosc_lateral as xl
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
-from xosc_lateral.files.opendrive import read_road
+from xosc_lateral.files.opendrive import parse_opendrive
 from xosc_lateral.workflows.recordings.roads_from_lanes import DrivenLane, roads_of_lanes
 
 WIDTH, RADIUS = 3.2, 60.0
@@ -47,7 +47,7 @@ def test_lanes_lie_where_they_lay_and_part_as_they_parted(left_handed):
     text = roads_of_lanes(
         [right, left, straight_on(right, 40.0), straight_on(left, 30.0)], "x", left_handed=left_handed
     )
-    network = read_road(text.encode(), "x")
+    network = parse_opendrive(text.encode(), "x")
     assert network.notes == ()
     road = network.roads[0]
     ids = (1, 2) if left_handed else (-2, -1)  # of the right and the left lane
@@ -72,7 +72,7 @@ def test_a_lane_that_ends_before_its_neighbour_has_no_width_from_there_on():
         DrivenLane(edge(0.0), edge(-WIDTH), 1, []),
         DrivenLane(edge(WIDTH, 0.0, 60.0), edge(0.0, 0.0, 60.0), -1, []),
     ]
-    network = read_road(roads_of_lanes(lanes, "x").encode(), "x")
+    network = parse_opendrive(roads_of_lanes(lanes, "x").encode(), "x")
     assert network.lane_state_at(0, -1, 50.0)[::2] == pytest.approx((0.5 * WIDTH, WIDTH), abs=1e-3)
     for s in (70.0, 99.0):
         assert network.lane_state_at(0, -1, s).width == pytest.approx(0.0, abs=1e-3)
@@ -85,7 +85,7 @@ def test_roads_that_meet_lead_on_into_one():
         for y in (30.0, -20.0)
     )
     onward = DrivenLane(np.array([[50.0, 1.6], [90.0, 1.6]]), np.array([[50.0, -1.6], [90.0, -1.6]]), -1, [])
-    network = read_road(roads_of_lanes([one, other, onward], "x").encode(), "x")
+    network = parse_opendrive(roads_of_lanes([one, other, onward], "x").encode(), "x")
     for road in (0, 1):
         assert [(link.road, link.lane, link.direction) for link in network.next_lanes(road, -1, 1)] == [(2, -1, 1)]
 
@@ -102,7 +102,8 @@ def sumo_run(folder: Path, *, left_handed: bool = False, packed: bool = False) -
         for index in range(3):
             y = flip * (-2.5 + index) * WIDTH
             allow = 'allow="pedestrian"' if index == 0 else ""
-            lanes += f'<lane id="{name}_{index}" index="{index}" {allow} shape="{start},{y} {end},{y}"/>'
+            about = f'id="{name}_{index}" index="{index}" length="{end - start}" {allow}'
+            lanes += f'<lane {about} shape="{start},{y} {end},{y}"/>'
         edges += f'<edge id="{name}" function="{"internal" if name[0] == ":" else "normal"}">{lanes}</edge>'
     links = "".join(
         f'<connection from="e0" to="e1" fromLane="{k}" toLane="{k}" via=":j_0_{k}"/>'
@@ -159,9 +160,9 @@ def test_a_run_of_sumo_drives_on_its_own_network(tmp_path, left_handed, packed):
     ("fcd", "net", "error", "said"),
     [
         (None, "", FormatError, "--road FILE.net.xml"),
-        (None, "<net/>", FormatError, "no lane for vehicles"),
-        (None, '<net><edge id="a"><lane index="0" shape="1,2"/></edge></net>', FormatError, "shape='1,2' is no line"),
-        (None, '<net><edge id="a"><lane index="x" shape="1,2 3,4"/></edge></net>', FormatError, "index='x'"),
+        (None, "<net/>", FormatError, "no lane: not a SUMO network"),
+        (None, '<net><lane id="a_0" length="5" allow="pedestrian"/></net>', FormatError, "no lane for vehicles"),
+        (None, '<net><lane id="a_0" length="5" shape="1,2"/></net>', FormatError, "shape='1,2' is no line"),
         (None, "<net><edge", FormatError, "not XML"),
         ("<fcd-export/>", None, NotEnoughDataError, "no vehicle"),
         ('<fcd-export><timestep time="0"><vehicle id="a" x="?"/></timestep></fcd-export>', None, FormatError, "x='?'"),

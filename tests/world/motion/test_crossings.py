@@ -16,7 +16,8 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.workflows.conversion.page import conversion_page
 from xosc_lateral.workflows.conversion.result import EntityResult
 from xosc_lateral.workflows.playing.figures import lane_changes_over_time
-from xosc_lateral.world.motion.crossings import ALPHA, BETA, NINE_TENTHS, PEAK_SHARE, TENTH
+from xosc_lateral.workflows.recordings.transitions import Rough, fit_transition
+from xosc_lateral.world.motion.crossings import ALPHA, BETA, NINE_TENTHS, PEAK_SHARE, TENTH, bell_share
 
 WIDTH = 3.5
 
@@ -121,3 +122,14 @@ def test_the_report_draws_lane_changes_before_and_after(tmp_path: Path) -> None:
     written, enriched = (np.asarray(mark.y) for mark in figure.panels[0].curves())
     assert written.max() == pytest.approx(0.5 * np.pi * WIDTH / 5.0, abs=0.02) and written.min() > -0.01
     assert 0.7 * written.max() < enriched.max() < 1.5 * written.max()
+
+
+@pytest.mark.parametrize("is_bell", [True, False])
+def test_a_recorded_lane_change_is_told_from_a_sinusoid(is_bell: bool) -> None:
+    time = np.arange(0.0, 20.0, 0.1)
+    u = np.clip((time - 6.0) / 8.0, 0.0, 1.0)
+    y = WIDTH * (bell_share(u) if is_bell else 0.5 - 0.5 * np.cos(np.pi * u))
+    y += np.random.default_rng(1).normal(0.0, 0.003, len(time))
+    found = fit_transition(time, y, Rough(62, 138, 0.0, WIDTH, 1), 0.0)
+    assert found.is_bell == is_bell
+    assert min(found.bell_residual, found.residual) < 0.015 < max(found.bell_residual, found.residual)

@@ -453,3 +453,11 @@ def test_travelled_distance_is_that_in_the_plane(tmp_path: Path) -> None:
     steep = map_of(road("1", line(), 1000.0, rest=grade))
     inside = '<TraveledDistanceCondition value="100"/>'
     assert fires(tmp_path, when(by_entity(inside)), roads=steep) == pytest.approx(5.0, abs=FRAME)
+
+
+def test_any_of_several_entities_is_enough_and_all_are_needed_where_all_is_said(tmp_path: Path) -> None:
+    far = '<TraveledDistanceCondition value="100"/>'  # Ego is there after 5 s, Lead after 10
+    for names in (("Ego", "Lead"), ("Lead", "Ego")):
+        assert fires(tmp_path, when(by_entity(far, *names))) == pytest.approx(5.0, abs=FRAME)
+        assert fires(tmp_path, when(by_entity(far, *names, rule="all"))) == pytest.approx(10.0, abs=FRAME)
+    assert fires(tmp_path, when(by_entity(far, "Lead"))) == pytest.approx(10.0, abs=FRAME)

@@ -120,6 +120,9 @@ def test_written_headings_count(tmp_path: Path) -> None:
     way = polyline((None, in_world(30.0, 0.0, 0.1)), (None, in_world(130.0, 0.0, 0.1)))
     motion = entity(Stage(tmp_path).play(maneuvers(event(follow(way))), start=EGO, last=3.0))
     np.testing.assert_allclose(motion.heading[1:], 0.1, atol=1e-9)
+    way = polyline((None, in_world(30.0, -1.75, 0.1)), (None, in_world(130.0, -1.75, 0.1)))
+    motion = entity(Stage(tmp_path).play(maneuvers(event(follow(way))), start=EGO, last=3.0))
+    np.testing.assert_allclose(motion.heading_relative[1:], 0.1, atol=1e-9)
 
 
 @pytest.mark.parametrize("repeated", [True, False])

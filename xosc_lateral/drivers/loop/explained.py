@@ -21,9 +21,8 @@ from xosc_lateral.base.normal import NORMAL_95
 from xosc_lateral.drivers.loop.autocorrelation import Whitener
 from xosc_lateral.drivers.loop.candidates import Family
 from xosc_lateral.drivers.loop.dictionary import Quantities, beside, orthonormal
-from xosc_lateral.drivers.loop.model import Fitted
+from xosc_lateral.drivers.loop.model import Fitted, latent_path
 from xosc_lateral.drivers.loop.omnibus import DELAYS, smooth_covariance, tents
-from xosc_lateral.drivers.loop.regression import design_of
 from xosc_lateral.drivers.loop.timeline import Coarse
 
 ROUNDS = 30  # Of variances and weights by turns.
@@ -76,10 +75,8 @@ def explained_share(
     for fold, (start, final) in enumerate(zip(starts, finals, strict=True)):
         held = (blocks % len(finals) == fold) & coarse.valid
         whitener = final.whitener
-        columns, _, _ = design_of(start.coarse, start.terms)
-        found, _, _ = design_of(final.coarse, final.terms)
         free = courses @ _free_weights(courses, start, whitener)
-        paths = (columns @ start.sizes, found @ final.sizes, columns @ start.sizes + free)
+        paths = (_path(start), _path(final), _path(start) + free)
         before, *better = (_squares(whitener, final.coarse.offset - path, held) for path in paths)
         gains += 0.5 * (before - np.asarray(better)) / max(float(before[held].mean()) if held.any() else 1.0, 1e-300)
     numbers = np.unique(blocks[coarse.valid])
@@ -91,6 +88,12 @@ def explained_share(
     return Explained(
         float(by_effects.mean()), float(by_columns.mean()), error, share, scatter / max(abs(total), 1e-300)
     )
+
+
+def _path(fitted: Fitted) -> FloatArray:
+    """Mean by the terms that say where a car is on rows that they were not fitted on, shape (n,). [m]"""
+    paths = [latent_path(term, fitted) for term in fitted.terms if term.seen_held_out]
+    return np.asarray(np.sum([np.zeros(len(fitted.coarse)), *paths], axis=0))
 
 
 def _courses(quantities: Quantities) -> FloatArray:

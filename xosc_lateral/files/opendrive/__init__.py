@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from xosc_lateral.files.opendrive.reader import read_opendrive, read_road
+from xosc_lateral.files.opendrive.reader import parse_opendrive, read_opendrive
 
-__all__ = ["read_opendrive", "read_road"]
+__all__ = ["parse_opendrive", "read_opendrive"]

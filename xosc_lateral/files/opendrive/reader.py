@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from os import PathLike
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
-from xosc_lateral.files.opendrive.document import RoadFile, XmlElement, open_document
+from xosc_lateral.files.opendrive.document import RoadFile, XmlElement, open_document, parse_document
 from xosc_lateral.files.opendrive.lane_sections import read_sections, speed_limit
 from xosc_lateral.files.opendrive.plan_view import Record, finish_elements, read_plan_view
 from xosc_lateral.world.road.geometry import ReferenceElement
@@ -31,7 +29,18 @@ def read_opendrive(path: str | PathLike[str]) -> RoadNetwork:
 
     Raises `FormatError` if it is no OpenDRIVE, or can't be understood: file, line, element and value.
     """
-    root, source = open_document(path)
+    return _network(*open_document(path))
+
+
+def parse_opendrive(data: bytes, name: str) -> RoadNetwork:
+    """Read a road that is no file of its own, and that messages call by this name.
+
+    Raises `FormatError`: see `read_opendrive`.
+    """
+    return _network(*parse_document(data, name))
+
+
+def _network(root: XmlElement, source: RoadFile) -> RoadNetwork:
     elements = list(root.iterfind("road"))
     if not elements:
         raise source.error("no road", root)
@@ -54,17 +63,6 @@ def read_opendrive(path: str | PathLike[str]) -> RoadNetwork:
         geo_reference=reference.strip() if reference and reference.strip() else None,
         header_offset=HeaderOffset(*shift),
     )
-
-
-def read_road(data: bytes, name: str) -> RoadNetwork:
-    """Read a road that is no file of its own, and that messages call by this name.
-
-    Raises `FormatError`: see `read_opendrive`.
-    """
-    with TemporaryDirectory() as folder:
-        path = Path(folder, f"{name}.xodr")
-        path.write_bytes(data)
-        return read_opendrive(path)
 
 
 def _check_ids(elements: Sequence[XmlElement], source: RoadFile) -> None:

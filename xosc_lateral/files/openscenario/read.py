@@ -16,7 +16,7 @@ from xosc_lateral.files.openscenario.declarations import read_declarations, read
 from xosc_lateral.files.openscenario.element import XmlElement, local_name, means_true
 from xosc_lateral.files.openscenario.entities import read_entities
 from xosc_lateral.files.openscenario.storyboard import READERS
-from xosc_lateral.files.xml import read_document
+from xosc_lateral.files.xml import document_of, read_document
 from xosc_lateral.world.scenario import (
     FileHeader,
     Scenario,
@@ -96,6 +96,7 @@ def read_scenario(
     allowed: Iterable[Path] = (),
     strict: bool = False,
     roads: RoadSearch = NO_ROADS,
+    data: bytes | None = None,
 ) -> Scenario:
     """Read a scenario with all that it takes from catalogs.
 
@@ -114,13 +115,15 @@ def read_scenario(
         Refuse a scenario whose vehicle catalog is missing, instead of playing a usual car and remarking it.
     roads : RoadSearch
         Where else its road may lie.
+    data : bytes, optional
+        Its content, where nothing is written to the path as yet.
 
     Returns
     -------
     Scenario
     """
     path = Path(path)
-    document = read_document(path)
+    document = read_document(path) if data is None else document_of(data, path)
     root = open_scenario(document.root, path)
     if root.child("ParameterValueDistribution") is not None:
         root.fail("is a parameter value distribution, not a scenario: read the scenarios that it stands for")

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from xosc_lateral.files.pages.figure import Figure
-    from xosc_lateral.workflows.conversion.result import ConvertedScenario
+    from xosc_lateral.workflows.conversion.result import ConvertedScenario, EventShift
 
 SCENARIO_SUFFIXES = (".xosc",)
 
@@ -144,6 +144,11 @@ class Conversion(Result):
     def modes(self) -> dict[str, str]:
         """Vehicle that was enriched -> "trajectory" or "lane-offset"."""
         return dict(self._made.provenance.modes)
+
+    @property
+    def shifts(self) -> tuple[EventShift, ...]:
+        """How much earlier or later events of a reactive output come, the largest under several egos. [s]"""
+        return self._made.shifts
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -9,13 +9,29 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.files.openscenario.write.lateral_actions import LateralAction
 from xosc_lateral.workflows.conversion.result import EntityResult, SampledSegment
-from xosc_lateral.world.motion.deviation import NaturalSpline
-from xosc_lateral.world.motion.nominal import Activity, NominalMotion
-from xosc_lateral.world.motion.offset_chain import GRID, OffsetChain, Ring, ring_along
+from xosc_lateral.world.motion.deviation import (
+    SETTLING_TIME,
+    NaturalSpline,
+    SampledDeviation,
+    deviation_through,
+    settle,
+    smoother_step,
+)
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
+from xosc_lateral.world.motion.offset_chain import GRID, RESOLUTION, OffsetChain, OffsetPath, Ring, ring_along
+from xosc_lateral.world.motion.trajectory import distance_driven
 from xosc_lateral.world.road import RoadNetwork
 
 LONGEST_TURN = 300.0
 """Of a ring: a run that is stopped by something that never happens lasts an hour. [s]"""
+ROAD_END = 20.0
+"""A path ends so far before its road: what lies beyond has no place. [m]"""
+LEAST_PATH = 60.0
+"""A shorter path is none; in its last so many metres it is led to where a ring begins. [m]"""
+CUT = 0.002
+"""By which straight pieces may cut a bend. [m]"""
+LEAST_GAP = 1.0
+"""Between vertices. [m]"""
 AT_ONCE = 0.1
 """A segment that begins within this after an action ends begins because of it. [s]"""
 
@@ -27,6 +43,7 @@ def chains_of(
     items: Collection[LateralAction],
     *,
     tows: bool,
+    changes_speed: bool,
 ) -> list[OffsetChain]:
     """Chains of one entity, each with the offsets that it has in the nominal run then, or else with its longest ones.
 
@@ -40,15 +57,21 @@ def chains_of(
         Its own.
     tows : bool
         It pulls a trailer, and is not put down beside the middle: the trailer would swing.
+    changes_speed : bool
+        Something may change its speed: it begins with a path by the distance driven.
     """
     longest = max(entity.segments, key=_length)
     added = next((item.path for item in items if item.adds and not _is_there_at_start(entity)), None)
     first = next(iter(_in_phase(entity, motion, added, items)), None)
     is_placed = first is not None and first.span.first == 0 and not tows
     ring = _ring(first or longest, from_middle=not is_placed)
-    placed = _offset_t(entity, network, ring.origin) if is_placed else None
+    path = _path(entity, motion, network, items, ring.origin) if changes_speed and not tows else None
+    is_placed = is_placed or path is not None
+    side, middle_t = _middle(entity, network) if is_placed else (1.0, 0.0)
+    begin = ring.origin if path is None else path.offset[0]
+    placed = middle_t + side * begin if is_placed else None
     is_steered = bool(entity.motion.activity[0] & Activity.STEERED)
-    chains = [] if is_steered else [OffsetChain(entity.name, added, ring, placed)]
+    chains = [] if is_steered else [OffsetChain(entity.name, added, ring, placed, side, path)]
     for item in items:
         if not item.adds and not item.steers:
             found = max(_in_phase(entity, motion, item.path, items), key=_length, default=longest)
@@ -87,9 +110,68 @@ def _ring(segment: SampledSegment, *, from_middle: bool) -> Ring:
     return ring_along(grid, path, from_middle=from_middle)
 
 
-def _offset_t(entity: EntityResult, network: RoadNetwork, aside: float) -> float:
-    """Along +t from the lane's centre, beside where the entity begins nominally. [m]"""
+def _path(
+    entity: EntityResult, motion: NominalMotion, network: RoadNetwork, items: Collection[LateralAction], end: float
+) -> OffsetPath | None:
+    """From the start along what was sampled before the first lateral action and beyond it, to some offset. [m]
+
+    On one road alone, up to shortly before its end, where the place of each vertex is certain.
+    """
+    own, paths = entity.motion, {item.path for item in items}
+    starts = [one.start for one in motion.actions if one.actor == entity.name and one.path in paths]
+    until = min(starts, default=np.inf)
+    segments = [segment for segment in entity.segments if segment.span.start < until]
+    last = int(np.searchsorted(own.time, min(until, float(own.time[-1]))))
+    rows = slice(0, last)
+    is_here = ((own.activity[1:last] & (Activity.ACTIVE | Activity.TELEPORTED)) == Activity.ACTIVE).all()
+    if not segments or last < 2 or not is_here or len(set(own.road[rows].tolist())) != 1 or own.road[0] < 0:
+        return None
+    driven = distance_driven(own)
+    parts = [_sampled(segment, own, driven, is_last=segment is segments[-1]) for segment in segments]
+    side, _ = _middle(entity, network)
+    length = network.roads[int(own.road[0])].length
+    room = (length - float(own.s[0]) if side > 0.0 else float(own.s[0])) - ROAD_END
+    reach = min(room, float(parts[-1].distance[-1]))
+    if reach < LEAST_PATH:
+        return None
+    at = _vertices(own, network, driven, last, reach)
+    through = deviation_through(parts)
+    begin = through(np.array([0.0, LEAST_GAP]))
+    offset = through(at) - settle(at, LEAST_PATH, float(np.diff(begin)[0]) / LEAST_GAP, 0.0)
+    share = smoother_step((at - reach + LEAST_PATH) / LEAST_PATH)
+    offset += share * (end - offset)
+    return OffsetPath(tuple(np.round(at, 3).tolist()), tuple(np.round(offset, RESOLUTION).tolist()))
+
+
+def _sampled(segment: SampledSegment, own: EntityMotion, driven: FloatArray, *, is_last: bool) -> SampledDeviation:
+    """One segment by the distance driven, the last one with what was sampled beyond it, at the speed of its end."""
+    distance, offset = np.interp(segment.time, own.time, driven), segment.offset
+    speeds = own.speed[[segment.span.first, segment.span.last]]
+    if is_last:
+        step = float(speeds[1]) * (segment.time[1] - segment.time[0])
+        distance = np.append(distance, distance[-1] + step * np.arange(1, len(segment.beyond) + 1))
+        offset = np.append(offset, segment.beyond)
+    settling = SETTLING_TIME * speeds
+    return SampledDeviation(distance, offset, (float(settling[0]), float(settling[1])))
+
+
+def _vertices(own: EntityMotion, network: RoadNetwork, driven: FloatArray, last: int, reach: float) -> FloatArray:
+    """Distances of vertices: every 0.1 s as it is driven nominally, closer in bends, never below 1 m. [m]"""
+    rows = np.arange(0, last, max(1, round(GRID / (own.time[1] - own.time[0]))))
+    bend = np.abs(network.lane_curvature(own.road[rows], own.lane[rows], own.s[rows]))
+    gap = np.minimum(GRID * np.abs(own.speed[rows]), np.sqrt(8.0 * CUT / np.maximum(bend, 1e-6)))
+    gap, found = np.clip(gap, LEAST_GAP, None), [0.0]
+    while found[-1] < reach:
+        found.append(found[-1] + float(np.interp(found[-1], driven[rows], gap)))
+    return np.append(found[:-1], reach) if reach - found[-2] > 0.5 * LEAST_GAP else np.append(found[:-2], reach)
+
+
+def _middle(entity: EntityResult, network: RoadNetwork) -> tuple[float, float]:
+    """Where an entity begins: +1 where +t is to its left, else -1; its nominal place along +t from the lane's centre.
+
+    [m]
+    """
     motion = entity.motion
     direction = float(network.travel_directions(motion.road[:1], motion.lane[:1])[0])
     along_lane = 1.0 if np.cos(motion.heading_relative[0]) >= 0.0 else -1.0
-    return direction * (float(motion.offset[0]) + along_lane * aside)
+    return direction * along_lane, direction * float(motion.offset[0])

@@ -69,7 +69,12 @@ def _lateral_within_a_lane(motion: EntityMotion) -> list[tuple[int, int]]:
     return [(part.start, part.stop - 1) for part in parts if in_one_lane(part)]
 
 
-def gaps_of(motion: NominalMotion, trajectories: Sequence[WorldTrajectory]) -> tuple[Gap, ...]:
+def touching(motion: NominalMotion) -> dict[tuple[str, str], float]:
+    """Pairs of vehicles that touch in a run, and when they overlap most. [s]"""
+    return {gap.names: gap.time for gap in gaps_of(motion, motion.entities) if gap.touches}
+
+
+def gaps_of(motion: NominalMotion, trajectories: Sequence[WorldTrajectory | EntityMotion]) -> tuple[Gap, ...]:
     """Smallest gap of each pair of vehicles that meet; `trajectories`: one per entity."""
     every = max(1, round(GAP_STEP / motion.step))
     vehicles = [both for both in zip(motion.entities, trajectories, strict=True) if both[0].entity.is_vehicle]

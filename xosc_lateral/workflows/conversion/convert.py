@@ -3,30 +3,33 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from xosc_lateral.base.errors import DriverProfileError, FormatError
 from xosc_lateral.base.rows import BLOCK, beside, blocks
 from xosc_lateral.base.version import BEHAVIOUR, __version__
+from xosc_lateral.files.atomic import write_atomically
 from xosc_lateral.files.context_table import read_context
 from xosc_lateral.files.openscenario.provenance import PENDING
 from xosc_lateral.files.openscenario.write.build import named
 from xosc_lateral.files.openscenario.write.draft import WrittenScenario
+from xosc_lateral.files.openscenario.write.lateral_actions import changing_speed, lateral_actions
 from xosc_lateral.files.openscenario.write.target import Player
 from xosc_lateral.files.openscenario.write.trajectory_scenario import motion_unknown_to, write_trajectory_scenario
 from xosc_lateral.files.output_paths import refuse_outputs
 from xosc_lateral.files.profiles import profile_hash
-from xosc_lateral.files.source import edit_in_place, guarding_inputs
+from xosc_lateral.files.source import guarding_inputs
+from xosc_lateral.workflows.conversion.as_written import CHANGES, as_written, read_written
+from xosc_lateral.workflows.conversion.chains import chains_of
 from xosc_lateral.workflows.conversion.drivers import choose_drivers
-from xosc_lateral.workflows.conversion.enrich import enrich, with_offsets
+from xosc_lateral.workflows.conversion.enrich import enrich
 from xosc_lateral.workflows.conversion.lane_changes import refuse_steps, stay_as_written
 from xosc_lateral.workflows.conversion.load import Played, input_hashes, play_scenario, play_until
-from xosc_lateral.workflows.conversion.meaning import Shift, keep_meaning, meaning_of
+from xosc_lateral.workflows.conversion.meaning import KeptChains, keep_meaning, meaning_of
 from xosc_lateral.workflows.conversion.modes import (
     WritingPlan,
     chosen_egos,
@@ -36,13 +39,16 @@ from xosc_lateral.workflows.conversion.modes import (
     kept_controllers,
     writing_plan,
 )
-from xosc_lateral.workflows.conversion.result import ConversionProvenance, ConvertedScenario, Enriched
+from xosc_lateral.workflows.conversion.result import ConversionProvenance, ConvertedScenario, Enriched, EventShift
 from xosc_lateral.workflows.conversion.settings import ConvertSettings, OutputMode, relative
-from xosc_lateral.world.motion.nominal import Activity
+from xosc_lateral.workflows.conversion.shifts import Comparison, largest_of
+from xosc_lateral.world.motion.nominal import Activity, NominalMotion
+from xosc_lateral.world.motion.offset_chain import OffsetChain
 from xosc_lateral.world.scenario import Scenario
 from xosc_lateral.world.scenario.dependence import Dependence, dependence
 
-CHANGES = "with offsets, what happens would happen otherwise"
+LARGE_SHIFT = 0.3
+"""Of its duration, by which an action lasts longer or shorter without a word. [-]"""
 LEAST_LONGER, LONGER = 1.3, 2.0
 """A vehicle under test may be later at what ends the run, or never come to it: others follow trajectories for so
 many times the nominal run. A fifth slower takes a quarter longer; a file of trajectories grows with their time. [-]"""
@@ -137,10 +143,12 @@ def _convert(
     making = _Making(played, lasting, settings, variant, inputs, egos, unforeseeable, depends, output, save)
     if plan.is_replay:
         replayed = _in_replay(played, settings, unforeseeable, sampled)
-        provenance, written = making.write(enriched, plan, replayed)
-        changes: tuple[str, ...] = ()
+        provenance, written = making.write(enriched, plan, replayed=replayed, save=save)
+        changes, shifts = tuple[str, ...](), tuple[EventShift, ...]()
     else:
-        enriched, plan, provenance, written, changes = making.write_reactive(enriched, plan)
+        made = making.write_reactive(enriched, plan)
+        enriched, plan, provenance, written = made.enriched, made.plan, made.provenance, made.written
+        changes, shifts = made.warnings, made.shifts
     warnings = enriched.warnings() + tuple(
         f"{removed.place.element}: left out ({removed.reason})" for removed in written.removed
     )
@@ -150,8 +158,12 @@ def _convert(
         warnings = (str(played.motion.cut_off), *warnings)
     data = b"" if save else written.data
     return ConvertedScenario(
-        source, output, written.sha256, enriched, provenance, warnings, data, plan.is_replay, controllers
+        source, output, written.sha256, enriched, provenance, warnings, data, plan.is_replay, shifts, controllers
     )
+
+
+_Trial = tuple[tuple[OffsetChain, ...], WritingPlan, ConversionProvenance, WrittenScenario, Scenario, NominalMotion]
+"""Chains, how they were written, and what was played."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,63 +182,92 @@ class _Making:
     save: bool
 
     def write(
-        self, enriched: Enriched, plan: WritingPlan, replayed: frozenset[str] | None = None
+        self,
+        enriched: Enriched,
+        plan: WritingPlan,
+        *,
+        replayed: frozenset[str] | None = None,
+        chains: Sequence[OffsetChain] = (),
+        save: bool,
     ) -> tuple[ConversionProvenance, WrittenScenario]:
         """Write it with these offsets."""
         provenance = _provenance(
             self.played, enriched, self.settings, self.variant, self.inputs, self.egos, plan, self.output
         )
         written = _write(
-            self.lasting, enriched, self.output, provenance, self.settings, plan, replayed, self.depends, save=self.save
+            self.lasting, enriched, self.output, provenance, self.settings, plan, replayed, chains, save=save
         )
         return replace(provenance, content_sha256=written.content_sha256), written
 
-    def write_reactive(
-        self, enriched: Enriched, plan: WritingPlan
-    ) -> tuple[Enriched, WritingPlan, ConversionProvenance, WrittenScenario, tuple[str, ...]]:
-        """Write it with offsets that leave what happens as it was, and what there is to say of them."""
+    def write_reactive(self, enriched: Enriched, plan: WritingPlan) -> _Reactive:
+        """Write it with offsets that leave what happens as it was; all trials are made in memory."""
+        settings, source = self.settings, self.played.scenario
+        meaning = meaning_of(self.played, tuple(self.egos), step=settings.step, time_limit=settings.time_limit)
+        lateral, changing = lateral_actions(source), changing_speed(source)
+        chains = [
+            chain
+            for entity in enriched.entities
+            if entity.name in plan.lane_offsets
+            for chain in chains_of(
+                entity,
+                self.played.motion,
+                self.played.network,
+                lateral.get(entity.name, ()),
+                tows=entity.name in self.played.trailers.values(),
+                changes_speed=entity.name in changing,
+            )
+        ]
+        last: list[_Trial] = []
+
+        def attempt(some: Sequence[OffsetChain]) -> list[Comparison]:
+            written_for = replace(plan, lane_offsets=frozenset(chain.entity for chain in some))
+            provenance, written = self.write(enriched, written_for, chains=some, save=False)
+            again = read_written(written.data, self.output, source, settings)
+            comparisons, run = meaning.compare(again, plan.trajectories)
+            last[:] = [(tuple(some), written_for, provenance, written, again, run)]
+            return comparisons
+
+        kept = keep_meaning(chains, self.played.motion, attempt)
+        if last[0][0] != kept.chains:
+            attempt(kept.chains)
+        _, written_for, provenance, written, again, run = last[0]
+        left = plan.lane_offsets - written_for.lane_offsets
+        measured = as_written(enriched, self.lasting, again, run, written_for.lane_offsets, left)
         if self.save:
-            return self._keeping_meaning(enriched, plan)
-        with TemporaryDirectory() as folder:
-            trial = replace(self, output=Path(folder) / self.output.name, save=True)
-            enriched, plan, _, _, said = trial._keeping_meaning(enriched, plan)
-        return enriched, plan, *self.write(enriched, plan), said
+            write_atomically(self.output, written.data)
+        shifts = largest_of(kept.comparisons)
+        return _Reactive(measured, written_for, provenance, written, shifts, tuple(_words(kept, left, shifts)))
 
-    def _keeping_meaning(
-        self, enriched: Enriched, plan: WritingPlan
-    ) -> tuple[Enriched, WritingPlan, ConversionProvenance, WrittenScenario, tuple[str, ...]]:
-        provenance, written = self.write(enriched, plan)
-        settings = self.settings
-        meaning = meaning_of(self.played, self.unforeseeable, step=settings.step, time_limit=settings.time_limit)
 
-        def changed(names: Collection[str], factor: float) -> tuple[Enriched, WritingPlan]:
-            left = with_offsets(enriched, plan.lane_offsets - frozenset(names), 0.0, CHANGES)
-            left = left if factor == 1.0 else with_offsets(left, names, factor, "")
-            return left, replace(plan, lane_offsets=frozenset(names))
+@dataclass(frozen=True, slots=True)
+class _Reactive:
+    """A reactive output, and what there is to say of it."""
 
-        def attempt(names: Collection[str], factor: float) -> list[Shift]:
-            if (names, factor) != (plan.lane_offsets, 1.0):
-                self.write(*changed(names, factor))
-            return meaning.shifts(self._played_again(meaning.limit), plan.trajectories)
+    enriched: Enriched
+    plan: WritingPlan
+    provenance: ConversionProvenance
+    written: WrittenScenario
+    shifts: tuple[EventShift, ...]
+    warnings: tuple[str, ...]
 
-        names, factor, left = keep_meaning(plan.lane_offsets, attempt)
-        said = tuple(f"'{name}' stays as it is: {CHANGES}" for name in sorted(plan.lane_offsets - names))
-        if factor != 1.0:
-            said += (f"lane offsets are {factor:g} times what was sampled: larger ones change what happens",)
-        if (names, factor) != (plan.lane_offsets, 1.0):
-            enriched, plan = changed(names, factor)
-            provenance, written = self.write(enriched, plan)
-        return enriched, plan, provenance, written, said + tuple(map(str, left))
 
-    def _played_again(self, time_limit: float) -> Played:
-        source, settings = self.played.scenario, self.settings
-        roads = () if source.road_file is None else (source.road_file.parent,)
-        allowed = (*settings.allow, *(path.parent for path in source.input_files), *roads)
-        again = play_scenario(
-            self.output, step=settings.step, time_limit=time_limit, allowed=allowed, roads=settings.roads
-        )
-        edit_in_place(self.output)  # ours: it may be written anew
-        return again
+def _words(kept: KeptChains, left: Collection[str], shifts: Sequence[EventShift]) -> Iterator[str]:
+    """A line each: who stays as it is, whose moves are smaller, what comes much later, what is left."""
+    for name in sorted(left):
+        yield f"'{name}' stays as it is: {CHANGES}"
+    for name, (factor, everywhere) in sorted(kept.smaller.items()):
+        if name not in left:
+            size = "none" if factor == 0.0 else f"{factor:g} times what was sampled"
+            where = "" if everywhere else " before a maneuver"
+            yield f"lane offsets of '{name}' are {size}{where}: {CHANGES}"
+    for shift in shifts:
+        longer = shift.end - shift.start
+        if shift.duration > 0.0 and abs(longer) > LARGE_SHIFT * shift.duration:
+            yield (
+                f"event '{shift.event}' of '{shift.entity}' at {shift.time:.2f} s lasts {shift.duration + longer:.2f} "
+                f"instead of {shift.duration:.2f} s: its way from beside the middle is another one"
+            )
+    yield from map(str, kept.changes)
 
 
 def _refuse_lane_offsets_for_carla(scenario: Scenario, settings: ConvertSettings) -> None:
@@ -295,7 +336,7 @@ def _write(
     settings: ConvertSettings,
     plan: WritingPlan,
     replayed: frozenset[str] | None,
-    depends: Dependence,
+    chains: Sequence[OffsetChain],
     *,
     save: bool,
 ) -> WrittenScenario:
@@ -305,22 +346,7 @@ def _write(
     facts = {field.name: getattr(provenance, field.name) for field in fields(provenance)}
     if not plan.is_replay:
         from xosc_lateral.files.openscenario.write.lane_offset_scenario import write_lane_offset_scenario
-        from xosc_lateral.files.openscenario.write.lateral_actions import lateral_actions
-        from xosc_lateral.workflows.conversion.chains import chains_of
 
-        lateral = lateral_actions(played.scenario)
-        chains = [
-            chain
-            for entity in enriched.entities
-            if entity.name in plan.lane_offsets
-            for chain in chains_of(
-                entity,
-                played.motion,
-                played.network,
-                lateral.get(entity.name, ()),
-                tows=entity.name in played.trailers.values(),
-            )
-        ]
         return write_lane_offset_scenario(
             played.scenario,
             played.motion,

@@ -148,29 +148,6 @@ def enrich(
     return best
 
 
-def with_offsets(enriched: Enriched, names: Collection[str], factor: float, why: str) -> Enriched:
-    """With the offsets of some entities times a factor, and none where it is 0: `why` says the reason."""
-    entities = tuple(
-        _scaled(entity, enriched.network, factor, why) if entity.name in names else entity
-        for entity in enriched.entities
-    )
-    gaps_after = gaps_of(enriched.motion, [entity.trajectory for entity in entities])
-    departures = tuple(found for entity in entities for found in lane_departures(entity, enriched.network))
-    return replace(enriched, entities=entities, gaps_after=gaps_after, departures=departures)
-
-
-def _scaled(entity: EntityResult, network: RoadNetwork, factor: float, why: str) -> EntityResult:
-    if factor == 0.0:
-        return _untouched(entity.motion, entity.spans, why)
-    segments = tuple(
-        replace(segment, offset=factor * segment.offset, beyond=factor * segment.beyond) for segment in entity.segments
-    )
-    n = len(entity.deviation)
-    deviation = columns(n, ([factor * entity.deviation[rows]] for rows in blocks(n)))[0]
-    trajectory = displace(entity.motion, network, deviation)
-    return replace(entity, segments=segments, deviation=deviation, trajectory=trajectory)
-
-
 def _trouble(enriched: Enriched) -> int:
     return len(enriched.new_contacts) + len(enriched.departures)
 
@@ -333,7 +310,7 @@ def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:
     """Paths through the offsets, smoothed where nobody could drive them."""
     entity = drawn.motion
     if not drawn.samples:
-        return _untouched(entity, drawn.spans, drawn.why)
+        return untouched(entity, drawn.spans, drawn.why)
     driven, bounds = zip(
         *(drivable(one.offset, SAMPLE_STEP, entity.speed[one.knots]) for one in drawn.samples), strict=True
     )
@@ -384,7 +361,8 @@ def _with_trailers(
     return tuple(results.values())
 
 
-def _untouched(entity: EntityMotion, spans: tuple[SegmentSpan, ...], why: str) -> EntityResult:
+def untouched(entity: EntityMotion, spans: tuple[SegmentSpan, ...], why: str) -> EntityResult:
+    """An entity as it moves nominally."""
     no_deviation = np.broadcast_to(0.0, len(entity.time))
     return EntityResult(entity, spans, None, why, (), no_deviation, _nominal(entity))
 

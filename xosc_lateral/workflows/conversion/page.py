@@ -72,6 +72,7 @@ def conversion_page(conversion: ConvertedScenario) -> str:
     _add_dynamics(page, enriched, done)
     _add_lane_changes(page, enriched, done)
     _add_gaps(page, enriched)
+    _add_shifts(page, conversion)
     page.section(
         "Segments",
         "Offsets are sampled where a vehicle simply follows its road. Everywhere else the table gives the reason why "
@@ -219,6 +220,31 @@ def _add_followings(page: Page, enriched: Enriched) -> None:
         f"speed of the vehicle behind, and over the closing speed. Pairs within {LONGEST_HEADWAY:g} s."
         + (f" {len(rows) - MOST_FOLLOWINGS} more pairs are left out." if len(rows) > MOST_FOLLOWINGS else ""),
         formats=dict.fromkeys(FOLLOWING_COLUMNS, ".2f"),
+    )
+
+
+def _add_shifts(page: Page, conversion: ConvertedScenario) -> None:
+    """Events that come at other times with the offsets than without them."""
+    if not conversion.shifts:
+        return
+    rows = [
+        {
+            "event": shift.event,
+            "of": shift.entity or "",
+            "at [s]": shift.time,
+            "lasts [s]": shift.duration,
+            "starts later by [s]": shift.start,
+            "ends later by [s]": shift.end,
+        }
+        for shift in conversion.shifts
+    ]
+    page.heading("Events")
+    page.table(
+        rows,
+        "How much later events start and end with the offsets than without them (negative: earlier), the largest under "
+        "egos at 0.8, 1.0 and 1.2 of their initial speed and one that brakes to a stop. An action by an acceleration "
+        "or a rate takes longer or shorter from beside the middle.",
+        formats=dict.fromkeys(("at [s]", "lasts [s]", "starts later by [s]", "ends later by [s]"), ".2f"),
     )
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.model.drivability import Bound
@@ -173,6 +174,32 @@ def _jumps(entity: EntityResult) -> list[str]:
     ]
 
 
+class EventShift(Struct, frozen=True):
+    """One action of an event in both runs.
+
+    Parameters
+    ----------
+    event : str
+    entity : str or None
+        Its actor.
+    time, duration : float
+        Without offsets. [s]
+    start, end : float
+        How much later with offsets. [s]
+    unexplained_start, unexplained_end : float
+        What of that is not the way of a lateral action. [s]
+    """
+
+    event: str
+    entity: str | None
+    time: float
+    duration: float
+    start: float
+    end: float
+    unexplained_start: float
+    unexplained_end: float
+
+
 @dataclass(frozen=True, slots=True)
 class ConversionProvenance:
     """What went into an output: enough to make the same bytes again."""
@@ -210,4 +237,5 @@ class ConvertedScenario:
     warnings: tuple[str, ...]  # what a user has to know, a line each
     data: bytes = b""  # the converted scenario, if it was not to be written
     is_replay: bool = True  # everything happens by the clock of the nominal run, whoever drives
+    shifts: tuple[EventShift, ...] = ()  # of events of a reactive output, the largest under several egos
     controllers: Mapping[str, Control] = field(default_factory=dict)  # of entities that are left to them

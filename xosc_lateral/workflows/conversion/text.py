@@ -6,9 +6,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from msgspec import structs
+
 from xosc_lateral.drivers.fitting.answers import basis_of, borrows, responses_in_words
 from xosc_lateral.drivers.model.profile import SIDES, DriverProfile
-from xosc_lateral.workflows.conversion.result import ConversionProvenance, ConvertedScenario, Neighbours
+from xosc_lateral.workflows.conversion.result import ConversionProvenance, ConvertedScenario, EventShift, Neighbours
 from xosc_lateral.world.motion.gaps import Gap
 
 WRITTEN_AS = {"trajectory": "a trajectory", "lane-offset": "lane offsets"}
@@ -98,10 +100,22 @@ def facts(conversion: ConvertedScenario, report: Path | None = None) -> dict[str
         ],
         "gap_before": _smallest_gap(enriched.gaps_before),
         "gap_after": _smallest_gap(enriched.gaps_after),
+        "shifts": [
+            {
+                name: round(value, 6) if isinstance(value, float) else value
+                for name, value in structs.asdict(one).items()
+            }
+            for one in conversion.shifts
+        ],
         "notes": [asdict(note) for note in enriched.motion.notes],
         "warnings": list(conversion.warnings),
         "provenance": provenance_record(conversion.provenance),
     }
+
+
+def _shift_facts(shift: EventShift) -> dict[str, Any]:
+    values = structs.asdict(shift)
+    return {name: round(value, 6) if isinstance(value, float) else value for name, value in values.items()}
 
 
 def _beside_facts(profile: DriverProfile | None) -> dict[str, str] | None:

@@ -35,7 +35,8 @@ VEHICLES = {
 }  # fmt: skip
 MANEUVERS = {
     "entity": "entity", "kind": "maneuver", "side": "side", "start": "start [s]", "duration": "duration [s]",
-    "shape": "shape", "lanes": "lanes", "residual": "residual, rms [m]", "cut_off": "cut off", "begins": "begins",
+    "shape": "shape", "lanes": "lanes", "residual": "residual, rms [m]", "bell_residual": "of a bell [m]",
+    "cut_off": "cut off", "begins": "begins",
 }  # fmt: skip
 ENCOUNTERS = {
     "entity": "entity", "kind": "maneuver", "time": "time [s]", "side": "side", "ahead": "ahead",
@@ -114,6 +115,7 @@ def maneuver_rows(plans: Sequence[VehiclePlan], relative: Any) -> list[dict[str,
                     "shape": one.shape.value,
                     "lanes": abs(one.lanes),
                     "residual": round(one.residual, 4),
+                    "bell_residual": round(one.bell_residual, 4) if np.isfinite(one.bell_residual) else None,
                     "cut_off": one.cut,
                     "begins": "by the clock" if trigger is None else f"{trigger.distance:.1f} m from {trigger.other}",
                 }
@@ -147,6 +149,13 @@ def not_expressed(plans: Sequence[VehiclePlan], residuals: Sequence[Residuals], 
         cut = sum(each.cut for each in plan.lateral.transitions)
         if cut:
             lines.append(f"{plan.name}: {cut} lateral maneuvers begin or end outside of the recording")
+        lines += [
+            f"{plan.name}: its lane change at {each.start:.1f} s is nearer to the bell of drivers "
+            f"({1e3 * each.bell_residual:.0f} mm instead of {1e3 * each.residual:.0f} mm): "
+            "convert with --lane-changes lifelike"
+            for each in plan.lateral.transitions
+            if each.is_bell
+        ]
         for word, values in (("along the road", one.along), ("beside its maneuvers", one.across)):
             if len(values) and (worst := float(np.abs(values).max())) > WORTH_NAMING:
                 row = int(np.abs(values).argmax())

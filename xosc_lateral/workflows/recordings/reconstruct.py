@@ -12,6 +12,7 @@ import numpy as np
 
 from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.texts import composed
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.hashes import parsed_hashes
 from xosc_lateral.files.openscenario.write.build import Version, named
@@ -174,6 +175,8 @@ def reconstruct_recording(traffic: RecordedTraffic, settings: ReconstructSetting
     Raises `FormatError`: a vehicle that is not in the recording, a window without time; `NotEnoughDataError`: if no
     vehicle is left.
     """
+    vehicles = None if settings.vehicles is None else frozenset(map(composed, settings.vehicles))
+    settings = replace(settings, vehicles=vehicles, host=composed(settings.host), around=composed(settings.around))
     tracks, begin, end = chosen(traffic, settings)
     recording = place_tracks(tracks, traffic.network, begin, end)
     plans = plan_vehicles(recording, traffic.network, error=settings.error)

@@ -11,17 +11,20 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.texts import composed
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping
-from xosc_lateral.files.opendrive import read_opendrive, read_road
+from xosc_lateral.files.opendrive import parse_opendrive, read_opendrive
 from xosc_lateral.files.opendrive.write import SHOULDER, WIDTH_PIECE, WrittenLane, WrittenRoad, curved_plan
+from xosc_lateral.files.sumo import read_sumo_net
 from xosc_lateral.files.tables import foreign_errors
+from xosc_lateral.files.xml import root_tag
 from xosc_lateral.workflows.recordings.importers import dlr_ht, levelx
 from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH, Tracks, read_tracks, tracks_of
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
 from xosc_lateral.workflows.recordings.lane_shapes import LaneShape
 from xosc_lateral.workflows.recordings.recorded import Track
 from xosc_lateral.workflows.recordings.roads_from_lanes import DrivenLane, roads_of_lanes
-from xosc_lateral.workflows.recordings.sumo import NET_ENDINGS, first_tag, read_fcd, read_net
+from xosc_lateral.workflows.recordings.sumo import NET_ENDINGS, lanes_of_net, read_fcd
 from xosc_lateral.world.road.network import RoadNetwork
 
 STEP = 0.1
@@ -73,7 +76,9 @@ def read_recording(
     if not source.exists():
         raise FormatError("no such file or folder", path=source)
     with foreign_errors(source, "can't be read as a recording"), np.errstate(all="ignore"):
-        return READERS[kind](source, road, as_mapping(columns))
+        traffic = READERS[kind](source, road, as_mapping(columns))
+    tracks = tuple(replace(track, name=composed(track.name)) for track in traffic.tracks)
+    return replace(traffic, tracks=tracks, host=composed(traffic.host))
 
 
 def format_of(source: Path) -> str:
@@ -85,7 +90,7 @@ def format_of(source: Path) -> str:
         return "levelx"
     if name.endswith((".osi", ".mcap", ".osi.gz")):
         return "osi"
-    if name.endswith((".xml", ".xml.gz")) and first_tag(source) == "fcd-export":
+    if name.endswith((".xml", ".xml.gz")) and root_tag(source) == "fcd-export":
         return "fcd"
     return "commonroad" if name.endswith((".xml", ".pb")) else "tracks"
 
@@ -122,8 +127,8 @@ def _fcd(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraf
         if road is None:
             raise FormatError("comes without lanes: give its network with --road FILE.net.xml", path=source)
         return _on_road(read_fcd(source), source, road)
-    lanes, left_handed = read_net(road)
-    own = roads_of_lanes(lanes, name_of(source), left_handed=left_handed).encode()
+    net = read_sumo_net(road)
+    own = roads_of_lanes(lanes_of_net(net, road), name_of(source), left_handed=net.left_hand).encode()
     return replace(_on_road(read_fcd(source), source, None, own), sources=(source, road))
 
 
@@ -137,7 +142,7 @@ def _on_road(tracks: Tracks, source: Path, road: Path | None, own: bytes | None 
     if road is not None:
         network, data, road_name = read_opendrive(road), road.read_bytes(), road.name
     elif own is not None:
-        network, data, road_name = read_road(own, name_of(source)), own, f"{name_of(source)}.xodr"
+        network, data, road_name = parse_opendrive(own, name_of(source)), own, f"{name_of(source)}.xodr"
     else:
         raise FormatError("comes without a road: give it with --road FILE.xodr", path=source)
     x, y = network.header_offset.undo(tracks.x, tracks.y)
@@ -187,7 +192,7 @@ def _thinned(time: FloatArray) -> NDArray[np.bool_]:
 def _made(road: WrittenRoad, tracks: Sequence[Track], sources: Sequence[Path], notes: Sequence[str]) -> RecordedTraffic:
     data = road.to_xml().encode()
     about = data, f"{road.name}.xodr", tuple(sources), tuple(notes)
-    return RecordedTraffic(road.name, tuple(tracks), read_road(data, road.name), *about)
+    return RecordedTraffic(road.name, tuple(tracks), parse_opendrive(data, road.name), *about)
 
 
 def _dlr(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.world.motion.crossings import bell_share
 from xosc_lateral.world.scenario.enums import DynamicsShape
 
 MARGIN = 1.0
@@ -14,7 +16,7 @@ MARGIN = 1.0
 DURATIONS = (1.0, 16.0)
 """Of lane changes; naturalistic ones last 1 to 16.5 s (T. Toledo, D. Zohar, Transportation Research Record 1999, 2007:
 mean 4.6 s). [s]"""
-SHAPES = {
+SHAPES: Mapping[DynamicsShape, Callable[[FloatArray], FloatArray]] = {
     DynamicsShape.SINUSOIDAL: lambda u: 0.5 - 0.5 * np.cos(np.pi * u),
     DynamicsShape.CUBIC: lambda u: u * u * (3.0 - 2.0 * u),
     DynamicsShape.LINEAR: lambda u: u,
@@ -36,11 +38,17 @@ class Transition:
     cut: bool = False  # the recording begins or ends within it
     change: float = 0.0  # of the level, positive left [m]
     residual: float = 0.0  # root mean square of the recorded path from the fitted one [m]
+    bell_residual: float = np.inf  # the same from the bell that drivers take, where one was fitted [m]
 
     @property
     def end(self) -> float:
         """[s]"""
         return self.start + self.duration
+
+    @property
+    def is_bell(self) -> bool:
+        """Whether the bell fits better than what a maneuver can say."""
+        return self.bell_residual < self.residual
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,17 +96,29 @@ def fit_transition(time: FloatArray, y: FloatArray, rough: Rough, free: float) -
     )
     best: tuple[float, float, float, DynamicsShape] = (np.inf, begin, duration, DynamicsShape.SINUSOIDAL)
     for shape in SHAPES if rough.held else (DynamicsShape.SINUSOIDAL, DynamicsShape.CUBIC):
-        found = _search(t, rows, rough, shape, middle, duration, free)
+        found = _search(t, rows, rough, SHAPES[shape], middle, duration, free)
         if found[0] < best[0] * (1.0 - 1e-9):
             best = (*found, shape)
     _, start, duration, shape = best
     residual = float(np.sqrt(best[0] / len(t))) if np.isfinite(best[0]) else 0.0
     where = rough.lanes, rough.offset, level
-    return Transition(start, duration, shape, *where, rough.aborted, rough.cut, residual=residual)
+    bell_residual = np.inf
+    if rough.lanes and not rough.held and not rough.cut and len(t):
+        cost = _search(t, rows, rough, bell_share, middle, duration, free)[0]
+        bell_residual = float(np.sqrt(cost / len(t)))
+    return Transition(
+        start, duration, shape, *where, rough.aborted, rough.cut, residual=residual, bell_residual=bell_residual
+    )
 
 
 def _search(
-    t: FloatArray, y: FloatArray, rough: Rough, shape: DynamicsShape, middle: float, duration: float, free: float
+    t: FloatArray,
+    y: FloatArray,
+    rough: Rough,
+    share_of: Callable[[FloatArray], FloatArray],
+    middle: float,
+    duration: float,
+    free: float,
 ) -> tuple[float, float, float]:
     """Least cost [m2], start and duration [s]."""
     shortest = 0.1 if rough.held else DURATIONS[0]
@@ -113,7 +133,7 @@ def _search(
             m, d = np.array([free + 0.5 * duration]), np.array([duration])
             possible = np.ones(1, dtype=bool)
         m, d = m[possible], d[possible]
-        share = SHAPES[shape](np.clip((t - (m - 0.5 * d)[:, None]) / d[:, None], 0.0, 1.0))
+        share = share_of(np.clip((t - (m - 0.5 * d)[:, None]) / d[:, None], 0.0, 1.0))
         cost = ((y - rough.before - (rough.after - rough.before) * share) ** 2).sum(axis=1)
         k = int(cost.argmin())
         if cost[k] < best[0]:

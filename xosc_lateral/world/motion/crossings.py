@@ -78,14 +78,19 @@ def crossings(motion: NominalMotion, entity: EntityMotion, runs: Sequence[Sequen
 
 def beside_written(entity: EntityMotion, crossing: Crossing) -> tuple[slice, FloatArray]:
     """Rows on which the bell is beside the written way, and by how much, positive left. [m]"""
-    from scipy.special import betainc
-
     begin, duration = _bell_time(entity, crossing)
     rows = slice(*np.searchsorted(entity.time, (begin, begin + duration)))
     rows = slice(min(rows.start, crossing.first), max(rows.stop, crossing.last + 1))
-    done = betainc(ALPHA, BETA, np.clip((entity.time[rows] - begin) / duration, 0.0, 1.0))
+    done = bell_share(np.clip((entity.time[rows] - begin) / duration, 0.0, 1.0))
     written = np.interp(np.arange(rows.start, rows.stop), np.arange(crossing.first, crossing.last + 1), crossing.way)
     return rows, np.asarray(crossing.way[-1] * done - written)
+
+
+def bell_share(u: FloatArray) -> FloatArray:
+    """Share of the way over share of the bell's duration, 0 to 1, any shape. [-]"""
+    from scipy.special import betainc
+
+    return np.asarray(betainc(ALPHA, BETA, u), dtype=np.float64)
 
 
 def _way(entity: EntityMotion, first: int, last: int) -> FloatArray:

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 from msgspec import Struct
+from msgspec.structs import replace
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.world.motion.deviation import smoother_step
@@ -78,6 +79,21 @@ class Ring(Struct, frozen=True):
     moves: tuple[Move, ...]
 
 
+class OffsetPath(Struct, frozen=True):
+    """Places by the distance driven: what is driven slowly or stands moves sideways slowly or not at all.
+
+    Parameters
+    ----------
+    distance : tuple of float
+        From where it begins, increasing. [m]
+    offset : tuple of float
+        Positive left. [m]
+    """
+
+    distance: tuple[float, ...]
+    offset: tuple[float, ...]
+
+
 class OffsetChain(Struct, frozen=True):
     """The moves of one entity after one action, or from the start.
 
@@ -91,12 +107,30 @@ class OffsetChain(Struct, frozen=True):
     placed_t : float, optional
         The entity is put down there, along +t from the lane's centre, and the ring begins at once; None: it is led to
         the ring's origin. [m]
+    side : float
+        +1 where +t is to the left of travel, else -1.
+    path : OffsetPath, optional
+        Driven before the ring: of an entity that is put down at its beginning.
     """
 
     entity: str
     after: tuple[str, ...] | None
     ring: Ring
     placed_t: float | None = None
+    side: float = 1.0
+    path: OffsetPath | None = None
+
+
+def scaled(chain: OffsetChain, factor: float) -> OffsetChain:
+    """With moves of another size that take as long, and without a path; none at all with 0."""
+    ring, placed = chain.ring, chain.placed_t
+    places = np.round(factor * np.cumsum([ring.origin, *(move.change for move in ring.moves[:-1])]), RESOLUTION)
+    changes = np.round(np.diff(np.append(places, places[:1])), RESOLUTION).tolist() if factor else ()
+    moves = tuple(replace(move, change=change) for move, change in zip(ring.moves, changes, strict=False) if change)
+    if placed is not None:
+        begun = ring.origin if chain.path is None else chain.path.offset[0]
+        placed -= chain.side * (begun - float(places[0]))
+    return replace(chain, ring=Ring(float(places[0]), moves), placed_t=placed, path=None)
 
 
 def ring_along(time: FloatArray, offset: FloatArray, *, from_middle: bool) -> Ring:

@@ -91,13 +91,15 @@ class StoryboardElement:
             self.start()
         if self.state is _RUNNING:
             for child in self.children:
-                child.evaluate_triggers(time)
+                if child.state is _STANDBY or (child.state is _RUNNING and (child.children or child.stop_trigger)):
+                    child.evaluate_triggers(time)
 
     def step(self, time: float, step: float) -> None:
         """Let running actions move their actors for one frame from `time` on. [s]"""
         if self.state is _RUNNING:
             for child in self.children:
-                child.step(time, step)
+                if child.state is _RUNNING:
+                    child.step(time, step)
 
     def end(self) -> None:
         """Come to a regular end, with all that still runs below; perhaps to start again."""
@@ -176,6 +178,8 @@ class EventElement(StoryboardElement):
 
     def make_room(self) -> bool:
         """By the priority among the events of the maneuver."""
+        if self.priority not in (Priority.SKIP, Priority.OVERRIDE):
+            return True
         siblings = () if self.parent is None else self.parent.children
         running = [event for event in siblings if event is not self and event.is_running]
         if self.priority is Priority.SKIP:

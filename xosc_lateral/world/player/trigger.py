@@ -39,6 +39,9 @@ class RunningCondition:
     def evaluate(self, time: float) -> bool:
         """Value at `time` [s]. At the same time again, as at time 0, the new value replaces the old one."""
         now = self.check()
+        if self.delay <= 0.0 and self.edge is ConditionEdge.NONE:
+            self._last, self._armed = now, True
+            return now
         filtered = self._filter(now)
         self._last = now
         self._armed = True

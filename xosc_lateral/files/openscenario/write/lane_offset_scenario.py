@@ -26,11 +26,10 @@ from xosc_lateral.files.openscenario.write.moving import moving_entities
 from xosc_lateral.files.openscenario.write.replaced_maneuvers import ReplacedManeuvers
 from xosc_lateral.files.openscenario.write.target import STANDARD, TargetPlayer
 from xosc_lateral.world.motion.nominal import NominalMotion
-from xosc_lateral.world.motion.offset_chain import REST, Move, OffsetChain, Ring
+from xosc_lateral.world.motion.offset_chain import REST, Move, OffsetChain, OffsetPath, Ring
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.scenario import Scenario
 from xosc_lateral.world.scenario.enums import Priority
-from xosc_lateral.world.scenario.under_test import controlled_entities
 
 CHAIN = "xosc-lateral offsets"
 TURNS = 10000
@@ -79,7 +78,7 @@ def write_lane_offset_scenario(
     maneuvers = ReplacedManeuvers(draft, moving)
     story = build.story("xosc-lateral")
     lateral = lateral_actions(scenario)
-    changing = changing_speed(scenario) | controlled_entities(scenario).keys()
+    changing = changing_speed(scenario)
     for chain in chains:
         acts = _Acts(story, chain, draft, lateral.get(chain.entity, ()), chain.entity in changing)
         acts.add()
@@ -140,9 +139,10 @@ class _Acts:
         for _ in range(1 if item is None or not item.repeats else self._runs + REPEATED):
             act = build.sub(self._story, "Act", name=f"{CHAIN} {len(self._story) + 1}")
             name = str(act.get("name"))
-            self._add_ring(act, name)
+            path = None if self._chain.path is None else self._add_path(act, name, self._chain.path)
+            self._add_ring(act, name, path)
             if self._changes_speed:
-                self._add_halt(act, name)
+                self._add_halt(act, name, path)
             if item is None:
                 build.time_trigger(act, "StartTrigger", 0.0, self._version)
             else:
@@ -153,10 +153,34 @@ class _Acts:
             self._add_stop(act, name)
             before = name
 
-    def _add_ring(self, act: etree._Element, name: str) -> None:
-        """Moves that begin one after the other, over and over; before them one that leads there."""
+    def _add_path(self, act: etree._Element, name: str, path: OffsetPath) -> etree._Element:
+        """A trajectory without times, from where the entity is: its speed stays as written.
+
+        The reference player finds the places of the vertices when it starts first: it may run once.
+        """
+        side, entity = self._chain.side, self._chain.entity
+        group = build.maneuver_group(act, f"{name} path", entity)
+        event = build.event(
+            build.sub(group, "Maneuver", name=f"{name} path"), f"{name} path event", Priority.OVERRIDE, self._version
+        )
+        follow = build.sub(build.private_action(event, f"{name} path action"), "RoutingAction/FollowTrajectoryAction")
+        holder = follow if self._version < (1, 1) else build.sub(follow, "TrajectoryRef")
+        polyline = build.sub(build.sub(holder, "Trajectory", name=f"{name} path", closed="false"), "Shape/Polyline")
+        middle_t = (self._chain.placed_t or 0.0) - side * path.offset[0]
+        for number, (ahead, aside) in enumerate(zip(path.distance, path.offset, strict=True)):
+            vertex = build.sub(polyline, "Vertex", time=build.decimal(0.1 * number, 1))
+            ds, offset = build.decimal(side * ahead, 3), build.decimal(middle_t + side * aside, 4)
+            build.sub(vertex, "Position/RelativeLanePosition", entityRef=entity, dLane="0", ds=ds, offset=offset)
+        build.sub(follow, "TimeReference/None")
+        build.sub(follow, "TrajectoryFollowingMode", followingMode="position")
+        group = build.sub(event, "StartTrigger/ConditionGroup")
+        build.state_condition(group, "act", name, "runningState", FIRST)
+        return event
+
+    def _add_ring(self, act: etree._Element, name: str, path: etree._Element | None) -> None:
+        """Moves that begin one after the other, over and over; before them a path, or a move that leads there."""
         ring, entity = self._chain.ring, self._chain.entity
-        lead = None
+        lead = path
         if self._chain.placed_t is None and ring.origin != 0.0:
             group = build.maneuver_group(act, f"{name} lead", entity)
             lead = self._event(build.sub(group, "Maneuver", name=f"{name} lead"), f"{name} lead event", leading(ring))
@@ -190,14 +214,16 @@ class _Acts:
         if self._changes_speed:
             _add_speed(group, self._chain.entity, MOVING_SPEED, "none")
 
-    def _add_halt(self, act: etree._Element, name: str) -> None:
-        """Sideways by nothing, at once: what ends a move under way."""
+    def _add_halt(self, act: etree._Element, name: str, path: etree._Element | None) -> None:
+        """Sideways by nothing, at once: what ends a move under way; a path is no move."""
         group = build.maneuver_group(act, f"{name} halt", self._chain.entity)
         maneuver = build.sub(group, "Maneuver", name=f"{name} halt")
         event = build.event(maneuver, f"{name} halt event", Priority.OVERRIDE, self._version)
         event.set("maximumExecutionCount", str(TURNS))
         self._add_offset(event, {"dynamicsShape": "step"}, 0.0)
         group = build.sub(event, "StartTrigger/ConditionGroup")
+        if path is not None:
+            build.state_condition(group, "event", str(path.get("name")), "completeState", 0.0)
         _add_speed(group, self._chain.entity, HALTING_SPEED, "falling")
 
     def _add_stop(self, act: etree._Element, name: str) -> None:

@@ -57,13 +57,14 @@ def lateral_actions(scenario: Scenario) -> dict[str, tuple[LateralAction, ...]]:
 
 
 def changing_speed(scenario: Scenario) -> set[str]:
-    """Entities that have longitudinal actions in events."""
-    return {
+    """Entities that have longitudinal actions in events, or a controller."""
+    own = {
         actor
         for _, actors, action, *_ in _actions(scenario)
         if isinstance(action.content, LONGITUDINAL)
         for actor in actors
     }
+    return own | controlled_entities(scenario).keys()
 
 
 def _actions(scenario: Scenario) -> Iterator[tuple[tuple[str, ...], tuple[str, ...], Action, bool, bool]]:

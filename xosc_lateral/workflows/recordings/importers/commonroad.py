@@ -19,7 +19,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.files.labels import file_labels
-from xosc_lateral.files.xml import read_xml
+from xosc_lateral.files.xml import read_xml, root_tag
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
 from xosc_lateral.workflows.recordings.importers.table import Imported, guarded
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks, ground_speed, travel_heading
@@ -65,6 +65,9 @@ def _graph(scenario: Any) -> tuple[LaneGraph, list[_Lanelet]]:
 
 
 def _opened(path: Path) -> Any:
+    if (tag := root_tag(path)) != "commonRoad":
+        what = f"its root element is {tag!r}" if tag else "it is no XML"
+        raise FormatError(f"not a CommonRoad scenario: {what}", path=path)
     try:
         from commonroad.common.file_reader import CommonRoadFileReader
     except ImportError as error:

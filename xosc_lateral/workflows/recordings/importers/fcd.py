@@ -25,6 +25,7 @@ from xosc_lateral.files.sumo import (
     number_of,
     read_sumo_net,
     read_vehicle_types,
+    require_fcd,
     usual_length,
     wrong_element,
 )
@@ -61,6 +62,7 @@ def import_fcd(
     `net`: the road network, ``.net.xml``, for widths and counts of lanes, and for who is on the next edge. `types`:
     file with the vehicle types, for lengths. `lane_width`: without a network. [m]
     """
+    require_fcd(source)
     known = None if net is None else read_sumo_net(Path(net))
     vehicle_types = read_vehicle_types(None if types is None else Path(types))
     rows = [row for row in _rows(source) if known is not None or not row.lane.startswith(":")]

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.labels import file_labels
-from xosc_lateral.files.opendrive import read_opendrive, read_road
+from xosc_lateral.files.opendrive import parse_opendrive, read_opendrive
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
 from xosc_lateral.workflows.recordings.importers.table import Imported, guarded
 from xosc_lateral.workflows.recordings.importers.tracks import place_on_road
@@ -94,7 +94,7 @@ def _placed(recorded: Recorded, path: Path, road: Path | None) -> tuple[PlacedTr
     if road is not None:
         network, files, where = read_opendrive(road), [path, road], road.name
     elif recorded.opendrive is not None:
-        network, where = read_road(recorded.opendrive, path.stem), "the road in it"
+        network, where = parse_opendrive(recorded.opendrive, path.stem), "the road in it"
     if network is not None:
         placed, graph = place_on_road(tracks, network)
     elif (lanes := lanes_of(recorded)) is not None:

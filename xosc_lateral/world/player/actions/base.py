@@ -96,7 +96,7 @@ class RunningAction(StoryboardElement):
         """End what the actor does in a domain that this action needs."""
         if self.actor is not None and self.domains:
             for other in self.actor.actions:
-                if other is not self and other.is_running and other.domains & self.domains:
+                if other.state is State.RUNNING and other is not self and other.domains & self.domains:
                     other.end()
         return True
 

@@ -70,6 +70,7 @@ class PolylinePath(Path):
         )
         self._pitches = _pitches(self.corners, self.lengths)
         self._rolls = tuple(c.roll if c.roll == c.roll else 0.0 for c in self.corners)
+        self._is_flat = not any(self._pitches) and not any(self._rolls)
         self._speeds, self._accelerations = self._lay_out_speed(initial_speed)
 
     def at(self, s: float) -> PathPoint:
@@ -82,7 +83,9 @@ class PolylinePath(Path):
             b = self.corners[i + 1]
             end_z = b.road_z if b.z != b.z else b.z
             x, y, z = a.x + u * (b.x - a.x), a.y + u * (b.y - a.y), a.z + u * (end_z - a.z)
-        pitch, roll = (self._angle(self._pitches, i, u), self._angle(self._rolls, i, u)) if z == z else (nan, nan)
+        pitch, roll = (0.0, 0.0) if z == z else (nan, nan)
+        if z == z and not self._is_flat:
+            pitch, roll = self._angle(self._pitches, i, u), self._angle(self._rolls, i, u)
         headed = a.heading == a.heading
         return PathPoint(x, y, z, self._angle(self.headings, i, u), pitch, roll, self.tangents[i], headed)
 

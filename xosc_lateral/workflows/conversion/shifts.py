@@ -1,0 +1,289 @@
+"""What happens in two runs of a scenario, with and without offsets: which events come at other times, and why.
+
+An action by a lateral acceleration or speed takes longer or shorter from beside the middle: over b' instead of b it
+lasts D (b'/b)^p, with p = 1/2 or 1, as its dynamics have it [1]_. That, and what waits for its end, is explained; what
+is not is another meaning.
+
+References
+----------
+.. [1] ASAM OpenSCENARIO XML 1.3, TransitionDynamics, LaneOffsetActionDynamics: peak rate and peak acceleration of a
+       shape are in proportion to b / D and b / D^2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from itertools import pairwise
+from math import inf
+
+import numpy as np
+from msgspec import Struct
+
+from xosc_lateral.workflows.conversion.consequences import touching
+from xosc_lateral.workflows.conversion.result import EventShift
+from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion, PlayedAction
+from xosc_lateral.world.road.network import RoadNetwork
+from xosc_lateral.world.scenario import Scenario
+from xosc_lateral.world.scenario.conditions import StoryboardElementStateCondition
+from xosc_lateral.world.scenario.dependence import conditions_of, entity_references, refers_to
+from xosc_lateral.world.scenario.enums import DynamicsDimension, StoryboardElementState
+from xosc_lateral.world.scenario.private_actions import LaneChangeAction, LaneOffsetAction, LateralDistanceAction
+from xosc_lateral.world.scenario.storyboard import Condition, Trigger
+
+EVENT_TOLERANCE = 0.05
+"""By which an event may be earlier or later beyond what is explained: a frame of a coarse player. [s]"""
+PASSED_ON = 3.0
+"""Times as late as an entity begins to change its speed, it comes to a distance from another: change over closing
+speed. What is later by more is told. [-]"""
+LEAST_WAY = 1e-3
+"""A lateral action over less than this has no duration to compare. [m]"""
+STORY_PREFIX = "xosc-lateral"
+"""Begins the names of stories that we add."""
+
+Path = tuple[str, ...]
+Key = tuple[Path, str | None, int]
+"""Names of an action from the story down, its actor, and which of its runs."""
+
+
+class Change(Struct, frozen=True):
+    """One thing that happens otherwise: which, whose (none: nobody's), when without offsets [s], and in which way."""
+
+    what: str
+    entity: str | None
+    time: float
+    how: str
+
+    def __str__(self) -> str:
+        """One line."""
+        return f"{self.what} {self.how} with the offsets"
+
+
+class Comparison(Struct, frozen=True):
+    """Shifts of all events that both runs have, and what is another meaning."""
+
+    shifts: tuple[EventShift, ...]
+    changes: tuple[Change, ...]
+
+
+def compare_runs(
+    scenario: Scenario,
+    network: RoadNetwork,
+    before: NominalMotion,
+    after: NominalMotion,
+    *,
+    ignored: Collection[str] = (),
+    ends: bool = True,
+) -> Comparison:
+    """Compare a run with offsets with one without.
+
+    Ignored entities may end in any lane and touch each other; `ends`: both are to end at the same time.
+    """
+    then, now = _runs(before.actions), _runs(after.actions)
+    shifts = _Shifts(scenario, network, before, after)
+    changes: dict[str, Change] = {}
+    found = []
+    for key, action in then.items():
+        if action.start > before.end_time - EVENT_TOLERANCE:
+            continue  # due in the last moments, it may come after the end just as well
+        what = _named(key, action)
+        if key not in now:
+            if action.start + shifts.largest <= after.end_time - EVENT_TOLERANCE:
+                changes.setdefault(what, Change(what, key[1], action.start, "no longer happens"))
+            continue
+        shift = shifts.of(key, action, now[key])
+        found.append(shift)
+        for rest, moved, how in (
+            (shift.unexplained_start, shift.start, "happens"),
+            (shift.unexplained_end, shift.end, "is over"),
+        ):
+            if abs(rest) > EVENT_TOLERANCE:
+                changes.setdefault(what, Change(what, key[1], action.start, f"{how} {_later(moved)}"))
+    for key, action in now.items():
+        if key not in then and (*key[:2], 0) in then and action.start <= before.end_time - EVENT_TOLERANCE:
+            what = _named(key, action)
+            changes.setdefault(what, Change(what, key[1], action.start, "happens once more"))
+    others = [*_other_order(then, now), *_other_lanes(before, after, ignored)]
+    for change in (*others, *(_other_end(shifts, before, after) if ends else ())):
+        changes.setdefault(change.what, change)
+    for pair, time in touching(after).items() if len(before.entities) > 1 else ():
+        if pair not in touching(before) and not set(pair) <= set(ignored):
+            what = f"contact of '{pair[0]}' and '{pair[1]}' at {time:.1f} s"
+            changes.setdefault(what, Change(what, pair[0], time, "is new"))
+    return Comparison(tuple(found), tuple(changes.values()))
+
+
+def _later(moved: float) -> str:
+    return f"{abs(moved):.2f} s {'later' if moved > 0 else 'earlier'}"
+
+
+def _named(key: Key, action: PlayedAction) -> str:
+    """The event in words."""
+    path, actor, _ = key
+    whose = "" if actor is None else f" of '{actor}'"
+    return f"event '{path[-2] if len(path) > 1 else path[-1]}'{whose} at {action.start:.2f} s"
+
+
+def _runs(actions: Sequence[PlayedAction]) -> dict[Key, PlayedAction]:
+    """Actions of the source's events, counted for those that run several times."""
+    found: dict[Key, PlayedAction] = {}
+    numbers: dict[tuple[Path, str | None], int] = {}
+    for played in actions:
+        if played.path != ("Init",) and not played.path[0].startswith(STORY_PREFIX):
+            number = numbers.get((played.path, played.actor), 0)
+            numbers[played.path, played.actor] = number + 1
+            found[played.path, played.actor, number] = played
+    return found
+
+
+class _Shifts:
+    """Shifts of actions, in order of time, each explained by those before it."""
+
+    def __init__(self, scenario: Scenario, network: RoadNetwork, before: NominalMotion, after: NominalMotion) -> None:
+        self._network, self._scenario = network, scenario
+        self._entities = [{entity.name: entity for entity in run.entities} for run in (before, after)]
+        self._ends = before.end_time, after.end_time
+        self._triggers = _triggers_of(scenario)
+        self._starts, self._over = dict[Path, float](), dict[Path, float]()
+        self._of_entity = dict[str, list[float]]()
+        self._start_times = dict[str, list[tuple[float, float]]]()
+        self.largest = 0.0
+
+    def of(self, key: Key, then: PlayedAction, now: PlayedAction) -> EventShift:
+        """One action, after all that began before it."""
+        path, actor, _ = key
+        start = now.start - then.start
+        rest = _nearest(start, self._causes(self._triggers.get(path[:-1], ())))
+        begun = self._start_times.setdefault(actor or "", [])
+        end, over, duration = start, 0.0, 0.0
+        if self._is_over(then, 0) and self._is_over(now, 1):
+            assert then.end is not None and now.end is not None
+            duration, end = then.end - then.start, now.end - now.start - (then.end - then.start) + start
+            expected = [start + longer for longer in self._longer(then, now)]
+            cut = [shift for moment, shift in begun if abs(moment - then.end) <= EVENT_TOLERANCE]
+            over = _nearest(end, [*expected, *cut])
+        begun.append((then.start, start))
+        for depth in range(1, len(path) + 1):
+            self._starts.setdefault(path[:depth], start)
+            self._over[path[:depth]] = end
+        if actor is not None:
+            self._of_entity.setdefault(actor, []).extend((start, end))
+        self.largest = max(self.largest, start, end)
+        return EventShift(path[-2] if len(path) > 1 else path[-1], actor, then.start, duration, start, end, rest, over)
+
+    def _is_over(self, played: PlayedAction, run: int) -> bool:
+        """Before its run is: what the run's end cuts has no end of its own."""
+        return played.end is not None and played.end < self._ends[run] - EVENT_TOLERANCE
+
+    def of_end(self, moved: float) -> float:
+        """What of the end's shift is unexplained. [s]"""
+        return _nearest(moved, self._causes(conditions_of(self._scenario.storyboard.stop_trigger)))
+
+    def _causes(self, conditions: Collection[Condition] | Iterator[Condition]) -> list[float]:
+        """Shifts that conditions may pass on: of elements that they wait for, of entities that they look at."""
+        found, others = list[float](), 0
+        for condition in conditions:
+            content = condition.content
+            if isinstance(content, StoryboardElementStateCondition):
+                starts = content.state in (StoryboardElementState.START_TRANSITION, StoryboardElementState.RUNNING)
+                known = self._starts if starts else self._over
+                found += [shift for path, shift in known.items() if refers_to(content, path)]
+                continue
+            others += 1
+            looked_at = set(entity_references(content))
+            if condition.triggering_entities is not None:
+                looked_at |= set(condition.triggering_entities.entity_refs)
+            moved = [abs(shift) for name in looked_at for shift in self._of_entity.get(name, ())]
+            far = PASSED_ON * max(moved, default=0.0)
+            found += np.arange(-far, far, EVENT_TOLERANCE / 5.0).tolist()
+        return found if found and not others else [*found, 0.0]
+
+    def _longer(self, then: PlayedAction, now: PlayedAction) -> list[float]:
+        """By how much longer the action may last for its way. [s]"""
+        powers = _powers(then)
+        duration = (then.end or 0.0) - then.start
+        ways = [self._way(entities, run) for entities, run in zip(self._entities, (then, now), strict=True)]
+        if not powers or min(ways) < LEAST_WAY:
+            return [0.0]
+        return [duration * ((ways[1] / ways[0]) ** power - 1.0) for power in powers]
+
+    def _way(self, entities: Mapping[str, EntityMotion], played: PlayedAction) -> float:
+        """How far it leads across the road. [m]"""
+        entity = entities.get(played.actor or "")
+        if entity is None or played.end is None:
+            return 0.0
+        rows = np.clip(
+            np.searchsorted(entity.time, [played.start + 1e-9, played.end + 1e-9], side="right") - 1, 0, None
+        )
+        road, lane, s = entity.road[rows], entity.lane[rows], entity.s[rows]
+        if (road < 0).any():
+            return 0.0
+        t = self._network.offset_to_t(road, lane, s, entity.offset[rows])
+        return float(abs(t[1] - t[0]))
+
+
+def _powers(played: PlayedAction) -> tuple[float, ...]:
+    """By which power of its way a lateral action's duration changes; none: it does not."""
+    content = played.action.content
+    if isinstance(content, LaneChangeAction):
+        return (1.0,) if content.dynamics.dimension is DynamicsDimension.RATE else ()
+    if isinstance(content, LaneOffsetAction):
+        return (0.5,)
+    return (0.0, 0.5, 1.0) if isinstance(content, LateralDistanceAction) else ()
+
+
+def _nearest(shift: float, causes: Sequence[float]) -> float:
+    """What is left of a shift beside the cause that explains most of it. [s]"""
+    return min((shift - cause for cause in causes), key=abs, default=shift)
+
+
+def _triggers_of(scenario: Scenario) -> dict[Path, tuple[Condition, ...]]:
+    """Conditions that the start of each event waits for."""
+    found: dict[Path, tuple[Condition, ...]] = {}
+    for story, act, group in scenario.storyboard.groups():
+        for maneuver, event in group.events():
+            triggers: tuple[Trigger | None, ...] = (act.start_trigger, event.start_trigger)
+            path = (story.name, act.name, group.name, maneuver.name, event.name)
+            found[path] = tuple(condition for trigger in triggers for condition in conditions_of(trigger))
+    return found
+
+
+def _other_order(then: Mapping[Key, PlayedAction], now: Mapping[Key, PlayedAction]) -> Iterator[Change]:
+    """Events that come before one that they came after."""
+    both = sorted((key for key in then if key in now), key=lambda key: then[key].start)
+    for first, second in pairwise(both):
+        apart = then[second].start - then[first].start, now[second].start - now[first].start
+        if apart[0] > EVENT_TOLERANCE and apart[1] < -EVENT_TOLERANCE:
+            yield Change(_named(second, then[second]), second[1], then[second].start, f"comes before '{first[0][-2]}'")
+
+
+def _other_end(shifts: _Shifts, before: NominalMotion, after: NominalMotion) -> Iterator[Change]:
+    moved = after.end_time - before.end_time
+    if before.ended_by == after.ended_by and abs(shifts.of_end(moved)) > EVENT_TOLERANCE + before.step:
+        what = f"the end ({before.ended_by}) at {before.end_time:.2f} s"
+        yield Change(what, None, before.end_time, f"comes {_later(moved)}")
+
+
+def _other_lanes(before: NominalMotion, after: NominalMotion, ignored: Collection[str]) -> Iterator[Change]:
+    lanes = {entity.name: _last_lanes(entity, after.end_time) for entity in before.entities}
+    for entity in after.entities:
+        last = _last_lanes(entity, before.end_time)
+        if entity.name not in ignored and not set(lanes.get(entity.name, last)) & set(last):
+            what = f"the last lane of '{entity.name}', {lanes[entity.name][-1]},"
+            yield Change(what, entity.name, before.end_time, f"is {last[-1]}")
+
+
+def _last_lanes(entity: EntityMotion, end: float) -> list[int]:
+    """Where both runs are still on: that in which it ends, after those that it has just left."""
+    rows = (entity.time <= end) & (entity.time >= min(end, float(entity.time[-1])) - EVENT_TOLERANCE)
+    return [int(lane) for lane in entity.lane[rows]] or [int(entity.lane[0])]
+
+
+def largest_of(comparisons: Sequence[Comparison]) -> tuple[EventShift, ...]:
+    """Each event once, with its largest shift over several pairs of runs, in order of time."""
+    found: dict[tuple[str, str | None], EventShift] = {}
+    for shift in (one for comparison in comparisons for one in comparison.shifts):
+        key = shift.event, shift.entity
+        size = max(abs(shift.start), abs(shift.end))
+        if key not in found or size > max(abs(found[key].start), abs(found[key].end), -inf):
+            found[key] = shift
+    return tuple(sorted(found.values(), key=lambda one: one.time))
