@@ -35,6 +35,11 @@ class Pool:
     name: str
     curves: Sequence[Curve]
 
+    @property
+    def is_single_run(self) -> bool:
+        """Whether it is one of the runs with differential GNSS."""
+        return self.name.startswith("real: RTK")
+
     @classmethod
     def of(cls, name: str, views: Views, detectors: Sequence[Detector]) -> Pool:
         """Run detectors on it."""
@@ -46,19 +51,25 @@ class Pool:
 
 
 def alarm_lines(pools: Sequence[Pool]) -> str:
-    """False alarms by threshold of lateral speed."""
+    """False alarms by threshold of lateral speed; of single runs the range."""
     thresholds = [curve.detector.setting for curve in pools[0].curves]
     heads = [f"{threshold:.2f} m/s" for threshold in thresholds]
     lines = ["| traffic | hours | " + " | ".join(heads) + " |", "|---" * (2 + len(heads)) + "|"]
     for pool in pools:
-        cells = [_rate(curve) for curve in pool.curves]
-        lines.append(f"| {pool.name} | {pool.curves[0].hours.sum():.2f} | " + " | ".join(cells) + " |")
+        if not pool.is_single_run:
+            cells = [_rate(curve) for curve in pool.curves]
+            lines.append(f"| {pool.name} | {pool.curves[0].hours.sum():.2f} | " + " | ".join(cells) + " |")
+    runs = [[float(curve.rate[curve.detector.chosen]) for curve in pool.curves] for pool in pools if pool.is_single_run]
+    if runs:
+        hours = sum(float(pool.curves[0].hours.sum()) for pool in pools if pool.is_single_run)
+        cells = [f"{min(rates):.1f} to {max(rates):.1f}" for rates in zip(*runs, strict=True)]
+        lines.append(f"| real: {len(runs)} GNSS runs singly | {hours:.2f} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
 
 def default_lines(pools: Sequence[Pool]) -> str:
     """Every rule at its default: false alarms an hour, and the median time before the marking."""
-    shown = _shown(pools)
+    shown = [pool for pool in _shown(pools) if pool.name not in ("nominal", "lifelike: rural")]
     lines = ["| detector | " + " | ".join(pool.name for pool in shown) + " |", "|---" * (1 + len(shown)) + "|"]
     for number, first in enumerate(pools[0].curves):
         curves = [pool.curves[number] for pool in shown]
@@ -77,9 +88,7 @@ def tuned_lines(pools: Sequence[Pool]) -> str:
         cells = []
         for number in rules:
             k, curve = pool.curves[number].tuned(TUNED_RATE), real.curves[number]
-            low, high = curve.rate_interval()[:, k]
-            rate = f"{curve.rate[k]:.0f} ({low:.0f} to {high:.0f})"
-            cells.append(f"{curve.detector.thresholds[k]:g}: {rate}, {_lead(curve, k)}")
+            cells.append(f"{curve.detector.thresholds[k]:g}: {curve.rate[k]:.0f}, {_lead(curve, k)}")
         lines.append(f"| {pool.name} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
