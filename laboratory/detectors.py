@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from zlib import crc32
@@ -78,9 +78,12 @@ def seen(scenes: Iterable[Scene], sensor: Sensor = PERFECT) -> Views:
     return [(scene, views_of(scene, sensor, SEED)) for scene in scenes]
 
 
-def scenes_of(paths: Sequence[Path], profile: str = "", variants: int = 0) -> Iterator[Scene]:
+def scenes_of(
+    paths: Sequence[Path], profile: str = "", variants: int = 0, lane_changes: str = "written"
+) -> Iterator[Scene]:
     """Scenes of scenarios as written; with a profile, of their lifelike variants."""
-    settings = SourceSettings(ConvertSettings.of(seed=SEED), variants, (profile,) if profile else (), "none")
+    convert = ConvertSettings.of(seed=SEED, lane_changes=lane_changes)
+    settings = SourceSettings(convert, variants, (profile,) if profile else (), "none")
     for path in paths:
         written, *lifelike = sources_of(path, settings)
         for source in lifelike or [written]:
@@ -133,13 +136,13 @@ def training(given: Given, folder: Path) -> dict[str, list[Scene]]:
     half = xl.write_profile(
         xl.fit(table[[_half(name) == 0 for name in table["drive"]]], name="half"), folder / "half.json"
     )
-    found = {
+    lifelike = partial(scenes_of, scenarios, str(half), 2 * given.variants)
+    return {
         "nominal": list(scenes_of(scenarios)),
-        "lifelike: half of the recording": list(scenes_of(scenarios, str(half), 2 * given.variants)),
+        "lifelike: half of the recording": list(lifelike()),
+        "the same, lane changes lifelike": list(lifelike(lane_changes="lifelike")),
+        "real: half of the recording": list(half_of(recorded(given.wheel), 0)),
     }
-    if (shipped_folder("driver_profiles") / "rural.json").exists():
-        found["lifelike: rural"] = list(scenes_of(scenarios, "rural", 2 * given.variants))
-    return found | {"real: half of the recording": list(half_of(recorded(given.wheel), 0))}
 
 
 def main() -> None:
