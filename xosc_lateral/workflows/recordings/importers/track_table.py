@@ -121,15 +121,9 @@ def tracks_of(
     *,
     is_log: bool = False,
 ) -> Tracks:
-<<<<<<< HEAD
-    """Tracks of a table that is read; see `read_tracks`."""
+    """Tracks of a table that is read; see `read_tracks`. `is_log`: it is one of esmini, whose units are known."""
     is_played = set(map(str, table.columns)) >= STATE_COLUMNS
     if is_played:  # a table of states, as `play` and `live` write it
-=======
-    """Tracks of a table that is read; see `read_tracks`. `is_log`: it is one of esmini, whose units are known."""
-    is_played = set(COLUMNS) <= set(map(str, table.columns))
-    if is_played:  # a table of states, as `play` writes it
->>>>>>> main
         table = table.rename(columns={"name": "vehicle", "h": "heading"})
     found = _columns(table, path, as_mapping(None) if saved is None else saved, columns)
     order = found.sort_values(["vehicle", "time"], kind="stable", ignore_index=True)
