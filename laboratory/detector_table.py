@@ -165,7 +165,7 @@ def trained_lines(detectors: Mapping[str, Logistic], held: Views, runs: Views, s
     lines = [
         f"Sensor: {sensor}.",
         "",
-        "| trained on | false alarms an hour | fewer than trained on nominal | on the RTK runs |",
+        "| trained on | false alarms an hour | fewer than trained on nominal | on the GNSS runs |",
         "|---|---|---|---|",
     ]
     for name, one in found.items():
