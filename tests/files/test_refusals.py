@@ -42,13 +42,11 @@ def test_a_refusal_names_the_file_and_the_cause(tmp_path, capsys, words, name, t
     assert not output.exists()
 
 
-@pytest.mark.parametrize(
-    "error", [IndexError("index -1 is out of bounds"), KeyError("x"), ZeroDivisionError("by zero")]
-)
+@pytest.mark.parametrize("error", [IndexError("index -1"), KeyError("x"), ZeroDivisionError("by zero")])
 def test_an_error_of_the_program_is_told_as_one_of_the_file(tmp_path, error):
-    with pytest.raises(FormatError, match="can't be read: it is empty, damaged, or laid out otherwise"):
-        with foreign_errors(tmp_path / "a.bin", "can't be read"):
-            raise error
+    what = "can't be read: it is empty, damaged, or laid out otherwise"
+    with pytest.raises(FormatError, match=what), foreign_errors(tmp_path / "a.bin", "can't be read"):
+        raise error
 
 
 def test_levelx_tables_without_rows_are_refused(tmp_path):

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
+import xosc_lateral as xl
 from examples.driver_simulator import simulate_drive
 from tests.kit.profiles import as_drive, simulated_profile
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.drivers.drives.cuts import all_runs
+from xosc_lateral.drivers.drives.cuts import all_runs, lane_change_rows
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.model.sampled_offsets import cut_snippets, sample_context, sample_free, sample_like
 from xosc_lateral.drivers.model.validity import Validity
+from xosc_lateral.files.drives import read_drives
 
 
 @pytest.fixture(scope="module")
@@ -47,13 +51,31 @@ def test_sampled_snippets_do_not_depend_on_the_drives_beside_them(drives: list[D
     assert all(np.array_equal(a.offset, b.offset) for a, b in zip(alone, both, strict=False))
 
 
-def test_a_free_run_covers_the_whole_drive(drives: list[Drive]) -> None:
+def test_a_free_run_covers_the_drive_but_for_its_lane_changes(drives: list[Drive]) -> None:
     runs = list(sample_context(simulated_profile(), drives, 1))
-    assert [run.drive for run in runs] == [drive.name for drive in drives]
-    for run, drive in zip(runs, drives, strict=True):
-        assert run.time[0] == drive.time[0]
-        assert drive.time[-1] - run.time[-1] < 0.2 + 1e-9
-        assert np.isfinite(run.offset).all()
+    for drive in drives:
+        own = [run for run in runs if run.drive == drive.name]
+        changes = lane_change_rows(drive)
+        assert changes.any() and len(own) > 1
+        assert own[0].time[0] == drive.time[0] and drive.time[-1] - own[-1].time[-1] < 0.2 + 1e-9
+        covered = np.concatenate([run.time for run in own])
+        changing = drive.time[changes]
+        assert np.abs(covered - changing[len(changing) // 2]).min() > 1.0
+        assert len(covered) == pytest.approx((~changes).sum() * np.median(np.diff(drive.time)) / 0.2, rel=0.02)
+        assert all(np.isfinite(run.offset).all() for run in own)
+
+
+def test_sampled_tables_are_fitted_as_they_are(drives: list[Drive], tmp_path: Path) -> None:
+    """Without a step at lane changes: no lateral speed of metres a second."""
+    profile, width = simulated_profile(), float(np.median(np.concatenate([drive.lane_width for drive in drives])))
+    for kind in ("context", "like"):
+        table = tmp_path / f"{kind}.csv"
+        xl.sample(profile, **{kind: drives}, seed=1).write(table)
+        again = xl.fit(table, name="again", neighbours=False)
+        assert again.provenance.drives == len(drives)
+        assert again.validity.speed is not None and again.lane_width == pytest.approx(width, abs=0.05)
+        steps = [np.abs(np.diff(run.offset)).max() for run in all_runs(read_drives(table))]
+        assert max(steps) < 0.2
 
 
 def test_a_free_run_of_a_duration_has_its_length_and_the_profiles_lane() -> None:

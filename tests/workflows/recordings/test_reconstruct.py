@@ -254,6 +254,24 @@ def test_a_vehicle_that_never_moves_points_along_its_lane(tmp_path):
         assert np.cos(rows["h"] - along).min() > 0.99, name
 
 
+def test_a_played_vehicle_may_drive_backwards(tmp_path):
+    """Two of three rows contradict their headings, which are those of a table that `play` wrote: no unit is wrong."""
+    (tmp_path / "road.xodr").write_text(ROAD)
+    table, _ = jam(1, 0.0, vehicles=3, lasting=20.0)
+    table["h"] = np.arctan2(table["x"], RADIUS - table["y"])
+    back = table["id"] != "j2"
+    for axis in "xyh":
+        table.loc[back, axis] = table[back].groupby("id")[axis].transform(lambda rows: rows.to_numpy()[::-1])
+    played = table.rename(columns={"id": "name"}).assign(z=0.0, speed=1.0, road="1", lane=-1, offset_t=0.0, s=0.0)
+    played.to_csv(tmp_path / "states.csv", index=False)
+    made = xl.reconstruct(tmp_path / "states.csv", road=tmp_path / "road.xodr")
+    assert "j2" in set(made.to_frame()["recorded_as"])
+    assert all("backwards" in line for line in made.left_out)
+    table.rename(columns={"h": "heading"}).to_csv(tmp_path / "tracks.csv", index=False)
+    with pytest.raises(FormatError, match="'heading': contradicts"):
+        xl.reconstruct(tmp_path / "tracks.csv", road=tmp_path / "road.xodr")
+
+
 def test_a_name_that_begins_with_a_dollar_sign_is_no_parameter(tmp_path):
     (tmp_path / "$road.xodr").write_text(ROAD)
     table, _ = jam(1, 0.0, vehicles=2)

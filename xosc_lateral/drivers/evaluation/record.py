@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from math import isfinite
 from typing import Any
 
-from xosc_lateral.base.digits import all_significant
+from xosc_lateral.base.digits import all_significant, significant
 from xosc_lateral.drivers.evaluation.lane_keeping import UNITS, Margins
 from xosc_lateral.drivers.evaluation.realism import Beside, ConditionScores, VarianceParts
 from xosc_lateral.drivers.evaluation.scores import LAGS, ProfileScores, SnippetScores
@@ -20,6 +20,28 @@ def scores_to_dict(scores: ProfileScores) -> dict[str, Any]:
         "drives": scores.drives,
         "runs": scores.runs,
         "hours": round(scores.hours, 4),
+        "verdict": {
+            "words": scores.verdict.in_words(),
+            "like_up_to_hz": scores.verdict.like_up_to,
+            "bands": [
+                {
+                    "low_hz": band.low,
+                    "high_hz": band.high,
+                    "ratio": significant(band.ratio, 3),
+                    "error": round(band.error, 3),
+                    "is_like": band.is_like,
+                }
+                for band in scores.verdict.bands
+            ],
+            "alarms_per_hour": {
+                f"{speed:g}": {
+                    "real": round(real, 1) if scores.verdict.shows_alarms else None,
+                    "sampled": round(made, 1),
+                }
+                for speed, (real, made) in scores.verdict.alarms.items()
+            },
+        },
+        "compared_below_hz": scores.below,
         "realism": [_condition_to_dict(one) for one in scores.realism.conditions],
         "variance_m2": {
             "real": _variance_to_dict(scores.realism.variance_real),

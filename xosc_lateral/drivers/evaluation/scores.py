@@ -8,7 +8,7 @@ margins.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,13 +17,27 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.evaluation.distances import Distances, mean_distances, metric_distances, split_groups
-from xosc_lateral.drivers.evaluation.filters import STOP_FREQUENCY, comparison_band, slow_movement
+from xosc_lateral.drivers.evaluation.filters import (
+    STOP_FREQUENCY,
+    comparison_band,
+    dithered,
+    resolution_of,
+    slow_movement,
+)
 from xosc_lateral.drivers.evaluation.lane_keeping import Margins, margins
 from xosc_lateral.drivers.evaluation.metrics import METRICS, snippet_metrics
 from xosc_lateral.drivers.evaluation.parts import PartEvaluation, SnippetCondition, evaluate_parts
 from xosc_lateral.drivers.evaluation.realism import Realism, score_realism
-from xosc_lateral.drivers.evaluation.snippets import Snippets, sample_runs, sample_snippets, snippets_of
+from xosc_lateral.drivers.evaluation.snippets import (
+    FEW_DRIVES,
+    Snippets,
+    sample_runs,
+    sample_snippets,
+    sensor_noise,
+    snippets_of,
+)
 from xosc_lateral.drivers.evaluation.spectra import Spectrum, autocorrelation, spectrum
+from xosc_lateral.drivers.evaluation.verdict import Verdict, verdict_of
 from xosc_lateral.drivers.model.profile import DriverProfile
 
 SNIPPET = 10.0  # The paper's. [s]
@@ -103,6 +117,7 @@ class ProfileScores:
     runs: int
     hours: float
     realism: Realism  # The headline: free runs and shared starts beside other real drivers.
+    verdict: Verdict  # Up to which frequency free runs are like other real drivers.
     snippets: SnippetScores  # 10 s.
     long_snippets: SnippetScores | None  # 60 s; None with fewer than `MIN_SNIPPETS`.
     evaluations: tuple[PartEvaluation, ...]
@@ -185,7 +200,22 @@ def score_profile(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
         traces=_traces(runs, free, step),
         seed=seed,
         below=below,
+        verdict=_verdict(profile, runs, seed),
     )
+
+
+def _verdict(profile: DriverProfile, runs: Sequence[Run], seed: int) -> Verdict:
+    """Free runs with the profile's sensor beside the measured ones, both at the recording's resolution."""
+    step, resolution = profile.model.step, resolution_of(runs)
+    free = sample_runs(profile, runs, seed + 5, same_start=False)
+    recorded = [path + error for path, error in zip(free, sensor_noise(profile, free, seed + 5), strict=True)]
+    drives = {run.drive for run in runs}
+    groups = [run.drive if len(drives) >= FEW_DRIVES else f"{run.drive} {run.index}" for run in runs]
+    measured = [
+        replace(run, offset=path)
+        for run, path in zip(runs, dithered([run.offset for run in runs], resolution, seed + 6), strict=True)
+    ]
+    return verdict_of(measured, dithered(recorded, resolution, seed + 7), groups, step)
 
 
 def _traces(runs: Sequence[Run], sampled: Sequence[FloatArray], step: float) -> tuple[Trace, ...]:

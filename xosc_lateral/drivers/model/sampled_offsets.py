@@ -15,7 +15,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
 from xosc_lateral.base.segment import Segment
-from xosc_lateral.drivers.drives.cuts import PAPER_RULES, CutRules, all_runs, whole_run
+from xosc_lateral.drivers.drives.cuts import PAPER_RULES, CutRules, all_runs, cut_runs, whole_run
 from xosc_lateral.drivers.drives.drive import Drive, Run
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.model.plausibility import check_offsets
@@ -26,6 +26,9 @@ from xosc_lateral.drivers.model.sensor.model import SensorModel
 
 MEAN_SPEED = 30.0
 """Of a free run whose speed nobody named: about 108 km/h. [m/s]"""
+
+WHERE_LANES_CHANGE = CutRules(min_speed=0.0, min_run=0.0)
+"""Free runs under a drive's context go on through slow driving, however short they are."""
 
 MAX_DURATION = 1e7
 """Of a free run [s]: 2 GB of offsets, anything longer is a slip."""
@@ -40,6 +43,9 @@ class SampledOffsets:
     time: FloatArray
     offset: FloatArray
     offset_real: FloatArray | None
+    lane_width: FloatArray
+    speed: FloatArray
+    """NaN where it is not known. [m/s]"""
 
 
 def sample_like(
@@ -60,20 +66,37 @@ def sample_like(
         segment = segment_of(snippet.run, snippet.rows)
         offset = recorded_offsets(profile, segment, own, sensor, float(snippet.offset[0]))
         _check(offset, segment, profile, name)
-        yield SampledOffsets(name, snippet.index, snippet.time, offset, snippet.offset)
+        yield SampledOffsets(name, snippet.index, snippet.time, offset, snippet.offset, *_driven(segment))
 
 
 def sample_context(
-    profile: DriverProfile, drives: Sequence[Drive], seed: int, *, with_sensor: bool = False
+    profile: DriverProfile,
+    drives: Sequence[Drive],
+    seed: int,
+    rules: CutRules = WHERE_LANES_CHANGE,
+    *,
+    with_sensor: bool = False,
 ) -> Iterator[SampledOffsets]:
-    """One free run per measured drive, under its context from its first row to its last, lane changes included."""
+    """One free run per measured drive, under its context from its first row to its last.
+
+    It is cut where the drive is, at lane changes and gaps: there the context jumps, and the offset with it.
+    """
     sensor = known_sensor(profile) if with_sensor else None
     root = np.random.SeedSequence(seed)
     for number, drive in enumerate(drives):
         segment = segment_of(whole_run(drive))
         offset = recorded_offsets(profile, segment, child(root, number), sensor)
         _check(offset, segment, profile, drive.name)
-        yield SampledOffsets(drive.name, 0, segment.time, offset, None)
+        width, speed = _driven(segment)
+        for run in cut_runs(drive, rules):
+            first = round(float(run.time[0] - segment.time[0]) / profile.model.step)
+            rows = slice(first, first + len(run))
+            yield SampledOffsets(drive.name, run.index, run.time, offset[rows], None, width[rows], speed[rows])
+
+
+def _driven(segment: Segment) -> tuple[FloatArray, FloatArray]:
+    """Lane width [m] and speed [m/s] inside a segment."""
+    return segment.lane_width[segment.inside], segment.speed[segment.inside]
 
 
 def _check(offset: FloatArray, segment: Segment, profile: DriverProfile, drive: str) -> None:
@@ -101,7 +124,7 @@ def sample_free(
     segment = Segment.even(duration, profile.model.step, width, speed)
     sensor = known_sensor(profile) if with_sensor else None
     offset = recorded_offsets(profile, segment, child(np.random.SeedSequence(seed), 0), sensor)
-    yield SampledOffsets(profile.name, 0, segment.time, offset, None)
+    yield SampledOffsets(profile.name, 0, segment.time, offset, None, *_driven(segment))
 
 
 def known_sensor(profile: DriverProfile) -> SensorModel:

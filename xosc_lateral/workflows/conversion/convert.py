@@ -42,6 +42,7 @@ from xosc_lateral.workflows.conversion.modes import (
 from xosc_lateral.workflows.conversion.result import ConversionProvenance, ConvertedScenario, Enriched, EventShift
 from xosc_lateral.workflows.conversion.settings import ConvertSettings, OutputMode, relative
 from xosc_lateral.workflows.conversion.shifts import Comparison, largest_of
+from xosc_lateral.workflows.conversion.validity import validity_warnings, without_proving_grounds
 from xosc_lateral.world.motion.nominal import Activity, NominalMotion
 from xosc_lateral.world.motion.offset_chain import OffsetChain
 from xosc_lateral.world.scenario import Scenario
@@ -107,6 +108,7 @@ def _convert(
     refuse_outputs([output if save else None, report], inputs)
     for_carla = settings.target.player is Player.CARLA
     drivers = choose_drivers(played.scenario, settings, egos, controllers if for_carla else {})
+    drivers = without_proving_grounds(drivers, played.motion, played.network, settings.entity)
     lasting = played
     reacts = settings.mode is OutputMode.AUTO and not is_replay(settings, depends)
     ends = depends.of_trigger(played.scenario.storyboard.stop_trigger) and played.motion.cut_off is None
@@ -153,7 +155,7 @@ def _convert(
         f"{removed.place.element}: left out ({removed.reason})" for removed in written.removed
     )
     warnings += tuple(f"'{name}' follows a trajectory, too: {why}" for name, why in sampled.items()) + written.notes
-    warnings += plan.frozen + changes + stay_as_written(enriched, settings, through)
+    warnings += plan.frozen + changes + stay_as_written(enriched, settings, through) + validity_warnings(enriched)
     if played.motion.cut_off is not None:
         warnings = (str(played.motion.cut_off), *warnings)
     data = b"" if save else written.data

@@ -105,6 +105,13 @@ def _provenance(conversion: ConvertedScenario) -> dict[str, object]:
         "variant": made.variant,
         "parameters set": [f"{name} = {value}" for name, value in made.options["parameters"].items()],
         "profiles": [f"{entity}: {name} ({sha[:12]})" for entity, (name, sha) in made.profiles.items()],
+        "profiles are valid for": sorted(
+            {
+                f"{one.profile.name}: {one.profile.validity.in_words() or 'not stated'}"
+                for one in conversion.enriched.entities
+                if one.is_enriched and one.profile is not None
+            }
+        ),
         "inputs": [f"{name} ({sha[:12]})" for name, sha in made.inputs.items()],
         "output hash": conversion.output_sha256,
     }

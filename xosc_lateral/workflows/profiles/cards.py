@@ -57,8 +57,13 @@ def _list_line(name: str, profile: DriverProfile, width: int) -> str:
     known, tags = profile.provenance, "".join(f"#{tag} " for tag in profile.metadata.tags)
     return (
         f"{name:{width}s}  {profile.model.kind:14s} {known.hours:6.2f} h  {known.drives:4d} drives  "
-        f"{len(profile.effects)} effects  {tags}{known.notes or known.source}"
+        f"{len(profile.effects)} effects  {tags}{known.notes or known.source}{_licence_note(profile)}"
     ).rstrip()
+
+
+def _licence_note(profile: DriverProfile) -> str:
+    licence = profile.metadata.licence
+    return f" [{licence}]" if licence else ""
 
 
 def list_record(entries: Sequence[Entry]) -> list[dict[str, Any]]:
@@ -101,6 +106,7 @@ def card(profile: DriverProfile) -> dict[str, Any]:
     """Everything that a person asks first, as plain values."""
     return {
         "id": profile.name,
+        "validity": profile.validity.to_dict(),
         **_identity(profile),
         "effects": [effect.to_dict() for effect in profile.effects],
         "neighbours": {side: basis_of(profile, side).value for side in SIDES},
@@ -139,6 +145,7 @@ def card_rows(profile: DriverProfile, summary: MovementSummary) -> list[tuple[st
     count = len(profile.effects)
     effects = "1 effect" if count == 1 else f"{count or 'no'} effects"
     rows = [
+        ("valid", profile.validity.in_words()),
         ("model", f"{profile.model.kind}, {effects}, lane width {profile.lane_width:.2f} m"),
         *(("effect", effect_line(effect)) for effect in profile.effects),
         ("neighbours", responses_in_words(profile)),

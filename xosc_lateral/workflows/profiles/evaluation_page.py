@@ -71,6 +71,8 @@ def evaluation_text(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
     lines = [
         f"{scores.profile} on {scores.hours:.2f} h of {scores.drives} drives ({scores.runs} runs), seed {scores.seed}",
         *([FITTED] if _fitted_on(profile, inputs) else []),
+        f"verdict: {scores.verdict.in_words()}",
+        scores.verdict.alarm_words(),
         f"worst comparison: {block}, {ratio:.2f} times that between real drivers",
         *realism_lines(scores.realism),
         "as in the paper: from the same start, without the sensor; real drivers are compared without a common start",
@@ -118,6 +120,8 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
     worst_figure = KeyFigure(
         f"{ratio:.2f}", f"worst comparison: {worst}", "1: as close as other real drivers", _tone(ratio)
     )
+    page.text(f"Verdict: {scores.verdict.in_words()}. {scores.verdict.alarm_words().capitalize()}.")
+    page.text(f"The profile is valid for: {profile.validity.in_words() or 'not stated'}.")
     page.key_figures([worst_figure, *_key_figures(scores.realism)])
     if _fitted_on(profile, inputs):
         page.warning(FITTED)

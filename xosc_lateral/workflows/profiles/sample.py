@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.drivers.drives.cleaning import RUN
 from xosc_lateral.files.mapping import MappingLike
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.workflows.result import (
@@ -140,17 +141,23 @@ class Offsets(Result):
         return "\n".join([self.headline(), *(f"  warning: {warning}" for warning in self.warnings)])
 
     def to_frame(self) -> pd.DataFrame:
-        """Columns `drive`, `time` [s], `offset` [m]; of snippets also `snippet` and `offset_real` [m]."""
+        """Columns `drive`, `time` [s], `offset`, `lane_width` [m], `speed` [m/s] where known; of snippets also
+        `snippet` and `offset_real` [m]. `following_run` counts what is cut apart: the table can be fitted as it is.
+        """
         import numpy as np
 
-        is_snippet = "snippet_s" in self._settings
-        names = ["drive", "snippet", "time", "offset", "offset_real"] if is_snippet else ["drive", "time", "offset"]
         lengths = [len(one.time) for one in self._made]
-        columns = {}
-        for name in names:
+        numbers = np.repeat(np.arange(len(lengths)), lengths)
+        columns: dict[str, Any] = {"drive": np.repeat([one.drive for one in self._made], lengths)}
+        if "snippet_s" in self._settings:
+            columns["snippet"] = np.repeat([one.snippet for one in self._made], lengths)
+        for name in ("time", "offset", "offset_real", "lane_width", "speed"):
             values = [getattr(one, name) for one in self._made]
-            columns[name] = np.repeat(values, lengths) if name in ("drive", "snippet") else np.concatenate(values)
-        return pd.DataFrame(columns)
+            if values and values[0] is not None:
+                columns[name] = np.concatenate(values)
+        if np.isnan(columns.get("speed", np.nan)).all():
+            columns.pop("speed", None)
+        return pd.DataFrame({**columns, RUN: numbers})
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them: what was sampled, without the offsets themselves."""

@@ -149,17 +149,16 @@ def not_expressed(plans: Sequence[VehiclePlan], residuals: Sequence[Residuals], 
         cut = sum(each.cut for each in plan.lateral.transitions)
         if cut:
             lines.append(f"{plan.name}: {cut} lateral maneuvers begin or end outside of the recording")
-        lines += [
-            f"{plan.name}: its lane change at {each.start:.1f} s is nearer to the bell of drivers "
-            f"({1e3 * each.bell_residual:.0f} mm instead of {1e3 * each.residual:.0f} mm): "
-            "convert with --lane-changes lifelike"
-            for each in plan.lateral.transitions
-            if each.is_bell
-        ]
         for word, values in (("along the road", one.along), ("beside its maneuvers", one.across)):
             if len(values) and (worst := float(np.abs(values).max())) > WORTH_NAMING:
                 row = int(np.abs(values).argmax())
                 lines.append(f"{plan.name}: up to {worst:.2f} m {word}, at {one.time[row]:.1f} s")
+    fitted = [one for plan in plans for one in plan.lateral.transitions if np.isfinite(one.bell_residual)]
+    if bells := sum(one.is_bell for one in fitted):
+        lines.append(
+            f"{bells} of {len(fitted)} lane changes are nearer to the bell of drivers than to a maneuver's shape: "
+            "convert --lane-changes lifelike has it"
+        )
     return lines
 
 

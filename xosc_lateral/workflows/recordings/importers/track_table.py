@@ -41,6 +41,9 @@ HEADERS: Mapping[str, tuple[str, ...]] = {
 }
 """Name -> headers that are understood, in lower case, the first that is there; others by the map."""
 
+STATE_COLUMNS = frozenset(COLUMNS) - {"z", "offset_t"}
+"""What a table of states has, whether `play` or `live` wrote it; its positions are those of reference points."""
+
 USUAL_LENGTH = {"truck": 16.5, "bus": 12.0, "trailer": 12.0, "motorcycle": 2.2, "motorbike": 2.2}
 """Where no length is given; 4.6 m for the rest (EU new cars, 2023: mean 4.4 m). [m]"""
 
@@ -105,16 +108,22 @@ def read_tracks(path: Path, columns: Sequence[str] = (), mapping: MappingLike | 
     two rows.
     """
     saved = as_mapping(mapping)
-    table = read_esmini_log(path) if is_esmini_log(path) else read_table(path, saved)[0]
-    return tracks_of(table, path, columns, saved)
+    is_log = is_esmini_log(path)
+    table = read_esmini_log(path) if is_log else read_table(path, saved)[0]
+    return tracks_of(table, path, columns, saved, is_log=is_log)
 
 
 def tracks_of(
-    table: pd.DataFrame, path: Path, columns: Sequence[str] = (), saved: TableMapping | None = None
+    table: pd.DataFrame,
+    path: Path,
+    columns: Sequence[str] = (),
+    saved: TableMapping | None = None,
+    *,
+    is_log: bool = False,
 ) -> Tracks:
-    """Tracks of a table that is read; see `read_tracks`."""
-    is_played = set(COLUMNS) <= set(map(str, table.columns))
-    if is_played:  # a table of states, as `play` writes it
+    """Tracks of a table that is read; see `read_tracks`. `is_log`: it is one of esmini, whose units are known."""
+    is_played = set(map(str, table.columns)) >= STATE_COLUMNS
+    if is_played:  # a table of states, as `play` and `live` write it
         table = table.rename(columns={"name": "vehicle", "h": "heading"})
     found = _columns(table, path, as_mapping(None) if saved is None else saved, columns)
     order = found.sort_values(["vehicle", "time"], kind="stable", ignore_index=True)
@@ -130,8 +139,9 @@ def tracks_of(
     x, y = order["x"].to_numpy(dtype=np.float64), order["y"].to_numpy(dtype=np.float64)
     way, driven = travel_heading(x, y, vehicle, time, step), ground_speed(x, y, vehicle, time, step)
     heading, speed = _given_columns(order, "heading", way), np.abs(_given_columns(order, "speed", driven))
-    require_headings(heading, way, driven, path)
-    _require_speed(speed, driven, path)
+    if not is_played and not is_log:  # a player's vehicles may drive backwards; its units are known
+        require_headings(heading, way, driven, path)
+        _require_speed(speed, driven, path)
     kind = order["vehicle_class"].astype(str).str.lower().to_numpy(dtype=str) if "vehicle_class" in order else None
     kinds = np.full(len(order), "") if kind is None else kind
     length = _given_columns(order, "length", np.array([USUAL_LENGTH.get(one, 4.6) for one in kinds]))
