@@ -79,9 +79,7 @@ JOB_TIMEOUT = Limit(
 )
 JOB_MEMORY = Limit(4000, "MB", "memory for one scenario", "500 entities for a minute take 1.5 GB")
 
-LIVE_PAUSE = Limit(
-    600, "s", "time between two steps of a running simulation", "drivers catch up within a second or two"
-)
+LIVE_PAUSE = Limit(60, "s", "time between two steps of a running simulation", "300 steps of a driver: a second or two")
 LIVE_LINE = Limit(100, "MB", "a line of live stdio", "100 000 vehicles; one that sends no end of line fills any memory")
 
 OFFSET_LANES = Limit(

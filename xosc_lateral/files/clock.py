@@ -14,9 +14,8 @@ from xosc_lateral.base.lazy import pd
 
 DAY = 86_400.0
 
-FOLD_LENGTHS = (1700.0, 3601.0)
-"""Where clocks are put back at the end of summer time, stamps go back by half an hour (Lord Howe) to an hour, less the
-row's own step or the gap there. [s]"""
+FOLD_LENGTHS = (1.0, 3601.0)
+"""Clocks that are put back at the end of summer time go back by an hour, less what was not recorded there. [s]"""
 
 ROW_STEPS = (5e-4, 2.0)
 """Median time between two rows of a recording: 2 kHz is more than any driving is logged at, and what comes every 2 s

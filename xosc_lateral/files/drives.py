@@ -124,6 +124,10 @@ def from_middle(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.Da
     if not {"distance_left", "distance_right"} <= set(table.columns):
         return table
     left, right = (numbers_of(table[name], path, name) for name in ("distance_left", "distance_right"))
+    for name, values in (("distance_left", left), ("distance_right", right)):
+        if np.isfinite(values).any() and float(np.nanmedian(values)) < 0.0:
+            what = "distances are mostly negative: both count outwards from the vehicle"
+            raise FormatError(f"{what}; turn the sign, {name}=COLUMN:-m", path=path, element=f"column {name!r}")
     if mapping.wheel_track is None:
         known = (left + right)[np.isfinite(left + right)]
         median = float(np.median(known)) if len(known) else 0.0

@@ -80,3 +80,27 @@ def test_a_town_in_kilometres_an_hour_is_refused() -> None:
     table = measured().assign(speed=54.0)
     with pytest.raises(FormatError, match=r"speed is 54 m/s.*if it is in km/h"):
         drives_of_table(table, {})
+
+
+def test_columns_of_another_rate_are_bridged_and_long_absences_stay() -> None:
+    """As bus logs are joined: rows of the camera, and rows of a slower bus in between."""
+    table = measured()
+    slow = pd.DataFrame({"time": np.arange(0.005, 300.0, 0.1)}).assign(
+        speed=lambda rows: 25.0 + 0.01 * rows["time"], lead=lambda rows: 50.0 - 0.1 * rows["time"]
+    )
+    slow.loc[(slow["time"] > 120.0) & (slow["time"] < 130.0), "lead"] = np.nan
+    joined = pd.concat([table, slow]).sort_values("time", kind="stable", ignore_index=True)
+    (drive,) = drives_of_table(joined, {})
+    assert len(drive) > 0.99 * len(table)
+    np.testing.assert_allclose(drive.context["speed"], 25.0 + 0.01 * drive.time, atol=1e-6)
+    away = np.isnan(drive.context["lead"])
+    assert away[(drive.time > 120.1) & (drive.time < 129.9)].all()
+    assert not away[(drive.time > 0.1) & (drive.time < 119.9)].any()
+
+
+def test_a_distance_that_counts_the_other_way_is_refused_with_the_sign() -> None:
+    table = measured()
+    sides = pd.DataFrame({"time": table["time"], "distance_left": 1.75 - table["offset"],
+                          "distance_right": -1.75 - table["offset"]})  # fmt: skip
+    with pytest.raises(FormatError, match="distance_right=COLUMN:-m"):
+        drives_of_table(sides, {})

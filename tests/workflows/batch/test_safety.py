@@ -120,11 +120,11 @@ def test_a_signal_is_one_line_with_the_number_of_finished_outputs(tmp_path: Path
     out = tmp_path / "out"
     words = ["convert", str(inputs), "-o", str(out), "--jobs", "2", "-q"]
     command = [sys.executable, "-c", STOPPED_RUN, *words]
-    with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
         while len(list(out.glob("*.xosc"))) < 10:
             assert process.poll() is None
             time.sleep(0.02)
-        process.send_signal(number)
+        os.killpg(process.pid, number)  # as a terminal does: workers get it, too
         _, said = process.communicate(timeout=60)
     assert process.returncode == 128 + number
     there = len(list(out.glob("*.xosc")))

@@ -134,6 +134,7 @@ TAMPERINGS: dict[str, Callable[[dict[str, Any]], object]] = {
     "an input less": lambda facts: facts["inputs"].pop(min(facts["inputs"])),
     "no profiles": lambda facts: facts.update(profiles={}),
     "a profile less": lambda facts: facts["profiles"].pop(min(facts["profiles"])),
+    "a list of profiles": lambda facts: facts["options"].update(profile=["motorway"]),
     "another profile": lambda facts: facts["options"].update(profile="motorway"),
     "modes": lambda facts: facts.update(modes={}),
     "who is ego": lambda facts: facts.update(ego=["Ego"]),

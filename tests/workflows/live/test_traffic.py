@@ -186,10 +186,17 @@ def test_a_damaged_state_is_refused_though_sealed_anew_and_the_drive_goes_on(
     assert json.dumps(traffic.to_dict()) == before
 
 
+def test_times_that_are_added_up_step_by_step_hit_model_steps_as_well_as_round_ones(profile: DriverProfile) -> None:
+    traffic = Traffic(profile, seed=6)
+    for k, off in enumerate((-2e-9, -9e-10, -3e-10, -1e-10, 0.0, 3e-10, 9e-10), start=1):
+        for at in (0.2 * k + off - 1.0, 0.2 * k - 0.9):  # a simulation may begin before 0
+            assert np.isfinite(traffic.step(at, moment()).offset).all()
+
+
 def test_a_leap_in_time_and_a_vehicle_named_twice_are_refused(profile: DriverProfile) -> None:
     traffic = Traffic(profile, seed=6)
     drive(traffic, 1.0)
-    with pytest.raises(SimulationError, match=r"simulation: 1e\+09 s, at most 600 s"):
+    with pytest.raises(SimulationError, match=r"simulation: 1e\+09 s, at most 60 s"):
         traffic.step(1e9, moment())
     with pytest.raises(ValueError, match="named twice"):
         traffic.step(1.0, moment(("a", "a")))

@@ -435,6 +435,16 @@ def test_highd_offsets_are_left_positive_on_both_carriageways(tmp_path):
     assert imported.provenance.format == "levelx highD"
 
 
+def test_highd_of_the_other_direction_is_refused(tmp_path):
+    _highd(tmp_path, 0.4, -0.3)
+    meta = tmp_path / "01_tracksMeta.csv"
+    meta.write_text(meta.read_text().replace(",2", ",0").replace(",1", ",2").replace(",0", ",1"))
+    with pytest.raises(
+        FormatError, match="drive against the direction of their lanes in the recording's drivingDirection"
+    ):
+        import_levelx(tmp_path)
+
+
 def test_highd_without_its_meta_file_is_refused(tmp_path, capsys):
     _highd(tmp_path, 0.0, 0.0)
     (tmp_path / "01_recordingMeta.csv").unlink()

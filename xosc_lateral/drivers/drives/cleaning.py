@@ -11,6 +11,7 @@ import numpy as np
 from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.limits import DRIVE_SPAN, TIME
+from xosc_lateral.drivers.drives.cuts import MAX_GAP
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.drives.frozen import frozen_rows
 from xosc_lateral.drivers.drives.markings import both_markings
@@ -26,6 +27,10 @@ MAX_MEDIAN_SPEED = 50.0
 
 MAX_OUTSIDE = 0.01
 """Share of rows farther than one lane width from the lane centre that is still taken for glitches. [-]"""
+
+OWN_ROWS = 0.3
+"""Share of a column's values in rows without a place that speaks of a bus of its own: all, less those that coincide;
+where a camera loses the lane for that long, other columns are bridged over 0.5 s, and no more. [-]"""
 
 CONTRADICTION = 0.05
 """Two rows of one time further apart than this contradict each other [m] ..."""
@@ -71,6 +76,9 @@ def clean_drive(
         What messages call the source.
     """
     columns = _in_order(columns, name, path)
+    if RUN not in columns:
+        place = np.isfinite(_position(columns)[0])
+        columns = {key: _bridged(key, columns, levels, place) for key in columns}
     offset, lane_width = _position(columns)
     _check_units(name, columns, offset, lane_width, path)
     narrow = (lane_width < LANE_WIDTHS[0] / 2) | (lane_width > 2 * LANE_WIDTHS[1])
@@ -112,6 +120,22 @@ def _stated(column: str, columns: Mapping[str, FloatArray], good: BoolArray, pat
         )
         raise FormatError(what, path=path, element=f"column {column!r}")
     return float(values[0])
+
+
+def _bridged(name: str, columns: Mapping[str, FloatArray], levels: frozenset[str], place: BoolArray) -> FloatArray:
+    """A context column at the rows with a `place`, where it comes in rows of its own, as buses are joined: without
+    gaps as short as those of the offset that are bridged. Others stay as they are: no value, "there is none"."""
+    values, time = columns[name], columns["time"]
+    known = np.flatnonzero(~np.isnan(values))
+    if name in DRIVE_COLUMNS or not len(known) or (~place[known]).mean() < OWN_ROWS:
+        return values
+    after = np.searchsorted(known, np.arange(len(values)))
+    before, after = known[np.maximum(after - 1, 0)], known[np.minimum(after, len(known) - 1)]
+    short = np.isnan(values) & (before < after) & (time[after] - time[before] <= MAX_GAP + 1e-9)
+    if name in levels or not np.isfinite(values[known]).all():
+        nearest = np.where(time - time[before] <= time[after] - time, before, after)
+        return np.where(short, values[nearest], values)
+    return np.where(short, np.interp(time, time[known], values[known]), values)
 
 
 def _seen_through(drive: Drive) -> Drive:

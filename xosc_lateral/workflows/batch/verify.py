@@ -75,6 +75,8 @@ class _Origin:
             for name in ("inputs", "profiles"):
                 if not isinstance(facts[name], dict):
                     raise TypeError(f"{name} are no object")
+            if not all(isinstance(one, str) for one in (settings.profile, *settings.entity.values())):
+                raise TypeError("a profile is no text")
             variant = int(facts["variant"])
             if variant < 1:
                 raise ValueError(f"variant {variant}")

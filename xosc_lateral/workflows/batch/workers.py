@@ -43,8 +43,8 @@ CHECK_EVERY = 5.0
 SIGNAL_EVERY = 0.2
 """How often it is looked whether a signal has come. [s]"""
 
-FINISH_TIME = 5.0
-"""What is at work when a signal comes may go on for so long. [s]"""
+FINISH_TIME = 10.0
+"""What is handed out when a signal comes may go on for so long. [s]"""
 
 
 class ClusterError(XoscLateralError):
@@ -132,6 +132,11 @@ class _LocalProcesses(Pool):
         threads = dict.fromkeys(
             ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
         )
+        if sys.platform != "win32":
+            from multiprocessing.resource_tracker import ensure_running
+
+            with _safe_path():
+                ensure_running()  # it unblocks signals: before workers start, which are to have them blocked
         with _safe_path():
             return ProcessPoolExecutor(
                 max_workers=self._count, env=threads | _SAFE, initializer=_end_with_parent, initargs=(os.getpid(),)
@@ -145,13 +150,17 @@ _SAFE = {"PYTHONSAFEPATH": "1"}
 def _safe_path() -> Iterator[None]:
     """Python processes that start meanwhile import nothing from the working folder, which may be anybody's.
 
-    Workers are told in their own environment; joblib's process that tracks their resources has this one's.
+    Workers are told in their own environment; joblib's process that tracks their resources has this one's. And no
+    signal that a terminal sends to everybody reaches them: the run decides what becomes of its workers.
     """
     before = os.environ.get(next(iter(_SAFE)))
     os.environ.update(_SAFE)
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING) if hasattr(signal, "pthread_sigmask") else None
     try:
         yield
     finally:
+        if mask is not None:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         del os.environ[next(iter(_SAFE))]
         os.environ.update({name: before for name in _SAFE if before is not None})
 
@@ -163,7 +172,7 @@ def _end_with_parent(parent: int) -> None:
     and if the run was gone before this was said, a thread looks every `PARENT_CHECK`.
     """
     let_worker_die()
-    for number in ENDING:  # a terminal sends them to everybody: the run decides what becomes of its workers
+    for number in ENDING:
         signal.signal(number, signal.SIG_IGN)
     if sys.platform.startswith("linux"):
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
@@ -342,9 +351,8 @@ def _wait_for_any(pool: Pool, running: Collection[Future[Result]]) -> Collection
 
 
 def _finished(running: Mapping[Future[Result], Task]) -> Iterator[tuple[Task, Result]]:
-    """Results of what was at work and ends well within `FINISH_TIME`; what was not is not begun."""
-    at_work = [future for future in running if not future.cancel()]
-    for future in wait(at_work, FINISH_TIME, ALL_COMPLETED).done:
+    """Results of what was handed out, as far as it ends well within `FINISH_TIME`; workers may hold it already."""
+    for future in wait(running, FINISH_TIME, ALL_COMPLETED).done:
         if not future.cancelled() and future.exception() is None:
             yield running[future], future.result()
 

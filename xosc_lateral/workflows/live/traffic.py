@@ -184,7 +184,11 @@ class Traffic:
     # ---- model steps -------------------------------------------------------------------------------------------------
     def is_due(self, time: float) -> bool:
         """Whether `step` at `time` [s] will look at the context: lane widths and places matter then only."""
-        return time >= self._step * self._knots - 1e-9 or self._time is None
+        return self._time is None or self._knots_until(time) > self._knots
+
+    def _knots_until(self, time: float) -> int:
+        """Model steps begun by a time [s], which a simulation may have added up from many steps of its own."""
+        return int(np.floor(time / self._step + 1e-9)) + 1
 
     def _context(self, moment: Moment) -> dict[str, FloatArray]:
         """What everybody sees, checked before anything changes."""
@@ -217,8 +221,8 @@ class Traffic:
         """On to the model step that is now, or to the last one of those that have passed."""
         if self._columns is None:
             self._columns = tuple(sorted(context))
-            self._knots = max(self._knots, int(np.floor(time / self._step + 1e-9)))
-        due = int(np.floor(time / self._step + 1e-9)) + 1 - self._knots
+            self._knots = self._knots_until(time) - 1
+        due = self._knots_until(time) - self._knots
         self._knots += due
         row, width = {moment.names[k]: k for k in there.tolist()}, context["lane_width"]
         known = {name for _, members in self._groups.values() for name in members}

@@ -30,6 +30,7 @@ from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.tables import read_table
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings, Rows, cut_table
+from xosc_lateral.workflows.recordings.gate import require_lane_direction
 from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
 from xosc_lateral.workflows.recordings.neighbours import REACH, find_neighbours
 
@@ -129,6 +130,8 @@ def _from_highd(
     meta = tracks_meta.set_index("id").reindex(tracks["id"])
     rightwards = meta["drivingDirection"].to_numpy() == 2
     way = np.where(rightwards, 1.0, -1.0)
+    velocity = tracks["xVelocity"].to_numpy(dtype=np.float64)
+    require_lane_direction(way * np.sign(velocity), np.abs(velocity), "the recording's drivingDirection", path)
     # y points down: for traffic towards +x the left is at smaller y.
     x = way * (tracks["x"] + 0.5 * tracks["width"]).to_numpy()
     left = -way * (tracks["y"] + 0.5 * tracks["height"]).to_numpy()
