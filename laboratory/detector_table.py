@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.files.pages.chart import BLUE, MUTED, VERMILLION
+from xosc_lateral.files.pages.chart import BLUE, DASHED, GREEN, MUTED, VERMILLION
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.workflows.detection.detectors import NO_DANGER, Detector
 from xosc_lateral.workflows.detection.logistic import Logistic
@@ -22,6 +22,7 @@ Views = list[tuple[Scene, list[View]]]
 TUNED_RATE = 5.0
 """False alarms that a detector is tuned to at most. [1/h]"""
 TUNED = ("lateral-speed", "wandering-zone", "time-to-line")
+ASIDE = ("paper", "single")
 EQUAL_SHARE = 0.95
 """Cut-ins seen before the marking at which trained detectors are compared. [-]"""
 DRAWS = 500
@@ -34,6 +35,11 @@ class Pool:
     name: str
     curves: Sequence[Curve]
 
+    @property
+    def is_single_run(self) -> bool:
+        """Whether it is one of the runs with differential GNSS."""
+        return self.name.startswith("real: RTK")
+
     @classmethod
     def of(cls, name: str, views: Views, detectors: Sequence[Detector]) -> Pool:
         """Run detectors on it."""
@@ -45,19 +51,25 @@ class Pool:
 
 
 def alarm_lines(pools: Sequence[Pool]) -> str:
-    """False alarms by threshold of lateral speed."""
+    """False alarms by threshold of lateral speed; of single runs the range."""
     thresholds = [curve.detector.setting for curve in pools[0].curves]
     heads = [f"{threshold:.2f} m/s" for threshold in thresholds]
     lines = ["| traffic | hours | " + " | ".join(heads) + " |", "|---" * (2 + len(heads)) + "|"]
     for pool in pools:
-        cells = [_rate(curve) for curve in pool.curves]
-        lines.append(f"| {pool.name} | {pool.curves[0].hours.sum():.2f} | " + " | ".join(cells) + " |")
+        if not pool.is_single_run:
+            cells = [_rate(curve) for curve in pool.curves]
+            lines.append(f"| {pool.name} | {pool.curves[0].hours.sum():.2f} | " + " | ".join(cells) + " |")
+    runs = [[float(curve.rate[curve.detector.chosen]) for curve in pool.curves] for pool in pools if pool.is_single_run]
+    if runs:
+        hours = sum(float(pool.curves[0].hours.sum()) for pool in pools if pool.is_single_run)
+        cells = [f"{min(rates):.1f} to {max(rates):.1f}" for rates in zip(*runs, strict=True)]
+        lines.append(f"| real: {len(runs)} GNSS runs singly | {hours:.2f} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
 
 def default_lines(pools: Sequence[Pool]) -> str:
     """Every rule at its default: false alarms an hour, and the median time before the marking."""
-    shown = _shown(pools)
+    shown = [pool for pool in _shown(pools) if pool.name not in ("nominal", "lifelike: rural")]
     lines = ["| detector | " + " | ".join(pool.name for pool in shown) + " |", "|---" * (1 + len(shown)) + "|"]
     for number, first in enumerate(pools[0].curves):
         curves = [pool.curves[number] for pool in shown]
@@ -76,9 +88,7 @@ def tuned_lines(pools: Sequence[Pool]) -> str:
         cells = []
         for number in rules:
             k, curve = pool.curves[number].tuned(TUNED_RATE), real.curves[number]
-            low, high = curve.rate_interval()[:, k]
-            rate = f"{curve.rate[k]:.0f} ({low:.0f} to {high:.0f})"
-            cells.append(f"{curve.detector.thresholds[k]:g}: {rate}, {_lead(curve, k)}")
+            cells.append(f"{curve.detector.thresholds[k]:g}: {curve.rate[k]:.0f}, {_lead(curve, k)}")
         lines.append(f"| {pool.name} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
@@ -155,7 +165,7 @@ def trained_lines(detectors: Mapping[str, Logistic], held: Views, runs: Views, s
     lines = [
         f"Sensor: {sensor}.",
         "",
-        "| trained on | false alarms an hour | fewer than trained on nominal | on the RTK runs |",
+        "| trained on | false alarms an hour | fewer than trained on nominal | on the GNSS runs |",
         "|---|---|---|---|",
     ]
     for name, one in found.items():
@@ -182,12 +192,21 @@ def alarm_figure(pools: Sequence[Pool]) -> Figure:
     """False alarms by threshold of lateral speed: nominal, lifelike, real."""
     figure = Figure(1, 1, height=210.0, legend=True)
     panel = figure.row(0)[0]
-    for kind, color in (("real", MUTED), ("lifelike", BLUE)):
-        chosen = [pool for pool in pools if pool.name.startswith(kind) and not pool.name.endswith("paper")]
-        chosen = [pool for pool in chosen if "vehicle" not in pool.name]
+    drawn = [
+        ("real", MUTED, "", lambda name: name.startswith("real")),
+        (
+            "lifelike",
+            BLUE,
+            "",
+            lambda name: name.startswith("lifelike") and "paper" not in name and "single" not in name,
+        ),
+        ("the paper's model", GREEN, DASHED, lambda name: "paper" in name),
+    ]
+    for kind, color, dashes, belongs in drawn:
+        chosen = [pool for pool in pools if belongs(pool.name)]
         for pool in chosen:
-            curve = pool.curves[0]
-            panel.line(*_course(curve), color, label=kind if pool is chosen[0] else "", width=1.6)
+            label = kind if pool is chosen[0] else ""
+            panel.line(*_course(pool.curves[0]), color, label=label, width=1.6, dashes=dashes)
     nominal = next(pool for pool in pools if pool.name == "nominal").curves[0]
     panel.line(
         nominal.detector.thresholds, np.full(len(nominal.rate), LEAST), VERMILLION, label="nominal: none", width=2.4

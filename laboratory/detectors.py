@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from zlib import crc32
@@ -34,6 +34,8 @@ from xosc_lateral.workflows.detection.tracks import Scene
 Views = list[tuple[Scene, list[View]]]
 
 SEED = 55
+SWERVES = ("_4_1_2_", "_4_6_2_")
+"""ALKS scenarios with a vehicle that moves sideways in its lane as written: no lane keeping, and left out."""
 SHORTCUT_VARIANTS = 8
 """Of each scenario for the shortcut test, times --variants: six scenarios have eight lane changes."""
 SPEEDS = (0.10, 0.15, 0.20, 0.25)
@@ -49,6 +51,14 @@ class Given:
     runs: Sequence[Path]
     templates: Path
     variants: int
+
+    @property
+    def scenarios(self) -> list[Path]:
+        """Our templates and the ALKS scenarios."""
+        return [
+            self.templates,
+            *(path for path in sorted(self.alks.glob("*.xosc")) if not any(map(path.name.count, SWERVES))),
+        ]
 
 
 def half_of(scenes: Iterable[Scene], half: int) -> Iterator[Scene]:
@@ -68,9 +78,12 @@ def seen(scenes: Iterable[Scene], sensor: Sensor = PERFECT) -> Views:
     return [(scene, views_of(scene, sensor, SEED)) for scene in scenes]
 
 
-def scenes_of(paths: Sequence[Path], profile: str = "", variants: int = 0) -> Iterator[Scene]:
+def scenes_of(
+    paths: Sequence[Path], profile: str = "", variants: int = 0, lane_changes: str = "written"
+) -> Iterator[Scene]:
     """Scenes of scenarios as written; with a profile, of their lifelike variants."""
-    settings = SourceSettings(ConvertSettings.of(seed=SEED), variants, (profile,) if profile else (), "none")
+    convert = ConvertSettings.of(seed=SEED, lane_changes=lane_changes)
+    settings = SourceSettings(convert, variants, (profile,) if profile else (), "none")
     for path in paths:
         written, *lifelike = sources_of(path, settings)
         for source in lifelike or [written]:
@@ -85,7 +98,9 @@ def recorded(path: Path) -> tuple[Scene, ...]:
 
 @cache
 def drive_table(path: Path) -> pd.DataFrame:
-    return xl.import_drives("dlr-ht", path).to_frame()
+    """Of the motorway recording, without the one vehicle beyond 50 m/s that `fit` refuses."""
+    table = xl.import_drives("dlr-ht", path).to_frame()
+    return table[table.groupby("drive")["speed"].transform("median") <= 50.0]
 
 
 def run_scenes(path: Path) -> list[Scene]:
@@ -96,7 +111,7 @@ def run_scenes(path: Path) -> list[Scene]:
 
 def pools(given: Given, folder: Path) -> dict[str, Views]:
     """Traffic by what it is: nominal, lifelike by profile, the paper's model, real."""
-    scenarios = [given.templates, given.alks]
+    scenarios = given.scenarios
     paper = xl.write_profile(xl.fit(drive_table(given.wheel), name="paper", model="two-level"), folder / "paper.json")
     shipped = [profile.stem for profile in sorted(shipped_folder("driver_profiles").glob("*.json"))]
     single = [name for name in shipped if "-vehicle-" in name]
@@ -117,17 +132,17 @@ def pools(given: Given, folder: Path) -> dict[str, Views]:
 # ---- trained on one, tested on another -------------------------------------------------------------------------------
 def training(given: Given, folder: Path) -> dict[str, list[Scene]]:
     """Scenes by what they are; no vehicle of the recording's other half had a part in any of them."""
-    table, scenarios = drive_table(given.wheel), [given.templates, given.alks]
+    table, scenarios = drive_table(given.wheel), given.scenarios
     half = xl.write_profile(
         xl.fit(table[[_half(name) == 0 for name in table["drive"]]], name="half"), folder / "half.json"
     )
-    found = {
+    lifelike = partial(scenes_of, scenarios, str(half), 2 * given.variants)
+    return {
         "nominal": list(scenes_of(scenarios)),
-        "lifelike: half of the recording": list(scenes_of(scenarios, str(half), 2 * given.variants)),
+        "lifelike: half of the recording": list(lifelike()),
+        "the same, lane changes lifelike": list(lifelike(lane_changes="lifelike")),
+        "real: half of the recording": list(half_of(recorded(given.wheel), 0)),
     }
-    if (shipped_folder("driver_profiles") / "rural.json").exists():
-        found["lifelike: rural"] = list(scenes_of(scenarios, "rural", 2 * given.variants))
-    return found | {"real: half of the recording": list(half_of(recorded(given.wheel), 0))}
 
 
 def main() -> None:

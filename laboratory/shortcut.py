@@ -13,7 +13,7 @@ from scipy.stats import rankdata
 
 import xosc_lateral as xl
 from xosc_lateral.workflows.conversion.load import play_scenario
-from xosc_lateral.workflows.detection.logistic import features, fit_regression
+from xosc_lateral.workflows.detection.logistic import FEATURES, features, fit_regression
 from xosc_lateral.workflows.detection.observation import View
 from xosc_lateral.workflows.detection.sources import played_scene
 from xosc_lateral.workflows.detection.tracks import STEP, Scene
@@ -124,6 +124,13 @@ def told_before(moments: Moments, seed: int = 0) -> tuple[float, float, float]:
     return area(score, moments.positive), float(low), float(high)
 
 
+def strongest(moments: Moments) -> str:
+    """Feature with the largest standardised coefficient, and its sign."""
+    found = fit_regression(moments.columns, moments.positive).coefficients[1:]
+    k = int(np.argmax(np.abs(found)))
+    return f"{'more' if found[k] > 0 else 'less'} {FEATURES[k]}"
+
+
 def shortcut_lines(replays: Views, reactive: Views, nominal: Views, real: Views) -> str:
     """A row for each kind of output, beside real drives."""
     written = begins_of(nominal)
@@ -134,8 +141,11 @@ def shortcut_lines(replays: Views, reactive: Views, nominal: Views, real: Views)
         ("reactive outputs", moments_of(reactive), "by movement"),
         ("real: motorway recording", moments_of(real), "by movement"),
     ]
-    lines = ["| traffic | beginning of the lane change | lane changes | AUC, 5 to 0 s before |", "|---|---|---|---|"]
+    heads = "traffic", "beginning of the lane change", "lane changes", "AUC, 5 to 0 s before", "strongest feature"
+    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     for name, moments, kind in rows:
         auc, low, high = told_before(moments)
-        lines.append(f"| {name} | {kind} | {moments.changes} | {auc:.2f} ({low:.2f} to {high:.2f}) |")
+        lines.append(
+            f"| {name} | {kind} | {moments.changes} | {auc:.2f} ({low:.2f} to {high:.2f}) | {strongest(moments)} |"
+        )
     return "\n".join(lines)

@@ -8,16 +8,19 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import xosc_lateral as xl
-from tests.workflows.detection.made import lane_change, scene, track
+from tests.kit.lane_tracks import lane_change, scene, track
 from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.cli import main
 from xosc_lateral.workflows.detection.command import Command
 from xosc_lateral.workflows.detection.detectors import WanderingZone
 from xosc_lateral.workflows.detection.observation import PERFECT, Sensor, views_of
 from xosc_lateral.workflows.detection.scoring import Tally
+from xosc_lateral.workflows.detection.sources import SourceSettings, sources_of
+from xosc_lateral.workflows.detection.tracks import STEP
 
 ZONE = """
 import json, sys
@@ -33,9 +36,10 @@ for line in sys.stdin:
 
 AWK = r"""{
   time = $0; sub(/^\{"time": /, "", time); sub(/,.*/, "", time)
-  offset = $0; sub(/.*"A": \{"offset": /, "", offset); sub(/,.*/, "", offset)
-  if (offset + 0 > 0.5) printf "{\"time\": %s, \"vehicles\": {\"A\": {\"score\": 1, \"side\": \"left\"}}}\n", time
-  else printf "{\"time\": %s, \"vehicles\": {}}\n", time
+  if (!match($0, /"CutIn": \{"offset": [-0-9.e]+/)) { printf "{\"vehicles\": {}}\n"; fflush(); next }
+  offset = substr($0, RSTART, RLENGTH); sub(/.*: /, "", offset); offset += 0
+  side = offset > 0 ? "left" : "right"; size = offset > 0 ? offset : -offset
+  printf "{\"time\": %s, \"vehicles\": {\"CutIn\": {\"score\": %d, \"side\": \"%s\"}}}\n", time, (size > 0.3), side
   fflush()
 }"""
 
@@ -65,17 +69,40 @@ def test_a_program_with_the_rule_of_a_built_in_one_scores_the_same(sensor, tmp_p
     assert built_in.counts[:, built_in.detector.chosen].sum() > 0
 
 
+def awk(folder: Path) -> str:
+    """A program in another language that knows `offset` alone."""
+    (folder / "mine.awk").write_text(AWK)
+    return f"{'gawk' if shutil.which('gawk') else 'mawk -W interactive'} -f {folder / 'mine.awk'}"
+
+
 @pytest.mark.skipif(shutil.which("mawk") is None and shutil.which("gawk") is None, reason="no awk that flushes")
-def test_a_program_in_another_language_alarms_where_the_states_say(tmp_path):
-    (tmp_path / "mine.awk").write_text(AWK)
-    awk = "gawk" if shutil.which("gawk") else "mawk -W interactive"
-    made = made_scene()
-    views = views_of(made, PERFECT, 0)
-    scores = Command(f"{awk} -f {tmp_path / 'mine.awk'}").scores(made, views)
-    for view, score in zip(views, scores, strict=True):
-        offset = np.round(view.track.rows.offset, 6)
-        wanted = (offset > 0.5) if (view.track.name, view.side) == ("A", 1) else np.zeros(len(offset), dtype=bool)
-        np.testing.assert_array_equal(score, wanted)
+def test_a_program_in_another_language_alarms_where_the_states_of_three_sources_say(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    xl.write_template("cut-in", tmp_path)
+    xl.convert("cut-in.xosc", "lifelike.xosc", ego="none", seed=2)
+    states = xl.play("lifelike.xosc", step=STEP)
+    states.write("states.csv")
+    frame = states.to_frame()
+    mine = frame[frame["name"] == "CutIn"]
+    along = np.where(mine["lane"] < 0, 1.0, -1.0)  # right-hand traffic: lanes with negative numbers run along s
+    played = dict(zip(mine["time"].round(3), along * mine["offset_t"], strict=True))
+    time = STEP * np.arange(1200)
+    pd.DataFrame({"drive": "CutIn", "time": time, "offset": 0.5 * np.sin(time), "lane_width": 3.5}).to_csv("drive.csv")
+    measured = dict(zip(time.round(3), 0.5 * np.sin(time), strict=True))
+    wanted = {"lifelike.xosc": played, "states.csv": played, "drive.csv": measured}
+    for path, offsets in wanted.items():
+        road = Path("cut-in.xodr") if path == "states.csv" else None
+        (source,) = sources_of(Path(path), SourceSettings(road=road, ego="none"))
+        (one,) = source.scenes()
+        views = views_of(one, PERFECT, 0)
+        for view, score in zip(views, Command(awk(tmp_path)).scores(one, views), strict=True):
+            if view.track.name == "CutIn":
+                known = np.array([offsets[moment] for moment in view.track.time.round(3).tolist()])
+                sure = np.ones(len(known), dtype=bool)
+                if path == "states.csv":  # recordings are thinned to 0.1 s, rows between are interpolated
+                    sure = (np.abs(np.abs(known) - 0.3) > 0.01) & (np.abs(known) < 1.7)
+                np.testing.assert_array_equal(score[sure] > 0.5, (view.side * known > 0.3)[sure], err_msg=path)
+                assert 0 < (score > 0.5).sum() < len(score)
 
 
 ANSWER = "import sys\nfor line in sys.stdin:\n    print({!r}, flush=True)\n"

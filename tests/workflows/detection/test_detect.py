@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 import xosc_lateral as xl
-from tests.workflows.detection.made import lane_change, weave
+from tests.kit.lane_tracks import lane_change, weave
 from xosc_lateral.cli import main
 
 
@@ -45,11 +45,14 @@ def test_a_variant_is_what_convert_writes_and_play_plays(folder):
     assert [one[name] for name in names] == pytest.approx([other[name] for name in names])
 
 
-def test_a_table_of_states_on_its_road_gives_what_the_scenario_gives(folder):
-    xl.play("cut-in.xosc").write("states.csv")
+@pytest.mark.parametrize("writer", ["play", "live"])
+def test_a_table_of_states_on_its_road_gives_what_the_scenario_gives(writer, folder):
+    states = xl.play("cut-in.xosc").to_frame()
+    if writer == "live":
+        states = states.drop(columns=["z", "offset_t"]).assign(driver="", steered=0)
+    states.to_csv("states.csv", index=False)
     one = row(xl.detect("cut-in.xosc", ego="Ego"), "cut-in", "lateral-speed")
-    states = xl.detect("states.csv", road="cut-in.xodr", ego="Ego")
-    other = row(states, "states", "lateral-speed")
+    other = row(xl.detect("states.csv", road="cut-in.xodr", ego="Ego"), "states", "lateral-speed")
     assert one["cut_ins"] == other["cut_ins"] == 1
     assert other["lead_median"] == pytest.approx(one["lead_median"], abs=0.11)
 

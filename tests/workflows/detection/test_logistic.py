@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from tests.workflows.detection.made import lane_change, scene, track, weave
+from tests.kit.lane_tracks import lane_change, scene, track, weave
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.workflows.detection.logistic import PENALTY, Logistic, features, fit_regression, train
 from xosc_lateral.workflows.detection.observation import PERFECT, views_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.workflows.detection.made import LANE, lane_change, scene, track, weave
+from tests.kit.lane_tracks import LANE, lane_change, scene, track, weave
 from xosc_lateral.workflows.detection.detectors import LateralSpeed, MarkingDistance, WanderingZone
 from xosc_lateral.workflows.detection.observation import PERFECT, RATE_WINDOW, Sensor, views_of
 from xosc_lateral.workflows.detection.scoring import Tally, count_onsets, lead_times

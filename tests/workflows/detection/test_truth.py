@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.workflows.detection.made import LANE, WIDTH, lane_change, track
+from tests.kit.lane_tracks import LANE, WIDTH, lane_change, track
 from xosc_lateral.workflows.detection.tracks import STEP
 from xosc_lateral.workflows.detection.truth import moves_in_lane, truth_of
 

@@ -27,6 +27,7 @@ from tests.kit.recordings import (
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main
 from xosc_lateral.workflows.recordings.importing import import_drives
+from xosc_lateral.workflows.recordings.recordings import read_recording
 
 
 def gap(case: Case) -> float:
@@ -106,6 +107,8 @@ def test_tracks_of_the_other_side_or_mirrored_are_refused(case: Case, tmp_path: 
     case.tracks().to_csv(tmp_path / "tracks.csv", index=False)
     with pytest.raises(FormatError, match=r"100 % of the moving rows drive against .* road_"):
         import_drives("tracks", tmp_path / "tracks.csv", road=road_file(other, tmp_path))
+    with pytest.raises(FormatError, match="100 % of the moving rows drive against"):
+        read_recording(tmp_path / "tracks.csv", road=road_file(other, tmp_path))
     mirrored = case.tracks().assign(y=lambda rows: -rows["y"], heading=lambda rows: -rows["heading"])
     mirrored.to_csv(tmp_path / "tracks.csv", index=False)
     with pytest.raises(FormatError, match="y may point down"):

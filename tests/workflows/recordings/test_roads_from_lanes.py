@@ -79,6 +79,18 @@ def test_a_lane_that_ends_before_its_neighbour_has_no_width_from_there_on():
         assert network.lane_state_at(0, -2, s)[::2] == pytest.approx((-0.5 * WIDTH, WIDTH), abs=2e-3)
 
 
+def test_a_road_lies_along_the_straightest_of_its_lanes():
+    """Lanes in junctions are drawn with bends of a few metres, on which lengths beside the line say nothing."""
+    bent = np.array([[0.0, 0.0], [1.0, 0.3], [2.0, -0.3], [4.0, 0.0]])
+    lanes = [
+        DrivenLane(bent, bent - [0.0, WIDTH], 1, []),
+        DrivenLane(np.array([[0.0, WIDTH], [4.0, WIDTH]]), np.array([[0.0, 0.0], [4.0, 0.0]]), -1, []),
+    ]
+    network = parse_opendrive(roads_of_lanes(lanes, "x").encode(), "x")
+    assert network.roads[0].length == pytest.approx(4.0)
+    assert max(abs(network.curvature_at(0, s)) for s in (0.0, 1.0, 2.0, 3.0)) == 0.0
+
+
 def test_roads_that_meet_lead_on_into_one():
     one, other = (
         DrivenLane(np.array([[0.0, y], [50.0, 1.6]]), np.array([[0.0, y - 3.2], [50.0, -1.6]]), -1, [2])
@@ -88,6 +100,30 @@ def test_roads_that_meet_lead_on_into_one():
     network = parse_opendrive(roads_of_lanes([one, other, onward], "x").encode(), "x")
     for road in (0, 1):
         assert [(link.road, link.lane, link.direction) for link in network.next_lanes(road, -1, 1)] == [(2, -1, 1)]
+
+
+def test_a_lane_change_waits_for_the_lane_that_it_leads_to(tmp_path):
+    """A lane is added on the left at 100 m; the car is there at 5 s, but began to move over half a second before."""
+    time = np.arange(0.0, 15.0, 0.1)
+    u = np.clip((time - 4.5) / 4.0, 0.0, 1.0)
+    y = -0.5 * WIDTH + WIDTH * 0.5 * (1.0 - np.cos(np.pi * u))
+    pd.DataFrame({"id": "a", "time": time, "x": 20.0 * time + 1.35, "y": y}).to_csv(tmp_path / "a.csv", index=False)
+
+    def straight(t: float, start: float, end: float) -> np.ndarray:
+        return np.array([[start, t], [end, t]])
+
+    lanes = [
+        DrivenLane(straight(0.0, 0.0, 100.0), straight(-WIDTH, 0.0, 100.0), -1, [1]),
+        DrivenLane(straight(0.0, 100.0, 400.0), straight(-WIDTH, 100.0, 400.0), 2, []),
+        DrivenLane(straight(WIDTH, 100.0, 400.0), straight(0.0, 100.0, 400.0), -1, []),
+    ]
+    (tmp_path / "road.xodr").write_text(roads_of_lanes(lanes, "road"))
+    made = xl.reconstruct(tmp_path / "a.csv", tmp_path / "out", road=tmp_path / "road.xodr")
+    (change,) = made.to_dict()["maneuvers"]
+    assert 5.0 < change["start"] < 5.4 and change["start"] + change["duration"] == pytest.approx(8.5, abs=0.3)
+    rows = xl.play(tmp_path / "out/a.xosc").to_frame()
+    assert rows["y"].iloc[-1] == pytest.approx(0.5 * WIDTH, abs=0.02)
+    assert np.abs(rows["y"] - np.interp(rows["time"], time, y)).max() < 0.7  # 0.7 s late, at half the way's speed
 
 
 # ---- SUMO ------------------------------------------------------------------------------------------------------------

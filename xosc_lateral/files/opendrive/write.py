@@ -74,7 +74,7 @@ class WrittenRoad:
         """Write it into a document."""
         about = {"name": self.name, "length": decimal(float(self.plan[-1, 0] + self.plan[-1, 4]), 6)}
         road = sub(root, "road", **about, id=str(self.number), junction="-1", rule=self.rule)
-        for end, (element, number) in self.links.items():
+        for end, (element, number) in sorted(self.links.items()):  # in the schema's order
             touched = {"contactPoint": "start" if end == "successor" else "end"} if element == "road" else {}
             owner = road[0] if len(road) else sub(road, "link")
             sub(owner, end, elementType=element, elementId=str(number), **touched)

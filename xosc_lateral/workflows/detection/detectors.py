@@ -169,11 +169,14 @@ class WanderingZone(Rule):
 class TimeToLine(Rule):
     """Its side reaches the marking in less than a time [s] at its lateral speed.
 
+    Notes
+    -----
+    The default of 1 s is a choice, half of what warning systems look at (`lane_keeping.LONGEST_TLC`): see its curve.
+
     References
     ----------
     .. [1] W. van Winsum, K. A. Brookhuis, D. de Waard, Accident Analysis & Prevention 32, 2000: distance over lateral
-       speed. 1 s: S. Mammar, S. Glaser, M. Netto, IEEE Transactions on Intelligent Transportation Systems 7, 2006,
-       "Time to line crossing for lane departure avoidance".
+       speed.
     """
 
     name = "time-to-line"

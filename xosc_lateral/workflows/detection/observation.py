@@ -27,8 +27,9 @@ class Sensor:
 
     Notes
     -----
-    `USUAL_SENSOR` is a long-range radar with a camera: 0.05 m is 0.1 deg at 30 m, the azimuth accuracy on the data
-    sheet of Continental's ARS 408-21 (cycle 72 ms); 0.1 s is a cycle or two of 50 ms until an object list is out.
+    `USUAL_SENSOR` is a long-range radar with a camera: 0.05 m is 0.1 deg at 30 m, the azimuth accuracy that Continental
+    states for its ARS 408-21 (cycle 72 ms; as quoted, the data sheet could not be opened); 0.1 s is two cycles of 50 ms
+    until an object list is out. Look at several: `--sensor` takes any.
     """
 
     noise: float = 0.0  # standard deviation of each measured position, white [m]

@@ -29,8 +29,6 @@ from xosc_lateral.workflows.result import given_drives
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
 from xosc_lateral.world.road.network import RoadNetwork
 
-EVERY = 2
-"""Rows of a played scenario that are taken, 0.1 s apart as in recordings; between them motion is smooth. [rows]"""
 ACROSS_LANE = np.pi / 4
 """Heading from the lane's, beyond which a vehicle does not follow it, as in `motion.segments`. [rad]"""
 
@@ -146,7 +144,7 @@ def _present(motion: EntityMotion, network: RoadNetwork) -> Iterator[tuple[Rows,
     """Rows of an entity on roads, and those at which it was placed anew."""
     placed = np.cumsum((motion.activity & Activity.TELEPORTED) != 0)
     there = ((motion.activity & Activity.ACTIVE) != 0) & (motion.road >= 0)
-    rows = np.flatnonzero(there)[::EVERY]
+    rows = np.flatnonzero(there)
     if len(rows) > 1:
         road, lane, s = motion.road[rows], motion.lane[rows], motion.s[rows]
         turned = np.abs(np.sin(motion.heading_relative[rows])) < np.sin(ACROSS_LANE)

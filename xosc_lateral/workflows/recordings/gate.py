@@ -14,6 +14,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.world.road.network import RoadNetwork
 
 MOVING_SPEED = 3.0
 """Slower vehicles have no direction: 2 cm of noise over 0.4 s turn the way of one at 3 m/s by 1 degree. [m/s]"""
@@ -23,6 +24,9 @@ LANE_AGREEMENT = 0.7
 
 HEADING_AGREEMENT = 0.94
 """Cosine of a vehicle's heading and of its way: 20 degrees, as of its front at R = 10 m. [-]"""
+
+WITHIN_EARTH = 4e7
+"""Places beyond are none: the earth's girth. [m]"""
 
 MAX_AGAINST = 0.1
 """Share of the moving rows that may contradict: mirrored or turned recordings have all, or half where headings are
@@ -71,6 +75,19 @@ def require_lane_direction(agreement: FloatArray, speed: FloatArray, where: str,
         what = f"{100 * share:.0f} % of the moving rows drive against the direction of their lanes in {where}: {cause}"
         raise FormatError(what, path=path)
     return np.asarray(against)
+
+
+def require_along_lanes(
+    network: RoadNetwork, x: FloatArray, y: FloatArray, heading: FloatArray, speed: FloatArray, path: Path
+) -> None:
+    """Refuse places in the coordinates of a road's file that drive against its lanes. [m], [rad], [m/s]"""
+    near = np.flatnonzero(np.abs(x) + np.abs(y) < WITHIN_EARTH)
+    found = network.world_to_lane(x[near], y[near], heading=heading[near])
+    inside = (found.distance <= 0.0) & (found.lane != 0)
+    lane = network.lane_to_world(found.road[inside], found.lane[inside], found.s[inside])
+    agreement = np.full(len(near), np.nan)
+    agreement[inside] = np.cos(heading[near][inside] - lane.heading)
+    require_lane_direction(agreement, speed[near], Path(network.path).name or "its lanes", path)
 
 
 def is_right_to_left(

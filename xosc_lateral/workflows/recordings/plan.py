@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,9 @@ FRAME = 0.1
 """Vehicles appear and leave at whole multiples of this: a moment between two frames of a player would place them up to
 a frame's way off. [s]"""
 
+
+ENTERED = 0.2
+"""So long after a recorded vehicle has come onto a road, its planned one has, too: `--error` is between them. [s]"""
 
 PLAYED = 0.2
 """Share of the error's bound, and of the time between corners, for a track that was played: nothing in it is a driver's
@@ -93,7 +96,7 @@ def _plan(name: str, vehicle: RecordedVehicle, network: RoadNetwork, length: flo
     appears = None if time[0] < FRAME + 1e-9 else float(np.ceil(time[0] / FRAME - 1e-6) * FRAME)
     leaves = None if time[-1] > length - 1.5 * FRAME else float(np.floor(time[-1] / FRAME + 1e-6) * FRAME)
     begin = 0.0 if appears is None else appears
-    lateral = lateral_plan(vehicle, begin if appears is None else begin + FRAME)
+    lateral = _beside_lanes(lateral_plan(vehicle, begin if appears is None else begin + FRAME), vehicle, network)
     poses = vehicle.poses(network, lateral.at(time) - vehicle.levels[0])
     dx, dy = np.diff(poses.x), np.diff(poses.y)
     ahead_of_row = dx * np.cos(poses.heading[1:]) + dy * np.sin(poses.heading[1:])
@@ -149,6 +152,23 @@ def _from(speed: SpeedProfile, begin: float) -> SpeedProfile:
     first = float(np.interp(begin, speed.time, speed.speed))
     start = float(speed.way(np.array([begin]))[0])
     return SpeedProfile(np.r_[begin, speed.time[later]], np.r_[first, speed.speed[later]], start)
+
+
+def _beside_lanes(lateral: LateralPlan, vehicle: RecordedVehicle, network: RoadNetwork) -> LateralPlan:
+    """With lane changes that begin where the lane that they lead to is there: it may come with the next road."""
+    transitions = list[Transition]()
+    for one in lateral.transitions:
+        rows = np.flatnonzero((vehicle.time >= one.start) & (vehicle.time < one.end - FRAME))
+        for row in rows if one.lanes else ():
+            moved = replace(one, start=float(vehicle.time[row]), duration=one.end - float(vehicle.time[row]))
+            lane = _target(vehicle, network, moved)
+            if network.has_lane_at(int(vehicle.road[row]), lane, float(vehicle.s[row])):
+                if row > rows[0]:
+                    late = min(ENTERED, 0.5 * moved.duration)
+                    one = replace(moved, start=moved.start + late, duration=moved.duration - late)
+                break
+        transitions.append(one)
+    return replace(lateral, transitions=tuple(transitions))
 
 
 def _target(vehicle: RecordedVehicle, network: RoadNetwork, one: Transition) -> int:

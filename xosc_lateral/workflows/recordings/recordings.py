@@ -18,6 +18,7 @@ from xosc_lateral.files.opendrive.write import SHOULDER, WIDTH_PIECE, WrittenLan
 from xosc_lateral.files.sumo import read_sumo_net
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.files.xml import root_tag
+from xosc_lateral.workflows.recordings.gate import require_along_lanes
 from xosc_lateral.workflows.recordings.importers import dlr_ht, levelx
 from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH, Tracks, read_tracks, tracks_of
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
@@ -31,6 +32,9 @@ STEP = 0.1
 """Rows are thinned to this: lane changes and braking last seconds. [s]"""
 REAR_AXLE = 0.3
 """Middle of a vehicle ahead of its rear axle, as a share of its length: 1.4 m of a car of 4.6 m. [-]"""
+GATE_ROWS = 20_000
+"""So many rows tell whether a recording drives along its lanes. [-]"""
+
 MAXIMUM_LENGTH = 60.0
 """Of vehicles with all that they pull: road trains have 53.5 m. [m]"""
 MAXIMUM_WIDTH = 6.0
@@ -147,6 +151,8 @@ def _on_road(tracks: Tracks, source: Path, road: Path | None, own: bytes | None 
         raise FormatError("comes without a road: give it with --road FILE.xodr", path=source)
     x, y = network.header_offset.undo(tracks.x, tracks.y)
     heading = tracks.heading - network.header_offset.heading
+    every = slice(None, None, max(1, len(x) // GATE_ROWS))
+    require_along_lanes(network, x[every], y[every], heading[every], tracks.speed[every], source)
     found, notes = [], []
     for k, rows in enumerate(_rows_of(tracks.vehicle)):
         rows = rows[_thinned(tracks.time[rows])]

@@ -21,6 +21,8 @@ SAMPLE_LENGTH = 0.5
 """Between points of a line that widths are measured at: its chord is off by 3 mm on a radius of 10 m. [m]"""
 WIDTH_TOLERANCE = 1e-3
 """Widths go in straight pieces that are within this. [m]"""
+WHOLE_LENGTH = 0.8
+"""A line of this share of the longest runs along the whole road: what it lacks is that it cuts corners. [-]"""
 ABSENCE_LENGTH = 2.0
 """A lane that ends so much before its neighbours is none from there on; less is how its boundary was cut. [m]"""
 
@@ -125,8 +127,9 @@ def _links(
 
 
 def _road(road_number: int, lanes: Sequence[DrivenLane], name: str) -> WrittenRoad:
-    """Lanes from left to right along the left line of the longest of them."""
-    line = smooth_line(max((lane.left for lane in lanes), key=_length))
+    """Lanes from left to right along the straightest of their left lines that is about as long as the longest."""
+    longest = max(_length(lane.left) for lane in lanes)
+    line = smooth_line(min((one.left for one in lanes if _length(one.left) > WHOLE_LENGTH * longest), key=_turning))
     s = np.linspace(0.0, line.length, max(2, int(np.ceil(line.length / SAMPLE_LENGTH)) + 1))
     samples = line.place(s, 0)
     sides = [(_aside(lane.left, line, s, samples), _aside(lane.right, line, s, samples)) for lane in lanes]
@@ -189,6 +192,14 @@ def smooth_line(points: FloatArray) -> ReferenceLine:
 
 def _length(points: FloatArray) -> float:
     return float(np.hypot(*np.diff(points[:, :2], axis=0).T).sum())
+
+
+def _turning(points: FloatArray) -> float:
+    """Of a line, left and right together. [rad]"""
+    steps = np.diff(points[:, :2], axis=0)
+    steps = steps[np.hypot(*steps.T) > 0.0]
+    turns = np.diff(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0])))
+    return float(np.round(np.abs(turns).sum(), 6))
 
 
 def _aside(edge: FloatArray, line: ReferenceLine, s: FloatArray, samples: FloatArray) -> FloatArray:

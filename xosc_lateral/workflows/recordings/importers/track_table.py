@@ -41,6 +41,9 @@ HEADERS: Mapping[str, tuple[str, ...]] = {
 }
 """Name -> headers that are understood, in lower case, the first that is there; others by the map."""
 
+STATE_COLUMNS = frozenset(COLUMNS) - {"z", "offset_t"}
+"""What a table of states has, whether `play` or `live` wrote it; its positions are those of reference points."""
+
 USUAL_LENGTH = {"truck": 16.5, "bus": 12.0, "trailer": 12.0, "motorcycle": 2.2, "motorbike": 2.2}
 """Where no length is given; 4.6 m for the rest (EU new cars, 2023: mean 4.4 m). [m]"""
 
@@ -119,8 +122,8 @@ def tracks_of(
     is_log: bool = False,
 ) -> Tracks:
     """Tracks of a table that is read; see `read_tracks`. `is_log`: it is one of esmini, whose units are known."""
-    is_played = set(COLUMNS) <= set(map(str, table.columns))
-    if is_played:  # a table of states, as `play` writes it
+    is_played = set(map(str, table.columns)) >= STATE_COLUMNS
+    if is_played:  # a table of states, as `play` and `live` write it
         table = table.rename(columns={"name": "vehicle", "h": "heading"})
     found = _columns(table, path, as_mapping(None) if saved is None else saved, columns)
     order = found.sort_values(["vehicle", "time"], kind="stable", ignore_index=True)
