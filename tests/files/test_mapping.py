@@ -150,6 +150,15 @@ def test_from_raw_files_to_a_tagged_library_in_five_commands(
     assert Path("team/anna.json").exists()
 
 
+def test_the_mapping_of_the_page_is_one(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "formats.md").read_text(encoding="utf-8")
+    (tmp_path / "m.toml").write_text(page.split("```toml\n")[1].split("```")[0], encoding="utf-8")
+    mapping = read_mapping(tmp_path / "m.toml")
+    assert mapping.rows == ("quality >= 2", "lane_change == 0") and mapping.missing == (-9999.0,)
+    assert mapping.classes == {"3": "truck"} and mapping.time_zone == "Europe/Berlin"
+    assert mapping.wheel_track == 1.6 and mapping.reference == "front"
+
+
 HEADERS_IN_USE = {
     "offset": (
         "LaneOffset [m]", "lane_offset", "Lane_LatOffset", "lat_offset_m", "LateralPosition", "lateral deviation",

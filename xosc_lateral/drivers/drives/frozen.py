@@ -26,12 +26,14 @@ def frozen_rows(time: FloatArray, offset: FloatArray, lane_width: FloatArray) ->
     if (~same).sum() < CHANGES or (np.diff(offset) != 0.0).sum() < CHANGES:
         return found
     edges = np.flatnonzero(np.diff(np.r_[False, same, False].astype(np.int8)))
-    for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-        count = end - first
-        usual = (same.sum() - count) / max(len(same) - count, 1)
-        lasts = time[end] - time[first] >= FROZEN_TIME
-        if lasts and len(same) * usual**count < CHANCE:
-            found[first + 1 : end + 1] = True
+    first, end = edges[::2], edges[1::2]
+    lasting = time[end] - time[first] >= FROZEN_TIME
+    repeated = int(same.sum())
+    for begin, last in zip(first[lasting].tolist(), end[lasting].tolist(), strict=True):
+        count = last - begin
+        usual = (repeated - count) / max(len(same) - count, 1)
+        if len(same) * usual**count < CHANCE:
+            found[begin + 1 : last + 1] = True
     return found
 
 

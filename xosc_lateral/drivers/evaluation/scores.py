@@ -29,7 +29,6 @@ from xosc_lateral.drivers.evaluation.metrics import METRICS, snippet_metrics
 from xosc_lateral.drivers.evaluation.parts import PartEvaluation, SnippetCondition, evaluate_parts
 from xosc_lateral.drivers.evaluation.realism import Realism, score_realism
 from xosc_lateral.drivers.evaluation.snippets import (
-    FEW_DRIVES,
     Snippets,
     sample_runs,
     sample_snippets,
@@ -210,7 +209,7 @@ def _verdict(profile: DriverProfile, runs: Sequence[Run], seed: int) -> Verdict:
     free = sample_runs(profile, runs, seed + 5, same_start=False)
     recorded = [path + error for path, error in zip(free, sensor_noise(profile, free, seed + 5), strict=True)]
     drives = {run.drive for run in runs}
-    groups = [run.drive if len(drives) >= FEW_DRIVES else f"{run.drive} {run.index}" for run in runs]
+    groups = [run.drive if len(drives) > 1 else f"{run.drive} {run.index}" for run in runs]
     measured = [
         replace(run, offset=path)
         for run, path in zip(runs, dithered([run.offset for run in runs], resolution, seed + 6), strict=True)

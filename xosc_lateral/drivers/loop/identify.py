@@ -14,12 +14,13 @@ from xosc_lateral.drivers.loop.cross_validation import Nested, Progress, nest
 from xosc_lateral.drivers.loop.dictionary import Quantities
 from xosc_lateral.drivers.loop.feedback import Feedback, find_feedback
 from xosc_lateral.drivers.loop.model import Term
+from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.search import Search
 from xosc_lateral.drivers.loop.selection import ERROR_BUDGET, Gain, Rejected, Selection, select
 from xosc_lateral.drivers.loop.terms.between import BetweenTerm, is_between
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
 from xosc_lateral.drivers.loop.terms.spread import SpreadTerm
-from xosc_lateral.drivers.loop.terms.time import TimeMeanTerm, TimeSpreadTerm
+from xosc_lateral.drivers.loop.terms.time import AS_LIKELY, StepTerm, TimeMeanTerm, TimeSpreadTerm
 from xosc_lateral.drivers.loop.timeline import Coarse, Timeline, unsized
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Drift, TimeSmooth, VarianceTrend
 from xosc_lateral.drivers.model.profile import DriverProfile
@@ -86,7 +87,7 @@ def identify(
     # products of small matrices gain nothing from threads, and lose a factor of ten to them where all cores are busy
     with threadpool_limits(1, user_api="blas"):
         search = Search.over(coarse, usable.columns, seed, ERROR_BUDGET, lambda what: progress(0.1, what))
-        selection = select(search, initial)
+        selection = _beside_time(search, select(search, initial))
         if not selection.accepted:
             return Identified(usable, selection, search.quantities)
         accepted = [one.term for one in selection.accepted]
@@ -96,6 +97,24 @@ def identify(
 
         nested = nest(search, initial, accepted, finished)
         return _worst_first(Identified(usable, selection, search.quantities, nested))
+
+
+def _beside_time(search: Search, selection: Selection) -> Selection:
+    """Columns that changed as a change with time would, which explains about as much: either may be why."""
+    for one in selection.accepted:
+        if not isinstance(one.term, MeanTerm) or not search.coarse.lasts:
+            continue
+        without = selection.without([one.term], "").final
+        test = StepTerm.test(search, without)
+        if test is None or test.term is None or not test.term.passes(search, test.p_value, without):
+            continue
+        by_time = fit_model(search.coarse, (*without.terms, test.term))
+        if by_time.log_likelihood > selection.final.log_likelihood - AS_LIKELY:
+            term = replace(one.term, alike=(*one.term.alike, ("time",)))
+            accepted = tuple(replace(other, term=term) if other is one else other for other in selection.accepted)
+            terms = [term if other is one.term else other for other in selection.final.terms]
+            selection = replace(selection, accepted=accepted, final=fit_model(search.coarse, terms))
+    return selection
 
 
 def usable_columns(

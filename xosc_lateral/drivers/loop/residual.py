@@ -24,7 +24,7 @@ import numpy as np
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.drives.resampling import in_digits
-from xosc_lateral.drivers.loop.timeline import LOCAL_S, PAD, Timeline, local_mean, smoothed
+from xosc_lateral.drivers.loop.timeline import LOCAL_S, PAD, Timeline, local_mean, missing_throughout, smoothed
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import OffsetSampler
 from xosc_lateral.drivers.model.seeds import child
@@ -95,6 +95,7 @@ def statistics_of(
         none = np.isnan(values)
         smooth = in_digits(timeline.respond(_filled(values, timeline.valid), 0.0, RESPONSE_S))
         label, middle = _binned(smooth, timeline.valid, none)
+        label[missing_throughout(values, timeline)] = -1
         if len(middle) > 1:
             labels[name], middles[name] = label, middle
     labels["time"], middles["time"] = _time_bins(timeline)

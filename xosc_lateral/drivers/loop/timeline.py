@@ -91,6 +91,18 @@ class Timeline:
         return values[np.clip(rows - round(late_s / STEP), edges[self.drive], edges[self.drive + 1] - 1)]
 
 
+def missing_throughout(values: FloatArray, timeline: Timeline) -> BoolArray:
+    """Rows of drives of ten minutes and more without a single value, shape (n,), while other drives have some.
+
+    Ten minutes without meeting anybody are no road: the column was not measured, which says which drive it is.
+    """
+    there, gone = np.isfinite(values) & timeline.valid, np.zeros(len(values), dtype=np.bool_)
+    for span in timeline.spans:
+        lasting = timeline.valid[span].sum() * timeline.step >= MIN_DRIFT_S
+        gone[span] = lasting and not there[span].any()
+    return gone if there.any() else np.zeros(len(values), dtype=np.bool_)
+
+
 def smoothed(offset: FloatArray, timeline: Timeline, times_s: Sequence[float]) -> list[FloatArray]:
     """Moving averages of a series over each of several times, shape (n,) each, in its unit."""
     return [local_mean(offset, timeline.valid, seconds, timeline.step) for seconds in times_s]

@@ -15,6 +15,7 @@ from xosc_lateral.drivers.loop.omnibus import DELAYS
 from xosc_lateral.drivers.loop.passage import Passage
 from xosc_lateral.drivers.loop.residual import LackOfFit
 from xosc_lateral.drivers.loop.selection import Rejected
+from xosc_lateral.drivers.loop.terms.time import CHANGE_WITH_TIME
 from xosc_lateral.drivers.loop.timeline import LOCAL_S
 from xosc_lateral.drivers.model.effects import Acts, Angular, ColumnEffect, Levels, Magnitude, Product
 
@@ -281,6 +282,8 @@ def group_words(name: str, result: LoopResult) -> str:
 
 def _hidden_sentence(finding: Finding) -> str:
     sentence = _HIDDEN.get(finding.kind, "")
+    if finding.effect == CHANGE_WITH_TIME:
+        sentence = "The mean position changes with time, and the drives do not tell in which form."
     detail = f"{finding.shape}; {size_words(finding)}"
     return f"{sentence} ({detail[0].upper()}{detail[1:]}.)"
 

@@ -10,6 +10,7 @@ from scipy import stats
 
 from tests.kit.coarse import coarse_of, movement
 from tests.kit.profiles import whole_terms
+from xosc_lateral.drivers.loop.columns import Column, Values
 from xosc_lateral.drivers.loop.low_frequencies import (
     SHORTEST_S,
     SPREAD_ORDERS,
@@ -183,3 +184,26 @@ def test_drives_of_one_driver_change_alike() -> None:
     outcome = TimeSpreadTerm.test(search_of(coarse), fit_model(coarse, ()))
     assert outcome is not None
     assert outcome.p_value < ERROR_BUDGET["time_spread"]
+
+
+def change(form: str, size: float) -> Coarse:
+    """40 min of 0.1 m of movement whose mean changes in a form, and a switch that goes on when a step would be."""
+    rng = np.random.default_rng(71)
+    n = round(2400.0 / 0.2)
+    time = 0.2 * np.arange(n)
+    switch = (time > 1000.0).astype(float)
+    course = {"step": switch, "settling": np.exp(-time / 300.0), "smooth": 0.5 * np.cos(np.pi * time / 2400.0)}[form]
+    return coarse_of(size * course + movement(rng, 2400.0, 3.0), {"switch": switch})
+
+
+@pytest.mark.parametrize("form", ["step", "settling", "smooth"])
+def test_the_true_form_of_a_change_is_never_ruled_out(form: str) -> None:
+    coarse = change(form, 0.2)
+    columns = [Column("switch", Values.SWITCH, False, levels=(0.0, 1.0))]
+    test = StepTerm.test(Search.over(coarse, columns, np.random.SeedSequence(1), ERROR_BUDGET), fit_model(coarse, ()))
+    assert test is not None and test.term is not None
+    assert test.p_value < ERROR_BUDGET["time_mean"]
+    named = "step" if isinstance(test.term, StepTerm) else test.term.form
+    assert form in (named, *test.term.others)
+    # a column that changes once, just then, is a candidate as well
+    assert (("switch",) in test.term.alike) is (form == "step")

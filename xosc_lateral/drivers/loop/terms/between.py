@@ -22,6 +22,7 @@ from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage
 from xosc_lateral.drivers.loop.search import Search
 from xosc_lateral.drivers.loop.significance import MANY_DRIVES, LoopSeed, as_one_degree, upper_tail
 from xosc_lateral.drivers.loop.terms.column import ColumnTerm, of_kind
+from xosc_lateral.drivers.loop.timeline import missing_throughout
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect, Linear
 from xosc_lateral.drivers.model.seeds import generator
 
@@ -64,6 +65,8 @@ class BetweenTerm(ColumnTerm):
             if isinstance(candidate.effect, Linear) and search.columns[candidate.columns[0]].gaps:
                 # a line in a distance would set a neighbour who is far away apart from one who is gone
                 continue
+            if missing_throughout(coarse.context[candidate.columns[0]], coarse.timeline).any():
+                continue  # it would say which drive it is
             mean = places.left(coarse.by_drive(values.astype(np.float64)))
             power = float(mean @ mean)
             if power > 1e-12 and power**2 / max(float(np.sum(mean**4)), 1e-300) >= MIN_SUPPORT:

@@ -11,12 +11,14 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
 import numpy as np
+from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.drivers.loop.candidates import Family
 from xosc_lateral.drivers.loop.low_frequencies import (
     MEAN_SHORTEST_S,
     ORDERS,
@@ -34,16 +36,22 @@ from xosc_lateral.drivers.loop.low_frequencies import (
     without_known,
 )
 from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Removal, Stage, Term
+from xosc_lateral.drivers.loop.refinement import Alternatives
 from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.search import Search
 from xosc_lateral.drivers.loop.significance import LoopSeed
 from xosc_lateral.drivers.loop.squares import SLOW_S, fine_squares, log_sizes, quick_squares, slow_squares
+from xosc_lateral.drivers.loop.terms.mean import MeanTerm
 from xosc_lateral.drivers.loop.terms.spread import what_a_column_may_do, what_columns_do
 from xosc_lateral.drivers.loop.timeline import COARSE, Coarse
 from xosc_lateral.drivers.model.effects import Effect, Step, TimeSmooth
 from xosc_lateral.drivers.model.seeds import generator
 
 STEP_PARAMETERS = 2  # Of a step: its height and its moment.
+# Time constants of an exponential that are tried, a factor of two apart. [s]
+SETTLING_S = (150.0, 300.0, 600.0, 1200.0)
+AS_LIKELY = float(np.log(20.0))  # A form so much less likely than the best, or less so, is not ruled out. [nat]
+CHANGE_WITH_TIME = "change of the mean with time"
 SURER = 0.01  # Where it is surer than the best column by this factor, what that column may do is left to time. [-]
 
 
@@ -72,6 +80,8 @@ class StepTerm(_MeanByTime):
     stages: ClassVar[tuple[Stage, ...]] = (Stage.LOW_FREQUENCY,)
     seen_held_out: ClassVar[bool] = False
     at: int  # Row of the 1 Hz grid.
+    others: tuple[str, ...] = ()  # Forms that are about as likely.
+    alike: Alternatives = ()
 
     def mean_columns(self, coarse: Coarse) -> FloatArray:
         """0 before, 1 after, shape (n, 1). [-]"""
@@ -102,10 +112,25 @@ class StepTerm(_MeanByTime):
         step = cls(moment_of(rows, whitener, int(moments[np.argmax(np.abs(unit.T @ slow[:, 0]))])))
         smooth = smooth_probabilities(slow[:, 0], waves, ORDERS)
         order = min(smooth, key=lambda one: smooth[one])
-        likelihoods = [fit_model(coarse, (*fitted.terms, one)).log_likelihood for one in (step, TimeMeanTerm(order))]
-        price = 0.5 * (STEP_PARAMETERS - order) * float(np.log(coarse.valid.sum()))
-        is_step = likelihoods[0] - likelihoods[1] > price
-        return Outcome(step if is_step else TimeMeanTerm(), (), p_value)
+        settling = [TimeMeanTerm(1, settling_s=seconds) for seconds in SETTLING_S]
+
+        def priced(term: Term, parameters: int) -> float:
+            price = 0.5 * parameters * float(np.log(coarse.valid.sum()))
+            return fit_model(coarse, (*fitted.terms, term)).log_likelihood - price
+
+        forms = {
+            "step": priced(step, STEP_PARAMETERS),
+            "smooth": priced(TimeMeanTerm(order), order),
+            "settling": max(priced(one, STEP_PARAMETERS) for one in settling),
+        }
+        best = max(forms, key=lambda one: forms[one])
+        others = tuple(one for one in forms if one != best and forms[one] > forms[best] - AS_LIKELY)
+        found: StepTerm | TimeMeanTerm = TimeMeanTerm(form=best, others=others)
+        found = replace(step, others=others) if best == "step" else found
+        if cls.passes(search, p_value, fitted):
+            columns = (term for term in _plain_terms(search) if priced(term, 1) > forms[best] - AS_LIKELY)
+            found = replace(found, alike=tuple(dict.fromkeys(term.columns for term in columns)))
+        return Outcome(found, (), p_value)
 
     def matches(self, other: Self) -> bool:
         """About the same moment."""
@@ -131,7 +156,8 @@ class StepTerm(_MeanByTime):
         """Height and moment."""
         effect = effects[0]
         assert isinstance(effect, Step)
-        return Description("step", f"at {effect.at_s:.0f} s", effect.size, effect.size_error, f"mean by effect: {key}")
+        name, shape = _named("step", self.others, f"at {effect.at_s:.0f} s")
+        return Description(name, shape, effect.size, effect.size_error, f"mean by effect: {key}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,9 +166,15 @@ class TimeMeanTerm(_MeanByTime):
 
     kind: ClassVar[str] = "drift"
     order: int = max(ORDERS)  # Half cosines that it is made of.
+    settling_s: float = 0.0  # Time constant of an exponential in their place; 0: none. [s]
+    form: str = "smooth"
+    others: tuple[str, ...] = ()  # Forms that are about as likely.
+    alike: Alternatives = ()
 
     def mean_columns(self, coarse: Coarse) -> FloatArray:
-        """Half cosines, within -1..1, shape (n, order). [-]"""
+        """Half cosines, within -1..1, shape (n, order), or an exponential. [-]"""
+        if self.settling_s:
+            return np.exp(-(coarse.time - clock_range(coarse)[0]).clip(0.0) / self.settling_s)[:, None]
         return half_cosines_of(coarse, self.order)
 
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
@@ -166,7 +198,10 @@ class TimeMeanTerm(_MeanByTime):
         effect = effects[0]
         assert isinstance(effect, TimeSmooth)
         size, error, shape = _swing(fitted.coarse, effect, effect.location, effect.location_errors)
-        return Description("mean offset by time", shape, size, error, f"mean by effect: {key}")
+        name, shape = _named(self.form, self.others, shape.removeprefix("smooth, "))
+        return Description(
+            "mean offset by time" if name == "smooth" else name, shape, size, error, f"mean by effect: {key}"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,6 +289,19 @@ class TimeSpreadTerm(Term):
         size, error, shape = _swing(fitted.coarse, effect, effect.spread, effect.spread_errors)
         factor = float(np.exp(size))
         return Description("spread by time", shape, factor, factor * error, f"spread by effect: {key}")
+
+
+def _named(form: str, others: tuple[str, ...], when: str) -> tuple[str, str]:
+    """What a change is called, and its form in words; a change with time where other forms are as likely."""
+    if not others:
+        return form, when if form == "step" else f"{form}, {when}"
+    return CHANGE_WITH_TIME, f"{form}, {when}; about as likely: {', '.join(others)}"
+
+
+def _plain_terms(search: Search) -> list[MeanTerm]:
+    """Columns as they are: one that changes as the mean does may be why."""
+    plain = (one for one in search.quantities.candidates if one.family is Family.PLAIN and len(one.contrast) == 1)
+    return [MeanTerm.of(structs.replace(one.effect, response_s=1.0)) for one in plain]
 
 
 def penalised_cosines(sizes: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:

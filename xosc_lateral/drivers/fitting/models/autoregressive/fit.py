@@ -40,7 +40,8 @@ an autoregression nearly add up to one, and what they lack of it decides how far
 
 LIMIT_SPREADS = 4.0
 """Standard deviations from the mean to the limits at least: the extremes of few drivers' minutes lie nearer, and their
-drivers would sit at them (17.7 % of two-minute runs for 3 s and more; so 0.7 %). The markings bound either. [-]"""
+drivers would sit at them (17.7 % of two-minute runs for 3 s and more; so 0.7 %). Of a driver whose movement is volatile
+more, by the exponential of its log variance: his tails are heavier. The markings bound either. [-]"""
 
 MOST_DIGITS = 17
 """That a number has. [-]"""
@@ -76,6 +77,15 @@ def _tidy_volatility(part: Volatility) -> Volatility:
     return Volatility(*all_significant((part.between, part.within, part.correlation_time, part.slow), DIGITS))
 
 
+def _limits(offsets: FloatArray, mean: float, spreads: float) -> tuple[float, float]:
+    """What was recorded, so many standard deviations at least, the markings at most. [lane widths]"""
+    reach = max(spreads * float(offsets.std()), 1e-3)
+    return (
+        min(max(-0.5, min(float(offsets.min()), mean - reach)), mean - 1e-3),
+        max(min(0.5, max(float(offsets.max()), mean + reach)), mean + 1e-3),
+    )
+
+
 def fit_autoregressive(
     rel_offsets: Sequence[FloatArray], drives: Sequence[str], settings: FitSettings = DEFAULT_SETTINGS
 ) -> AutoregressiveModel:
@@ -96,9 +106,6 @@ def fit_autoregressive(
     bands = [split_bands(run, settings.step) for run in runs]
     coarse, between = fit_coarse([slow - mean for slow, _ in bands], drives, settings)
     coarse, fine = fit_spectrum(runs, coarse, settings)
-    reach = LIMIT_SPREADS * float(everything.std())
-    low = max(-0.5, min(float(everything.min()), mean - reach))
-    high = min(0.5, max(float(everything.max()), mean + reach))
     model = AutoregressiveModel(
         mean=mean,
         between_drivers=float(np.sqrt(between)),
@@ -107,8 +114,10 @@ def fit_autoregressive(
         coarse_volatility=Volatility(),
         fine_volatility=Volatility(),
         correlation=0.0,
-        limits=(min(low, mean - 1e-3), max(high, mean + 1e-3)),
+        limits=_limits(everything, mean, LIMIT_SPREADS),
         step=settings.step,
     )
     model = with_volatility(model, bands, len(set(drives)) > 1, settings)
+    varying = model.coarse_volatility.within + model.coarse_volatility.slow
+    model = replace(model, limits=_limits(everything, mean, LIMIT_SPREADS * float(np.exp(varying))))
     return rounded(matched(model, runs, settings))
