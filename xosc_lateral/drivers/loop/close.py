@@ -259,6 +259,8 @@ def _explained(setting: Setting, found: Identified) -> Explained | None:
         starts, finals = [one.start for one in folds], [one.final for one in folds]
     else:
         number, terms = folds_of(blocks), found.selection.start.terms
+        if number < 2:
+            return None
         starts = finals = [fit_model(coarse.only(blocks % number != fold), terms) for fold in range(number)]
     return explained_share(starts, finals, found.quantities, coarse, blocks)
 
