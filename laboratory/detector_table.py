@@ -149,8 +149,19 @@ def _limit(one: Scored, weights: NDArray[np.int64]) -> int:
     return max(int(np.searchsorted(one.limits, value)) - 1, 0)
 
 
-def trained_lines(detectors: Mapping[str, Logistic], held: Views, runs: Views, sensor: str) -> list[str]:
-    """False alarms at equal detection on held-out real vehicles, and how many fewer than trained on nominal traffic."""
+def trained_lines(rows: Mapping[str, Mapping[str, Sequence[str]]]) -> str:
+    """Cells of `trained_cells` by sensor and training; of sensors other than the first the rate alone."""
+    first, *others = rows
+    heads = "trained on", "false alarms an hour", "fewer than trained on nominal", "on the GNSS runs"
+    heads = *heads, *(f"sensor: {sensor}" for sensor in others)
+    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
+    for name, cells in rows[first].items():
+        lines.append(f"| {' | '.join([name, *cells, *(rows[sensor][name][0] for sensor in others)])} |")
+    return "\n".join(lines)
+
+
+def trained_cells(detectors: Mapping[str, Logistic], held: Views, runs: Views) -> dict[str, list[str]]:
+    """False alarms at equal detection on held-out vehicles, how many fewer than trained on nominal, on the runs."""
     found = {name: scored(detector, held) for name, detector in detectors.items()}
     first = next(iter(found.values()))
     k = len(first.hours)
@@ -162,12 +173,7 @@ def trained_lines(detectors: Mapping[str, Logistic], held: Views, runs: Views, s
 
     drawn = {name: np.array([rate(one, weights) for weights in draws]) for name, one in found.items()}
     base = next(iter(found))
-    lines = [
-        f"Sensor: {sensor}.",
-        "",
-        "| trained on | false alarms an hour | fewer than trained on nominal | on the GNSS runs |",
-        "|---|---|---|---|",
-    ]
+    rows = dict[str, list[str]]()
     for name, one in found.items():
         low, high = np.quantile(drawn[name], [0.025, 0.975])
         fewer = drawn[base] - drawn[name]
@@ -183,8 +189,8 @@ def trained_lines(detectors: Mapping[str, Logistic], held: Views, runs: Views, s
                 keeping = view.truth.keeping & view.watched
                 count += int(count_onsets(score, keeping, limit)[0])
                 hours += float(keeping.sum()) * STEP / 3600.0
-        lines.append(f"| {name} | " + " | ".join([*cells, f"{count / hours:.1f}"]) + " |")
-    return [*lines, ""]
+        rows[name] = [*cells, f"{count / hours:.1f}"]
+    return rows
 
 
 # ---- figure ----------------------------------------------------------------------------------------------------------

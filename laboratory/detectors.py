@@ -20,7 +20,15 @@ from zlib import crc32
 import pandas as pd
 
 import xosc_lateral as xl
-from laboratory.detector_table import Pool, alarm_figure, alarm_lines, default_lines, trained_lines, tuned_lines
+from laboratory.detector_table import (
+    Pool,
+    alarm_figure,
+    alarm_lines,
+    default_lines,
+    trained_cells,
+    trained_lines,
+    tuned_lines,
+)
 from laboratory.markers import show
 from laboratory.shortcut import played_variants, shortcut_lines
 from xosc_lateral.base.shipped import shipped_folder
@@ -171,7 +179,7 @@ def main() -> None:
             if args.figure is not None:
                 alarm_figure(alarms).save(args.figure)
         if "trained" in parts:
-            scenes, lines = training(given, folder), list[str]()
+            scenes, rows = training(given, folder), dict[str, dict[str, list[str]]]()
             runs = [scene for path in given.runs for scene in run_scenes(path)]
             for word, sensor in (("perfect", PERFECT), ("usual", USUAL_SENSOR)):
                 detectors = {
@@ -179,8 +187,8 @@ def main() -> None:
                     for name, each in scenes.items()
                 }
                 held = seen(half_of(recorded(given.wheel), 1), sensor)
-                lines += trained_lines(detectors, held, seen(runs, sensor), word)
-            show("\n".join(lines), args.write, "trained")
+                rows[word] = trained_cells(detectors, held, seen(runs, sensor))
+            show(trained_lines(rows), args.write, "trained")
         if "shortcut" in parts:
             scenarios = [given.templates / f"{name}.xosc" for name in ("cut-in", "dense-traffic")]
             scenarios += sorted(given.alks.glob("*_4_4_*.xosc")) + sorted(given.alks.glob("*_4_5_*.xosc"))

@@ -41,6 +41,9 @@ def fit(
             help="two-level: Neis and Beyerer; autoregressive: the default; best: the same.",
         ),
     ] = "autoregressive",
+    corrected: Annotated[
+        bool, typer.Option("--corrected", help="Two-level model: freed of its fit's bias, by simulation.")
+    ] = False,
     mapped: Mapped,
     name: Annotated[str, typer.Option(help="Name of the profile; default: the file's name.")] = "",
     source: Annotated[str, typer.Option(help="Description of the drives, for the provenance.")] = "",
@@ -93,6 +96,7 @@ def fit(
         tables,
         name=name or (usual if written is None else written.stem),
         model=model,
+        corrected=corrected,
         columns=mapped.mapping(),
         source=source,
         licence=licence,

@@ -10,7 +10,7 @@ from pathlib import Path
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.source import read_toml
 
-SETTINGS = frozenset({"ego", "neighbours"})
+SETTINGS = frozenset({"ego", "lane_changes", "neighbours"})
 """Of a conversion (`conversion.settings.ConvertSettings`), that may stand there."""
 
 KEYS = ("library", *sorted(SETTINGS))

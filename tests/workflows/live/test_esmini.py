@@ -220,3 +220,28 @@ def test_with_an_external_ego_every_trigger_fires_as_without_drivers(factor: flo
     assert [event[1:] for event in plain] == [event[1:] for event in ours]
     assert plain or factor > 1.0  # nobody cuts in before who drives away
     assert all(abs(a[0] - b[0]) <= 0.1 for a, b in zip(plain, ours, strict=True))
+
+
+BORDER = Path(__file__).resolve().parents[4] / "shared" / "cases" / "reactive" / "d1_border.xosc"
+
+
+@needs_esmini
+@pytest.mark.skipif(not BORDER.is_file(), reason="no shared cases")
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_vehicle_that_drifts_over_a_marking_stays_where_it_is(seed: int) -> None:
+    """Its lane is another one then; nobody puts it a lane aside."""
+    run = live_esmini(BORDER, REAL, ego=["Ego"], seed=seed, duration=15.0, step=0.01)
+    frame = run.to_frame()
+    for name in ("T", "U"):
+        own = frame[frame.name == name]
+        assert np.abs(np.diff(own.y)).max() < 0.01, name
+
+
+@needs_esmini
+@pytest.mark.skipif(not BORDER.is_file(), reason="no shared cases")
+@pytest.mark.parametrize("seed", [2, 3])
+def test_a_short_lateral_action_leaves_no_rest_of_the_driver_that_is_dropped_at_once(seed: int) -> None:
+    """Swerves of two seconds, in which the lateral speed from before has not run out when they end."""
+    run = live_esmini(BORDER.with_name("a09_rep_swerve.xosc"), REAL, ego=["Ego"], seed=seed, duration=30.0, step=0.01)
+    own = run.to_frame()
+    assert np.abs(np.diff(own[own.name == "T"].y)).max() < 0.012

@@ -14,7 +14,8 @@ from tests.workflows.conversion.test_vehicle_under_test import CHANGE, EXTERNAL
 from tests.world.scenario.test_under_test import at, event, headway, stories
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.workflows.conversion.page import conversion_page
-from xosc_lateral.workflows.conversion.result import EntityResult
+from xosc_lateral.workflows.conversion.result import EntityResult, LaneChanges
+from xosc_lateral.workflows.conversion.settings import ConvertSettings
 from xosc_lateral.workflows.playing.figures import lane_changes_over_time
 from xosc_lateral.workflows.recordings.transitions import Rough, fit_transition
 from xosc_lateral.world.motion.crossings import ALPHA, BETA, NINE_TENTHS, PEAK_SHARE, TENTH, bell_share
@@ -103,6 +104,16 @@ def test_a_vehicle_that_keeps_its_actions_changes_lanes_as_written_and_that_is_s
     made = xl.convert(path, seed=2, lane_changes="lifelike")
     assert made.modes == {"A": "lane-offset"}
     assert [line for line in made.warnings if "lane changes of 'A' stay as written: it keeps its actions" in line]
+
+
+def test_it_may_be_configured_and_said_in_a_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "xosc-lateral").mkdir()
+    (tmp_path / "xosc-lateral" / "config.toml").write_text('lane_changes = "lifelike"\n')
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    assert ConvertSettings.of().lane_changes is LaneChanges.LIFELIKE
+    assert ConvertSettings.of(lane_changes="written").lane_changes is LaneChanges.WRITTEN
+    row = ConvertSettings().of_row({"lane_changes": "lifelike"}, tmp_path)
+    assert row.lane_changes is LaneChanges.LIFELIKE
 
 
 def test_the_choice_is_recorded_and_made_again(tmp_path: Path) -> None:

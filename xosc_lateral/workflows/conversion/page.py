@@ -242,6 +242,7 @@ def _add_shifts(page: Page, conversion: ConvertedScenario) -> None:
             "lasts [s]": shift.duration,
             "starts later by [s]": shift.start,
             "ends later by [s]": shift.end,
+            "lateral speed [m/s]": shift.lateral_speed,
         }
         for shift in conversion.shifts
     ]
@@ -250,8 +251,10 @@ def _add_shifts(page: Page, conversion: ConvertedScenario) -> None:
         rows,
         "How much later events start and end with the offsets than without them (negative: earlier), the largest under "
         "egos at 0.8, 1.0 and 1.2 of their initial speed and one that brakes to a stop. An action by an acceleration "
-        "or a rate takes longer or shorter from beside the middle.",
-        formats=dict.fromkeys(("at [s]", "lasts [s]", "starts later by [s]", "ends later by [s]"), ".2f"),
+        "or a rate takes longer or shorter from beside the middle; it begins without the lateral speed that a vehicle "
+        "comes with.",
+        formats=dict.fromkeys(("at [s]", "lasts [s]", "starts later by [s]", "ends later by [s]"), ".2f")
+        | {"lateral speed [m/s]": ".3f"},
     )
 
 

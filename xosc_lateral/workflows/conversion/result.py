@@ -188,6 +188,8 @@ class EventShift(Struct, frozen=True):
         How much later with offsets. [s]
     unexplained_start, unexplained_end : float
         What of that is not the way of a lateral action. [s]
+    lateral_speed : float
+        Of the entity with offsets when a lateral action begins, which ends it. [m/s]
     """
 
     event: str
@@ -198,6 +200,7 @@ class EventShift(Struct, frozen=True):
     end: float
     unexplained_start: float
     unexplained_end: float
+    lateral_speed: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

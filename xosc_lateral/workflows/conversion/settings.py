@@ -64,7 +64,8 @@ class ConvertSettings:
         profile's answer is not known; not at all. Without: as configured, else "borrow".
     lane_changes : {"written", "lifelike"}
         The way across of lane changes and lane offsets of 3 to 13 s, where a vehicle follows a trajectory: as written,
-        or as drivers take it (a bell that is slightly early); start, duration and lane stay the file's.
+        or as drivers take it (a bell that is slightly early); start, duration and lane stay the file's. Without: as
+        configured, else "written".
     context : str or Path
         Table of context over time that the scenario doesn't state: `time` [s], and a column each.
     parameters : mapping
@@ -127,8 +128,8 @@ class ConvertSettings:
         "where that is not known (default); none: not at all.",
     )
     lane_changes: LaneChanges = option(
-        LaneChanges.WRITTEN, say.one_of(LaneChanges), kind=LaneChanges, cell=say.as_it_is,
-        help="The way across of lane changes on a trajectory: as written, or lifelike: as drivers take it.",
+        LaneChanges.WRITTEN, say.one_of(LaneChanges), kind=LaneChanges | None, cell=say.as_it_is, show_default=False,
+        help="The way across of lane changes on a trajectory: as written (default), or lifelike: as drivers take it.",
     )
     context: Path | None = option(
         None, Path, kind=Path | None, cell=say.beside,
@@ -244,7 +245,7 @@ class ConvertKeywords(TypedDict, total=False):
     only: Collection[str] | None
     ego: Collection[str] | None
     neighbours: Literal["profile", "borrow", "none"] | None
-    lane_changes: Literal["written", "lifelike"]
+    lane_changes: Literal["written", "lifelike"] | None
     context: PathLike | None
     parameters: Mapping[str, object] | None
     library: Paths

@@ -27,7 +27,12 @@ from xosc_lateral.world.scenario import Scenario
 from xosc_lateral.world.scenario.conditions import StoryboardElementStateCondition
 from xosc_lateral.world.scenario.dependence import conditions_of, entity_references, refers_to
 from xosc_lateral.world.scenario.enums import DynamicsDimension, StoryboardElementState
-from xosc_lateral.world.scenario.private_actions import LaneChangeAction, LaneOffsetAction, LateralDistanceAction
+from xosc_lateral.world.scenario.private_actions import (
+    LATERAL,
+    LaneChangeAction,
+    LaneOffsetAction,
+    LateralDistanceAction,
+)
 from xosc_lateral.world.scenario.storyboard import Condition, Trigger
 
 EVENT_TOLERANCE = 0.05
@@ -168,7 +173,18 @@ class _Shifts:
         if actor is not None:
             self._of_entity.setdefault(actor, []).extend((start, end))
         self.largest = max(self.largest, start, end)
-        return EventShift(path[-2] if len(path) > 1 else path[-1], actor, then.start, duration, start, end, rest, over)
+        event, speed = path[-2] if len(path) > 1 else path[-1], self._lateral_speed(now)
+        return EventShift(event, actor, then.start, duration, start, end, rest, over, speed)
+
+    def _lateral_speed(self, now: PlayedAction) -> float:
+        """With which an entity comes to a lateral action, with offsets. [m/s]"""
+        entity = self._entities[1].get(now.actor or "")
+        if entity is None or not isinstance(now.action.content, LATERAL):
+            return 0.0
+        row = int(np.searchsorted(entity.time, now.start + 1e-9, side="right")) - 1
+        if row < 1 or entity.lane[row] != entity.lane[row - 1]:
+            return 0.0
+        return float(abs(entity.offset[row] - entity.offset[row - 1]) / (entity.time[row] - entity.time[row - 1]))
 
     def _is_over(self, played: PlayedAction, run: int) -> bool:
         """Before its run is: what the run's end cuts has no end of its own."""

@@ -52,13 +52,13 @@ _VEHICLE, _TRUCKS, _PULLED = 1, (2, 3, 4, 5), (3, 4)
 
 
 class _Lane(NamedTuple):
-    """A lane where a vehicle is: road and id, if there is one and if it is for driving, +1 for travel along s, width
-    [m], heading of travel [rad]."""
+    """A lane where a vehicle is: road and id, if there is one and if it is for driving, +1 where +t is to the left of
+    where the vehicle drives (else -1), width [m], heading of travel [rad]."""
 
     place: tuple[int, int]
     is_lane: bool
     is_driving: bool
-    direction: int
+    direction: float
     width: float
     heading: float
 
@@ -78,6 +78,9 @@ class _Rest:
         self.way = float(settle(np.array([self.passed]), self.over, self.rate, 0.0)[0])
         return self.way
 
+
+LANE_STEP = 0.5
+"""By more than this the offset changes when another lane is under a vehicle; at joints of roads it does by less. [m]"""
 
 _SAME_PLACE = 0.05
 """A maneuver that moves a vehicle further in its first step puts it elsewhere, as a teleport does. [m]"""
@@ -170,8 +173,7 @@ class EsminiTraffic:
         moves = self.traffic.step(self.player.SE_GetSimulationTime() + dt, moment)
         for row, (_, state) in enumerate(seen):
             if moves.steered[row]:
-                direction = self.network.travel_direction(self._road(state), state.lane)
-                t = state.t + direction * float(moves.offset[row] - moment.offset[row])
+                t = state.t + self._direction(state) * float(moves.offset[row] - moment.offset[row])
                 self.player.SE_ReportObjectLateralPosition(state.id, t)
         self.moves = moves.by_name(moment.names)
         self._rates = dict(zip(moment.names, moves.rate.tolist(), strict=True))
@@ -192,12 +194,11 @@ class EsminiTraffic:
                 bound = LEADING_OVER * TURN * max(abs(state.speed), MINIMUM_SPEED)
                 over = max(SETTLING_TIME, 4.0 * abs(self._rates[name]) / bound)
                 self._rests[name] = _Rest(self._rates[name], over)
-            elif name not in busy or self._road(state) < 0:
+            elif self._road(state) < 0 or (name not in busy and name not in self._touched):
                 self._rests.pop(name, None)
-            elif name in self._rests:
-                direction = self.network.travel_direction(self._road(state), state.lane)
+            elif name in self._rests:  # once more when the action is over: from there on the driver leads over
                 way = self._rests[name].on(dt)
-                self.player.SE_ReportObjectLateralPosition(state.id, state.t + direction * way)
+                self.player.SE_ReportObjectLateralPosition(state.id, state.t + self._direction(state) * way)
 
     def _busy(self) -> set[str]:
         """Whom a lateral action moves now."""
@@ -209,8 +210,18 @@ class EsminiTraffic:
 
     def offset_of(self, state: ObjectState) -> float:
         """From the centre of its lane, positive LEFT of travel. [m]"""
-        road = self._road(state)
-        return float(state.offset_t) * (1 if road < 0 else self.network.travel_direction(road, state.lane))
+        return float(state.offset_t) * self._direction(state)
+
+    def _direction(self, state: ObjectState) -> float:
+        """+1 where +t is to the left of where a vehicle drives, on whichever lane it is, else -1."""
+        road, network = self._road(state), self.network
+        if road < 0:
+            return 1.0
+        direction = float(network.travel_direction(road, state.lane))
+        if state.lane == 0 or not network.has_lane_at(road, state.lane, state.s):
+            return direction
+        ahead = network.pose_at(road, state.lane, state.s).heading + network.header_offset.heading
+        return direction if np.cos(state.h - ahead) >= 0.0 else -direction
 
     # ---- what the simulation knows -----------------------------------------------------------------------------------
     def _objects(self) -> Iterable[tuple[str, ObjectState]]:
@@ -259,6 +270,10 @@ class EsminiTraffic:
         for row, name in enumerate(names):
             if in_maneuver[row] or name not in self._base:
                 self._base[name] = float(offset[row]) - (self._rests[name].way if name in self._rests else 0.0)
+            elif abs(moved := float(offset[row]) - self.moves.get(name, (float(offset[row]), False))[0]) > LANE_STEP:
+                self._base[name] += moved  # another lane is under it: it stays where it is
+            if name not in busy:
+                self._rests.pop(name, None)
         self._touched.clear()
         return Moment(
             names, column["speed"], width, offset, is_lane & ~in_maneuver, ours & ~pulled,
@@ -275,13 +290,13 @@ class EsminiTraffic:
             known = self._lane_of.get(name)
             if known is None or anew or known.place != (index, state.lane):
                 place, s = (index, state.lane), state.s
-                known = _Lane(place, False, False, 1, 1.0, state.h)
+                known = _Lane(place, False, False, 1.0, 1.0, state.h)
                 turned = network.header_offset.heading  # x and y are inertial
                 if index >= 0 and state.lane != 0 and network.has_lane_at(index, state.lane, s):
                     width = float(network.lane_width(index, state.lane, s))
                     known = _Lane(
                         place, True, bool(network.lane_index(index, state.lane, s)[0] >= 0) and width > 0.0,
-                        network.travel_direction(index, state.lane), max(width, 1e-3),
+                        self._direction(state), max(width, 1e-3),
                         network.pose_at(index, state.lane, s).heading + turned,
                     )  # fmt: skip
                 self._lane_of[name] = known

@@ -41,6 +41,7 @@ def fit(
     *,
     name: str,
     model: str = "autoregressive",
+    corrected: bool = False,
     columns: MappingLike | None = None,
     source: str = "",
     licence: str = "",
@@ -61,6 +62,8 @@ def fit(
         Of the profile.
     model : str
         "two-level": the paper's model to the letter; "autoregressive" (or "best"): ours.
+    corrected : bool
+        Of the two-level model: freed of what its own fit does to it, by simulation.
     source, licence : str
         Of the drives, for the provenance.
     sensor_noise : float, optional
@@ -89,13 +92,18 @@ def fit(
     """
     from msgspec.structs import replace
 
+    from xosc_lateral.base.errors import DriverProfileError
     from xosc_lateral.drivers.drives.frozen import summary_of
     from xosc_lateral.drivers.fitting.bands import KEEPING_BAND, split_by_band
     from xosc_lateral.drivers.fitting.fitting import fit_profile
+    from xosc_lateral.drivers.fitting.models.two_level.correction import correct_two_level
     from xosc_lateral.drivers.model.core.base import ModelKind
     from xosc_lateral.drivers.model.core.registry import model_named
+    from xosc_lateral.drivers.model.core.two_level.model import TwoLevelModel
     from xosc_lateral.drivers.model.profile import Provenance
 
+    if corrected and model_named(model).model.kind != ModelKind.TWO_LEVEL:
+        raise DriverProfileError(f"model {model}: only the two-level model has a corrected fit")
     given = given_drives(drives, columns).valid_below(valid_below)
     slow, fast = split_by_band(given.drives)
     is_partial = not fast and any(drive.valid_below is not None and drive.valid_below < KEEPING_BAND for drive in slow)
@@ -119,6 +127,9 @@ def fit(
             neighbours=neighbours,
             prior=given_profile(prior, library) if has_prior and prior is not None else None,
         )
+    if corrected and isinstance(profile.model, TwoLevelModel):
+        provenance = replace(profile.provenance, fit={**profile.provenance.fit, "corrected": True})
+        profile = replace(profile, model=correct_two_level(profile.model), provenance=provenance)
     return replace(profile, left_hand=left_hand)
 
 

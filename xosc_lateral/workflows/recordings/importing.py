@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from xosc_lateral.files.labels import file_label
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.workflows.recordings.importers import find_importer
 from xosc_lateral.workflows.recordings.importers.table import as_imported
@@ -80,7 +81,7 @@ class ImportedDrives(Result):
         from xosc_lateral.files.output_tables import output_suffixes
         from xosc_lateral.workflows.recordings.importers.table import write_imported
 
-        output = output_file(path, f"{self.sources[0].name.split('.')[0]}.parquet", output_suffixes())
+        output = output_file(path, f"{file_label(self.sources[0])}.parquet", output_suffixes())
         claim([output], [source for source in self.sources if source.is_file()], force=force)
         write_imported(self._imported, output)
         return output

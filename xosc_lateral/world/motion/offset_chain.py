@@ -29,8 +29,9 @@ LONGEST_MOVE = 6.0
 """Longer ones are never the cheapest: drivers turn back every 2 to 4 s. [s]"""
 WEIGHTS = (1.0, 0.5, 0.2)
 """What errors of place, of lateral speed and of lateral acceleration count. [1/s], [-], [s]"""
-JOINT_PRICE = 1.0
-"""Of a move, as much as errors as large as the path's own speed for so long. [s]"""
+JOINT_PRICE = 0.25
+"""Of a move, as much as errors as large as the path's own speed for so long. With it the autocorrelation of the lateral
+speed at 1 s is within 0.02 of the path's for profiles from 0.48 to 0.83; with 1 s it is 0.10 off for the former. [s]"""
 MOST_ENLARGED = 1.2
 """Times what fits best: more is asked for by noise alone. [-]"""
 ACTIVITY_TIME = 10.0
