@@ -87,11 +87,14 @@ schema: $(STAMP)
 # The shipped driver profiles, rebuilt from the public recording (50 MB from PyPI): byte for byte what is in the tree. What
 # the closed loop made stays as it is; `make refined` makes it anew.
 WHEEL := out/data/tasi-0.15.4-py3-none-any.whl
+# GNSS: the files of OpenACC's AstaZero campaign, from its catalogue (docs/real_data.md).
+GNSS ?= ASta_040719_platoon3.csv ASta_050719_platoon1.csv
+
 profiles: $(STAMP) $(WHEEL)
-	$(BIN)/python -m laboratory.build_library $(WHEEL) -o driver_profiles --keep-refined
+	$(BIN)/python -m laboratory.build_library $(WHEEL) $(GNSS:%=--gnss %) -o driver_profiles --keep-refined
 
 refined: $(STAMP) $(WHEEL)
-	$(BIN)/python -m laboratory.build_library $(WHEEL) -o driver_profiles
+	$(BIN)/python -m laboratory.build_library $(WHEEL) $(GNSS:%=--gnss %) -o driver_profiles
 
 # The README's picture, and CONTRIBUTING's map of the imports.
 picture: $(STAMP)
