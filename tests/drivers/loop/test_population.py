@@ -39,7 +39,7 @@ def test_the_probability_is_that_of_an_analysis_of_variance_with_halves_as_repea
     means = f_oneway(*([a.mean(), b.mean()] for a, b in halves)).pvalue
     spreads = f_oneway(*([np.log(a.std()), np.log(b.std())] for a, b in halves)).pvalue
     assert found is not None
-    assert found.p_value == pytest.approx(max(min(1.0, 2.0 * min(means, spreads)), core_model.LEAST), rel=1e-6)
+    assert found.p_value == pytest.approx(max(min(1.0, 2.0 * min(means, spreads)), core_model.MINIMUM_P), rel=1e-6)
 
 
 @pytest.mark.parametrize(("shift", "log_spread"), [(0.15, 0.0), (0.2, 0.3), (0.0, 0.4)])
