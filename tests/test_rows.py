@@ -50,7 +50,7 @@ def test_rows_in_a_file_give_the_same_bytes(scenario: Path, monkeypatch: pytest.
 
 def test_what_drivers_see_is_gone_before_paths_are_made(scenario: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Twenty columns a driver: of an hour of 500 cars they are three gigabytes."""
-    monkeypatch.setattr(enrich, "FEW", 0)
+    monkeypatch.setattr(enrich, "KEPT_ROWS", 0)
     displace, alive = enrich.displace, list[int]()
 
     def counted(*args: Any) -> Any:

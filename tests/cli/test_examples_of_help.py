@@ -115,6 +115,21 @@ def _fitted(path: Path) -> None:
     run("fit", "fitted.parquet", "-o", path.name)
 
 
+def _smoothed(path: Path) -> None:
+    """A drive whose provider took out what is faster than 0.3 Hz."""
+    table = simulate_drive(400.0, 6).table
+    smooth = np.exp(-0.5 * (np.arange(-100, 101) * np.median(np.diff(table["time"])) / 0.6) ** 2)
+    for name in ("distance_left", "distance_right"):
+        table[name] = np.convolve(np.pad(table[name], 100, mode="edge"), smooth / smooth.sum(), mode="valid")
+    pd.DataFrame(table).to_csv(path, index=False)
+
+
+def _openacc(path: Path) -> None:
+    from tests.workflows.recordings.test_openacc import platoon
+
+    platoon(path, phase=len(path.name))
+
+
 def _library(path: Path) -> None:
     _fitted(Path("mine.json"))
     run("profiles", "add", "mine.json", "--library", "team/", "--tag", "day")
@@ -154,6 +169,8 @@ MADE: dict[str, Callable[[Path], object]] = {
     "*.csv": lambda path: drives(path.with_name("monday.csv"), 3, in_km_h=True),
     "company.toml": lambda path: path.write_text('[columns]\nspeed = "v_kmh:km/h"'), "mine.json": _fitted,
     "team/": _library, "run.sumocfg": _sumo_run, "recording.csv": _tracks, "python mine.py": _detector,
+    "smoothed.csv": _smoothed, "out/": _batch,
+    **dict.fromkeys(["ASta_040719_platoon3.csv", "ASta_050719_platoon1.csv"], _openacc),
     "motorway.xodr": lambda path: road_file(Case(), path.parent).rename(path),
 }  # fmt: skip
 """Files that examples read -> how they are made; the first words of an example are no output."""

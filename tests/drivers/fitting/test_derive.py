@@ -44,7 +44,8 @@ def test_sdlp_mean_and_restlessness_are_those_of_the_offsets(base: DriverProfile
     assert np.sqrt((np.diff(drives, axis=1) ** 2).mean()) / 0.2 == pytest.approx(0.06, rel=0.03)
 
 
-def test_share_near_a_line_counts_the_vehicles_sides(base: DriverProfile) -> None:
+def test_share_near_a_line_counts_the_vehicles_sides(base: DriverProfile, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(deriving, "DRIVES", 120)  # a share of rare rows needs more of them
     made = derive(base, Asked(near_line=0.05), "x").profile
     limit = 0.5 * base.lane_width - 0.9 - 0.2
     assert (np.abs(_hours(made, 70, 40)) > limit).mean() == pytest.approx(0.05, rel=0.06)
@@ -88,7 +89,7 @@ def test_of_a_population_the_typical_driver_is_taken_and_a_truck_is_what_it_know
         ({"sdlp": 0.0}, "above 0"),
         ({"sdlp": 0.9}, "out of its lane|times as large"),
         ({"mean": 1.9}, "out of its lane"),
-        ({"sdlp": 0.16, "restlessness": 1.5}, "times as quick|no car could drive"),
+        ({"sdlp": 0.16, "restlessness": 1.5}, "times as (large|quick)|no car could drive"),
         ({"sdlp": 0.2, "memory": 4.5, "restlessness": 0.005}, "can't be had"),
         ({"sdlp": 0.16, "mean": 0.0, "near_line": 0.3}, "together"),
         ({"near_line": 1.5}, "below 1"),

@@ -114,13 +114,25 @@ main(None)
 """
 
 
+def _answer_interrupts() -> None:
+    """In a process that is about to begin: shells and CI start what runs in the background with SIGINT ignored."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_is_one_line_with_the_number_of_finished_outputs(tmp_path: Path, number: signal.Signals) -> None:
     inputs = make_inputs(tmp_path / "in", 8, **{f"slow{index}": "slow" for index in range(80)})
     out = tmp_path / "out"
     words = ["convert", str(inputs), "-o", str(out), "--jobs", "2", "-q"]
     command = [sys.executable, "-c", STOPPED_RUN, *words]
-    with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
+    with subprocess.Popen(
+        command,
+        cwd=ROOT,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=_answer_interrupts,
+    ) as process:
         while len(list(out.glob("*.xosc"))) < 10:
             assert process.poll() is None
             time.sleep(0.02)
@@ -141,7 +153,7 @@ def test_a_signal_ends_any_other_verb_in_one_line(number: signal.Signals) -> Non
     script += "s.Pipe.answers = lambda self, lines: iter([print('ready', flush=True), *lines])\nmain(None)\n"
     words = [sys.executable, "-c", script, "live", "stdio"]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-    with subprocess.Popen(words, cwd=ROOT, text=True, **pipes) as process:
+    with subprocess.Popen(words, cwd=ROOT, text=True, preexec_fn=_answer_interrupts, **pipes) as process:
         assert process.stdout is not None and process.stdout.readline() == "ready\n"
         process.send_signal(number)
         _, said = process.communicate(timeout=60)
