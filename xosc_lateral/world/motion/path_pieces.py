@@ -273,7 +273,7 @@ def _step(time: FloatArray, way: FloatArray, x: FloatArray, y: FloatArray) -> tu
 def _is_cut(times: FloatArray, time: FloatArray, x: FloatArray, y: FloatArray) -> bool:
     """A bend, which is more than a kink: too far from straight in the middle of several gaps in a row."""
 
-    def far(gaps: slice) -> BoolArray:
+    def is_far(gaps: slice) -> BoolArray:
         moments = times[gaps.start : gaps.stop + 1]
         ends = np.array([np.interp(moments, time, x), np.interp(moments, time, y)])
         middle = 0.5 * (moments[1:] + moments[:-1])
@@ -282,7 +282,7 @@ def _is_cut(times: FloatArray, time: FloatArray, x: FloatArray, y: FloatArray) -
         aside = np.abs(chord[0] * away[1] - chord[1] * away[0]) / np.maximum(np.hypot(*chord), LEAST_STEP)
         return np.asarray(aside > TOLERANCE / 2.0)
 
-    return any(part.stop - part.start >= BEND for part in slices_where(len(times) - 1, far))
+    return any(part.stop - part.start >= BEND for part in slices_where(len(times) - 1, is_far))
 
 
 def _head(time: FloatArray, way: FloatArray, until: float, step: float) -> FloatArray:
