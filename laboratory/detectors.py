@@ -1,6 +1,6 @@
 """What cut-in detectors do on nominal, lifelike and real traffic; the shortcut test.
 
-    python -m laboratory.detectors WHEEL --alks FOLDER --openacc FILE... [--variants 3] [--write PAGE.md]
+    python -m laboratory.detectors WHEEL --alks FOLDER --openacc FILE... [--variants 2] [--write PAGE.md]
         [--figure FIGURE.svg]
 
 WHEEL is `tasi-0.15.4-py3-none-any.whl`; FOLDER has the concrete scenarios of openMSL/sl-3-1-osc-alks-scenarios; FILEs
@@ -158,7 +158,7 @@ def main() -> None:
     parser.add_argument("wheel", type=Path)
     parser.add_argument("--alks", type=Path, required=True)
     parser.add_argument("--openacc", type=Path, nargs="+", required=True, metavar="FILE")
-    parser.add_argument("--variants", type=int, default=3)
+    parser.add_argument("--variants", type=int, default=2)
     parser.add_argument("--part", choices=("alarms", "trained", "shortcut"), nargs="+", help="default: all")
     parser.add_argument("--write", type=Path, help="page with the markers")
     parser.add_argument("--figure", type=Path, help="false alarms by lateral speed (.svg)")
