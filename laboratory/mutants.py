@@ -4,6 +4,8 @@ A seeded sample of mutants by cosmic-ray's operators, one place each, of playbac
 writer. A mutant is met by those tests of its room that run through its line, the most particular ones first, and is
 killed by the first that fails. Annotations are no places: nobody evaluates them. Works in a copy of what
 is committed; needs cosmic-ray, coverage and pytest-cov, which `make mutants` installs.
+
+    python -m laboratory.mutants --count 200 --seed 1
 """
 
 from __future__ import annotations
