@@ -52,7 +52,7 @@ class Pool:
 
 def alarm_lines(pools: Sequence[Pool]) -> str:
     """False alarms by threshold of lateral speed; of single runs the range."""
-    thresholds = [curve.detector.setting for curve in pools[0].curves]
+    thresholds = [curve.detector.threshold for curve in pools[0].curves]
     heads = [f"{threshold:.2f} m/s" for threshold in thresholds]
     lines = ["| traffic | hours | " + " | ".join(heads) + " |", "|---" * (2 + len(heads)) + "|"]
     for pool in pools:

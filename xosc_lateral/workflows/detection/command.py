@@ -19,7 +19,6 @@ from xosc_lateral.workflows.detection.detectors import RULES, Detector
 from xosc_lateral.workflows.detection.observation import View
 from xosc_lateral.workflows.detection.tracks import STEP, Scene
 
-CURVE = np.round(np.arange(0.0, 1.0, 0.02), 3)
 ANSWER_TIME = 10.0
 """An answer has to come within this; the first may take longer, while the program starts. [s]"""
 START_TIME = 60.0
@@ -31,6 +30,7 @@ class Command(Detector):
 
     name = "command"
     quantity = "score [-]"
+    CURVE = np.round(np.arange(0.0, 1.0, 0.02), 3)
 
     def __init__(self, words: str, threshold: float = 0.5, answer_time: float = ANSWER_TIME) -> None:
         try:
@@ -39,17 +39,7 @@ class Command(Detector):
             raise ValueError(f"{words!r}: {str(error).lower()}") from error
         if not self.words:
             raise ValueError("an empty command")
-        self.text, self._threshold, self._answer_time = words, threshold, answer_time
-
-    @property
-    def setting(self) -> float:
-        """See `Detector`."""
-        return self._threshold
-
-    @property
-    def thresholds(self) -> FloatArray:
-        """See `Detector`."""
-        return np.unique(np.append(CURVE, self._threshold))
+        self.text, self.threshold, self._answer_time = words, threshold, answer_time
 
     def label(self) -> str:
         """See `Detector`."""

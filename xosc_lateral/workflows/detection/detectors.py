@@ -32,16 +32,15 @@ class Detector(ABC):
     needs_observer: ClassVar[bool] = False
     quantity: ClassVar[str]  # what its threshold is, with its unit
     growing: ClassVar[bool] = True  # whether a larger threshold is a larger score
+    CURVE: ClassVar[FloatArray]  # thresholds that its curve is drawn over, besides the one that is set
+
+    threshold: float  # that is set, in its own unit
 
     @property
-    @abstractmethod
-    def setting(self) -> float:
-        """Threshold that is set, in its own unit."""
-
-    @property
-    @abstractmethod
     def thresholds(self) -> FloatArray:
         """Thresholds of the curve, in its own unit, from the most to the least sensitive."""
+        every = np.unique(np.append(self.CURVE, self.threshold))
+        return every if self.growing else every[::-1]
 
     @property
     def limits(self) -> FloatArray:
@@ -52,7 +51,7 @@ class Detector(ABC):
     @property
     def chosen(self) -> int:
         """Number of the threshold that is set."""
-        return int(np.argmin(np.abs(self.thresholds - self.setting)))
+        return int(np.argmin(np.abs(self.thresholds - self.threshold)))
 
     @abstractmethod
     def scores(self, scene: Scene, views: Sequence[View]) -> list[FloatArray]:
@@ -68,20 +67,8 @@ class Rule(Detector):
     """A detector that is a formula of one view; its fields are the options."""
 
     OPTIONS: ClassVar[Limits]
-    CURVE: ClassVar[FloatArray]
 
     threshold: float = 0.0
-
-    @property
-    def setting(self) -> float:
-        """See `Detector`."""
-        return self.threshold
-
-    @property
-    def thresholds(self) -> FloatArray:
-        """See `Detector`."""
-        every = np.unique(np.append(self.CURVE, self.threshold))
-        return every if self.growing else every[::-1]
 
     def scores(self, scene: Scene, views: Sequence[View]) -> list[FloatArray]:
         """See `Detector`."""

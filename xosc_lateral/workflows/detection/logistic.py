@@ -23,8 +23,6 @@ PENALTY = 1.0
 """Of half the squared coefficients of standardised features, beside a log-likelihood in which both classes weigh as
 much as all rows of the rarer one: keeps separable classes (lane-centre traffic) finite."""
 NEWTON_STEPS = 50
-CURVE = np.round(np.r_[0.01, 0.02, 0.05, np.arange(0.1, 0.91, 0.05), 0.95, 0.98, 0.99, 0.995, 0.999, 0.9999], 4)
-"""Probabilities of the curve."""
 
 
 def features(view: View) -> FloatArray:
@@ -83,20 +81,11 @@ class Logistic(Detector):
 
     name = "logistic"
     quantity = "probability [-]"
+    CURVE = np.round([0.01, 0.02, 0.05, *np.arange(0.1, 0.91, 0.05), 0.95, 0.98, 0.99, 0.995, 0.999, 0.9999], 4)
 
     def __init__(self, regression: Regression, threshold: float = 0.5) -> None:
         self.regression = regression
-        self._threshold = threshold
-
-    @property
-    def setting(self) -> float:
-        """See `Detector`."""
-        return self._threshold
-
-    @property
-    def thresholds(self) -> FloatArray:
-        """See `Detector`."""
-        return np.unique(np.append(CURVE, self._threshold))
+        self.threshold = threshold
 
     @property
     def limits(self) -> FloatArray:
@@ -109,7 +98,7 @@ class Logistic(Detector):
 
     def label(self) -> str:
         """See `Detector`."""
-        return f"{self.name} (threshold {self._threshold:g})"
+        return f"{self.name} (threshold {self.threshold:g})"
 
 
 def training_rows(views: Iterable[View]) -> tuple[FloatArray, BoolArray]:
