@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
+from xosc_lateral.base.rows import true_slices
 from xosc_lateral.drivers.drives.drive import Drive
 
 FROZEN_TIME = 1.0
@@ -25,15 +26,12 @@ def frozen_rows(time: FloatArray, offset: FloatArray, lane_width: FloatArray) ->
     same = (np.diff(offset) == 0.0) & (np.diff(lane_width) == 0.0)
     if (~same).sum() < CHANGES or (np.diff(offset) != 0.0).sum() < CHANGES:
         return found
-    edges = np.flatnonzero(np.diff(np.r_[False, same, False].astype(np.int8)))
-    first, end = edges[::2], edges[1::2]
-    lasting = time[end] - time[first] >= FROZEN_TIME
     repeated = int(same.sum())
-    for begin, last in zip(first[lasting].tolist(), end[lasting].tolist(), strict=True):
-        count = last - begin
+    for part in true_slices(same):
+        count = part.stop - part.start
         usual = (repeated - count) / max(len(same) - count, 1)
-        if len(same) * usual**count < CHANCE:
-            found[begin + 1 : last + 1] = True
+        if time[part.stop] - time[part.start] >= FROZEN_TIME and len(same) * usual**count < CHANCE:
+            found[part.start + 1 : part.stop + 1] = True
     return found
 
 

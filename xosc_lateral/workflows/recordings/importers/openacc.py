@@ -22,7 +22,6 @@ import io
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +29,7 @@ import numpy as np
 from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.rows import true_slices
 from xosc_lateral.drivers.drives.cleaning import RESOLUTION, RUN, VALID_BELOW
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import unpacked_text
@@ -297,13 +297,12 @@ def _smooth(values: FloatArray) -> FloatArray:
     return np.asarray(np.fft.irfft((spectrum.T * gain).T, len(values), axis=0))
 
 
-def frozen_rows(time: FloatArray, speed: FloatArray) -> BoolArray:
+def standing_speed(time: FloatArray, speed: FloatArray) -> BoolArray:
     """Rows of a moving car whose speed stands for `FROZEN_TIME` or more, shape (n,). [s], [m/s]"""
     frozen = np.zeros(len(speed), dtype=np.bool_)
-    edges = np.r_[0, np.flatnonzero(np.diff(speed) != 0.0) + 1, len(speed)]
-    for first, stop in pairwise(edges.tolist()):
-        if speed[first] > MINIMUM_SPEED and time[stop - 1] - time[first] >= FROZEN_TIME:
-            frozen[first:stop] = True
+    for part in true_slices(np.diff(speed) == 0.0):
+        if speed[part.start] > MINIMUM_SPEED and time[part.stop] - time[part.start] >= FROZEN_TIME:
+            frozen[part.start : part.stop + 1] = True
     return frozen
 
 
@@ -328,7 +327,7 @@ def _placed(cars: Sequence[_Car], loop: _Loop, lane_width: float) -> list[pd.Dat
                     VALID_BELOW: HIGHEST_FREQUENCY,
                     RESOLUTION: POSITION_RESOLUTION,
                     RUN: np.cumsum(new),
-                    "state": np.where(frozen_rows(car.time, car.speed), "speed frozen", state),
+                    "state": np.where(standing_speed(car.time, car.speed), "speed frozen", state),
                 }
             )
         )
