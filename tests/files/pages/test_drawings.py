@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lxml import etree
+from xosc_lateral.workflows.conversion.frames import conversion_frame
 
 from tests.kit.enriched import converted, made_enriched
 from tests.kit.places import hand_written
 from xosc_lateral.files.pages.chart import BLUE
 from xosc_lateral.files.pages.figure import Figure
-from xosc_lateral.workflows.conversion.frames import conversion_frame
 from xosc_lateral.workflows.conversion.text import as_text, facts
 from xosc_lateral.workflows.playing.figures import thumbnail
 from xosc_lateral.workflows.playing.road_lines import lane_surfaces, markings

@@ -9,7 +9,8 @@ import numpy as np
 
 from xosc_lateral.files.pages.page import KeyFigure, Page, Tone
 from xosc_lateral.workflows.conversion.consequences import followings_of
-from xosc_lateral.workflows.conversion.result import ConvertedScenario, Enriched, EntityResult
+from xosc_lateral.workflows.conversion.conversion import Conversion
+from xosc_lateral.workflows.conversion.result import Enriched, EntityResult
 from xosc_lateral.workflows.conversion.text import WRITTEN_AS, beside_text, under_test
 from xosc_lateral.workflows.playing import figures as figures
 from xosc_lateral.workflows.playing.figures import COMFORTABLE
@@ -39,9 +40,9 @@ GAP_TIMES = ("at [s]", "at [s] ")
 """Headings of the times of the nominal and the enriched gap: a table's headings differ, if only by a blank."""
 
 
-def conversion_page(conversion: ConvertedScenario) -> str:
+def conversion_page(conversion: Conversion) -> str:
     """HTML page on one converted scenario, self-contained; same input, same bytes."""
-    enriched = conversion.enriched
+    enriched = conversion.movement
     done = [entity for entity in enriched.entities if entity.is_enriched]
     page = Page(f"{conversion.source.name}: lateral movement added")
     page.lead(
@@ -52,7 +53,7 @@ def conversion_page(conversion: ConvertedScenario) -> str:
             else "No entity was enriched; the reasons are listed below."
         )
         + f" The scenario runs for {enriched.motion.end_time:.1f} s (ended by the {enriched.motion.ended_by}). "
-        f"The result is in `{conversion.output.name}`."
+        f"The result is in `{(conversion.output or conversion.source).name}`."
     )
     page.key_figures(_key_figures(enriched, done))
     page.lead(under_test(conversion))
@@ -89,16 +90,16 @@ def conversion_page(conversion: ConvertedScenario) -> str:
     return page.html(_provenance(conversion))
 
 
-def _provenance(conversion: ConvertedScenario) -> dict[str, object]:
+def _provenance(conversion: Conversion) -> dict[str, object]:
     made = conversion.provenance
     return {
         "scenario": conversion.source.name,
-        "output": conversion.output.name,
+        "output": (conversion.output or conversion.source).name,
         "under test": list(made.ego) or "none",
         "written as": [f"{name}: {WRITTEN_AS[mode]}" for name, mode in made.modes.items()],
         "neighbours": [
             f"{one.name}: {beside_text(one.profile, made.options['neighbours'])}"
-            for one in conversion.enriched.entities
+            for one in conversion.movement.entities
             if one.is_enriched and one.profile is not None
         ],
         "seed": made.options["seed"],
@@ -108,12 +109,12 @@ def _provenance(conversion: ConvertedScenario) -> dict[str, object]:
         "profiles are valid for": sorted(
             {
                 f"{one.profile.name}: {one.profile.validity.in_words() or 'not stated'}"
-                for one in conversion.enriched.entities
+                for one in conversion.movement.entities
                 if one.is_enriched and one.profile is not None
             }
         ),
         "inputs": [f"{name} ({sha[:12]})" for name, sha in made.inputs.items()],
-        "output hash": conversion.output_sha256,
+        "output hash": conversion.sha256,
     }
 
 
@@ -230,7 +231,7 @@ def _add_followings(page: Page, enriched: Enriched) -> None:
     )
 
 
-def _add_shifts(page: Page, conversion: ConvertedScenario) -> None:
+def _add_shifts(page: Page, conversion: Conversion) -> None:
     """Events that come at other times with the offsets than without them."""
     if not conversion.shifts:
         return

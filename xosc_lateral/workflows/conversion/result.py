@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from msgspec import Struct
@@ -20,7 +18,6 @@ from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.world.motion.segments import SegmentSpan
 from xosc_lateral.world.motion.trajectory import WorldTrajectory, leaps
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario.under_test import Control
 
 
 class Neighbours(StrEnum):
@@ -99,6 +96,19 @@ class EntityResult:
     def lateral_jerk(self) -> FloatArray:
         """Third time derivative of the deviation, shape (rows,). [m/s3]"""
         return _derivative(self.lateral_acceleration(), self.motion.time)
+
+
+def untouched(entity: EntityMotion, spans: tuple[SegmentSpan, ...], why: str) -> EntityResult:
+    """An entity as it moves nominally."""
+    no_deviation = np.broadcast_to(0.0, len(entity.time))
+    return EntityResult(entity, spans, None, why, (), no_deviation, nominal_path(entity))
+
+
+def nominal_path(entity: EntityMotion) -> WorldTrajectory:
+    """Its nominal motion as a path."""
+    return WorldTrajectory(
+        entity.time, entity.x, entity.y, entity.z, entity.heading, entity.pitch, entity.roll, entity.speed
+    )
 
 
 def _derivative(values: FloatArray, time: FloatArray) -> FloatArray:
@@ -201,44 +211,3 @@ class EventShift(Struct, frozen=True):
     unexplained_start: float
     unexplained_end: float
     lateral_speed: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class ConversionProvenance:
-    """What went into an output: enough to make the same bytes again."""
-
-    package_version: str
-    behaviour: int  # `version.BEHAVIOUR` of the program
-    scenario: str  # where the scenario lies, as seen from the output
-    # inputs: file name, as seen from the scenario -> SHA-256 of every file that was read (scenario, road,
-    # catalogs, context)
-    inputs: Mapping[str, str]
-    profiles: Mapping[str, tuple[str, str]]  # enriched entity -> name and SHA-256 of its profile
-    options: Mapping[str, Any]  # what was asked for: `ConvertSettings.record`
-    variant: int  # from 1, as in file names
-    version: str  # of the standard that was written
-    ego: tuple[str, ...]  # vehicles under test: left as they are. Empty: there is none, and everything is replayed
-    modes: Mapping[str, str]  # vehicle that was enriched -> "trajectory" or "lane-offset"
-    content_sha256: str  # of the output without its provenance
-
-    @property
-    def mode(self) -> str:
-        """Of all vehicles that were enriched: "trajectory", "lane-offset", "mixed"; empty: nobody was."""
-        found = sorted(set(self.modes.values()))
-        return "mixed" if len(found) > 1 else "".join(found)
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class ConvertedScenario:
-    """One converted scenario."""
-
-    source: Path
-    output: Path
-    output_sha256: str  # SHA-256 of the output's bytes
-    enriched: Enriched  # nominal and enriched motion, segments, gaps
-    provenance: ConversionProvenance
-    warnings: tuple[str, ...]  # what a user has to know, a line each
-    data: bytes = b""  # the converted scenario, if it was not to be written
-    is_replay: bool = True  # everything happens by the clock of the nominal run, whoever drives
-    shifts: tuple[EventShift, ...] = ()  # of events of a reactive output, the largest under several egos
-    controllers: Mapping[str, Control] = field(default_factory=dict)  # of entities that are left to them
