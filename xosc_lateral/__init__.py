@@ -13,8 +13,8 @@ _HOME = {
     "convert": "workflows.conversion.call",
     "convert_many": "workflows.batch.call",
     "reconstruct": "workflows.recordings.call",
-    "verify": "workflows.batch.verify_call",
-    "reproduce": "workflows.batch.verify_call",
+    "verify": "workflows.batch.verify",
+    "reproduce": "workflows.batch.verify",
     "play": "workflows.playing.call",
     "segments": "workflows.playing.call",
     "fit": "workflows.profiles.fit",
@@ -45,7 +45,7 @@ _HOME = {
     "Reconstruction": "workflows.recordings.call",
     "ConvertSettings": "workflows.conversion.settings",
     "BatchResult": "workflows.batch.call",
-    "Verification": "workflows.batch.verify_call",
+    "Verification": "workflows.batch.verify",
     "Playback": "workflows.playing.call",
     "Segments": "workflows.playing.call",
     "Offsets": "workflows.profiles.sample",
@@ -128,7 +128,7 @@ if TYPE_CHECKING:
     from xosc_lateral.drivers.model.profile import DriverProfile
     from xosc_lateral.drivers.model.stream import OffsetStream
     from xosc_lateral.workflows.batch.call import BatchResult, convert_many
-    from xosc_lateral.workflows.batch.verify_call import Verification, reproduce, verify
+    from xosc_lateral.workflows.batch.verify import Verification, reproduce, verify
     from xosc_lateral.workflows.conversion.call import Conversion, convert
     from xosc_lateral.workflows.conversion.settings import ConvertSettings
     from xosc_lateral.workflows.detection.call import Detection, detect
