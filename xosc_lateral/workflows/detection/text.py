@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from xosc_lateral.workflows.detection.detected import Detected
+    from xosc_lateral.workflows.detection.detection import Detection
 
 HEADINGS = ("source", "detector", "false alarms / h", "seen", "before the marking", "time before it [s]")
 
 
-def as_text(result: Detected) -> str:
+def as_text(detection: Detection) -> str:
     """The table at the thresholds that are set, then notes."""
-    rows = [HEADINGS, *(cells(row) for row in result.rows())]
+    rows = [HEADINGS, *(cells(row) for row in detection.rows())]
     widths = [max(len(row[k]) for row in rows) for k in range(len(HEADINGS))]
     lines = ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    return "\n".join([result.headline(), "", *lines, "", *notes(result)])
+    return "\n".join([detection.headline(), "", *lines, "", *notes(detection)])
 
 
 def cells(row: Mapping[str, Any]) -> tuple[str, ...]:
@@ -46,20 +46,20 @@ def _with_interval(row: Mapping[str, Any], name: str, low: str, high: str, digit
     return f"{value:.{digits}f}{unit}{between}"
 
 
-def notes(result: Detected) -> Sequence[str]:
+def notes(detection: Detection) -> Sequence[str]:
     """What the numbers count, and what can't be read from them."""
     lines = [
         "False alarms: alarms that begin while a vehicle keeps its lane, an hour, seen from one neighbouring lane. "
         "Seen: an alarm before the vehicle's reference point is in the other lane. Time: from the alarm to its side on "
         "the marking, median. Intervals: 95 %, by vehicles drawn anew."
     ]
-    silent = sorted(result.still)
+    silent = sorted(detection.still)
     if silent:
         lines.append(
             f"{', '.join(silent)}: no vehicle moves inside its lane, so that there are no false alarms by "
             "construction: that says nothing about a detector."
         )
-    alone = [curve for curve in result.curves if curve.detector.needs_observer and not len(curve.hours)]
+    alone = [curve for curve in detection.curves if curve.detector.needs_observer and not len(curve.hours)]
     left = sorted({f"{curve.detector.name} on {curve.source}" for curve in alone})
     if left:
         lines.append(f"Needs other vehicles, which are not there: {', '.join(left)}.")

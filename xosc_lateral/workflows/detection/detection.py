@@ -1,29 +1,42 @@
-"""What detectors did on sources, as values: what the text, the page and the JSON of `detect` are made from."""
+"""What detectors did on sources: counts, intervals, worst cases, as text, table, JSON and page."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+from functools import cached_property, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.hashes import parsed_hashes
+from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.workflows.detection.observation import Sensor
 from xosc_lateral.workflows.detection.scoring import Case, Curve, Tally, worst_of
 from xosc_lateral.workflows.detection.sources import Source
+from xosc_lateral.workflows.result import PathLike, Result, write_page
+
+if TYPE_CHECKING:
+    from xosc_lateral.files.pages.figure import Figure
 
 
-@dataclass(frozen=True, eq=False)
-class Detected:
-    """Tallies of every detector on every source, in the order of the sources."""
+@dataclass(frozen=True, eq=False, repr=False)
+class Detection(Result):
+    """What detectors did on sources, in the order of the sources."""
 
-    tallies: Sequence[Tally]
-    sources: Sequence[Source]
+    tallies: Sequence[Tally]  # of every detector on every source
+    origins: Sequence[Source]
     sensor: Sensor
     seed: int
     still: frozenset[str]  # sources in which no vehicle moves inside its lane
+    files: Sequence[Path]  # that must not be overwritten
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """Their labels."""
+        return tuple(source.label for source in self.origins)
 
     @cached_property
     def curves(self) -> tuple[Curve, ...]:
@@ -31,27 +44,38 @@ class Detected:
         return tuple(tally.curve() for tally in self.tallies)
 
     def headline(self) -> str:
-        """One line."""
-        detectors = len(self.curves) // len(self.sources)
+        """See `Result`."""
+        detectors = len(self.curves) // len(self.origins)
         hours = sum({curve.source: float(curve.hours.sum()) for curve in self.curves}.values())
-        return f"{detectors} detectors on {len(self.sources)} sources, {hours:.2f} h of lane keeping"
+        return f"{detectors} detectors on {len(self.origins)} sources, {hours:.2f} h of lane keeping"
+
+    def __str__(self) -> str:
+        from xosc_lateral.workflows.detection.text import as_text
+
+        return as_text(self)
 
     def rows(self, *, every: bool = False) -> list[dict[str, Any]]:
         """A row for each source and detector at the threshold that is set, or at every threshold."""
-        found = []
-        for curve in self.curves:
-            chosen = curve.detector.chosen
-            found += _rows(curve, range(len(curve.rate)) if every else [chosen])
-        return found
+        return [
+            row
+            for curve in self.curves
+            for row in _rows(curve, range(len(curve.rate)) if every else [curve.detector.chosen])
+        ]
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per source, detector and threshold; `is_set` marks the one that is set. [1/h], [s], shares."""
+        return pd.DataFrame(self.rows(every=True))
 
     def worst(self) -> list[tuple[str, str, Case]]:
         """Source, detector and case of the worst ones of all."""
-        return worst_of([(one.source, one.detector.label(), case) for one in self.tallies for case in one.cases])
+        return worst_of(
+            [(tally.source, tally.detector.label(), case) for tally in self.tallies for case in tally.cases]
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, for JSON."""
         return {
-            "sources": [{"label": one.label, "files": [path.name for path in one.files]} for one in self.sources],
+            "sources": [{"label": each.label, "files": [path.name for path in each.files]} for each in self.origins],
             "sensor": {"noise": self.sensor.noise, "delay": self.sensor.delay, "rate": self.sensor.rate},
             "rows": [_plain(row) for row in self.rows()],
             "curves": [
@@ -78,8 +102,30 @@ class Detected:
 
     def provenance(self) -> dict[str, Any]:
         """Seed and hashes of all inputs."""
-        files = [path for one in self.sources for path in one.files if path.is_file()]
+        files = [path for source in self.origins for path in source.files if path.is_file()]
         return {"seed": self.seed, "inputs": parsed_hashes(files)}
+
+    def plot(self) -> Figure:
+        """Cut-ins seen in time, and the median time before the marking, over false alarms an hour."""
+        from xosc_lateral.workflows.detection.page import curves_figure
+
+        return curves_figure(self.curves)
+
+    def write(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the table with every threshold: ``.csv``, ``.csv.gz`` or ``.parquet``."""
+        from xosc_lateral.files.output_tables import output_suffixes, write_frame
+
+        output = output_file(path, "detection.csv", output_suffixes())
+        claim([output], self.files, force=force)
+        write_frame(self.to_frame(), output, self.provenance())
+        return output
+
+    def write_report(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the HTML page: table, curves, and the worst cases in the player."""
+        from xosc_lateral.workflows.detection.page import detection_page
+
+        html = partial(detection_page, self)
+        return write_page(path, "detection.html", html, inputs=self.files, force=force)
 
 
 def _rows(curve: Curve, numbers: Sequence[int]) -> list[dict[str, Any]]:
@@ -88,10 +134,10 @@ def _rows(curve: Curve, numbers: Sequence[int]) -> list[dict[str, Any]]:
     low, middle, high = (curve.lead(share) for share in (0.05, 0.5, 0.95))
     fixed: dict[str, Any] = {"source": curve.source, "detector": detector.label()}
     counts = {"vehicles": len(curve.hours), "hours": float(curve.hours.sum()), "cut_ins": len(curve.leads)}
-    found = []
+    rows = []
     for k in numbers:
         is_set = k == detector.chosen
-        found.append({
+        rows.append({
             **fixed, "threshold": float(detector.thresholds[k]), "is_set": is_set, **counts,
             "false_alarms": int(curve.counts[:, k].sum()),
             "false_alarms_per_hour": float(curve.rate[k]),
@@ -103,7 +149,7 @@ def _rows(curve: Curve, numbers: Sequence[int]) -> list[dict[str, Any]]:
             "lead_median_low": medians[0] if is_set else np.nan,
             "lead_median_high": medians[1] if is_set else np.nan,
         })  # fmt: skip
-    return found
+    return rows
 
 
 def _listed(values: Any) -> list[float | None]:
