@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -20,6 +20,8 @@ from xosc_lateral.workflows.result import PathLike, Result, write_page
 
 if TYPE_CHECKING:
     from xosc_lateral.files.pages.figure import Figure
+
+HEADINGS = ("source", "detector", "false alarms / h", "seen", "before the marking", "time before it [s]")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -50,9 +52,29 @@ class Detection(Result):
         return f"{detectors} detectors on {len(self.origins)} sources, {hours:.2f} h of lane keeping"
 
     def __str__(self) -> str:
-        from xosc_lateral.workflows.detection.text import as_text
+        rows = [HEADINGS, *(cells(row) for row in self.rows())]
+        widths = [max(len(row[k]) for row in rows) for k in range(len(HEADINGS))]
+        lines = ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+        return "\n".join([self.headline(), "", *lines, "", *self.notes()])
 
-        return as_text(self)
+    def notes(self) -> Sequence[str]:
+        """What the numbers count, and what can't be read from them."""
+        lines = [
+            "False alarms: alarms that begin while a vehicle keeps its lane, an hour, seen from one neighbouring lane. "
+            "Seen: an alarm before the vehicle's reference point is in the other lane. Time: from the alarm to its "
+            "side on the marking, median. Intervals: 95 %, by vehicles drawn anew."
+        ]
+        silent = sorted(self.still)
+        if silent:
+            lines.append(
+                f"{', '.join(silent)}: no vehicle moves inside its lane, so that there are no false alarms by "
+                "construction: that says nothing about a detector."
+            )
+        alone = [curve for curve in self.curves if curve.detector.needs_observer and not len(curve.hours)]
+        left = sorted({f"{curve.detector.name} on {curve.source}" for curve in alone})
+        if left:
+            lines.append(f"Needs other vehicles, which are not there: {', '.join(left)}.")
+        return lines
 
     def rows(self, *, every: bool = False) -> list[dict[str, Any]]:
         """A row for each source and detector at the threshold that is set, or at every threshold."""
@@ -124,7 +146,14 @@ class Detection(Result):
         """Write the HTML page: table, curves, and the worst cases in the player."""
         from xosc_lateral.workflows.detection.page import detection_page
 
-        html = partial(detection_page, self)
+        html = partial(
+            detection_page,
+            lead=[f"{self.headline()}.", *self.notes()],
+            table=[dict(zip(HEADINGS, cells(row), strict=True)) for row in self.rows()],
+            curves=self.curves,
+            worst=self.worst(),
+            provenance=self.provenance(),
+        )
         return write_page(path, "detection.html", html, inputs=self.files, force=force)
 
 
@@ -162,3 +191,29 @@ def _plain(row: dict[str, Any]) -> dict[str, Any]:
         name: (None if np.isnan(value) else round(value, 6)) if isinstance(value, float) else value
         for name, value in row.items()
     }
+
+
+# ---- cells of the table ----
+def cells(row: Mapping[str, Any]) -> tuple[str, ...]:
+    """Cells of a row, as texts; intervals of 95 %."""
+    alarms = _with_interval(row, "false_alarms_per_hour", "false_alarms_low", "false_alarms_high", 1)
+    seen = _share(row, "seen", "seen_low", "seen_high")
+    in_time = _share(row, "seen_before_marking", "seen_before_marking_low", "seen_before_marking_high")
+    lead = _with_interval(row, "lead_median", "lead_median_low", "lead_median_high", 2)
+    return str(row["source"]), str(row["detector"]), alarms, seen, in_time, lead
+
+
+def _share(row: Mapping[str, Any], name: str, low: str, high: str) -> str:
+    """Percent of the cut-ins; none where there are none."""
+    if not row["cut_ins"]:
+        return "no cut-in"
+    percent = {key: 100.0 * row[key] for key in (name, low, high)}
+    return _with_interval(percent, name, low, high, 0, " %")
+
+
+def _with_interval(row: Mapping[str, Any], name: str, low: str, high: str, digits: int, unit: str = "") -> str:
+    value, ends = row[name], (row[low], row[high])
+    if np.isnan(value):
+        return "-"
+    between = "" if np.isnan(ends).any() else f" ({ends[0]:.{digits}f} to {ends[1]:.{digits}f})"
+    return f"{value:.{digits}f}{unit}{between}"

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -11,16 +10,12 @@ from xosc_lateral.files.pages.chart import ENRICHED, INK, color_of
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import Html, Page
 from xosc_lateral.workflows.detection.scoring import Case, Curve
-from xosc_lateral.workflows.detection.text import HEADINGS, cells, notes
 from xosc_lateral.workflows.detection.tracks import STEP, Track
 from xosc_lateral.workflows.playing.scene import scene_of
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.scenario import BoundingBox, Entity
 from xosc_lateral.world.scenario.enums import EntityCategory
 from xosc_lateral.world.scenario.place import Place
-
-if TYPE_CHECKING:
-    from xosc_lateral.workflows.detection.detection import Detection
 
 LEAST_RATE = 0.1
 """False alarms below this are drawn there: the axis is logarithmic. [1/h]"""
@@ -32,29 +27,33 @@ AROUND = 6.0
 """Of a case, before and after its moment. [s]"""
 
 
-def detection_page(detection: Detection) -> str:
+def detection_page(
+    lead: Sequence[str],
+    table: Sequence[Mapping[str, object]],
+    curves: Sequence[Curve],
+    worst: Sequence[tuple[str, str, Case]],
+    provenance: Mapping[str, object],
+) -> str:
     """HTML page, self-contained; same input, same bytes."""
     page = Page("Cut-in detectors")
-    page.lead(f"{detection.headline()}.", *notes(detection))
+    page.lead(*lead)
     page.section("Table")
-    rows = [dict(zip(HEADINGS, cells(row), strict=True)) for row in detection.rows()]
-    page.table(rows, "At the thresholds that are set; in brackets 95 % intervals")
+    page.table(table, "At the thresholds that are set; in brackets 95 % intervals")
     page.section(
         "Curves", "From left to right, thresholds become more sensitive. The dot is the threshold that is set."
     )
-    page.figure(curves_figure(detection.curves), "Cut-ins seen before the marking is crossed, and how long before")
+    page.figure(curves_figure(curves), "Cut-ins seen before the marking is crossed, and how long before")
     page.section("Worst cases")
-    cases = detection.worst()
-    case_rows = [_case_row(number, *case) for number, case in enumerate(cases, 1)]
+    case_rows = [_case_row(number, *case) for number, case in enumerate(worst, 1)]
     page.table(case_rows, "Cut-ins that were missed or seen late, then false alarms farthest above their threshold")
-    for number, (_, detector, case) in enumerate(cases, 1):
+    for number, (_, detector, case) in enumerate(worst, 1):
         title = f"{number}: {case.kind}, {case.view.track.name} at {case.time:.1f} s"
         page.heading(title, anchor=f"case-{number}")
         scene = clip_scene(case)
         if scene is not None:
             page.player(scene, f"Case {number} from above", anchor=f"scene-{number}")
         page.figure(_case_figure(case), f"Towards the neighbouring lane; shaded: alarm of {detector}")
-    return page.html(detection.provenance())
+    return page.html(provenance)
 
 
 def _case_row(number: int, source: str, detector: str, case: Case) -> dict[str, object]:
