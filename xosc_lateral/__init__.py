@@ -51,7 +51,7 @@ _HOME = {
     "Offsets": "workflows.profiles.sample",
     "Evaluation": "workflows.profiles.evaluate",
     "ClosedLoop": "workflows.profiles.loop",
-    "Detection": "workflows.detection.call",
+    "Detection": "workflows.detection.detection",
     "ImportedDrives": "workflows.recordings.importing",
     "XoscLateralError": "base.errors",
     "FormatError": "base.errors",
@@ -131,7 +131,8 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.batch.verify import Verification, reproduce, verify
     from xosc_lateral.workflows.conversion.call import Conversion, convert
     from xosc_lateral.workflows.conversion.settings import ConvertSettings
-    from xosc_lateral.workflows.detection.call import Detection, detect
+    from xosc_lateral.workflows.detection.call import detect
+    from xosc_lateral.workflows.detection.detection import Detection
     from xosc_lateral.workflows.live.call import LiveRun, live_esmini, live_sumo
     from xosc_lateral.workflows.live.esmini import EsminiTraffic
     from xosc_lateral.workflows.live.fmu import export_fmu
