@@ -24,15 +24,13 @@ from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping
 from xosc_lateral.files.rows import chosen_rows, without_markers
 from xosc_lateral.files.tables import comma_numbers, indicators, listed, numbers_of, plain_cells, read_table
 
-LABELS = ("drive", "driver")
-"""Columns that say which drive a row is of, and whose."""
+LABELS = ("drive", "driver")  # columns that say which drive a row is of, and whose
 
 WHEEL_WIDTH = 2.5
 """Lanes of roads driven at 40 km/h and more are wider but for the left one at roadworks; from the wheels of a car
 (1.5 to 1.6 m apart) one of 3.0 to 3.75 m has 1.4 to 2.25 m. [m]"""
 
-MAX_LEVELS = 12
-"""A column of whole numbers with at most so many values holds levels, not a quantity."""
+MAX_LEVELS = 12  # a column of whole numbers with at most so many values holds levels, not a quantity
 
 
 def read_drives(paths: str | Path | Sequence[str | Path], mapping: MappingLike | None = None) -> list[Drive]:

@@ -26,8 +26,7 @@ def harmless(text: str) -> str:
     return f"'{text}" if text.startswith(_FORMULA) else text
 
 
-METADATA_KEY = b"xosc-lateral"
-"""Key of the provenance in a Parquet file's schema metadata."""
+METADATA_KEY = b"xosc-lateral"  # key of the provenance in a Parquet file's schema metadata
 
 Encoder: TypeAlias = "Callable[[Callable[[], pd.DataFrame], Callable[[], str]], bytes]"
 """A table's bytes, from what gives it as a frame and what gives it as CSV; only one of both is asked for."""

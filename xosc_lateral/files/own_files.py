@@ -12,8 +12,7 @@ from typing import IO
 from xosc_lateral.base.errors import FormatError
 
 _PLAIN = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
-_LINKS = (errno.ELOOP, errno.EMLINK, errno.ENOTDIR)
-"""What systems answer where ``O_NOFOLLOW`` meets a link."""
+_LINKS = (errno.ELOOP, errno.EMLINK, errno.ENOTDIR)  # what systems answer where ``O_NOFOLLOW`` meets a link
 
 
 def open_own(path: Path) -> IO[bytes]:

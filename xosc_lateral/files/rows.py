@@ -17,8 +17,7 @@ from xosc_lateral.base.texts import composed
 USUAL_MARKERS = (32767.0, 32768.0, 65535.0, 2147483647.0, 4294967295.0)
 """Greatest whole numbers of two and four bytes: besides 999, 9999, ... what loggers write where there is no value."""
 
-LEAST_MARKERS = 3
-"""A usual marker that is there so often, and is far from all else, is taken for one. [rows]"""
+LEAST_MARKERS = 3  # a usual marker that is there so often, and is far from all else, is taken for one [rows]
 
 CONDITION = re.compile(r"\s*(.+?)\s*(==|!=|>=|<=|>|<)\s*(.+?)\s*")
 

@@ -92,8 +92,7 @@ def indicators(name: str, column: pd.Series, drives: pd.Series | None, most: int
 PARQUET = ".parquet"
 TABLE_SUFFIXES = (".csv", ".csv.gz", PARQUET)
 
-LONGEST_MESSAGE = 300
-"""Of what a library says about a file; some quote half of it."""
+LONGEST_MESSAGE = 300  # of what a library says about a file; some quote half of it
 
 _CHUNK = 1 << 20
 

@@ -8,8 +8,7 @@ from typing import Any
 
 from xosc_lateral.base.errors import XoscLateralError
 
-SUFFIXES = (".mcap", ".osi")
-"""Of traces: several channels and an index; messages one after the other."""
+SUFFIXES = (".mcap", ".osi")  # of traces: several channels and an index; messages one after the other
 
 
 def osi(module: str) -> Any:

@@ -26,8 +26,7 @@ from xosc_lateral.world.scenario.enums import EntityCategory, VehicleCategory
 from xosc_lateral.world.scenario.private_actions import LightStateAction
 
 TOPIC = "ground_truth"
-VERSION = (3, 8, 0)
-"""Of OSI, that is written."""
+VERSION = (3, 8, 0)  # of OSI, that is written
 
 NANOSECONDS = 1_000_000_000
 

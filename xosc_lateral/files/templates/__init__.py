@@ -17,8 +17,7 @@ from xosc_lateral.files.templates.template import Template
 
 __all__ = ["TEMPLATES", "AnyTemplate", "PlainTemplate", "Template", "all_templates", "find_template"]
 
-GROUP = "xosc_lateral.templates"
-"""Entry points of further templates."""
+GROUP = "xosc_lateral.templates"  # entry points of further templates
 
 AnyTemplate = Template | PlainTemplate
 

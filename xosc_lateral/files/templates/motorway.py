@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-FIXED_DATE = datetime(2024, 1, 1)
-"""Written where the formats ask for a date: the same settings give the same bytes."""
+FIXED_DATE = datetime(2024, 1, 1)  # written where the formats ask for a date: the same settings give the same bytes
 
 
 def document(root: ET.Element) -> str:
@@ -21,8 +20,7 @@ def document(root: ET.Element) -> str:
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'
 
 
-ROAD = 1
-"""Id of the only road."""
+ROAD = 1  # id of the only road
 
 SHOULDER = 3.0  # hard shoulder [m]; RAA 2008 (guidelines for motorways), cross-section RQ 31
 

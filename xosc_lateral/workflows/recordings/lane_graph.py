@@ -90,8 +90,7 @@ class LaneGraph:
         return steps
 
 
-SLOPE_LENGTH = 10.0
-"""To each side: over which metres of a lane are compared with those of its neighbour. [m]"""
+SLOPE_LENGTH = 10.0  # to each side: over which metres of a lane are compared with those of its neighbour [m]
 
 
 def follow(values: FloatArray, line: tuple[FloatArray, FloatArray]) -> FloatArray:

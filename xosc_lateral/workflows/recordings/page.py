@@ -25,8 +25,7 @@ from xosc_lateral.world.motion.trajectory import WorldTrajectory
 if TYPE_CHECKING:
     from xosc_lateral.workflows.recordings.reconstruct import Reconstructed
 
-FRAME = 0.1
-"""Rows of the page's player. [s]"""
+FRAME = 0.1  # rows of the page's player [s]
 VEHICLES = {
     "entity": "entity", "recorded_as": "recorded as", "class": "class", "from": "from [s]", "to": "to [s]",
     "corners": "changes of acceleration", "along_rms": "along, rms [m]", "along_largest": "along, largest [m]",

@@ -38,14 +38,9 @@ VERSIONS: dict[str, Version] = {named(version): version for version in ((1, 0), 
 """Of the standard that can be written."""
 LONG_DRIVE = 100.0
 """Of road-following, for a profile of one vehicle: ten windows that the evaluation compares drivers by. [s]"""
-LONGEST_WINDOW = 3600.0
-"""A scenario of more can't be looked at, and times in ms or us instead of s give it. [s]"""
-AROUND = 100.0
-"""Who comes as near as this to the vehicle in question, along or across, belongs to its surroundings. [m]"""
-
-
-NO_HOST = "none"
-"""Stands for no vehicle under test."""
+LONGEST_WINDOW = 3600.0  # a scenario of more can't be looked at, and times in ms or us instead of s give it [s]
+AROUND = 100.0  # who comes as near as this to the vehicle in question, along or across, belongs to its surroundings [m]
+NO_HOST = "none"  # stands for no vehicle under test
 
 
 def _version(text: str) -> str:

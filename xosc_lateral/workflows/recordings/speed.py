@@ -16,12 +16,9 @@ from xosc_lateral.base.arrays import FloatArray
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
-SPACING = 0.4
-"""Rows are thinned to this: in that time, a change of acceleration of 1 m/s2 shows as 1 cm. [s]"""
-APART = 1.0
-"""Corners are at least this far apart: a driver's foot needs about so long from one pedal to the other. [s]"""
-ROUNDS = 12
-"""Of Gauss-Newton; corners move by less than 10 ms after eight."""
+SPACING = 0.4  # rows are thinned to this: in that time, a change of acceleration of 1 m/s2 shows as 1 cm [s]
+APART = 1.0  # corners are at least this far apart: a driver's foot needs about so long from one pedal to the other [s]
+ROUNDS = 12  # of Gauss-Newton; corners move by less than 10 ms after eight
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -28,8 +28,7 @@ from xosc_lateral.workflows.recordings.importers.track_table import Tracks
 from xosc_lateral.workflows.recordings.roads_from_lanes import DrivenLane
 
 NET_ENDINGS = (".net.xml", ".net.xml.gz")
-REAR_FROM_FRONT = 0.8
-"""Rear axle behind the front bumper, as a share of the length: 3.7 m of a car of 4.6 m. [-]"""
+REAR_FROM_FRONT = 0.8  # rear axle behind the front bumper, as a share of the length: 3.7 m of a car of 4.6 m [-]
 
 
 def lanes_of_net(net: SumoNet, path: Path) -> list[DrivenLane]:

@@ -11,8 +11,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.world.motion.crossings import bell_share
 from xosc_lateral.world.scenario.enums import DynamicsShape
 
-MARGIN = 1.0
-"""Rows of road-following that are fitted along, at both ends. [s]"""
+MARGIN = 1.0  # rows of road-following that are fitted along, at both ends [s]
 DURATIONS = (1.0, 16.0)
 """Of lane changes; naturalistic ones last 1 to 16.5 s (T. Toledo, D. Zohar, Transportation Research Record 1999, 2007:
 mean 4.6 s). [s]"""

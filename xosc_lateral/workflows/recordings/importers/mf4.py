@@ -49,8 +49,7 @@ LICENCE = "your own recording"
 
 _NO_MDF = "not an MDF file that asammdf can read"
 
-LISTED = 40
-"""Channel names in a message, at most."""
+LISTED = 40  # channel names in a message, at most
 
 MAX_CHANNEL_DISTANCE = 0.2
 """Median distance of two channels of one name, as a share of the standard deviation, that is not one of rates. [-]"""

@@ -33,8 +33,7 @@ from xosc_lateral.workflows.recordings.placed import (
 
 LICENCE = "that of the trace"
 
-HOST = "host"
-"""Stands for the trace's own host vehicle."""
+HOST = "host"  # stands for the trace's own host vehicle
 
 
 @guarded

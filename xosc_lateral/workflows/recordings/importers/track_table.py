@@ -76,8 +76,7 @@ class Tracks:
 MAX_SPEED_RATIO = 1.39
 """A speed off by more is in another unit: the nearest, knots, are 1.94 times as many, and this is its root. [-]"""
 
-SPEED_WINDOW = 0.4
-"""Positions are differenced over this where no speed was recorded. [s]"""
+SPEED_WINDOW = 0.4  # positions are differenced over this where no speed was recorded [s]
 
 
 def ground_speed(x: FloatArray, y: FloatArray, vehicle: IntArray, time: FloatArray, step: float) -> FloatArray:
@@ -216,13 +215,11 @@ def _columns(table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequen
     return made.dropna(subset=["vehicle", "time", "x", "y"])
 
 
-FIRST = b"esmini "
-"""Begins the lines before the table, which name the player's version."""
+FIRST = b"esmini "  # begins the lines before the table, which name the player's version
 
 HEAD = "Index [-]"
 
-MOST_LINES = 50
-"""Before the table's head; a player writes seven."""
+MOST_LINES = 50  # before the table's head; a player writes seven
 
 _LOGGED = {
     "vehicle": "Entity_Name",

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-BEYOND_END = 1e-3
-"""Points farther than this past the end of a line go on with it. [m]"""
+BEYOND_END = 1e-3  # points farther than this past the end of a line go on with it [m]
 
 
 def extend_thing(kept: Any, seen: Any) -> None:

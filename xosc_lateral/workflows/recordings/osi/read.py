@@ -29,11 +29,8 @@ KINDS = {
 THINGS = ("lane", "lane_boundary", "logical_lane", "logical_lane_boundary")
 """Fields of a `GroundTruth` that are kept besides moving objects: lanes in both encodings."""
 
-LEAP = 3.0
-"""Farther than twice what it drives in a step, and by this much: not the same vehicle any more. [m]"""
-
-COLUMNS = 12
-"""Number, time, x, y, yaw, speed, length, pitch, roll; the rear axle, on the ground, from the middle."""
+LEAP = 3.0  # farther than twice what it drives in a step, and by this much: not the same vehicle any more [m]
+COLUMNS = 12  # number, time, x, y, yaw, speed, length, pitch, roll; the rear axle, on the ground, from the middle
 
 
 @dataclass

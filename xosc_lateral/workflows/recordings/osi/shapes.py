@@ -15,8 +15,7 @@ from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
 from xosc_lateral.workflows.recordings.lane_shapes import Strip, lane_graph, middle
 from xosc_lateral.workflows.recordings.osi.read import Recorded
 
-SHOWING_ROWS = 20_000
-"""So many rows of a trace show which way its lanes are driven. [-]"""
+SHOWING_ROWS = 20_000  # so many rows of a trace show which way its lanes are driven [-]
 
 
 @dataclass(frozen=True)
