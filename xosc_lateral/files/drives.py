@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,7 +19,6 @@ from xosc_lateral.drivers.drives.cuts import MIN_RUN
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.model.plausibility import drives_nobody, first_implausible, implausible, implausible_rows
 from xosc_lateral.files.clock import seconds_of_stamps
-from xosc_lateral.files.labels import file_label
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping
 from xosc_lateral.files.rows import chosen_rows, without_markers
 from xosc_lateral.files.tables import comma_numbers, indicators, listed, numbers_of, plain_cells, read_table
@@ -217,3 +216,38 @@ def _driver(table: pd.DataFrame, name: str, rows: NDArray[np.intp], path: Path) 
         what = f"drive {name}: {found[0]} and {found[1]}; a drive has one driver"
         raise FormatError(what, path=path, element="column 'driver'")
     return str(found[0]) if len(found) else ""
+
+
+FORMAT_ENDINGS = (".csv.gz", ".csv", ".parquet", ".mf4", ".mdf", ".dat", ".mcap", ".osi", ".xml")
+"""Ends of file names that say how a file is written; whatever else has a dot belongs to the name (``2026.11.21``)."""
+
+
+def file_label(path: Path) -> str:
+    """A file's name without the ending that gives its format."""
+    ending = next((end for end in FORMAT_ENDINGS if path.name.lower().endswith(end)), "")
+    return path.name[: len(path.name) - len(ending)] or path.name
+
+
+def file_labels(paths: Sequence[Path]) -> list[str]:
+    """Different labels for several files: with folders where names are equal, whole where these are.
+
+    Raises `FormatError`: a file is named twice.
+    """
+    if twice := [path for path in paths if paths.count(path) > 1]:
+        raise FormatError("the file is named twice", path=twice[0])
+    short = [file_label(path) for path in paths]
+    longer = [str(path.parent / label) for path, label in zip(paths, short, strict=True)]
+    return [
+        label if short.count(label) == 1 else long if longer.count(long) == 1 else str(path)
+        for path, label, long in zip(paths, short, longer, strict=True)
+    ]
+
+
+def labels_apart(paths: Sequence[Path], labels: Sequence[Iterable[str]]) -> list[dict[str, str]]:
+    """For every file, its drives' own labels and what they are called beside the others': with the file where two
+    files have the same."""
+    every = [label for own in labels for label in set(own)]
+    return [
+        {label: label if every.count(label) == 1 else f"{name}:{label}" for label in own}
+        for name, own in zip(file_labels(paths), labels, strict=True)
+    ]

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.hashes import file_hash
+from xosc_lateral.files.source import file_hash
 
 STDOUT = "-"  # name of the standard output where an output is asked for
 LONGEST_NAME = 255  # of a file, on all common systems [byte]

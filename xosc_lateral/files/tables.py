@@ -20,8 +20,7 @@ from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.limits import TABLE_CELLS, TABLE_COLUMNS
 from xosc_lateral.base.texts import composed
 from xosc_lateral.files.clock import seconds_of_stamps
-from xosc_lateral.files.hashes import parsed_hash
-from xosc_lateral.files.source import Source, open_source
+from xosc_lateral.files.source import Source, open_source, parsed_hash
 
 if TYPE_CHECKING:
     from xosc_lateral.files.mapping import TableMapping

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.files.osi.extra import osi
+from xosc_lateral.files.osi import osi
 from xosc_lateral.world.road.geometry import simplify
 from xosc_lateral.world.road.lanes import DRIVING, Lane, LaneSection, beside
 from xosc_lateral.world.road.network import RoadNetwork

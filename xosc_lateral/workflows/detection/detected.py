@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from xosc_lateral.files.hashes import parsed_hashes
+from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.workflows.detection.observation import Sensor
 from xosc_lateral.workflows.detection.scoring import Case, Curve, Tally, worst_of
 from xosc_lateral.workflows.detection.sources import Source

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.rows import true_slices
+from xosc_lateral.workflows.recordings.motion_fits import SHAPES, Rough, Transition, fit_transition
 from xosc_lateral.workflows.recordings.recorded import MOVING_SPEED, RecordedVehicle
-from xosc_lateral.workflows.recordings.transitions import SHAPES, Rough, Transition, fit_transition
 
 SETTLED = 0.7  # nobody has settled in a lane who is farther from its centre, see `recordings.cuts` [m]
 CALM = 0.1  # a lane change reaches to where the lateral speed falls below this, see there [m/s]

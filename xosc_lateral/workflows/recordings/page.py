@@ -9,10 +9,10 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.version import __version__
-from xosc_lateral.files.hashes import parsed_hashes
 from xosc_lateral.files.pages.chart import MEASURED, SAMPLED
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import KeyFigure, Page
+from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.workflows.conversion.result import EntityResult, SampledSegment
 from xosc_lateral.workflows.playing.scene import scene_of
 from xosc_lateral.workflows.recordings.drivers import ChosenDriver

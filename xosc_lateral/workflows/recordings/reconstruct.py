@@ -14,10 +14,10 @@ from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.texts import composed
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.files.hashes import parsed_hashes
 from xosc_lateral.files.openscenario.write.build import Version, named
 from xosc_lateral.files.output_tables import write_frame
 from xosc_lateral.files.profiles import find_profile, list_profiles, profile_bytes, read_profile
+from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.workflows.conversion import options as say
 from xosc_lateral.workflows.conversion.drivers import AUTO_PROFILE
 from xosc_lateral.workflows.conversion.options import Paths, option

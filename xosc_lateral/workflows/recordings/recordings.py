@@ -20,12 +20,12 @@ from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.files.xml import root_tag
 from xosc_lateral.workflows.recordings.gate import require_along_lanes
 from xosc_lateral.workflows.recordings.importers import dlr_ht, levelx
+from xosc_lateral.workflows.recordings.importers.fcd import NET_ENDINGS, lanes_of_net, read_fcd
 from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH, Tracks, read_tracks, tracks_of
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
 from xosc_lateral.workflows.recordings.lane_shapes import LaneShape
 from xosc_lateral.workflows.recordings.recorded import Track
 from xosc_lateral.workflows.recordings.roads_from_lanes import DrivenLane, roads_of_lanes
-from xosc_lateral.workflows.recordings.sumo import NET_ENDINGS, lanes_of_net, read_fcd
 from xosc_lateral.world.road.network import RoadNetwork
 
 STEP = 0.1  # rows are thinned to this: lane changes and braking last seconds [s]

@@ -12,8 +12,8 @@ from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.build import Version, decimal, sub
 from xosc_lateral.files.output_paths import template_mark
 from xosc_lateral.workflows.recordings.encounters import RelativeTrigger
+from xosc_lateral.workflows.recordings.motion_fits import Transition, peak_acceleration
 from xosc_lateral.workflows.recordings.plan import VehiclePlan
-from xosc_lateral.workflows.recordings.transitions import Transition, peak_acceleration
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.enums import Priority
 

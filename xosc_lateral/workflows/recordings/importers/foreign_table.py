@@ -12,8 +12,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.files.drives import drives_of_table, translated
-from xosc_lateral.files.labels import file_labels, labels_apart
+from xosc_lateral.files.drives import drives_of_table, file_labels, labels_apart, translated
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping, factor, spelled
 from xosc_lateral.files.tables import comma_numbers, read_table, text_encoding
 

@@ -32,7 +32,7 @@ from xosc_lateral.files.tables import read_table
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings, Rows, cut_table
 from xosc_lateral.workflows.recordings.gate import require_lane_direction
 from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
-from xosc_lateral.workflows.recordings.neighbours import REACH, find_neighbours
+from xosc_lateral.workflows.recordings.lane_graph import REACH, find_neighbours
 
 LICENCE = (
     "highD/exiD: leveLXData, under the licence that you signed (free for non-commercial research); whether fitted "

@@ -15,7 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.labels import file_labels
+from xosc_lateral.files.drives import file_labels
 from xosc_lateral.files.opendrive import parse_opendrive, read_opendrive
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
 from xosc_lateral.workflows.recordings.importers.table import Imported, guarded

@@ -17,9 +17,9 @@ from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.clock import require_row_step, seconds_of_stamps
 from xosc_lateral.files.mapping import UNITS, MappingLike, TableMapping, as_mapping, parse_map
+from xosc_lateral.files.output_tables import COLUMNS
 from xosc_lateral.files.rows import chosen_rows, without_markers
 from xosc_lateral.files.source import open_source
-from xosc_lateral.files.states import COLUMNS
 from xosc_lateral.files.tables import foreign_errors, listed, numbers_of, read_table, unpacked_text
 from xosc_lateral.workflows.recordings.gate import MOVING_SPEED, require_headings
 

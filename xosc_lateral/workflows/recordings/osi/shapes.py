@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.files.osi.extra import osi
+from xosc_lateral.files.osi import osi
 from xosc_lateral.workflows.recordings.gate import MOVING_SPEED
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
 from xosc_lateral.workflows.recordings.lane_shapes import Strip, lane_graph, middle
