@@ -21,7 +21,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.files.clock import require_row_step
+from xosc_lateral.files.columns import require_row_step
 from xosc_lateral.files.sumo import (
     TRUCKS,
     WIDTH,

@@ -82,7 +82,7 @@ def read_recording_files(path: Path) -> tuple[pd.DataFrame, pd.DataFrame, pd.Dat
         if not file.exists():
             what = "missing; a recording is XX_tracks.csv, XX_tracksMeta.csv and XX_recordingMeta.csv"
             raise FormatError(what, path=file)
-        tables.append(read_table(file)[0])
+        tables.append(read_table(file))
         if tables[-1].empty:
             raise NotEnoughDataError(f"{file}: has no rows")
     return tables[0], tables[1], tables[2]

@@ -35,9 +35,9 @@ from xosc_lateral.base.limits import CLOCK_ROWS, TIME
 from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.drivers.drives.cuts import JUMP, MAX_GAP
 from xosc_lateral.drivers.drives.resampling import average, resample
+from xosc_lateral.files.columns import refuse_marker
 from xosc_lateral.files.drives import file_labels, from_middle
 from xosc_lateral.files.mapping import ColumnSource, MappingLike, as_mapping, factor, is_measured, parse_map, spelled
-from xosc_lateral.files.rows import refuse_marker
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import LONGEST_MESSAGE, foreign_errors
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS

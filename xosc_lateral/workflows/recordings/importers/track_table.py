@@ -15,12 +15,11 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.files.clock import require_row_step, seconds_of_stamps
+from xosc_lateral.files.columns import chosen_rows, listed, numbers_of, require_row_step, seconds_of_stamps
 from xosc_lateral.files.mapping import UNITS, MappingLike, TableMapping, as_mapping, parse_map
 from xosc_lateral.files.output_tables import COLUMNS
-from xosc_lateral.files.rows import chosen_rows, without_markers
 from xosc_lateral.files.source import open_source
-from xosc_lateral.files.tables import foreign_errors, listed, numbers_of, read_table, unpacked_text
+from xosc_lateral.files.tables import foreign_errors, read_table, unpacked_text
 from xosc_lateral.workflows.recordings.gate import MOVING_SPEED, require_headings
 
 if TYPE_CHECKING:
@@ -108,7 +107,7 @@ def read_tracks(path: Path, columns: Sequence[str] = (), mapping: MappingLike | 
     """
     saved = as_mapping(mapping)
     is_log = is_esmini_log(path)
-    table = read_esmini_log(path) if is_log else read_table(path, saved)[0]
+    table = read_esmini_log(path) if is_log else read_table(path, saved)
     return tracks_of(table, path, columns, saved, is_log=is_log)
 
 
@@ -190,7 +189,7 @@ def _columns(table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequen
         raise FormatError(f"--map {min(unknown)}: tracks have {', '.join(HEADERS)}", path=path)
     by_lower = {str(name).strip().lower(): name for name in reversed(list(table.columns))}
     found: dict[str, pd.Series] = {}
-    table = chosen_rows(without_markers(table, saved.missing, path), saved.rows, path)
+    table = chosen_rows(table, saved.missing, saved.rows, path)
     for name, headers in HEADERS.items():
         source = mapping.get(name)
         header = next((by_lower[one] for one in headers if one in by_lower), None) if source is None else source.column
