@@ -92,6 +92,7 @@ def _temporary_beside(path: Path) -> Iterator[Path]:
 
 _PLAIN = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 _LINKS = (errno.ELOOP, errno.EMLINK, errno.ENOTDIR)  # what systems answer where ``O_NOFOLLOW`` meets a link
+_LINK = "is a link, which is not followed here: remove it"
 
 
 def open_own(path: Path) -> IO[bytes]:
@@ -112,7 +113,7 @@ def open_own(path: Path) -> IO[bytes]:
             os.close(folder)
     except OSError as error:
         if error.errno in _LINKS:
-            raise FormatError("is a link, which is not followed here: remove it", path=here) from error
+            raise FormatError(_LINK, path=here) from error
         error.filename = str(here)
         raise
     state = os.fstat(descriptor)
@@ -133,3 +134,14 @@ def _owner_of_new_files(folder: Path) -> int:
     """Some network folders give all files to one user."""
     with tempfile.TemporaryFile(dir=folder) as file:
         return os.fstat(file.fileno()).st_uid
+
+
+def make_own_folder(folder: Path, depth: int) -> None:
+    """Make a folder that is so many levels below the one that the user named.
+
+    Raises `FormatError`: it, or one in between, is a link, which an output would follow; `OSError`: it can't be made.
+    """
+    for place in (folder, *folder.parents)[:depth]:
+        if place.is_symlink():
+            raise FormatError(_LINK, path=place)
+    folder.mkdir(parents=True, exist_ok=True)

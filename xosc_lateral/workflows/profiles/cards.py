@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.normal import NORMAL_95
+from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, keeping_of
 from xosc_lateral.drivers.evaluation.metrics import DURATION, MovementSummary, free_runs, summarise, summary_of
 from xosc_lateral.drivers.evaluation.spectra import spectrum
