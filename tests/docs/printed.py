@@ -32,7 +32,5 @@ def _alike(shown: str, printed: str, last_digit: float) -> bool:
     page, command = (" ".join(text.split()) for text in (shown, printed))
     if NUMBER.sub("#", page) != NUMBER.sub("#", command):
         return False
-    return all(
-        abs(Decimal(a) - Decimal(b)) <= Decimal(str(last_digit)) * Decimal(1).scaleb(int(Decimal(a).as_tuple().exponent))
-        for a, b in zip(NUMBER.findall(page), NUMBER.findall(command), strict=True)
-    )
+    pairs = [(Decimal(a), Decimal(b)) for a, b in zip(NUMBER.findall(page), NUMBER.findall(command), strict=True)]
+    return all(abs(a - b) <= Decimal(last_digit).scaleb(int(a.as_tuple().exponent)) for a, b in pairs)
