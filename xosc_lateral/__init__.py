@@ -13,8 +13,8 @@ _HOME = {
     "convert": "workflows.conversion.call",
     "convert_many": "workflows.batch.call",
     "reconstruct": "workflows.recordings.call",
-    "verify": "workflows.batch.verify_call",
-    "reproduce": "workflows.batch.verify_call",
+    "verify": "workflows.batch.verify",
+    "reproduce": "workflows.batch.verify",
     "play": "workflows.playing.call",
     "segments": "workflows.playing.call",
     "fit": "workflows.profiles.fit",
@@ -45,13 +45,13 @@ _HOME = {
     "Reconstruction": "workflows.recordings.call",
     "ConvertSettings": "workflows.conversion.settings",
     "BatchResult": "workflows.batch.call",
-    "Verification": "workflows.batch.verify_call",
+    "Verification": "workflows.batch.verify",
     "Playback": "workflows.playing.call",
     "Segments": "workflows.playing.call",
     "Offsets": "workflows.profiles.sample",
     "Evaluation": "workflows.profiles.evaluate",
     "ClosedLoop": "workflows.profiles.loop",
-    "Detection": "workflows.detection.call",
+    "Detection": "workflows.detection.detection",
     "ImportedDrives": "workflows.recordings.importing",
     "XoscLateralError": "base.errors",
     "FormatError": "base.errors",
@@ -128,10 +128,11 @@ if TYPE_CHECKING:
     from xosc_lateral.drivers.model.profile import DriverProfile
     from xosc_lateral.drivers.model.stream import OffsetStream
     from xosc_lateral.workflows.batch.call import BatchResult, convert_many
-    from xosc_lateral.workflows.batch.verify_call import Verification, reproduce, verify
+    from xosc_lateral.workflows.batch.verify import Verification, reproduce, verify
     from xosc_lateral.workflows.conversion.call import Conversion, convert
     from xosc_lateral.workflows.conversion.settings import ConvertSettings
-    from xosc_lateral.workflows.detection.call import Detection, detect
+    from xosc_lateral.workflows.detection.call import detect
+    from xosc_lateral.workflows.detection.detection import Detection
     from xosc_lateral.workflows.live.call import LiveRun, live_esmini, live_sumo
     from xosc_lateral.workflows.live.esmini import EsminiTraffic
     from xosc_lateral.workflows.live.fmu import export_fmu

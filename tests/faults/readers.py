@@ -204,14 +204,14 @@ def _output_files(folder: Path) -> Iterable[Path]:
 
 
 def _use_output(path: Path) -> None:
-    (found,) = verify([path], ConvertSettings())
+    (found,) = verify(path).checked
     if not found.problems:
         good, now = (file.read_bytes() for file in (path.with_suffix(".good"), path))
         if without_provenance(good) != without_provenance(now):
             raise NonsenseError("called good")
         return
     try:
-        (again,) = reproduce(path, path.with_name("again.xosc"), ConvertSettings())
+        (again,) = reproduce(path, path.with_name("again.xosc")).checked
     except FormatError as error:  # it names the scenario that the provenance states
         raise FormatError(str(error), path=path) from error
     if not again.problems and facts_in(path.read_bytes()) is None:

@@ -1,4 +1,4 @@
-"""Files that a run keeps its state in, in folders that others may write to: opened so that no link leads elsewhere."""
+"""Files and folders of a run in places that others may write to: no link there leads a run elsewhere."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from xosc_lateral.base.errors import FormatError
 _PLAIN = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 _LINKS = (errno.ELOOP, errno.EMLINK, errno.ENOTDIR)
 """What systems answer where ``O_NOFOLLOW`` meets a link."""
+
+_LINK = "is a link, which is not followed here: remove it"
 
 
 def open_own(path: Path) -> IO[bytes]:
@@ -34,7 +36,7 @@ def open_own(path: Path) -> IO[bytes]:
             os.close(folder)
     except OSError as error:
         if error.errno in _LINKS:
-            raise FormatError("is a link, which is not followed here: remove it", path=here) from error
+            raise FormatError(_LINK, path=here) from error
         error.filename = str(here)
         raise
     state = os.fstat(descriptor)
@@ -55,3 +57,14 @@ def _owner_of_new_files(folder: Path) -> int:
     """Some network folders give all files to one user."""
     with tempfile.TemporaryFile(dir=folder) as file:
         return os.fstat(file.fileno()).st_uid
+
+
+def make_own_folder(folder: Path, depth: int) -> None:
+    """Make a folder that is so many levels below the one that the user named.
+
+    Raises `FormatError`: it, or one in between, is a link, which an output would follow; `OSError`: it can't be made.
+    """
+    for place in (folder, *folder.parents)[:depth]:
+        if place.is_symlink():
+            raise FormatError(_LINK, path=place)
+    folder.mkdir(parents=True, exist_ok=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.normal import NORMAL_95
+from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.drives.cuts import HALF_WIDTH
 from xosc_lateral.drivers.model.jit_kernel import prepare

@@ -251,10 +251,9 @@ class Segments(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them."""
-
         rows = [structs.asdict(row) for row in self._rows]
-        found = [row | {"start": round(row["start"], 6), "end": round(row["end"], 6)} for row in rows]
-        return {"segments": found, "controllers": list(self.controllers)}
+        rounded = [row | {"start": round(row["start"], 6), "end": round(row["end"], 6)} for row in rows]
+        return {"segments": rounded, "controllers": list(self.controllers)}
 
 
 def scenario_segments(played: Played) -> tuple[SegmentRow, ...]:

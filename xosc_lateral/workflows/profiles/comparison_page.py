@@ -58,8 +58,8 @@ def _distance_note(compared: Compared) -> str:
     scale = dict(zip(METRICS, compared.scale.tolist(), strict=True))
     return (
         f"distance: of the ten metrics of {SNIPPET:g} s snippets, on average; 1.00 is as far as single snippets "
-        f"differ: {scale['mean']:.2f} m in their mean, {scale['std']:.2f} m in their standard deviation. By chance: so far "
-        "apart are, in 19 of 20 cases, two recordings of one driver or population as long as those that were fitted"
+        f"differ: {scale['mean']:.2f} m in their mean, {scale['std']:.2f} m in their standard deviation. By chance: "
+        "so far apart are, in 19 of 20 cases, two recordings of one driver or population as long as those that were fitted"
     )
 
 

@@ -8,7 +8,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from xosc_lateral.base.normal import NORMAL_95
+from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.evaluation.distances import Distances
 from xosc_lateral.drivers.loop.close import Finding, LoopResult
