@@ -59,7 +59,7 @@ def _distance_note(compared: Compared) -> str:
     return (
         f"distance: of the ten metrics of {SNIPPET:g} s snippets, on average; 1.00 is as far as single snippets "
         f"differ: {scale['mean']:.2f} m in their mean, {scale['std']:.2f} m in their standard deviation. By chance: "
-        "so far apart are, in 19 of 20 cases, two recordings of one driver or population of the lengths that were fitted"
+        "so far apart are, in 19 of 20 cases, two recordings of one driver or population as long as the fitted ones"
     )
 
 
