@@ -23,7 +23,7 @@ _HOME = {
     "close_loop": "workflows.profiles.loop",
     "detect": "workflows.detection.call",
     "read_drives": "workflows.profiles.fit",
-    "import_drives": "workflows.recordings.importing",
+    "import_drives": "workflows.recordings.call",
     "read_profile": "workflows.profiles.profiles",
     "write_profile": "workflows.profiles.profiles",
     "list_profiles": "workflows.profiles.profiles",
@@ -52,7 +52,7 @@ _HOME = {
     "Evaluation": "workflows.profiles.evaluate",
     "ClosedLoop": "workflows.profiles.loop",
     "Detection": "workflows.detection.detection",
-    "ImportedDrives": "workflows.recordings.importing",
+    "ImportedDrives": "workflows.recordings.call",
     "XoscLateralError": "base.errors",
     "FormatError": "base.errors",
     "PlaybackError": "base.errors",
@@ -145,8 +145,7 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.profiles.loop import ClosedLoop, close_loop
     from xosc_lateral.workflows.profiles.profiles import compare_profiles, list_profiles, read_profile, write_profile
     from xosc_lateral.workflows.profiles.sample import Offsets, sample
-    from xosc_lateral.workflows.recordings.call import Reconstruction, reconstruct
-    from xosc_lateral.workflows.recordings.importing import ImportedDrives, import_drives
+    from xosc_lateral.workflows.recordings.call import ImportedDrives, Reconstruction, import_drives, reconstruct
 
 
 def __getattr__(name: str) -> object:

@@ -12,8 +12,7 @@ from urllib.parse import quote
 import numpy as np
 
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.atomic import write_atomically
-from xosc_lateral.files.own_files import make_own_folder
+from xosc_lateral.files.atomic import make_own_folder, write_atomically
 from xosc_lateral.files.pages.page import Html, KeyFigure, Page, Tone
 from xosc_lateral.workflows.batch.jobs import Batch, Job, fingerprint
 from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, read_manifest

@@ -13,10 +13,10 @@ from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.base.limits import BATCH_JOBS, VARIANTS
 from xosc_lateral.base.version import BEHAVIOUR, __version__
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.files.hashes import file_hash
 from xosc_lateral.files.openscenario.catalogs import require_folders
 from xosc_lateral.files.output_paths import real_path
 from xosc_lateral.files.profiles import find_profile, profile_hash
+from xosc_lateral.files.source import file_hash
 from xosc_lateral.workflows.batch.manifest import ManifestRow, printable
 from xosc_lateral.workflows.batch.request import DocumentKind, Request, concrete, document_kind, find_requests
 from xosc_lateral.workflows.conversion.convert import numbered

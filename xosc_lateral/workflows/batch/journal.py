@@ -16,7 +16,7 @@ from types import TracebackType
 from typing import IO, Any, Self
 
 from xosc_lateral.base.errors import FormatError, XoscLateralError
-from xosc_lateral.files.own_files import open_own
+from xosc_lateral.files.atomic import open_own
 from xosc_lateral.workflows.batch.manifest import (
     MANIFEST,
     TIMINGS,

@@ -16,11 +16,10 @@ from typing import Any, NamedTuple
 from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.version import BEHAVIOUR
-from xosc_lateral.files.hashes import file_hash
 from xosc_lateral.files.openscenario.provenance import CONTENT, content_hash, facts_in, without_provenance
 from xosc_lateral.files.output_paths import claim, output_file, output_folder, path_below
 from xosc_lateral.files.profiles import profile_hash, read_profile
-from xosc_lateral.files.source import check_regular, read_source
+from xosc_lateral.files.source import check_regular, file_hash, read_source
 from xosc_lateral.workflows.batch.batch import convert_many
 from xosc_lateral.workflows.batch.guard import JobLimits, within_limits
 from xosc_lateral.workflows.batch.jobs import Batch, Job, fingerprint
