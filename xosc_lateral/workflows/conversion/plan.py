@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from xosc_lateral.base.errors import FormatError, locate
-from xosc_lateral.files.context_table import ContextTable, read_context
 from xosc_lateral.files.openscenario.write.replaced_maneuvers import replaced_groups, separable
 from xosc_lateral.files.openscenario.write.target import Player
 from xosc_lateral.files.openscenario.write.trajectory_scenario import motion_unknown_to
 from xosc_lateral.files.output_paths import refuse_outputs
+from xosc_lateral.files.tables import ContextTable, read_context
 from xosc_lateral.workflows.conversion.drivers import choose_drivers, without_proving_grounds
 from xosc_lateral.workflows.conversion.enrich import Drivers
 from xosc_lateral.workflows.conversion.load import Loaded, Played, play_until
