@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from tests.kit.motion import drive, entity, together, two_roads
-from xosc_lateral.workflows.conversion.conversion import Conversion, ConversionProvenance
-from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, SampledSegment
+from xosc_lateral.workflows.conversion.conversion import Conversion
+from xosc_lateral.workflows.conversion.result import ConversionProvenance, Enriched, EntityResult, SampledSegment
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
 from xosc_lateral.world.motion.gaps import BoxPath, Gap, smallest_gaps
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, Note

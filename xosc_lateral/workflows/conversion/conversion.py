@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,99 +9,18 @@ import numpy as np
 
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.output_paths import claim, output_file
-from xosc_lateral.workflows.conversion.result import Enriched, EventShift
+from xosc_lateral.workflows.conversion.result import ConvertedScenario
 from xosc_lateral.workflows.result import PathLike, Result, write_page
 from xosc_lateral.world.motion.nominal import Activity
-from xosc_lateral.world.scenario.under_test import Control
 
 if TYPE_CHECKING:
     from xosc_lateral.files.pages.figure import Figure
 
 
-@dataclass(frozen=True, slots=True)
-class ConversionProvenance:
-    """What went into an output: enough to make the same bytes again."""
+class Conversion(ConvertedScenario, Result):
+    """A converted scenario, with what there is to see of it: words, table, figure, traces, page."""
 
-    package_version: str
-    behaviour: int  # `version.BEHAVIOUR` of the program
-    scenario: str  # where the scenario lies, as seen from the output
-    # inputs: file name, as seen from the scenario -> SHA-256 of every file that was read (scenario, road,
-    # catalogs, context)
-    inputs: Mapping[str, str]
-    profiles: Mapping[str, tuple[str, str]]  # enriched entity -> name and SHA-256 of its profile
-    options: Mapping[str, Any]  # what was asked for: `ConvertSettings.record`
-    variant: int  # from 1, as in file names
-    version: str  # of the standard that was written
-    ego: tuple[str, ...]  # vehicles under test: left as they are. Empty: there is none, and everything is replayed
-    modes: Mapping[str, str]  # vehicle that was enriched -> "trajectory" or "lane-offset"
-    content_sha256: str  # of the output without its provenance
-
-    @property
-    def mode(self) -> str:
-        """Of all vehicles that were enriched: "trajectory", "lane-offset", "mixed"; empty: nobody was."""
-        modes = sorted(set(self.modes.values()))
-        return "mixed" if len(modes) > 1 else "".join(modes)
-
-
-@dataclass(eq=False, repr=False, slots=True)
-class Conversion(Result):
-    """A converted scenario: nominal and enriched motion, what to know about it, and how to get it again."""
-
-    source: Path  # the scenario that was read
-    output: Path | None  # the scenario that was written; None if none was
-    sha256: str  # of the output's bytes
-    movement: Enriched  # nominal and enriched motion, segments, gaps
-    provenance: ConversionProvenance
-    warnings: tuple[str, ...] = ()  # what a user has to know, a line each
-    content: bytes = b""  # the output's bytes, if they were not written
-    is_replay: bool = True  # everything happens by the clock of the nominal run, whoever drives
-    # shifts: how much earlier or later events of a reactive output come, the largest under several egos [s]
-    shifts: tuple[EventShift, ...] = ()
-    controllers: Mapping[str, Control] = field(default_factory=dict)  # of entities that are left to them
-    report: Path | None = None  # page that was written, if one was
-
-    @property
-    def data(self) -> bytes:
-        """The converted scenario's bytes."""
-        return self.content if self.output is None else self.output.read_bytes()
-
-    @property
-    def entities(self) -> tuple[str, ...]:
-        """All entities, in the scenario's order."""
-        return tuple(entity.name for entity in self.movement.entities)
-
-    @property
-    def enriched(self) -> tuple[str, ...]:
-        """Those that got offsets."""
-        return tuple(entity.name for entity in self.movement.entities if entity.is_enriched)
-
-    @property
-    def ego(self) -> tuple[str, ...]:
-        """Vehicles under test: left as they are; empty: there is none, and everything is replayed."""
-        return self.provenance.ego
-
-    @property
-    def modes(self) -> dict[str, str]:
-        """Vehicle that was enriched -> "trajectory" or "lane-offset"."""
-        return dict(self.provenance.modes)
-
-    @property
-    def cut_off(self) -> str | None:
-        """The warning of a run that the time limit cut off."""
-        note = self.movement.motion.cut_off
-        return None if note is None else str(note)
-
-    @property
-    def end_time(self) -> float:
-        """[s]"""
-        return self.movement.motion.end_time
-
-    @property
-    def smallest_gap(self) -> tuple[float | None, float | None]:
-        """Smallest free space between two vehicles, nominal and enriched; None: none come near each other. [m]"""
-        sides = (self.movement.gaps_before, self.movement.gaps_after)
-        before, after = (min((gap.distance for gap in gaps), default=None) for gaps in sides)
-        return before, after
+    __slots__ = ()
 
     def headline(self) -> str:
         """One line."""

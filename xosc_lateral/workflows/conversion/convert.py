@@ -20,14 +20,14 @@ from xosc_lateral.files.profiles import profile_hash
 from xosc_lateral.files.source import guarding_inputs
 from xosc_lateral.workflows.conversion.chains import chains_of_all
 from xosc_lateral.workflows.conversion.consequences import as_played, stay_as_written
-from xosc_lateral.workflows.conversion.conversion import Conversion, ConversionProvenance
+from xosc_lateral.workflows.conversion.conversion import Conversion
 from xosc_lateral.workflows.conversion.drivers import validity_warnings
 from xosc_lateral.workflows.conversion.enrich import enrich
 from xosc_lateral.workflows.conversion.load import load_scenario, play_loaded, read_output, seed_words
 from xosc_lateral.workflows.conversion.meaning import keep_meaning, meaning_of
 from xosc_lateral.workflows.conversion.options import spelled_out
 from xosc_lateral.workflows.conversion.plan import Plan, WrittenAs, decide, heeds_controllers
-from xosc_lateral.workflows.conversion.result import Enriched, EventShift, LaneChanges
+from xosc_lateral.workflows.conversion.result import ConversionProvenance, Enriched, EventShift, LaneChanges
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings, relative
 from xosc_lateral.workflows.conversion.shifts import Comparison
 from xosc_lateral.workflows.result import PAGE_SUFFIXES, PathLike

@@ -9,8 +9,7 @@ import numpy as np
 
 from xosc_lateral.files.pages.page import KeyFigure, Page, Tone
 from xosc_lateral.workflows.conversion.consequences import followings_of
-from xosc_lateral.workflows.conversion.conversion import Conversion
-from xosc_lateral.workflows.conversion.result import Enriched, EntityResult
+from xosc_lateral.workflows.conversion.result import ConvertedScenario, Enriched, EntityResult
 from xosc_lateral.workflows.conversion.text import WRITTEN_AS, beside_text, under_test
 from xosc_lateral.workflows.playing import figures as figures
 from xosc_lateral.workflows.playing.figures import COMFORTABLE
@@ -40,7 +39,7 @@ GAP_TIMES = ("at [s]", "at [s] ")
 """Headings of the times of the nominal and the enriched gap: a table's headings differ, if only by a blank."""
 
 
-def conversion_page(conversion: Conversion) -> str:
+def conversion_page(conversion: ConvertedScenario) -> str:
     """HTML page on one converted scenario, self-contained; same input, same bytes."""
     enriched = conversion.movement
     done = [entity for entity in enriched.entities if entity.is_enriched]
@@ -90,7 +89,7 @@ def conversion_page(conversion: Conversion) -> str:
     return page.html(_provenance(conversion))
 
 
-def _provenance(conversion: Conversion) -> dict[str, object]:
+def _provenance(conversion: ConvertedScenario) -> dict[str, object]:
     made = conversion.provenance
     return {
         "scenario": conversion.source.name,
@@ -231,7 +230,7 @@ def _add_followings(page: Page, enriched: Enriched) -> None:
     )
 
 
-def _add_shifts(page: Page, conversion: Conversion) -> None:
+def _add_shifts(page: Page, conversion: ConvertedScenario) -> None:
     """Events that come at other times with the offsets than without them."""
     if not conversion.shifts:
         return

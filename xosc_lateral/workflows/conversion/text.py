@@ -9,13 +9,12 @@ from msgspec import structs
 
 from xosc_lateral.drivers.fitting.answers import basis_of, borrows, responses_in_words
 from xosc_lateral.drivers.model.profile import SIDES, DriverProfile
-from xosc_lateral.workflows.conversion.conversion import Conversion, ConversionProvenance
-from xosc_lateral.workflows.conversion.result import Neighbours
+from xosc_lateral.workflows.conversion.result import ConversionProvenance, ConvertedScenario, Neighbours
 
 WRITTEN_AS = {"trajectory": "a trajectory", "lane-offset": "lane offsets"}
 
 
-def as_text(conversion: Conversion) -> str:
+def as_text(conversion: ConvertedScenario) -> str:
     """What was done, what was not, what to know."""
     lines = [f"{conversion.output or conversion.source}"]
     lines.append(f"  {under_test(conversion)}")
@@ -47,7 +46,7 @@ def beside_text(profile: DriverProfile, neighbours: str) -> str:
     return responses_in_words(profile, [side for side in SIDES if may_borrow and borrows(profile, side)])
 
 
-def _responses(conversion: Conversion) -> list[str]:
+def _responses(conversion: ConvertedScenario) -> list[str]:
     """How drivers respond to vehicles beside them: a line for all who do so alike."""
     alike: dict[str, list[str]] = {}
     for entity in conversion.movement.entities:
@@ -57,7 +56,7 @@ def _responses(conversion: Conversion) -> list[str]:
     return [f"  {', '.join(names)} {words}" for words, names in alike.items()]
 
 
-def under_test(conversion: Conversion) -> str:
+def under_test(conversion: ConvertedScenario) -> str:
     """Vehicles that are not the storyboard's: under test, or driven by controllers, in a line."""
     egos, controllers = conversion.provenance.ego, conversion.controllers
     lines = [f"under test, left as written: {', '.join(egos)}"] if egos else []
@@ -69,7 +68,7 @@ def under_test(conversion: Conversion) -> str:
     )
 
 
-def facts(conversion: Conversion) -> dict[str, Any]:
+def facts(conversion: ConvertedScenario) -> dict[str, Any]:
     """Plain values about a conversion, rounded to what they are read for: a micrometre, a microsecond."""
     enriched = conversion.movement
     before, after = (None if gap is None else round(gap, 6) for gap in conversion.smallest_gap)
