@@ -131,7 +131,7 @@ def _convert_one(
     osi: str | None,
     said: Written,
 ) -> None:
-    from xosc_lateral.files.osi.extra import osi_wanted
+    from xosc_lateral.files.osi import osi_wanted
     from xosc_lateral.files.output_paths import STDOUT, claim, output_file
     from xosc_lateral.workflows.conversion.call import convert, lifelike, osi_files, output_scenario
     from xosc_lateral.workflows.conversion.convert import numbered

@@ -48,7 +48,7 @@ class Driven:
 
     def run(self, live: Callable[..., LiveRun], source: Path, said: Written, **settings: Any) -> None:
         """Run a simulation of that source, and write and say what came out."""
-        from xosc_lateral.files.osi.extra import SUFFIXES, osi_wanted
+        from xosc_lateral.files.osi import SUFFIXES, osi_wanted
         from xosc_lateral.files.output_paths import claim, output_file
         from xosc_lateral.files.tables import TABLE_SUFFIXES
 

@@ -71,7 +71,14 @@ def test_every_indicator_stands_beside_its_floor(realism: Realism):
         assert set(one.means) < set(one.named) and len(one.named) == 17
         assert all(value.floor >= 0.0 for value in one.named.values())
     text = "\n".join(realism_lines(realism))
-    for words in ("SDLP", "time to line crossing", "wandering zone", "jerk", "variance between drivers", "same start"):
+    for words in (
+        "within a snippet",
+        "time to line crossing",
+        "wandering zone",
+        "jerk",
+        "variance between drivers",
+        "same start",
+    ):
         assert words in text
 
 

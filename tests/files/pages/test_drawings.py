@@ -17,7 +17,7 @@ from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.workflows.conversion.frames import conversion_frame
 from xosc_lateral.workflows.conversion.text import as_text, facts
 from xosc_lateral.workflows.playing.figures import thumbnail
-from xosc_lateral.workflows.playing.road_lines import lane_surfaces, markings
+from xosc_lateral.workflows.playing.scene import lane_surfaces, markings
 from xosc_lateral.world.motion.nominal import Activity
 
 SVG = "{http://www.w3.org/2000/svg}"

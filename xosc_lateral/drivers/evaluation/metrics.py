@@ -8,8 +8,6 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
@@ -83,38 +81,8 @@ SPEED = 30.0  # Of the free runs: about 108 km/h. [m/s]
 DRIVERS, DURATION = 60, 300.0
 
 
-@dataclass(frozen=True)
-class MovementSummary:
-    """What a profile does in even traffic, in figures that a person can picture."""
-
-    mean_offset: float  # Positive: left of the lane centre. [m]
-    spread: float  # Standard deviation over all drivers and times. [m]
-    spread_within: float  # Mean standard deviation of one driver over 5 min. [m]
-    low: float  # 5 % and 95 % quantile. [m]
-    high: float  # 5 % and 95 % quantile. [m]
-    lateral_speed: float  # Root mean square. [m/s]
-
-
 def free_runs(profile: DriverProfile, seed: int, *, drivers: int = DRIVERS, duration: float = DURATION) -> FloatArray:
     """Offsets of several drivers in even traffic, shape (drivers, n). [m]"""
     segment = Segment.even(duration, profile.model.step, profile.lane_width, SPEED)
     root = np.random.SeedSequence(seed)
     return np.array([sample_offsets(profile, segment, child(root, k)) for k in range(drivers)])
-
-
-def summary_of(profile: DriverProfile, seed: int = 0) -> MovementSummary:
-    """Sample free runs and sum them up."""
-    return summarise(free_runs(profile, seed), profile.model.step)
-
-
-def summarise(runs: FloatArray, step: float) -> MovementSummary:
-    """Sum up free runs, shape (drivers, n) [m], with rows `step` seconds apart."""
-    low, high = np.quantile(runs, [0.05, 0.95])
-    return MovementSummary(
-        mean_offset=float(runs.mean()),
-        spread=float(runs.std()),
-        spread_within=float(runs.std(axis=1).mean()),
-        low=float(low),
-        high=float(high),
-        lateral_speed=float(np.sqrt((np.diff(runs, axis=1) ** 2).mean()) / step),
-    )

@@ -9,16 +9,14 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.evaluation.distances import wasserstein
-from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, keeping_of
+from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, MovementSummary, figures_of
 from xosc_lateral.drivers.evaluation.metrics import (
     DRIVERS,
     DURATION,
     METRICS,
-    MovementSummary,
     cut_snippets,
     free_runs,
     snippet_metrics,
-    summarise,
 )
 from xosc_lateral.drivers.evaluation.scores import SNIPPET
 from xosc_lateral.drivers.evaluation.spectra import Spectrum, spectrum
@@ -51,17 +49,20 @@ class Compared:
         Wasserstein distance per metric, in standard deviations over all profiles' snippets. On the diagonal: of a
         profile from itself, as much driving as it was fitted on from as much other driving, half of its drivers at
         most, where the mean over the metrics is the 95 % quantile of random choices.
+    scale : array, shape (10,)
+        Those standard deviations. [m]
     seed : int
     """
 
     profiles: tuple[ComparedProfile, ...]
     metrics: FloatArray
+    scale: FloatArray
     seed: int
 
     @property
     def names(self) -> list[str]:
         """Of the profiles."""
-        return [one.profile.name for one in self.profiles]
+        return [each.profile.name for each in self.profiles]
 
     @property
     def distance(self) -> FloatArray:
@@ -75,48 +76,49 @@ class Compared:
         From itself is one piece of its free runs from another, each as long as the drives that it was fitted on, at
         most half of them: so far apart are two profiles of one driver by the chance of what was recorded.
         """
-        own = np.diag(self.distance)
-        return np.sqrt(0.5 * (own[:, None] ** 2 + own[None, :] ** 2))
+        itself = np.diag(self.distance)
+        return np.sqrt(0.5 * (itself[:, None] ** 2 + itself[None, :] ** 2))
 
     @property
     def groups(self) -> tuple[tuple[str, ...], ...]:
-        """Profiles that are alike: no further apart (average linkage) than halves of their own drivers."""
+        """Profiles that are alike, each with each (complete linkage): no further apart than halves of their drivers."""
         from scipy.cluster.hierarchy import fcluster, linkage
         from scipy.spatial.distance import squareform
 
         between = self.distance / np.maximum(self.floors, 1e-12)
         np.fill_diagonal(between, 0.0)
-        labels = fcluster(linkage(squareform(between, checks=False), "average"), 1.0, "distance")
+        labels = fcluster(linkage(squareform(between, checks=False), "complete"), 1.0, "distance")
         names = self.names
-        return tuple(tuple(names[k] for k in np.flatnonzero(labels == one)) for one in dict.fromkeys(labels))
+        return tuple(tuple(names[k] for k in np.flatnonzero(labels == label)) for label in dict.fromkeys(labels))
 
 
 def compare(profiles: Sequence[DriverProfile], seed: int) -> Compared:
     """Sample every profile in even traffic and measure each against each; the first's luck is no other's."""
-    found = []
+    compared = []
     for number, profile in enumerate(profiles):
-        runs, step = free_runs(profile, seed + number), profile.model.step
-        own = summarise(runs, step), keeping_of(profile, seed), spectrum(list(runs), step)
-        found.append(ComparedProfile(profile, runs, *own))
-    return Compared(tuple(found), _distances(found, seed), seed)
+        runs = free_runs(profile, seed + number)
+        compared.append(
+            ComparedProfile(profile, runs, *figures_of(profile, seed), spectrum(list(runs), profile.model.step))
+        )
+    return Compared(tuple(compared), *_distances(compared, seed), seed)
 
 
-def _distances(profiles: Sequence[ComparedProfile], seed: int) -> FloatArray:
-    """Distance per metric in standard deviations, shape (k, k, metrics); the diagonal is between halves. [-]"""
+def _distances(profiles: Sequence[ComparedProfile], seed: int) -> tuple[FloatArray, FloatArray]:
+    """Distance per metric in standard deviations, shape (k, k, metrics), and these [m]; the diagonal is of halves."""
     drivers = [
-        [snippet_metrics(cut_snippets(run, round(SNIPPET / one.profile.model.step) + 1)) for run in one.runs]
-        for one in profiles
+        [snippet_metrics(cut_snippets(run, round(SNIPPET / each.profile.model.step) + 1)) for run in each.runs]
+        for each in profiles
     ]
-    pooled = [np.concatenate(own) for own in drivers]
+    pooled = [np.concatenate(metrics) for metrics in drivers]
     scale = np.concatenate(pooled).std(axis=0)
     scale = np.where(scale > 0.0, scale, 1.0)
-    found = np.empty((len(profiles), len(profiles), len(METRICS)))
-    for one in range(len(profiles)):
-        fitted = _fitted_drivers(profiles[one].profile)
-        found[one, one] = _from_itself(drivers[one], fitted, scale, np.random.default_rng([seed, one]))
-        for other in range(one):
-            found[one, other] = found[other, one] = _per_metric(pooled[one], pooled[other]) / scale
-    return found
+    distances = np.empty((len(profiles), len(profiles), len(METRICS)))
+    for row in range(len(profiles)):
+        fitted = _fitted_drivers(profiles[row].profile)
+        distances[row, row] = _from_itself(drivers[row], fitted, scale, np.random.default_rng([seed, row]))
+        for column in range(row):
+            distances[row, column] = distances[column, row] = _per_metric(pooled[row], pooled[column]) / scale
+    return distances, scale
 
 
 def _fitted_drivers(profile: DriverProfile) -> int:
@@ -128,13 +130,13 @@ def _fitted_drivers(profile: DriverProfile) -> int:
 def _from_itself(drivers: Sequence[FloatArray], fitted: int, scale: FloatArray, rng: np.random.Generator) -> FloatArray:
     """Distance per metric, shape (10,), between those random pieces that are further apart than 95 % of them."""
     count = min(max(fitted, 1), len(drivers) // 2)
-    found = []
+    distances = []
     for _ in range(HALVINGS):
         order = rng.permutation(len(drivers)).tolist()
         half, rest = order[:count], order[-count:]
-        found.append(_per_metric(*(np.concatenate([drivers[k] for k in part]) for part in (half, rest))) / scale)
-    means = [float(gaps.mean()) for gaps in found]
-    return found[int(np.argsort(means)[round(HALVING_COUNT_AND_SHARE * (HALVINGS - 1))])]
+        distances.append(_per_metric(*(np.concatenate([drivers[k] for k in part]) for part in (half, rest))) / scale)
+    means = [float(gaps.mean()) for gaps in distances]
+    return distances[int(np.argsort(means)[round(HALVING_COUNT_AND_SHARE * (HALVINGS - 1))])]
 
 
 def _per_metric(one: FloatArray, other: FloatArray) -> FloatArray:

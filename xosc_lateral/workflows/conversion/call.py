@@ -84,7 +84,7 @@ def lifelike(source: Path) -> Path:
 
 def osi_files(output: PathLike, source: Path) -> tuple[Path, Path]:
     """Files of the enriched and of the nominal trace; an output that is a folder gets a usual name."""
-    from xosc_lateral.files.osi.extra import SUFFIXES
+    from xosc_lateral.files.osi import SUFFIXES
 
     enriched = output_file(output, f"{source.stem}_gt.mcap", SUFFIXES)
     return enriched, enriched.with_name(f"{enriched.stem}_nominal{enriched.suffix}")

@@ -13,7 +13,6 @@ from xosc_lateral.base.errors import DriverProfileError, FormatError
 from xosc_lateral.base.rows import BLOCK, beside, blocks
 from xosc_lateral.base.version import BEHAVIOUR, __version__
 from xosc_lateral.files.atomic import write_atomically
-from xosc_lateral.files.context_table import read_context
 from xosc_lateral.files.openscenario.provenance import PENDING
 from xosc_lateral.files.openscenario.write.build import named
 from xosc_lateral.files.openscenario.write.draft import WrittenScenario
@@ -23,6 +22,7 @@ from xosc_lateral.files.openscenario.write.trajectory_scenario import motion_unk
 from xosc_lateral.files.output_paths import refuse_outputs
 from xosc_lateral.files.profiles import profile_hash
 from xosc_lateral.files.source import guarding_inputs
+from xosc_lateral.files.tables import read_context
 from xosc_lateral.workflows.conversion.as_written import CHANGES, as_written, read_written
 from xosc_lateral.workflows.conversion.chains import chains_of
 from xosc_lateral.workflows.conversion.drivers import choose_drivers

@@ -18,7 +18,6 @@ from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampled_offsets import known_sensor, sensor_error
 from xosc_lateral.drivers.model.sampling import OffsetSampler
 from xosc_lateral.workflows.conversion.consequences import HalfWidths, gaps_of, lane_departures
-from xosc_lateral.workflows.conversion.give_way import SampledVehicle, give_way
 from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, LaneChanges, Neighbours, SampledSegment
 from xosc_lateral.workflows.conversion.seen import NOTHING_SEEN, SAMPLE_STEP, Contexts, Seen, going_on, seen_by
 from xosc_lateral.world.motion.crossings import Crossing, beside_written, crossings
@@ -28,6 +27,7 @@ from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.world.motion.segments import SegmentKind, SegmentSpan, cut_segments, movement_runs
 from xosc_lateral.world.motion.trajectory import WorldTrajectory, displace, distance_driven
 from xosc_lateral.world.road.network import RoadNetwork
+from xosc_lateral.world.surroundings.give_way import SampledVehicle, give_way
 
 Drivers = Mapping[str, DriverProfile | str]
 """Per entity the profile that drives it, or the reason why it gets none."""

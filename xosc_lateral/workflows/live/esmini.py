@@ -24,7 +24,6 @@ from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.live.esmini_library import ObjectState, Player, StoryboardCallback
 from xosc_lateral.workflows.live.paths import LEADING_OVER, TURN, Moves
-from xosc_lateral.workflows.live.surroundings import OpenDriveRoads, Places
 from xosc_lateral.workflows.live.traffic import Moment, Traffic
 from xosc_lateral.world.motion.deviation import SETTLING_TIME, settle
 from xosc_lateral.world.scenario import Scenario
@@ -37,6 +36,7 @@ from xosc_lateral.world.scenario.private_actions import (
     TeleportAction,
 )
 from xosc_lateral.world.scenario.under_test import controlled_entities
+from xosc_lateral.world.surroundings.moment import OpenDriveRoads, Places
 
 LATERAL = (LaneChangeAction, LaneOffsetAction, LateralDistanceAction, FollowTrajectoryAction, TeleportAction)
 """Actions that say where a vehicle is sideways."""

@@ -25,10 +25,10 @@ from xosc_lateral.files.sumo import is_left_handed
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.live.paths import Moves
 from xosc_lateral.workflows.live.scene import KINDS
-from xosc_lateral.workflows.live.surroundings import Places
 from xosc_lateral.workflows.live.traffic import Moment, Traffic
 from xosc_lateral.world.surroundings.around import SIGHT_DISTANCE, Reach
 from xosc_lateral.world.surroundings.context import TRUCKS
+from xosc_lateral.world.surroundings.moment import Places
 
 HOLD = 0.5
 """A lane change is over when SUMO has wanted none for so long, and moves the vehicle no more. [s]"""

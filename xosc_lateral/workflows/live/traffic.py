@@ -26,8 +26,9 @@ from xosc_lateral.drivers.model.stream import sealed, unsealed
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.conversion.seen import mirrored_context, sides_known
 from xosc_lateral.workflows.live.paths import DRIVER, SPEEDS, Moves, drive_on
-from xosc_lateral.workflows.live.surroundings import Places, Roads, give_way_now, look_around
 from xosc_lateral.world.surroundings.context import STEERING
+from xosc_lateral.world.surroundings.give_way import Response, give_way_now
+from xosc_lateral.world.surroundings.moment import Places, Roads, look_around
 
 FORMAT = "xosc-lateral live traffic"
 
@@ -261,20 +262,19 @@ class Traffic:
         """How far everybody wants to move aside, shape (n,). [m]"""
         if moment.places is None or self._neighbours is not Neighbours.BORROW:
             return np.zeros(len(moment.names))
-        known = {f"{word}_{side}": np.zeros(len(moment.names), dtype=np.bool_)
-                 for word in ("responds", "alone") for side in ("left", "right")}  # fmt: skip
+        response = Response(*np.zeros((4, len(moment.names)), dtype=np.bool_))
         for key, (_, members) in self._groups.items():
             profile = self._profiles[key]
             other_hand = profile.left_hand != self._left_hand
             rows = there[np.isin(who, [self._index[name] for name in members])]
             for word, basis in (("responds", {Basis.POPULATION}), ("alone", {Basis.MEASURED, Basis.DECLARED})):
                 for side in sides_known(profile, basis, other_hand=other_hand):
-                    known[f"{word}_{side}"][rows] = True
+                    getattr(response, f"{word}_{side}")[rows] = True
         lateral = np.where(moment.following, moment.offset - moment.nominal, 0.0)
         deviation = lateral.copy()
         deviation[there] -= np.where(moment.following[there], self._state["aside"][who], 0.0)
         can_move = moment.driven & moment.following
-        return give_way_now(moment.places, lateral, deviation, can_move, known, left_hand=self._left_hand)
+        return give_way_now(moment.places, lateral, deviation, can_move, response, left_hand=self._left_hand)
 
     # ---- state -------------------------------------------------------------------------------------------------------
     def to_dict(self) -> dict[str, Any]:

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.base.normal import MAD_TO_SD
+from xosc_lateral.base.numbers import MAD_TO_SD
 from xosc_lateral.base.rows import true_slices
 
 KNOT_SPACING = 50.0  # [m]; chosen by leave-vehicles-out error on DLR HT (docs/real_data.md)
