@@ -36,6 +36,7 @@ _HOME = {
     "Moment": "workflows.live.traffic",
     "EsminiTraffic": "workflows.live.esmini",
     "SumoTraffic": "workflows.live.sumo",
+    "export_c": "workflows.live.c_driver",
     "export_fmu": "workflows.live.fmu",
     "LiveRun": "workflows.live.call",
     "OffsetStream": "drivers.model.stream",
@@ -89,6 +90,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "Moment",
     "EsminiTraffic",
     "SumoTraffic",
+    "export_c",
     "export_fmu",
     "LiveRun",
     "OffsetStream",
@@ -134,6 +136,7 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.conversion.settings import ConvertSettings
     from xosc_lateral.workflows.detection.call import detect
     from xosc_lateral.workflows.detection.detection import Detection
+    from xosc_lateral.workflows.live.c_driver import export_c
     from xosc_lateral.workflows.live.call import LiveRun, live_esmini, live_sumo
     from xosc_lateral.workflows.live.esmini import EsminiTraffic
     from xosc_lateral.workflows.live.fmu import export_fmu

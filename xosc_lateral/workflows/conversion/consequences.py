@@ -9,7 +9,7 @@ from itertools import chain
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
-from xosc_lateral.base.rows import blocks, give_back, slices_where, stored
+from xosc_lateral.base.rows import blocks, slices_where, stored
 from xosc_lateral.workflows.conversion.load import ending_at
 from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, LaneDeparture, untouched
 from xosc_lateral.world.motion.gaps import BoxPath, Gap, smallest_gaps
@@ -82,7 +82,6 @@ def gaps_of(motion: NominalMotion, trajectories: Sequence[WorldTrajectory | Enti
         x = np.where(absent, np.nan, path.x[::every])
         x, y, heading = (stored(values) for values in (x, path.y[::every], path.heading[::every]))
         paths.append(BoxPath(entity.name, x, y, heading, box.length, box.width, box.center_x))
-        give_back(len(entity.time))
     return smallest_gaps(motion.entities[0].time[::every], paths)
 
 

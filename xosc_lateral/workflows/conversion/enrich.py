@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
-from xosc_lateral.base.rows import blocks, columns, give_back, stored
+from xosc_lateral.base.rows import blocks, columns, stored
 from xosc_lateral.drivers.model.drivability import drivable
 from xosc_lateral.drivers.model.plausibility import check_offsets
 from xosc_lateral.drivers.model.profile import DriverProfile
@@ -269,7 +269,6 @@ def _draw(blank: _Drawn, driver: DriverProfile, seed: np.random.SeedSequence, wi
     for spans, knots, segment, side, responses in blank.seen.segments:
         offset = side * sampler.sample(segment, responses=responses)
         more = least - len(knots)
-        give_back(len(segment.time))
         beyond = side * sampler.copy().sample(going_on(segment, more)) if more > 0 else np.empty(0)
         who = f"profile {driver.name} for {blank.motion.name!r}"
         check_offsets(offset, segment.lane_width[segment.inside], who, segment.time[segment.inside])
@@ -298,7 +297,6 @@ def _apart(
 
 
 def _moved(sample: _Sample, rows: IntArray, move: FloatArray) -> _Sample:
-    give_back(len(rows))
     return sample._replace(offset=stored(sample.offset + np.interp(sample.knots, rows, move)))
 
 
@@ -310,7 +308,6 @@ def _sampled(one: _Drawn, rows: IntArray) -> SampledVehicle:
         for sample in one.samples:
             for span in sample.spans:
                 can_move[(rows >= span.first) & (rows <= span.last)] = span.is_road_following
-    give_back(len(one.motion.time))
     return SampledVehicle(one.motion, stored(deviation), stored(can_move), one.seen.responds, one.seen.alone)
 
 
