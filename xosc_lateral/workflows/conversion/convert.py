@@ -127,7 +127,7 @@ def sample(plan: Plan) -> Enriched:
     settings = plan.settings
     try:
         return enrich(
-            plan.lasting.motion,
+            plan.extended.motion,
             plan.played.network,
             plan.drivers,
             seed=settings.seed,
@@ -174,11 +174,10 @@ def write(plan: Plan, enriched: Enriched, chains: Sequence[OffsetChain] | None =
     facts = {field.name: getattr(provenance, field.name) for field in fields(provenance)}
     on_trajectories = plan.replayed() if plan.is_replay else vehicles.trajectories
     trajectories = {entity.name: entity.trajectory for entity in enriched.entities if entity.name in on_trajectories}
-    lasting = plan.lasting
     if plan.is_replay:
         file = write_trajectory_scenario(
-            lasting.scenario,
-            lasting.motion,
+            plan.extended.scenario,
+            plan.extended.motion,
             trajectories,
             plan.output,
             provenance=facts,
@@ -190,8 +189,8 @@ def write(plan: Plan, enriched: Enriched, chains: Sequence[OffsetChain] | None =
         from xosc_lateral.files.openscenario.write.lane_offset_scenario import write_lane_offset_scenario
 
         file = write_lane_offset_scenario(
-            lasting.scenario,
-            lasting.motion,
+            plan.extended.scenario,
+            plan.extended.motion,
             chains or (),
             plan.output,
             provenance=facts,

@@ -25,7 +25,7 @@ from xosc_lateral.world.scenario.private_actions import LaneChangeAction
 from xosc_lateral.world.scenario.storyboard import Condition
 from xosc_lateral.world.scenario.under_test import Control, controlled_entities, vehicles_under_test
 
-LEAST_LONGER, LONGER = 1.3, 2.0
+LEAST_EXTENSION, LARGEST_EXTENSION = 1.3, 2.0
 """A vehicle under test may be later at what ends the run, or never come to it: others follow trajectories for so
 many times the nominal run. A fifth slower takes a quarter longer; a file of trajectories grows with their time. [-]"""
 
@@ -36,7 +36,7 @@ class Plan:
 
     - `output`, `saves`: where it goes, and whether it is written there
     - `inputs`: SHA-256 of every file that was read
-    - `played`, `lasting`: the nominal run; as long as others may need offsets where a vehicle under test is slower
+    - `played`, `extended`: the nominal run; as long as others may need offsets where a vehicle under test is slower
     - `egos`: vehicles under test, and why each is one
     - `controllers`: of entities that are left to them
     - `depends`: what depends on either
@@ -50,7 +50,7 @@ class Plan:
     saves: bool
     inputs: Mapping[Path, str]
     played: Played
-    lasting: Played
+    extended: Played
     egos: Mapping[str, str]
     controllers: Mapping[str, Control]
     depends: Dependence
@@ -151,7 +151,7 @@ def decide(
         saves,
         inputs,
         played,
-        _lasting(played, settings, depends, tuple(egos)),
+        _extended_run(played, settings, depends, tuple(egos)),
         egos,
         controllers,
         depends,
@@ -203,13 +203,15 @@ def _is_replay(settings: ConvertSettings, depends: Dependence) -> bool:
     return settings.target.player is Player.CARLA or not (depends.entities or settings.only is not None)
 
 
-def _lasting(played: Played, settings: ConvertSettings, depends: Dependence, egos: tuple[str, ...]) -> Played:
+def _extended_run(played: Played, settings: ConvertSettings, depends: Dependence, egos: tuple[str, ...]) -> Played:
     """The run that offsets are for: a longer one where a vehicle under test decides when trajectories end."""
     ends = depends.of_trigger(played.scenario.storyboard.stop_trigger) and played.motion.cut_off is None
     if settings.mode is not OutputMode.AUTO or _is_replay(settings, depends) or not ends:
         return played
     runs = meaning_of(played, egos, step=settings.step, time_limit=settings.time_limit)
-    end = min(max(runs.end, LEAST_LONGER * played.motion.end_time), LONGER * played.motion.end_time, runs.limit)
+    end = min(
+        max(runs.end, LEAST_EXTENSION * played.motion.end_time), LARGEST_EXTENSION * played.motion.end_time, runs.limit
+    )
     return play_until(played, end, step=settings.step) if end > played.motion.end_time else played
 
 
