@@ -10,7 +10,7 @@ from xosc_lateral.base.version import __version__
 TYPE_CHECKING = False  # importing `typing` for it would take longer than all the rest
 
 _HOME = {
-    "convert": "workflows.conversion.call",
+    "convert": "workflows.conversion.convert",
     "convert_many": "workflows.batch.call",
     "reconstruct": "workflows.recordings.call",
     "verify": "workflows.batch.verify",
@@ -23,7 +23,7 @@ _HOME = {
     "close_loop": "workflows.profiles.loop",
     "detect": "workflows.detection.call",
     "read_drives": "workflows.profiles.fit",
-    "import_drives": "workflows.recordings.importing",
+    "import_drives": "workflows.recordings.call",
     "read_profile": "workflows.profiles.profiles",
     "write_profile": "workflows.profiles.profiles",
     "list_profiles": "workflows.profiles.profiles",
@@ -36,12 +36,13 @@ _HOME = {
     "Moment": "workflows.live.traffic",
     "EsminiTraffic": "workflows.live.esmini",
     "SumoTraffic": "workflows.live.sumo",
+    "export_c": "workflows.live.c_driver",
     "export_fmu": "workflows.live.fmu",
     "LiveRun": "workflows.live.call",
     "OffsetStream": "drivers.model.stream",
     "DriverProfile": "drivers.model.profile",
     "Drive": "drivers.drives.drive",
-    "Conversion": "workflows.conversion.call",
+    "Conversion": "workflows.conversion.conversion",
     "Reconstruction": "workflows.recordings.call",
     "ConvertSettings": "workflows.conversion.settings",
     "BatchResult": "workflows.batch.call",
@@ -52,7 +53,7 @@ _HOME = {
     "Evaluation": "workflows.profiles.evaluate",
     "ClosedLoop": "workflows.profiles.loop",
     "Detection": "workflows.detection.detection",
-    "ImportedDrives": "workflows.recordings.importing",
+    "ImportedDrives": "workflows.recordings.call",
     "XoscLateralError": "base.errors",
     "FormatError": "base.errors",
     "PlaybackError": "base.errors",
@@ -89,6 +90,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "Moment",
     "EsminiTraffic",
     "SumoTraffic",
+    "export_c",
     "export_fmu",
     "LiveRun",
     "OffsetStream",
@@ -129,10 +131,12 @@ if TYPE_CHECKING:
     from xosc_lateral.drivers.model.stream import OffsetStream
     from xosc_lateral.workflows.batch.call import BatchResult, convert_many
     from xosc_lateral.workflows.batch.verify import Verification, reproduce, verify
-    from xosc_lateral.workflows.conversion.call import Conversion, convert
+    from xosc_lateral.workflows.conversion.conversion import Conversion
+    from xosc_lateral.workflows.conversion.convert import convert
     from xosc_lateral.workflows.conversion.settings import ConvertSettings
     from xosc_lateral.workflows.detection.call import detect
     from xosc_lateral.workflows.detection.detection import Detection
+    from xosc_lateral.workflows.live.c_driver import export_c
     from xosc_lateral.workflows.live.call import LiveRun, live_esmini, live_sumo
     from xosc_lateral.workflows.live.esmini import EsminiTraffic
     from xosc_lateral.workflows.live.fmu import export_fmu
@@ -145,8 +149,7 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.profiles.loop import ClosedLoop, close_loop
     from xosc_lateral.workflows.profiles.profiles import compare_profiles, list_profiles, read_profile, write_profile
     from xosc_lateral.workflows.profiles.sample import Offsets, sample
-    from xosc_lateral.workflows.recordings.call import Reconstruction, reconstruct
-    from xosc_lateral.workflows.recordings.importing import ImportedDrives, import_drives
+    from xosc_lateral.workflows.recordings.call import ImportedDrives, Reconstruction, import_drives, reconstruct
 
 
 def __getattr__(name: str) -> object:

@@ -26,12 +26,12 @@ from xosc_lateral.drivers.drives.cuts import all_runs
 from xosc_lateral.drivers.loop.columns import Role
 from xosc_lateral.drivers.model.sampled_offsets import sample_free
 from xosc_lateral.drivers.model.stream import OffsetStream
-from xosc_lateral.files.context_table import read_context
 from xosc_lateral.files.mapping import read_mapping
 from xosc_lateral.files.openscenario.distribution import read_distribution
 from xosc_lateral.files.openscenario.provenance import facts_in, without_provenance
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.profiles import list_profiles, profile_bytes, read_profile
+from xosc_lateral.files.tables import read_context
 from xosc_lateral.workflows.batch.jobs import plan_batch
 from xosc_lateral.workflows.batch.journal import Journal
 from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, read_manifest, write_manifest

@@ -28,7 +28,7 @@ from xosc_lateral.files.openscenario.write.target import Player
 from xosc_lateral.workflows.conversion.settings import ConvertSettings, OutputMode
 
 if TYPE_CHECKING:
-    from xosc_lateral.workflows.conversion.call import Conversion
+    from xosc_lateral.workflows.conversion.conversion import Conversion
 
 app = group_of_verbs()
 
@@ -142,10 +142,10 @@ def _convert_one(
     osi: str | None,
     reply: Written,
 ) -> None:
-    from xosc_lateral.files.osi.extra import osi_wanted
+    from xosc_lateral.files.osi import osi_wanted
     from xosc_lateral.files.output_paths import STDOUT, claim, output_file
-    from xosc_lateral.workflows.conversion.call import convert, lifelike, osi_files, output_scenario
-    from xosc_lateral.workflows.conversion.convert import numbered
+    from xosc_lateral.workflows.conversion.conversion import osi_files
+    from xosc_lateral.workflows.conversion.convert import convert, lifelike, numbered, output_scenario
     from xosc_lateral.workflows.result import PAGE_SUFFIXES
 
     if output == STDOUT:

@@ -48,7 +48,7 @@ class Driven:
 
     def run(self, live: Callable[..., LiveRun], source: Path, reply: Written, **settings: Any) -> None:
         """Run a simulation of that source, and write and say what came out."""
-        from xosc_lateral.files.osi.extra import SUFFIXES, osi_wanted
+        from xosc_lateral.files.osi import SUFFIXES, osi_wanted
         from xosc_lateral.files.output_paths import claim, output_file
         from xosc_lateral.files.tables import TABLE_SUFFIXES
 
@@ -172,3 +172,20 @@ def fmu(
     export_fmu(chosen, output, fmi=fmi)
     if not quiet:
         typer.echo(f"{chosen.name} as FMI {fmi} in {output}", err=True)
+
+
+@command(export, "c", "C99 source for a test bench.", "export c -p motorway -o driver/")
+def c_source(
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FOLDER/", help="Folder of the files.")],
+    profile: Profile = "motorway",
+    library: Library = None,
+    quiet: Quiet = False,
+) -> None:
+    """Write a driver as C99 without dependencies: header, source, numbers, a CMake file and an example loop."""
+    from xosc_lateral.files.output_paths import output_folder
+    from xosc_lateral.workflows.live.c_driver import export_c
+    from xosc_lateral.workflows.result import given_profile
+
+    written = export_c(given_profile(profile, library or ()), output_folder(output))
+    if not quiet:
+        typer.echo(f"wrote {', '.join(str(path) for path in written)}", err=True)

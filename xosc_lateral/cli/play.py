@@ -58,7 +58,7 @@ def play(
 ) -> None:
     """Play a scenario without offsets and write every entity's position at every step."""
     from xosc_lateral import play
-    from xosc_lateral.files.osi.extra import SUFFIXES, osi_wanted
+    from xosc_lateral.files.osi import SUFFIXES, osi_wanted
     from xosc_lateral.files.output_paths import STDOUT, claim, output_file
     from xosc_lateral.files.output_tables import output_suffixes
 

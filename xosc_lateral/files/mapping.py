@@ -25,7 +25,7 @@ from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.limits import ANY_CONTEXT
 from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.base.texts import composed
-from xosc_lateral.files.rows import as_word, parse_condition
+from xosc_lateral.files.columns import as_word, parse_condition
 from xosc_lateral.files.source import read_toml
 
 # Factors to SI. Degrees stay apart from radians only by their factor.

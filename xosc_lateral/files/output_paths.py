@@ -15,14 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.hashes import file_hash
+from xosc_lateral.files.source import file_hash
 
-STDOUT = "-"
-"""Name of the standard output where an output is asked for."""
-
-
-LONGEST_NAME = 255
-"""Of a file, on all common systems. [byte]"""
+STDOUT = "-"  # name of the standard output where an output is asked for
+LONGEST_NAME = 255  # of a file, on all common systems [byte]
 
 
 def file_name(name: str, what: str) -> str:
@@ -120,13 +116,11 @@ def real_path(path: Path, folders: dict[Path, str]) -> str:
 
 
 # ---- whether a file is one that this package wrote: each format says so in its own place
-SIDECAR_SUFFIX = ".json"
-"""Beside ``out.csv`` lies ``out.csv.json``: a comment inside a CSV would stop most readers."""
+SIDECAR_SUFFIX = ".json"  # beside ``out.csv`` lies ``out.csv.json``: a comment inside a CSV would stop most readers
 
 PACKAGE = b"xosc-lateral"
 
-_HEAD = 65_536
-"""The mark of a file of ours stands this near to its beginning. [byte]"""
+_HEAD = 65_536  # the mark of a file of ours stands this near to its beginning [byte]
 
 
 def is_own(path: Path) -> bool:

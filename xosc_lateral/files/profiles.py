@@ -27,19 +27,13 @@ from xosc_lateral.files.output_paths import file_name
 from xosc_lateral.files.source import check_regular, guard_input, read_source, state_key
 from xosc_lateral.files.tables import foreign_errors
 
-SHIPPED = shipped_folder("driver_profiles")
-"""Profiles that come with the package."""
-
-LONGEST_NAME = 200
-"""Characters of a profile's name; file systems take 255 bytes, the suffix included."""
+SHIPPED = shipped_folder("driver_profiles")  # profiles that come with the package
+LONGEST_NAME = 200  # characters of a profile's name; file systems take 255 bytes, the suffix included
 
 SUFFIX = ".json"
 
-LIBRARY_VARIABLE = "XOSC_LATERAL_LIBRARY"
-"""Environment variable with folders of profiles, separated as in PATH."""
-
-GROUP = "xosc_lateral.profiles"
-"""Entry points of folders with further profiles."""
+LIBRARY_VARIABLE = "XOSC_LATERAL_LIBRARY"  # environment variable with folders of profiles, separated as in PATH
+GROUP = "xosc_lateral.profiles"  # entry points of folders with further profiles
 
 
 def find_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -> Path:

@@ -15,10 +15,11 @@ import hashlib
 import io
 import os
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
+from functools import lru_cache
 from logging import getLogger
 from pathlib import Path
 from typing import IO, Any
@@ -28,8 +29,7 @@ from xosc_lateral.base.limits import FILE_SIZE, PACKING_RATIO, UNPACKED_SIZE, UN
 
 LOG = getLogger(__name__)
 
-IN_MEMORY = 64_000_000
-"""Files up to this are read once and parsed from memory. [byte]"""
+IN_MEMORY = 64_000_000  # files up to this are read once and parsed from memory [byte]
 
 _KINDS = (
     (stat.S_ISDIR, "a folder"),
@@ -39,8 +39,7 @@ _KINDS = (
     (stat.S_ISSOCK, "a socket"),
 )
 
-REMEMBERED = 1000
-"""Hashes of so many files that were parsed are kept; a command states what it has just read."""
+REMEMBERED = 1000  # hashes of so many files that were parsed are kept; a command states what it has just read
 
 _LAST_READ: dict[str, str] = {}  # path -> SHA-256 of the bytes that were parsed, the oldest first
 _GUARDED: ContextVar[set[tuple[int, int]] | None] = ContextVar("inputs", default=None)
@@ -218,3 +217,45 @@ def _opened(path: Path) -> Iterator[IO[bytes]]:
 def _unreadable(error: OSError | ValueError, path: Path) -> FormatError:
     what = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
     return FormatError(f"{what[:1].lower()}{what[1:]}", path=path)
+
+
+def file_hash(path: Path) -> str:
+    """Hexadecimal SHA-256 of a file's bytes as they are now; read once per process for as long as it stays the same.
+
+    Raises `OSError` when it can't be read; `FormatError` when it is not there, or no regular file.
+    """
+    return _file_hash(path, state_key(check_regular(path)))
+
+
+def file_state(path: Path) -> str:
+    """Text that is another one whenever the file was replaced or written to since; empty if it is not there."""
+    try:
+        return " ".join(map(str, state_key(path.stat())))
+    except OSError:
+        return ""
+
+
+def parsed_hash(path: Path) -> str:
+    """Hexadecimal SHA-256 of the bytes that this process parsed, whatever has become of the file since.
+
+    What an output states about its inputs. A file that was not parsed is hashed now.
+    """
+    try:
+        return last_read(path)
+    except KeyError:
+        return file_hash(path)
+
+
+def parsed_hashes(paths: Iterable[Path]) -> dict[str, str]:
+    """`parsed_hash` of each file by its name; files of one name by as much of their paths as differs."""
+    names = {path: path.name for path in paths}
+    for depth in range(2, max((len(path.parts) for path in names), default=0) + 1):
+        given = list(names.values())
+        names |= {path: "/".join(path.parts[-depth:]) for path, name in names.items() if given.count(name) > 1}
+    return {name: parsed_hash(path) for path, name in names.items()}
+
+
+@lru_cache(maxsize=1024)
+def _file_hash(path: Path, _state: tuple[int, ...]) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -17,8 +17,7 @@ from xosc_lateral.files.xml import root_tag
 if TYPE_CHECKING:
     from lxml import etree
 
-WIDTH = 3.2
-"""Of SUMO's lanes. [m]"""
+WIDTH = 3.2  # of SUMO's lanes [m]
 
 LENGTHS = {
     "trailer": 16.5, "truck": 7.1, "lkw": 7.1, "coach": 14.0, "bus": 12.0, "delivery": 6.5, "emergency": 6.5,

@@ -16,8 +16,7 @@ from xosc_lateral.base.limits import XML_TREE
 from xosc_lateral.files.source import check_regular, guard_input, open_source, read_source, state_key
 from xosc_lateral.files.tables import unpacked_text
 
-MAX_CACHED_BYTES = 1_000_000
-"""Larger files are read anew each time: catalogs are small, and 16 trees are kept."""
+MAX_CACHED_BYTES = 1_000_000  # larger files are read anew each time: catalogs are small, and 16 trees are kept
 
 _BLANKS, _DECLARATION = re.compile(rb"\s*"), re.compile(rb"<\?xml\s[^<>\r\n]*\?>")
 

@@ -15,7 +15,7 @@ import numpy as np
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.files.hashes import parsed_hashes
+from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.workflows.conversion.options import PathLike, Paths, ProfileLike
 from xosc_lateral.workflows.conversion.options import paths as as_paths
 

@@ -16,7 +16,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.version import __version__
 from xosc_lateral.files.atomic import replace_atomically
-from xosc_lateral.files.osi.extra import SUFFIXES, osi
+from xosc_lateral.files.osi import SUFFIXES, osi
 from xosc_lateral.files.osi.lanes import RoadIds, write_lanes
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion, axes
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
@@ -26,8 +26,7 @@ from xosc_lateral.world.scenario.enums import EntityCategory, VehicleCategory
 from xosc_lateral.world.scenario.private_actions import LightStateAction
 
 TOPIC = "ground_truth"
-VERSION = (3, 8, 0)
-"""Of OSI, that is written."""
+VERSION = (3, 8, 0)  # of OSI, that is written
 
 NANOSECONDS = 1_000_000_000
 

@@ -17,7 +17,7 @@ from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.base.signals import deferring_signals
 from xosc_lateral.base.version import BEHAVIOUR, __version__
 from xosc_lateral.files.atomic import files_of_run, temporary_files
-from xosc_lateral.files.hashes import file_hash, file_state
+from xosc_lateral.files.source import file_hash, file_state
 from xosc_lateral.workflows.batch.guard import JobLimitError, JobLimits, within_limits
 from xosc_lateral.workflows.batch.jobs import Batch, Job
 from xosc_lateral.workflows.batch.journal import Journal, folder_lock

@@ -16,11 +16,10 @@ from typing import Any, NamedTuple
 from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.version import BEHAVIOUR
-from xosc_lateral.files.hashes import file_hash
 from xosc_lateral.files.openscenario.provenance import CONTENT, content_hash, facts_in, without_provenance
 from xosc_lateral.files.output_paths import claim, output_file, output_folder, path_below
 from xosc_lateral.files.profiles import profile_hash, read_profile
-from xosc_lateral.files.source import check_regular, read_source
+from xosc_lateral.files.source import check_regular, file_hash, read_source
 from xosc_lateral.workflows.batch.batch import convert_many
 from xosc_lateral.workflows.batch.guard import JobLimits, within_limits
 from xosc_lateral.workflows.batch.jobs import Batch, Job, fingerprint
@@ -233,7 +232,7 @@ def _other_row(row: ManifestRow, data: bytes, origin: _Origin) -> Iterator[str]:
 
 def _made_otherwise(output: Path, data: bytes, origin: _Origin) -> list[tuple[Problem, str]]:
     """How today's program makes it otherwise, from what its provenance states."""
-    made = convert_scenario(origin.scenario, output, origin.settings, variant=origin.variant - 1, save=False).data
+    made = convert_scenario(origin.scenario, output, origin.settings, variant=origin.variant - 1, saves=False).data
     stated, now = origin.facts, facts_in(made) or {}
     if made.replace(_version_of(now), _version_of(stated), 1) == data:
         return []

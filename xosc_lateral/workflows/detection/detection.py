@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.files.hashes import parsed_hashes
 from xosc_lateral.files.output_paths import claim, output_file
+from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.workflows.detection.observation import Sensor
 from xosc_lateral.workflows.detection.scoring import Case, Curve, Tally, worst_of
 from xosc_lateral.workflows.detection.sources import Source

@@ -25,12 +25,9 @@ from xosc_lateral.workflows.recordings.plan import Residuals, VehiclePlan
 
 WINDOW, STEP = 10.0, 0.2
 """Of movement that is summed up, as long as the evaluation's snippets; between rows, as profiles have it. [s]"""
-MINIMUM_LOG_ODDS = 2.0
-"""Another profile than the population's has to be likelier by this: weights of 7 to 1. [nat]"""
-FREE_RUNS = 40
-"""Of each profile, five minutes each: 30 windows of 40 drivers."""
-LEAST_SPREAD = 1e-4
-"""Of a path in a window, below which its logarithm would say something about digits. [m]"""
+MINIMUM_LOG_ODDS = 2.0  # another profile than the population's has to be likelier by this: weights of 7 to 1 [nat]
+FREE_RUNS = 40  # of each profile, five minutes each: 30 windows of 40 drivers
+LEAST_SPREAD = 1e-4  # of a path in a window, below which its logarithm would say something about digits [m]
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,8 +15,7 @@ from xosc_lateral.workflows.recordings.importers.track_table import Tracks
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
 from xosc_lateral.workflows.recordings.placed import PlacedTracks
 
-SMOOTHED = 20.0
-"""Way over which a lane's turning is averaged into a curvature: bounds are polygons. [m]"""
+SMOOTHED = 20.0  # way over which a lane's turning is averaged into a curvature: bounds are polygons [m]
 
 
 FACING_STEP = 5.0
@@ -134,11 +133,8 @@ def curvature_along(start: FloatArray, direction: FloatArray, way: FloatArray) -
 
 
 # ---- lanes between lines whose points don't face each other
-STEP = 1.0
-"""Points of a centre line are at most this far apart, so that the nearest one is next to a point's foot. [m]"""
-
-BEYOND = 1e-3
-"""A foot that lies farther than this before the start or past the end is outside. [m]"""
+STEP = 1.0  # points of a centre line are at most this far apart, so that the nearest one is next to a point's foot [m]
+BEYOND = 1e-3  # a foot that lies farther than this before the start or past the end is outside [m]
 
 
 class Strip(LaneShape):

@@ -9,10 +9,10 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.version import __version__
-from xosc_lateral.files.hashes import parsed_hashes
 from xosc_lateral.files.pages.chart import MEASURED, SAMPLED
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import KeyFigure, Page
+from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.workflows.conversion.result import EntityResult, SampledSegment
 from xosc_lateral.workflows.playing.scene import scene_of
 from xosc_lateral.workflows.recordings.drivers import ChosenDriver
@@ -25,8 +25,7 @@ from xosc_lateral.world.motion.trajectory import WorldTrajectory
 if TYPE_CHECKING:
     from xosc_lateral.workflows.recordings.reconstruct import Reconstructed
 
-FRAME = 0.1
-"""Rows of the page's player. [s]"""
+FRAME = 0.1  # rows of the page's player [s]
 VEHICLES = {
     "entity": "entity", "recorded_as": "recorded as", "class": "class", "from": "from [s]", "to": "to [s]",
     "corners": "changes of acceleration", "along_rms": "along, rms [m]", "along_largest": "along, largest [m]",

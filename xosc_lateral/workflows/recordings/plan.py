@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.workflows.recordings.lateral import LateralPlan, lateral_plan
+from xosc_lateral.workflows.recordings.motion_fits import APART, SpeedProfile, Transition, fit_speed
 from xosc_lateral.workflows.recordings.recorded import RecordedVehicle, Recording
-from xosc_lateral.workflows.recordings.speed import APART, SpeedProfile, fit_speed
-from xosc_lateral.workflows.recordings.transitions import Transition
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario import Entity

@@ -14,10 +14,10 @@ from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.texts import composed
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.files.hashes import parsed_hashes
 from xosc_lateral.files.openscenario.write.build import Version, named
 from xosc_lateral.files.output_tables import write_frame
 from xosc_lateral.files.profiles import find_profile, list_profiles, profile_bytes, read_profile
+from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.workflows.conversion import options as say
 from xosc_lateral.workflows.conversion.drivers import AUTO_PROFILE
 from xosc_lateral.workflows.conversion.options import Paths, option
@@ -38,14 +38,9 @@ VERSIONS: dict[str, Version] = {named(version): version for version in ((1, 0), 
 """Of the standard that can be written."""
 LONG_DRIVE = 100.0
 """Of road-following, for a profile of one vehicle: ten windows that the evaluation compares drivers by. [s]"""
-LONGEST_WINDOW = 3600.0
-"""A scenario of more can't be looked at, and times in ms or us instead of s give it. [s]"""
-AROUND = 100.0
-"""Who comes as near as this to the vehicle in question, along or across, belongs to its surroundings. [m]"""
-
-
-NO_HOST = "none"
-"""Stands for no vehicle under test."""
+LONGEST_WINDOW = 3600.0  # a scenario of more can't be looked at, and times in ms or us instead of s give it [s]
+AROUND = 100.0  # who comes as near as this to the vehicle in question, along or across, belongs to its surroundings [m]
+NO_HOST = "none"  # stands for no vehicle under test
 
 
 def _version(text: str) -> str:

@@ -13,27 +13,19 @@ from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.road.positions import Poses
 
-BESIDE = 1.0
-"""So far beside every driving lane a vehicle still keeps to one: it drives on its marking. [m]"""
-LONGEST_GAP = 1.0
-"""Rows farther apart than this are not of one passage, as in `recordings.cuts`. [s]"""
-FARTHEST = 1e8
-"""No map projection gives such a position: the Earth's circumference is 4e7 m. [m]"""
-SHORTEST_STEP = 1e-4
-"""Rows that follow sooner are of the same moment: no sensor has 10 kHz. [s]"""
-MINIMUM_PASSAGE = 2.0
-"""Passages below this are left out: a speed and its change can't be told in less. [s]"""
+BESIDE = 1.0  # so far beside every driving lane a vehicle still keeps to one: it drives on its marking [m]
+LONGEST_GAP = 1.0  # rows farther apart than this are not of one passage, as in `recordings.cuts` [s]
+FARTHEST = 1e8  # no map projection gives such a position: the Earth's circumference is 4e7 m [m]
+SHORTEST_STEP = 1e-4  # rows that follow sooner are of the same moment: no sensor has 10 kHz [s]
+MINIMUM_PASSAGE = 2.0  # passages below this are left out: a speed and its change can't be told in less [s]
 LEAP = 1.5
 """Farther than it can have driven by this much (half a narrow lane): an identifier that has gone to another vehicle.
 [m]"""
-BACKWARDS = 0.5
-"""Who falls back so far drives backwards; less is an error of standing vehicles' positions. [m]"""
+BACKWARDS = 0.5  # who falls back so far drives backwards; less is an error of standing vehicles' positions [m]
 MOVING_SPEED = 0.25
 """Below this a vehicle stands, and the direction of its movement is that of errors: half a walking pace. [m/s]"""
-VELOCITY_WINDOW = 2.0
-"""Rows whose positions a velocity is fitted to: 0.2 m of noise at 10 Hz are 0.08 m/s in it. [s]"""
-HEADING_WINDOW = 2.0
-"""Way over which a heading is averaged, so that positions' noise does not turn a slow vehicle. [m]"""
+VELOCITY_WINDOW = 2.0  # rows whose positions a velocity is fitted to: 0.2 m of noise at 10 Hz are 0.08 m/s in it [s]
+HEADING_WINDOW = 2.0  # way over which a heading is averaged, so that positions' noise does not turn a slow vehicle [m]
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -20,27 +20,20 @@ from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.files.xml import root_tag
 from xosc_lateral.workflows.recordings.gate import require_along_lanes
 from xosc_lateral.workflows.recordings.importers import dlr_ht, levelx
+from xosc_lateral.workflows.recordings.importers.fcd import NET_ENDINGS, lanes_of_net, read_fcd
 from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH, Tracks, read_tracks, tracks_of
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
 from xosc_lateral.workflows.recordings.lane_shapes import LaneShape
 from xosc_lateral.workflows.recordings.recorded import Track
 from xosc_lateral.workflows.recordings.roads_from_lanes import DrivenLane, roads_of_lanes
-from xosc_lateral.workflows.recordings.sumo import NET_ENDINGS, lanes_of_net, read_fcd
 from xosc_lateral.world.road.network import RoadNetwork
 
-STEP = 0.1
-"""Rows are thinned to this: lane changes and braking last seconds. [s]"""
-REAR_AXLE = 0.3
-"""Middle of a vehicle ahead of its rear axle, as a share of its length: 1.4 m of a car of 4.6 m. [-]"""
-GATE_ROWS = 20_000
-"""So many rows tell whether a recording drives along its lanes. [-]"""
-
-MAXIMUM_LENGTH = 60.0
-"""Of vehicles with all that they pull: road trains have 53.5 m. [m]"""
-MAXIMUM_WIDTH = 6.0
-"""Of what drives on roads, heavy transports included. [m]"""
-AROUND = 50.0
-"""A made road goes on so far beyond its traffic. [m]"""
+STEP = 0.1  # rows are thinned to this: lane changes and braking last seconds [s]
+REAR_AXLE = 0.3  # middle of a vehicle ahead of its rear axle, as a share of its length: 1.4 m of a car of 4.6 m [-]
+GATE_ROWS = 20_000  # so many rows tell whether a recording drives along its lanes [-]
+MAXIMUM_LENGTH = 60.0  # of vehicles with all that they pull: road trains have 53.5 m [m]
+MAXIMUM_WIDTH = 6.0  # of what drives on roads, heavy transports included [m]
+AROUND = 50.0  # a made road goes on so far beyond its traffic [m]
 USUAL_WIDTH = {"truck": 2.5, "bus": 2.5, "trailer": 2.5, "van": 2.0, "motorcycle": 0.8, "motorbike": 0.8}
 """Where no width is given; 1.8 m for the rest (2.55 m is the EU's limit, directive 96/53/EC). [m]"""
 USUAL_HEIGHT = {"truck": 3.6, "bus": 3.2, "trailer": 3.6, "van": 2.3}

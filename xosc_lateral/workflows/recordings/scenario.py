@@ -12,13 +12,12 @@ from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.build import Version, decimal, sub
 from xosc_lateral.files.output_paths import template_mark
 from xosc_lateral.workflows.recordings.encounters import RelativeTrigger
+from xosc_lateral.workflows.recordings.motion_fits import Transition, peak_acceleration
 from xosc_lateral.workflows.recordings.plan import VehiclePlan
-from xosc_lateral.workflows.recordings.transitions import Transition, peak_acceleration
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.enums import Priority
 
-DATE = "2024-01-01T00:00:00"
-"""The format asks for a date: the same recording gives the same bytes."""
+DATE = "2024-01-01T00:00:00"  # the format asks for a date: the same recording gives the same bytes
 
 MODELS = {"car": "car", "van": "van", "truck": "truck", "bus": "bus", "trailer": "trailer"}
 MODELS |= {"motorcycle": "motorbike", "motorbike": "motorbike", "bicycle": "bicycle"}
@@ -36,8 +35,7 @@ HALF_FRAME = 0.01
 which is therefore written as much later; for frames of 0.02 s, those of `play`. Else braking from 30 m/s to a stop ends
 0.3 m short. [s]"""
 
-VERTICES = 0.2
-"""Between the vertices of a recorded path. [s]"""
+VERTICES = 0.2  # between the vertices of a recorded path [s]
 
 
 def reconstructed_scenario(

@@ -32,7 +32,7 @@ from xosc_lateral.files.tables import read_table
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings, Rows, cut_table
 from xosc_lateral.workflows.recordings.gate import require_lane_direction
 from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
-from xosc_lateral.workflows.recordings.neighbours import REACH, find_neighbours
+from xosc_lateral.workflows.recordings.lane_graph import REACH, find_neighbours
 
 LICENCE = (
     "highD/exiD: leveLXData, under the licence that you signed (free for non-commercial research); whether fitted "
@@ -82,7 +82,7 @@ def read_recording_files(path: Path) -> tuple[pd.DataFrame, pd.DataFrame, pd.Dat
         if not file.exists():
             what = "missing; a recording is XX_tracks.csv, XX_tracksMeta.csv and XX_recordingMeta.csv"
             raise FormatError(what, path=file)
-        tables.append(read_table(file)[0])
+        tables.append(read_table(file))
         if tables[-1].empty:
             raise NotEnoughDataError(f"{file}: has no rows")
     return tables[0], tables[1], tables[2]

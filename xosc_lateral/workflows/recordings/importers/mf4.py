@@ -35,10 +35,9 @@ from xosc_lateral.base.limits import CLOCK_ROWS, TIME
 from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.drivers.drives.cuts import JUMP, MAX_GAP
 from xosc_lateral.drivers.drives.resampling import average, resample
-from xosc_lateral.files.drives import from_middle
-from xosc_lateral.files.labels import file_labels
+from xosc_lateral.files.columns import refuse_marker
+from xosc_lateral.files.drives import file_labels, from_middle
 from xosc_lateral.files.mapping import ColumnSource, MappingLike, as_mapping, factor, is_measured, parse_map, spelled
-from xosc_lateral.files.rows import refuse_marker
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import LONGEST_MESSAGE, foreign_errors
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
@@ -49,8 +48,7 @@ LICENCE = "your own recording"
 
 _NO_MDF = "not an MDF file that asammdf can read"
 
-LISTED = 40
-"""Channel names in a message, at most."""
+LISTED = 40  # channel names in a message, at most
 
 MAX_CHANNEL_DISTANCE = 0.2
 """Median distance of two channels of one name, as a share of the standard deviation, that is not one of rates. [-]"""

@@ -15,7 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.labels import file_labels
+from xosc_lateral.files.drives import file_labels
 from xosc_lateral.files.opendrive import parse_opendrive, read_opendrive
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
 from xosc_lateral.workflows.recordings.importers.table import Imported, guarded
@@ -33,8 +33,7 @@ from xosc_lateral.workflows.recordings.placed import (
 
 LICENCE = "that of the trace"
 
-HOST = "host"
-"""Stands for the trace's own host vehicle."""
+HOST = "host"  # stands for the trace's own host vehicle
 
 
 @guarded

@@ -17,9 +17,9 @@ from xosc_lateral.base.limits import TIME, Range, context_range
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.drives.cleaning import LANE_WIDTHS, MAX_OUTSIDE
 from xosc_lateral.drivers.model.plausibility import implausible_rows
-from xosc_lateral.files.hashes import parsed_hash
-from xosc_lateral.files.labels import file_label
+from xosc_lateral.files.drives import file_label
 from xosc_lateral.files.output_tables import harmless_frame, write_table
+from xosc_lateral.files.source import parsed_hash
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
 

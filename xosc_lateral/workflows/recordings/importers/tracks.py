@@ -24,14 +24,9 @@ from xosc_lateral.world.road.network import RoadNetwork
 
 LICENCE = "your own recording"
 
-LANE_VALUES = ("lane_width", "agreement", "scale")
-"""What is found of a lane, and is no column of its road."""
-
-INTO_NEXT = 1e-3
-"""Step beyond a section's end that brings one into the next. [m]"""
-
-Piece = tuple[int, int, int]
-"""Road, lane section, lane."""
+LANE_VALUES = ("lane_width", "agreement", "scale")  # what is found of a lane, and is no column of its road
+INTO_NEXT = 1e-3  # step beyond a section's end that brings one into the next [m]
+Piece = tuple[int, int, int]  # road, lane section, lane
 
 
 @guarded
