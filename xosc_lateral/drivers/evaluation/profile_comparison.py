@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.evaluation.distances import wasserstein
-from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, keeping_of
+from xosc_lateral.drivers.evaluation.lane_keeping import SHOWN_DRIVES, LaneKeeping, highway_drives, lane_keeping
 from xosc_lateral.drivers.evaluation.metrics import (
     DRIVERS,
     DURATION,
@@ -21,11 +22,12 @@ from xosc_lateral.drivers.evaluation.metrics import (
     summarise,
 )
 from xosc_lateral.drivers.evaluation.scores import SNIPPET
+from xosc_lateral.drivers.evaluation.sizes import LEVEL, Difference, Sizes, differences, sizes_of_samples
 from xosc_lateral.drivers.evaluation.spectra import Spectrum, spectrum
 from xosc_lateral.drivers.model.profile import DriverProfile
 
 HALVINGS, HALVING_COUNT_AND_SHARE = 40, 0.95
-"""Random halves of a profile's drivers, and how many of them are no further apart than what counts as alike. [-]"""
+"""Random halves of a profile's drivers, and how many of them are no further apart than the 95 % quantile. [-]"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -38,6 +40,10 @@ class ComparedProfile:
     summary: MovementSummary
     keeping: LaneKeeping
     spectrum: Spectrum
+    measured: Sizes | None
+    """Of the drives that it was fitted on, where it knows them."""
+    sampled: Sizes
+    """Of its own drives, as sure as if it had been fitted on such."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -70,7 +76,7 @@ class Compared:
 
     @property
     def floors(self) -> FloatArray:
-        """Up to which distance two profiles are alike, shape (k, k): root mean square of both from themselves. [-]
+        """How far apart two profiles of one driver may be, shape (k, k): root mean square of both from themselves. [-]
 
         From itself is one piece of its free runs from another, each as long as the drives that it was fitted on, at
         most half of them: so far apart are two profiles of one driver by the chance of what was recorded.
@@ -79,16 +85,27 @@ class Compared:
         return np.sqrt(0.5 * (own[:, None] ** 2 + own[None, :] ** 2))
 
     @property
-    def groups(self) -> tuple[tuple[str, ...], ...]:
-        """Profiles that are alike: no further apart (average linkage) than halves of their own drivers."""
-        from scipy.cluster.hierarchy import fcluster, linkage
-        from scipy.spatial.distance import squareform
+    def differences(self) -> dict[tuple[str, str], list[Difference]]:
+        """What each pair differs by, of the drives that both were fitted on, else of drives sampled from both."""
+        return {(one.profile.name, two.profile.name): _between(one, two) for one, two in combinations(self.profiles, 2)}
 
-        between = self.distance / np.maximum(self.floors, 1e-12)
-        np.fill_diagonal(between, 0.0)
-        labels = fcluster(linkage(squareform(between, checks=False), "average"), 1.0, "distance")
+    @property
+    def groups(self) -> tuple[tuple[str, ...], ...]:
+        """Profiles that are alike (average linkage): they differ by no more than two fits of one driver do."""
+        from scipy.cluster.hierarchy import fcluster, linkage
+        from scipy.stats import norm
+
+        p_values = [min((part.p_value for part in parts), default=1.0) for parts in self.differences.values()]
+        apart = norm.isf(0.5 * np.array(p_values)) / norm.isf(0.5 * LEVEL)
+        labels = fcluster(linkage(apart, "average"), 1.0, "distance")
         names = self.names
-        return tuple(tuple(names[k] for k in np.flatnonzero(labels == one)) for one in dict.fromkeys(labels))
+        return tuple(tuple(names[k] for k in np.flatnonzero(labels == label)) for label in dict.fromkeys(labels))
+
+
+def _between(one: ComparedProfile, two: ComparedProfile) -> list[Difference]:
+    if one.measured is not None and two.measured is not None:
+        return differences(one.measured, two.measured)
+    return differences(one.sampled, two.sampled)
 
 
 def compare(profiles: Sequence[DriverProfile], seed: int) -> Compared:
@@ -96,8 +113,12 @@ def compare(profiles: Sequence[DriverProfile], seed: int) -> Compared:
     found = []
     for number, profile in enumerate(profiles):
         runs, step = free_runs(profile, seed + number), profile.model.step
-        own = summarise(runs, step), keeping_of(profile, seed), spectrum(list(runs), step)
-        found.append(ComparedProfile(profile, runs, *own))
+        drives = highway_drives(profile, seed + number, drives=SHOWN_DRIVES)
+        own = summarise(runs, step), lane_keeping(drives, profile.lane_width, step), spectrum(list(runs), step)
+        known = profile.provenance.fit
+        measured = None if "derived_from" in known else Sizes.from_dict(known.get("sizes", {}))
+        sampled = sizes_of_samples(drives, step, *_fitted_drives(profile))
+        found.append(ComparedProfile(profile, runs, *own, measured, sampled))
     return Compared(tuple(found), _distances(found, seed), seed)
 
 
@@ -112,17 +133,19 @@ def _distances(profiles: Sequence[ComparedProfile], seed: int) -> FloatArray:
     scale = np.where(scale > 0.0, scale, 1.0)
     found = np.empty((len(profiles), len(profiles), len(METRICS)))
     for one in range(len(profiles)):
-        fitted = _fitted_drivers(profiles[one].profile)
+        fitted = round(_fitted_drives(profiles[one].profile)[1] / DURATION)
         found[one, one] = _from_itself(drivers[one], fitted, scale, np.random.default_rng([seed, one]))
         for other in range(one):
             found[one, other] = found[other, one] = _per_metric(pooled[one], pooled[other]) / scale
     return found
 
 
-def _fitted_drivers(profile: DriverProfile) -> int:
-    """Of how many free runs a profile's drives are worth, half of them where that is not known."""
+def _fitted_drives(profile: DriverProfile) -> tuple[int, float]:
+    """How many drives a profile was fitted on, and how long they are [s]; half of the free runs' if unknown."""
     known = profile.provenance
-    return round(3600.0 * known.hours / DURATION) if known.hours and "derived_from" not in known.fit else DRIVERS // 2
+    if not known.hours or "derived_from" in known.fit:
+        return DRIVERS // 2, DURATION * (DRIVERS // 2)
+    return max(known.drives, 1), 3600.0 * known.hours
 
 
 def _from_itself(drivers: Sequence[FloatArray], fitted: int, scale: FloatArray, rng: np.random.Generator) -> FloatArray:

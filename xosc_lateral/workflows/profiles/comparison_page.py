@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.evaluation.metrics import (
-    METRICS,
-)
+from xosc_lateral.drivers.evaluation.metrics import METRICS
 from xosc_lateral.drivers.evaluation.profile_comparison import Compared, ComparedProfile
 from xosc_lateral.drivers.evaluation.scores import SNIPPET
+from xosc_lateral.drivers.evaluation.sizes import LEVEL, Difference
 from xosc_lateral.files.pages.chart import color_of
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import Page
@@ -27,6 +27,9 @@ SPACING = 0.8
 
 MAXIMUM_DRAWN = 12
 """So many profiles are drawn at most; the distances are of all."""
+
+MAXIMUM_WORDED = 4
+"""Of so many profiles at most, what each pair differs by stands in the text; the JSON has all."""
 
 
 def comparison_text(compared: Compared) -> str:
@@ -44,9 +47,26 @@ def comparison_text(compared: Compared) -> str:
     width = max(map(len, compared.names))
     for name, distances in zip(compared.names, compared.distance, strict=True):
         lines.append(f"  {name:<{width}}  " + " ".join(f"{value:5.2f}" for value in distances))
-    lines.append("two profiles differ where their distance is above the root mean square of their diagonals")
+    if len(compared.profiles) <= MAXIMUM_WORDED:
+        lines.append("second beside first (95 % interval; in brackets the least that as much driving would show):")
+        lines += [f"  {' and '.join(pair)}: {_pair_words(parts)}" for pair, parts in compared.differences.items()]
     lines += [f"alike: {', '.join(group)}" for group in compared.groups if len(group) > 1]
     return "\n".join(line.rstrip() for line in lines)
+
+
+def _pair_words(parts: Sequence[Difference]) -> str:
+    """What two profiles differ by, and whether that is more than chance."""
+    words = []
+    for part in parts:
+        low, high = part.interval
+        if part.is_factor:
+            size, least = f"{np.exp(part.size):.2f} times ({np.exp(low):.2f} to {np.exp(high):.2f})", np.exp(part.least)
+        else:
+            size, least = f"{part.size:+.3f} m ({low:+.3f} to {high:+.3f})", part.least
+        words.append(f"{part.quantity} {size} [{least:.2f}]")
+    p_value = min((part.p_value for part in parts), default=1.0)
+    verdict = "differ" if p_value <= LEVEL else "not told apart"
+    return f"{', '.join(words)}: {verdict} (p = {p_value:.2g})" if parts else "nothing is known of both"
 
 
 def _row(one: ComparedProfile) -> dict[str, str]:
@@ -92,6 +112,18 @@ def comparison_record(compared: Compared) -> dict[str, Any]:
         "metrics": {name: _rounded_rows(compared.metrics[:, :, k]) for k, name in enumerate(METRICS)},
         "floor": round(float(compared.floors.max()), 4),
         "floors": _rounded_rows(compared.floors),
+        "differences": [
+            {"profiles": list(pair), "quantity": part.quantity, "p_value": part.p_value}
+            | {"unit": "-" if part.is_factor else "m"}
+            | {
+                name: round(float(np.exp(value) if part.is_factor else value), 4)
+                for name, value in zip(
+                    ("difference", "low", "high", "least"), (part.size, *part.interval, part.least), strict=True
+                )
+            }
+            for pair, parts in compared.differences.items()
+            for part in parts
+        ],
         "alike": [list(group) for group in compared.groups],
         "seed": compared.seed,
     }
