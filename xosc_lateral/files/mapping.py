@@ -84,9 +84,7 @@ def is_measured(unit: str) -> bool:
 
 
 def factor(column: str, unit: str) -> float:
-    """Factor from `unit` to the unit that the standard table has `column` in (SI where it names none).
-
-    A unit with a leading minus turns the sign: ``-m`` for offsets counted to the right.
+    """Factor from `unit` (``-m`` turns the sign) to that of the standard table's `column`, SI where it names none.
 
     Raises `ValueError` for an unknown unit, or one that measures something else.
     """
@@ -145,10 +143,7 @@ class TableMapping:
     recorded: Mapping[str, float] = field(default_factory=dict)  # by the names in `RECORDED`
 
     def class_names(self, column: pd.Series, path: Path) -> pd.Series:
-        """Vehicle classes in words.
-
-        Raises `FormatError`: they are numbers, and the mapping does not say of what.
-        """
+        """Vehicle classes in words; numbers need the mapping's [values.vehicle_class]."""
         words = column.map(as_word)
         if self.classes:
             return words.map(lambda word: self.classes.get(word, word))
@@ -163,10 +158,7 @@ class TableMapping:
         return replace(self, columns={**self.columns, **more}) if more else self
 
     def numbers(self, name: str, column: pd.Series, path: Path) -> pd.Series:
-        """The column `name`, its texts as the numbers that they stand for.
-
-        Raises `FormatError`: for a text that stands for none.
-        """
+        """The column `name`, its texts as the numbers that they stand for. Raises `FormatError`."""
         if name not in self.values:
             return column
         known = {text.strip().lower(): number for text, number in self.values[name].items()}
@@ -196,10 +188,7 @@ def as_mapping(given: MappingLike | None) -> TableMapping:
 
 
 def parse_map(words: Iterable[str]) -> dict[str, ColumnSource]:
-    """Read ``NAME=COLUMN`` or ``NAME=COLUMN:UNIT`` (``speed=v_kmh:km/h``, ``offset=lat:-cm``).
-
-    Raises `FormatError`: when a word has no ``=`` or its unit does not fit the column.
-    """
+    """Read ``NAME=COLUMN`` or ``NAME=COLUMN:UNIT`` (``speed=v_kmh:km/h``, ``offset=lat:-cm``). Raises `FormatError`."""
     mapping: dict[str, ColumnSource] = {}
     for word in map(composed, words):
         name, equals, rest = word.partition("=")

@@ -49,10 +49,7 @@ def require_lanes(placed: PlacedTracks, where: str, path: Path) -> None:
 def import_placed(
     placed: PlacedTracks, graph: LaneGraph, settings: CutSettings, *, only: Collection[str] | None = None, **about: Any
 ) -> Imported:
-    """Neighbours, cuts and the record of the import; of the vehicles in `only` alone, if it is given.
-
-    Raises `NotEnoughDataError` if nothing is left; further parameters are those of `table.finished`.
-    """
+    """Neighbours, cuts and record, see `table.finished`; of the vehicles in `only` alone, if it is given."""
     table = _drive_table(placed, graph, settings)
     if only is not None:
         table = table[table["drive"].isin(only)].reset_index(drop=True)
@@ -60,10 +57,7 @@ def import_placed(
 
 
 def import_each(sources: Path | Sequence[Path], read: Callable[[Path], Imported], *, keep_cut: bool) -> Imported:
-    """One table and one record of one or several files, each read with what would be cut.
-
-    Raises `NotEnoughDataError` if nothing is left.
-    """
+    """One table and one record of one or several files, each read with what would be cut."""
     files = [sources] if isinstance(sources, Path) else list(sources)
     parts = [read(file) for file in files]
     record = parts[0].provenance

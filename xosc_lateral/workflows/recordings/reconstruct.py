@@ -135,11 +135,7 @@ class ReconstructKeywords(TypedDict, total=False):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Reconstructed:
-    """A scenario as text, how it was made, and how far it is from the recording.
-
-    Residuals and drivers are in the order of the plans; `relative` holds, by entity, triggers that are distances, and
-    `fitted`, by name, profiles of single vehicles.
-    """
+    """A scenario, how it was made, and how far it is from the recording; residuals and drivers as the plans."""
 
     traffic: RecordedTraffic
     recording: Recording
@@ -165,11 +161,7 @@ class Reconstructed:
 
 
 def reconstruct_recording(traffic: RecordedTraffic, settings: ReconstructSettings) -> Reconstructed:
-    """Choose vehicles, plan their maneuvers, write the scenario in memory and play it.
-
-    Raises `FormatError`: a vehicle that is not in the recording, a window without time; `NotEnoughDataError`: if no
-    vehicle is left.
-    """
+    """Choose vehicles, plan their maneuvers, write the scenario in memory, and say who drove."""
     vehicles = None if settings.vehicles is None else frozenset(map(composed, settings.vehicles))
     settings = replace(settings, vehicles=vehicles, host=composed(settings.host), around=composed(settings.around))
     tracks, begin, end = chosen(traffic, settings)
@@ -256,10 +248,7 @@ def fitted_profiles(made: Reconstructed) -> dict[str, bytes]:
 
 
 def chosen(traffic: RecordedTraffic, settings: ReconstructSettings) -> tuple[list[Track], float, float]:
-    """Tracks and window of time [s] that the settings ask for.
-
-    Raises `FormatError`: a vehicle that is not in the recording, a window without time.
-    """
+    """Tracks and window of time [s] that the settings ask for."""
     by_name = {track.name: track for track in traffic.tracks}
     source = traffic.sources[0]
     host = settings.host and _host_name(traffic, settings)

@@ -62,11 +62,7 @@ class RecordedTraffic:
 def read_recording(
     source: Path, *, kind: str | None = None, road: Path | None = None, columns: MappingLike | None = None
 ) -> RecordedTraffic:
-    """Read a recording.
-
-    `kind`: its format, one of `READERS`; without it, told from the name. `road`: OpenDRIVE file, for formats that come
-    without one. `columns`: name -> ``COLUMN[:UNIT]``, of tables. Raises `FormatError`, `NotEnoughDataError`.
-    """
+    """Read a recording. `kind`: one of `READERS`, else told from the name. `road`: OpenDRIVE. `columns`: of tables."""
     kind = kind or format_of(source)
     if kind not in READERS:
         raise FormatError(f"no recording format {kind!r}; there are {', '.join(READERS)}", path=source)
@@ -267,11 +263,7 @@ def _short(names: NDArray[np.str_]) -> dict[str, str]:
 
 
 def dlr_road(found: dlr_ht.Carriageways) -> WrittenRoad:
-    """Both carriageways along one reference line; lanes where their traffic drives.
-
-    A lane's width is the distance of the two centres of its direction; what is left to the reference line is the
-    median's.
-    """
+    """Both carriageways along one line; a lane is as wide as its direction's centres are apart."""
     line = found.reference
     middle = line.place(np.array([0.5 * line.length]), 0)[0]
     origin = float(np.round(middle[0])), float(np.round(middle[1]))

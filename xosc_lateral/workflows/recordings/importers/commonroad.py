@@ -34,11 +34,7 @@ LICENCE = "that of the CommonRoad scenario and of the recording that it was made
 def import_commonroad(
     sources: Path | Sequence[Path], settings: CutSettings = DEFAULT_CUTS, *, keep_cut: bool = False
 ) -> Imported:
-    """Read one or several scenarios.
-
-    Raises `FormatError` if commonroad-io is not installed, or a file is no CommonRoad scenario; `NotEnoughDataError` if
-    nothing is left once lane changes are cut.
-    """
+    """Read one or several scenarios. Raises `FormatError`, `NotEnoughDataError`."""
     files = [sources] if isinstance(sources, Path) else list(sources)
     labels = dict(zip(files, file_labels(files), strict=True))
     return import_each(files, lambda file: _read(file, labels[file], settings), keep_cut=keep_cut)

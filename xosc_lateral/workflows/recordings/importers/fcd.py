@@ -64,9 +64,6 @@ def import_fcd(
 ) -> Imported:
     """A drive for every vehicle of what ``--fcd-output`` wrote; it is a truck when its type's name or class says so.
 
-    Raises `FormatError`, `NotEnoughDataError`: not such a file; one without `posLat`; one without vehicles; one whose
-    positions are not those of the network's side of the road.
-
     `net`: the road network, ``.net.xml``, for widths and counts of lanes, and for who is on the next edge. `types`:
     file with the vehicle types, for lengths. `lane_width`: without a network. [m]
     """
@@ -224,10 +221,7 @@ def _sides(name: str, lane: SumoLane, path: Path) -> tuple[FloatArray, FloatArra
 
 
 def read_fcd(path: Path) -> Tracks:
-    """Tracks of the rear axles, which pass where the front did: SUMO turns vehicles about their front.
-
-    Raises `FormatError`: no such file; `NotEnoughDataError`: no vehicle in it.
-    """
+    """Tracks of the rear axles, which pass where the front did: SUMO turns vehicles about their front."""
     require_fcd(path)
     rows, names, types = list[tuple[float, ...]](), dict[str, int](), list[str]()
     time = np.nan

@@ -50,10 +50,7 @@ VEHICLES = ("car", "van", "truck", "bus", "motorcycle", "trailer")
 
 @guarded
 def import_levelx(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cut: bool = False) -> Imported:
-    """Read one recording (its ``XX_tracks.csv``) or a folder of them; highD and exiD are recognised by their columns.
-
-    Raises `FormatError` if a file or a column is missing, or the exiD sign is undecided.
-    """
+    """Read one recording (its ``XX_tracks.csv``) or a folder of them, of highD or exiD, told by their columns."""
     tracks_files = sorted(source.glob("*_tracks.csv")) if source.is_dir() else [source]
     if not tracks_files:
         raise FormatError("no XX_tracks.csv in this folder", path=source)
@@ -213,8 +210,8 @@ def _first(column: pd.Series) -> FloatArray:
 def _left_sign(lateral: FloatArray, tracks: pd.DataFrame, vehicle: IntArray, step: float, path: Path) -> float:
     """+1 if the offset grows when a vehicle heads to the left of its lane's course, -1 if it shrinks.
 
-    By the correlation of the way to the left, from the heading, with the rate of the offset; the heading is taken
-    against its own mean over 4 s, which takes the road's course out of it.
+    By the correlation of its rate with the way to the left, by the heading less its own mean over 4 s (the road's
+    course).
     """
     heading = np.unwrap(np.radians(tracks["heading"].to_numpy()))
     half = max(1, round(2.0 / step))

@@ -114,12 +114,8 @@ def import_mf4(
 ) -> Imported:
     """Read mapped channels of bus logs at an even step, over the time that all position channels of a log cover.
 
-    Raises `FormatError` if the map lacks the position, asammdf is not installed, a log can't be read, a channel is not
-    in it, or the unit in the file measures something else.
-
-    `sources`: each log is a drive of its own, called after its file. `channels`: words ``NAME=CHANNEL[:UNIT]``.
-    `mapping`: more of them, saved. `step`: of the table [s]. Messages that stay away for longer than `fit` bridges
-    leave a gap.
+    Each log is a drive called after its file. `channels`: words ``NAME=CHANNEL[:UNIT]``; `mapping`: more of them,
+    saved. `step`: of the table [s]. Messages that stay away for longer than `fit` bridges leave a gap.
     """
     files = [sources] if isinstance(sources, Path) else list(sources)
     saved = as_mapping(mapping)
@@ -147,10 +143,7 @@ def import_mf4(
 
 
 def channels_wanted(source: Path) -> str:
-    """What the channel map has to name, and the channels that there are to choose from: for who has no map yet.
-
-    Raises `FormatError` when it can't be read as MDF.
-    """
+    """What the channel map has to name, and the channels that there are to choose from: for who has no map yet."""
     with _opened(source) as log:
         names = _names(log)
     listed = ", ".join(names[:LISTED]) + (", ..." if len(names) > LISTED else "")
@@ -184,10 +177,7 @@ def _opened(source: Path) -> Iterator[Any]:
 
 
 def _stated_unit(error: Exception) -> str:
-    """Words of an error, after which nothing is left of what it broke off.
-
-    asammdf's half-made objects complain on standard error when they are disposed of: here, and unheard.
-    """
+    """Words of an error, whose half-made objects, which complain on standard error, are disposed of here, unheard."""
     reason = " ".join(str(error).split())[:LONGEST_MESSAGE] or type(error).__name__
     hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
     try:

@@ -71,10 +71,7 @@ HEADER_LINES = 50  # lines before the header, at most: the campaign's files have
 def import_openacc(
     source: Path | Sequence[Path], *, lane_width: float = LANE_WIDTH, keep_cut: bool = False
 ) -> Imported:
-    """AstaZero's files, one or several, as they are in the catalogue (.csv, .csv.gz): a drive for each car and file.
-
-    `lane_width`: of the road, which nobody measured. [m]
-    """
+    """A drive for each car of AstaZero's files (.csv, .csv.gz). `lane_width`: of the road, not measured. [m]"""
     paths = [source] if isinstance(source, Path) else list(source)
     cars = [car for path in paths for car in _cars(path)]
     if not cars:
@@ -189,10 +186,7 @@ class _Loop:
         return np.asarray(cross / np.hypot(*first.T) ** 3)
 
     def place(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Index along the points, with its fraction, and distance to the left, shape (n,) each. [-], [m]
-
-        Across the line it is as between the normals of both neighbours, so that nothing jumps from point to point.
-        """
+        """Index along the points with its fraction, and distance to the left [m], as between both neighbours' normals."""
         from scipy.spatial import cKDTree
 
         points, normals = self.points, self.normals()

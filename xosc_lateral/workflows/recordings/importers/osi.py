@@ -48,9 +48,6 @@ def import_osi(
 ) -> Imported:
     """Read one or several traces of ground truth or sensor views.
 
-    Raises `FormatError`: The extra is missing; no trace; no lanes; no such vehicle; `NotEnoughDataError` if nothing is
-    left once lane changes are cut.
-
     `host`: keep this vehicle alone: its identifier or name in the trace; "host": the trace's host vehicle. `road`:
     OpenDRIVE file to take lanes from. `channel`: topic of an MCAP file with several.
     """

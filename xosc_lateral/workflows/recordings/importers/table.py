@@ -51,10 +51,7 @@ class Imported:
 
 
 def make_provenance(table: pd.DataFrame, *, sources: Sequence[Path], step: float, **about: Any) -> ImportRecord:
-    """Record of an import, from the table with its column `state` and rows `step` seconds apart.
-
-    `about`: the fields of `ImportRecord` that can't be counted: format, licence, settings, and more where there is.
-    """
+    """Record of an import, from the table with its column `state`; `about`: the fields that can't be counted."""
     return ImportRecord(
         source=", ".join(source.name for source in sources),
         sha256=hash_files(sources),
@@ -66,19 +63,13 @@ def make_provenance(table: pd.DataFrame, *, sources: Sequence[Path], step: float
 
 
 def finished(table: pd.DataFrame, *, keep_cut: bool, sources: Sequence[Path], **about: Any) -> Imported:
-    """A table with its column `state` and its record, see `make_provenance`; without the rows that are cut.
-
-    Raises `NotEnoughDataError` if nothing is left.
-    """
+    """A table with its record, see `make_provenance`; without the rows that are cut, unless they are wanted."""
     record = make_provenance(table, sources=sources, **about)
     return without_cut(table, record, keep_cut, sources[0])
 
 
 def without_cut(table: pd.DataFrame, record: ImportRecord, keep_cut: bool, source: Path) -> Imported:
-    """The table without the rows that are cut and without `state`, unless they are wanted.
-
-    Raises `NotEnoughDataError` if nothing is left.
-    """
+    """The table without the rows that are cut and without `state`, unless wanted. Raises `NotEnoughDataError`."""
     kept = table if keep_cut else table[table["state"] == KEPT_ROWS].drop(columns="state")
     if kept.empty:
         raise NotEnoughDataError(f"{source}: nothing is left of {len(table)} rows ({dict(record.rows)})")
@@ -89,11 +80,7 @@ Importer = TypeVar("Importer", bound="Callable[..., Imported | pd.DataFrame]")
 
 
 def guarded(read: Importer) -> Importer:
-    """An importer whose source, damaged in whatever way, ends in one line, and never in a table of nonsense.
-
-    Raises `NotEnoughDataError`: Too little is left; the message begins with the source; `FormatError`: whatever else
-    breaks in the source; offsets and lane widths that are none; a column beyond `limits`.
-    """
+    """An importer whose source, however damaged, ends in one line that names it, never in a table of nonsense."""
 
     @wraps(read)
     def within(source: Path | Sequence[Path], *args: Any, **settings: Any) -> Imported | pd.DataFrame:

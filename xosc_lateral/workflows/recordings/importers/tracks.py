@@ -39,15 +39,11 @@ def import_tracks(
     settings: CutSettings = DEFAULT_CUTS,
     keep_cut: bool = False,
 ) -> Imported:
-    """Read tracks on a known road.
+    """Read tracks on a known road, an OpenDRIVE file.
 
-    Raises `FormatError`: A missing column, or tracks that lie beside the road; `NotEnoughDataError` if nothing is left
-    once lane changes are cut.
-
-    `source`: CSV or Parquet table, one row per vehicle and instant; x and y are the vehicle's middle (or lie `rear`
-    behind it, where there is that column), in the road's coordinates. Or a log that esmini wrote (``--csv_logger``).
-    `road`: OpenDRIVE file. `columns`: ``NAME=COLUMN[:UNIT]`` for `vehicle`, `time`, `x`, `y`, `heading`, `speed`,
-    `length`, `rear`, `vehicle_class`. `mapping`: more of them, saved.
+    `source`: table of one row per vehicle and instant, or a log of esmini (``--csv_logger``); x and y are the vehicle's
+    middle, or lie `rear` behind it, in the road's coordinates. `columns`: ``NAME=COLUMN[:UNIT]``; `mapping`: more,
+    saved.
     """
     network = read_opendrive(road)
     placed, graph = place_on_road(read_tracks(source, columns, mapping), network)
@@ -57,10 +53,7 @@ def import_tracks(
 
 
 def place_on_road(tracks: Tracks, network: RoadNetwork) -> tuple[PlacedTracks, LaneGraph]:
-    """Every row's driving lane, and what the road is like there. x and y are inertial: the header's offset is undone.
-
-    Raises `FormatError`: the road has no driving lane.
-    """
+    """Every row's driving lane, and what the road is like there; x and y are inertial: the header's offset goes."""
     pieces, graph = lane_graph(network)
     if not pieces:
         raise FormatError("the road has no driving lane that tracks could lie in", path=network.path)
