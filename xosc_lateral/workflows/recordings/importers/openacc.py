@@ -186,7 +186,7 @@ class _Loop:
         return np.asarray(cross / np.hypot(*first.T) ** 3)
 
     def place(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Index along the points with its fraction, and distance to the left [m], as between both neighbours' normals."""
+        """Index along the points with its fraction, and distance to the left [m], as between two normals."""
         from scipy.spatial import cKDTree
 
         points, normals = self.points, self.normals()
