@@ -189,9 +189,12 @@ class ImportedDrives(Result):
         return f"{known.source}: {known.vehicles} vehicles, {known.hours:g} h"
 
     def __str__(self) -> str:
-        from xosc_lateral.workflows.recordings.importers.table import describe
-
-        return describe(self._imported.provenance)
+        record = self._imported.provenance
+        rows = ", ".join(f"{count} {state}" for state, count in record.rows.items())
+        head = f"{record.source}: {record.vehicles} vehicles, {record.hours:g} h kept (rows: {rows})"
+        lanes = ["  " + ", ".join(f"{name} {value}" for name, value in lane.items()) for lane in record.lanes]
+        notes = [f"  note: {note}" for note in record.notes]
+        return "\n".join([head, *lanes, *notes, f"licence: {record.licence}"])
 
     def to_frame(self) -> pd.DataFrame:
         """The drive table: what `fit` and the other calls take."""

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.workflows.recordings.gate import LANE_AGREEMENT
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks
+from xosc_lateral.workflows.recordings.importers.tracks import PlacedTracks
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
-from xosc_lateral.workflows.recordings.placed import PlacedTracks
 
 SMOOTHED = 20.0  # way over which a lane's turning is averaged into a curvature: bounds are polygons [m]
 

@@ -21,11 +21,11 @@ from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.files.drives import file_labels
 from xosc_lateral.files.xml import read_xml, root_tag
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
-from xosc_lateral.workflows.recordings.importers.table import Imported, guarded
+from xosc_lateral.workflows.recordings.importers.table import Imported, guarded, import_each, paths_of
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks, ground_speed, travel_heading
+from xosc_lateral.workflows.recordings.importers.tracks import import_placed, require_lanes
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
 from xosc_lateral.workflows.recordings.lane_shapes import LaneShape, curvature_along, lane_graph, place_in_shapes
-from xosc_lateral.workflows.recordings.placed import import_each, import_placed, require_lanes
 
 LICENCE = "that of the CommonRoad scenario and of the recording that it was made from"
 
@@ -35,7 +35,7 @@ def import_commonroad(
     sources: Path | Sequence[Path], settings: CutSettings = DEFAULT_CUTS, *, keep_cut: bool = False
 ) -> Imported:
     """Read one or several scenarios. Raises `FormatError`, `NotEnoughDataError`."""
-    files = [sources] if isinstance(sources, Path) else list(sources)
+    files = paths_of(sources)
     labels = dict(zip(files, file_labels(files), strict=True))
     return import_each(files, lambda file: _read(file, labels[file], settings), keep_cut=keep_cut)
 

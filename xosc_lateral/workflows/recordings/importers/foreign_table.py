@@ -16,6 +16,7 @@ from xosc_lateral.files.columns import comma_numbers
 from xosc_lateral.files.drives import drives_of_table, file_labels, labels_apart, translated
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping, factor, spelled
 from xosc_lateral.files.tables import read_table, text_encoding
+from xosc_lateral.workflows.recordings.importers.table import paths_of
 
 HEADERS = {
     "time": r"time|timestamp|t|zeit|zeitstempel|sec|seconds",
@@ -77,7 +78,7 @@ SIGNS = {"offset": "positive to the LEFT of travel, else :-m", "curvature": "pos
 def import_table(sources: Path | Sequence[Path], *, mapping: MappingLike | None = None) -> pd.DataFrame:
     """Tables under standard names and units, as they can be read; without `drive`, a drive called after its file."""
     known = as_mapping(mapping)
-    files = [sources] if isinstance(sources, Path) else list(sources)
+    files = paths_of(sources)
     made = []
     for path, label in zip(files, file_labels(files), strict=True):
         table = translated(read_table(path, known), known, path)

@@ -41,7 +41,7 @@ from xosc_lateral.files.mapping import ColumnSource, MappingLike, as_mapping, fa
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import LONGEST_MESSAGE, foreign_errors
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
-from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
+from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded, paths_of
 
 POSITIONS = (("offset", "lane_width"), ("distance_left", "distance_right"))
 LICENCE = "your own recording"
@@ -117,7 +117,7 @@ def import_mf4(
     Each log is a drive called after its file. `channels`: words ``NAME=CHANNEL[:UNIT]``; `mapping`: more of them,
     saved. `step`: of the table [s]. Messages that stay away for longer than `fit` bridges leave a gap.
     """
-    files = [sources] if isinstance(sources, Path) else list(sources)
+    files = paths_of(sources)
     saved = as_mapping(mapping)
     sources_of = {**saved.columns, **parse_map(channels)}
     if not any(set(pair) <= sources_of.keys() for pair in POSITIONS):
