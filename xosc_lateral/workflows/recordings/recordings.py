@@ -109,7 +109,7 @@ def _osi(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraf
 def _commonroad(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
     from xosc_lateral.workflows.recordings.importers.commonroad import read_obstacles
 
-    tracks, shapes, graph = read_obstacles(source)
+    tracks, shapes, graph, _ = read_obstacles(source, source.stem)
     names = tuple(name.removeprefix(f"{source.stem}:") for name in tracks.names)
     own = None if road is not None else roads_of_lanes(driven_lanes(shapes, graph), name_of(source)).encode()
     return _on_road(replace(tracks, names=names), source, road, own)
