@@ -25,10 +25,10 @@ from numpy.typing import NDArray
 import xosc_lateral as xl
 from laboratory import agreement
 from xosc_lateral.workflows.conversion.load import play_scenario
+from xosc_lateral.workflows.recordings.call import ReconstructSettings
 from xosc_lateral.workflows.recordings.importers import dlr_ht
 from xosc_lateral.workflows.recordings.reconstruct import (
-    Reconstructed,
-    ReconstructSettings,
+    Reconstruction,
     drivers_table,
     reconstruct_recording,
 )
@@ -92,7 +92,7 @@ class OtherReading:
         return found
 
 
-def lane_changes(made: Reconstructed, other: OtherReading) -> tuple[int, int, int, FloatArray]:
+def lane_changes(made: Reconstruction, other: OtherReading) -> tuple[int, int, int, FloatArray]:
     """Found by both, by the other reading alone, by the reconstruction alone; differences of begin and end [s]."""
     both, missed, extra, ends = 0, 0, 0, list[tuple[float, float]]()
     start = made.recording.start
@@ -136,7 +136,7 @@ def window_lines(traffic: RecordedTraffic, other: OtherReading, begins: Sequence
     return lines
 
 
-def write(made: Reconstructed, folder: Path) -> Path:
+def write(made: Reconstruction, folder: Path) -> Path:
     """Scenario, road and table of drivers."""
     (folder / made.traffic.road_name).write_bytes(made.traffic.road)
     path = folder / f"{made.traffic.name}.xosc"

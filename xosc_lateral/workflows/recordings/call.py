@@ -1,147 +1,27 @@
-"""The promised calls: `import_drives`, and `reconstruct` with its result."""
+"""The promised calls: `import_drives`, and `reconstruct` with its settings."""
 
 from __future__ import annotations
 
+from collections.abc import Collection
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Unpack
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.drives import file_label
 from xosc_lateral.files.mapping import MappingLike
-from xosc_lateral.files.output_paths import claim, output_file, output_folder
-from xosc_lateral.workflows.conversion.options import spelled_out, values_of
+from xosc_lateral.files.output_paths import claim, output_file
+from xosc_lateral.workflows.conversion import options as say
+from xosc_lateral.workflows.conversion.options import option, spelled_out, values_of
 from xosc_lateral.workflows.recordings.importers import find_importer
 from xosc_lateral.workflows.recordings.importers.table import Imported, as_imported
-from xosc_lateral.workflows.recordings.reconstruct import (
-    Reconstructed,
-    ReconstructKeywords,
-    ReconstructSettings,
-    drivers_table,
-    fitted_profiles,
-    reconstruct_recording,
-)
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths
 
+if TYPE_CHECKING:
+    from xosc_lateral.workflows.recordings.reconstruct import Reconstruction
 
-@spelled_out(ReconstructSettings)
-def reconstruct(
-    recording: PathLike,
-    output: PathLike | None = None,
-    *,
-    format: str | None = None,  # noqa: A002 (as in `import_drives`)
-    road: PathLike | None = None,
-    columns: MappingLike | None = None,
-    force: bool = False,
-    **options: Unpack[ReconstructKeywords],
-) -> Reconstruction:
-    """Turn a recording into maneuvers, a road and drivers.
-
-    Parameters
-    ----------
-    recording : str or Path
-        Tracks of several vehicles: DLR Highway Traffic, levelX, OSI traces, CommonRoad, SUMO's FCD output, or a table.
-    output : str or Path, optional
-        Folder to write to, see `Reconstruction.write`; without it nothing is written.
-    format : str, optional
-        "dlr-ht", "levelx", "osi", "commonroad", "fcd" or "tracks"; without it, told from the file.
-    road : str or Path, optional
-        OpenDRIVE file, for recordings that come without their lanes; SUMO's network, for its FCD output.
-    columns : dict, path or TableMapping, optional
-        Name -> ``COLUMN[:UNIT]`` for tables of tracks, or a saved mapping's file.
-    force : bool
-        Replace files that this package did not write.
-    options
-        `recordings.reconstruct.ReconstructSettings`: which part and which vehicles, and what is written of them.
-
-    Raises
-    ------
-    FormatError, NotEnoughDataError
-    """
-    from xosc_lateral.workflows.recordings.recordings import read_recording
-
-    settings = ReconstructSettings(**values_of(ReconstructSettings, options))
-    traffic = read_recording(Path(recording), kind=format, road=None if road is None else Path(road), columns=columns)
-    result = Reconstruction(reconstruct_recording(traffic, settings))
-    if output is not None:
-        result.write(output, force=force)
-    return result
-
-
-class Reconstruction(Result):
-    """A scenario with its road and drivers, and how near it is to the recording."""
-
-    __slots__ = ("_made", "outputs")
-
-    def __init__(self, made: Reconstructed) -> None:
-        self._made = made
-        self.outputs: tuple[Path, ...] = ()
-        """Files that were written."""
-
-    @property
-    def name(self) -> str:
-        """Of the files, without suffix."""
-        return self._made.traffic.name
-
-    @property
-    def scenario(self) -> str:
-        """The OpenSCENARIO document."""
-        return self._made.scenario
-
-    @property
-    def left_out(self) -> tuple[str, ...]:
-        """Vehicles, and parts of them, that are not in the scenario: a line each, with the reason."""
-        return self._made.recording.left_out
-
-    def headline(self) -> str:
-        """One line."""
-        return str(self).splitlines()[0]
-
-    def __str__(self) -> str:
-        from xosc_lateral.workflows.recordings.page import as_text
-
-        return as_text(self.to_dict())
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per vehicle: when it is there, its maneuvers, residuals and driver."""
-        return pd.DataFrame(self.to_dict()["vehicles"])
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values, as ``--json`` prints them and the report holds them."""
-        from xosc_lateral.workflows.recordings.page import facts_of
-
-        return facts_of(self._made) | {"outputs": [str(path) for path in self.outputs]}
-
-    def write(self, folder: PathLike, *, force: bool = False) -> tuple[Path, ...]:
-        """Write NAME.xosc and its road, drivers.csv for `convert`, report.html and report.json, all or none.
-
-        Returns
-        -------
-        tuple of Path
-        """
-        from xosc_lateral.files.atomic import write_atomically
-        from xosc_lateral.files.json_text import canonical_json
-        from xosc_lateral.workflows.recordings.page import facts_of, page_of
-
-        made, where = self._made, output_folder(folder)
-        facts = facts_of(made)
-        files: dict[str, bytes | str] = {
-            made.traffic.road_name: made.traffic.road,
-            f"{made.traffic.name}.xosc": made.scenario,
-            **fitted_profiles(made),
-            "report.html": page_of(made, facts),
-            "report.json": canonical_json(facts),
-        }
-        table = where / "drivers.csv"
-        paths = {where / name: data for name, data in files.items()}
-        kept = {path for path in made.traffic.sources if path.exists() and (where / path.name).exists()}
-        same = {path for path in paths if any(path.resolve() == one.resolve() for one in kept)}
-        claim([*(path for path in paths if path not in same), table], made.traffic.sources, force=force)
-        for path, data in paths.items():
-            if path not in same:  # a road that lies there already stays as it is
-                write_atomically(path, data)
-        drivers_table(made, table)
-        self.outputs = (*paths, table)
-        return self.outputs
+VERSIONS = ("1.0", "1.1", "1.2", "1.3")
+"""Of the standard that can be written."""
 
 
 def import_drives(
@@ -215,3 +95,138 @@ class ImportedDrives(Result):
         claim([output], [source for source in self.sources if source.is_file()], force=force)
         write_imported(self._imported, output)
         return output
+
+
+def _version(text: str) -> str:
+    if text not in VERSIONS:
+        raise ValueError(f"version {text!r}, expected {', '.join(VERSIONS)}")
+    return text
+
+
+@dataclass(frozen=True, slots=True)
+class ReconstructSettings:
+    """What is reconstructed, and how: keywords of `reconstruct`, and options of the command line.
+
+    Parameters
+    ----------
+    begin, end : float, optional
+        Part of the recording. [s]
+    vehicles : collection of str, optional
+        These alone.
+    around, window : str, float
+        A vehicle and those who come near it, for so long in the middle of its passage. [s]
+    host : str, optional
+        The vehicle under test, which `convert` leaves to the system that drives it; by default the recording's own
+        host; "none": there is none.
+    error : float
+        Positions along the road are within this; smaller: more corners in the speeds. [m]
+    version : str
+        Of OpenSCENARIO, "1.0" to "1.3".
+    relative : bool
+        Lane changes and braking begin at a distance to another vehicle, where the recording bears it out.
+    exact : bool
+        Recorded paths as trajectories, instead of maneuvers.
+    fit : bool
+        A driver profile of its own for every vehicle that drove long enough.
+    library : path or paths
+        Folders with further profiles to choose from.
+    """
+
+    # What is said of one option stays together.
+    # fmt: off
+    begin: float | None = option(
+        None, float, "--from", kind=float | None, show_default=False, help="Begin there [s].",
+    )
+    end: float | None = option(None, float, "--to", kind=float | None, show_default=False, help="End there [s].")
+    vehicles: frozenset[str] | None = option(
+        None, say.names, kind=list[str] | None, metavar="ID", help="This vehicle alone; may be repeated.",
+    )
+    around: str | None = option(
+        None, str, kind=str | None, metavar="ID", show_default=False,
+        help="This vehicle and those who come near it.",
+    )
+    window: float = option(
+        60.0, float, kind=float, min=1, max=3600, help="Length of the part that --around takes [s].",
+    )
+    host: str | None = option(
+        None, str, kind=str | None, metavar="ID", show_default=False,
+        help="The vehicle under test; default: the host of an OSI trace; none: no vehicle.",
+    )
+    error: float = option(
+        0.5, float, kind=float, min=0.01,
+        help="Positions along the road are within this [m]: the smaller, the more corners.",
+    )
+    version: str = option("1.2", _version, kind=str, metavar="1.0..1.3", help="Version of OpenSCENARIO to write.")
+    relative: bool = option(
+        False, bool, "--relative", kind=bool, help="Cut-ins and braking begin at a distance to another vehicle.",
+    )
+    exact: bool = option(
+        False, bool, "--exact", kind=bool, help="Recorded paths as trajectories, no maneuvers.",
+    )
+    fit: bool = option(
+        False, bool, "--fit", kind=bool, help="Fit a profile to everybody who drove long enough.",
+    )
+    library: tuple[Path, ...] = option((), say.paths)
+    # fmt: on
+
+
+class ReconstructKeywords(TypedDict, total=False):
+    """The same names for type checkers, with what a call may be given."""
+
+    begin: float | None
+    end: float | None
+    vehicles: Collection[str] | None
+    around: str | None
+    window: float
+    host: str | None
+    error: float
+    version: str
+    relative: bool
+    exact: bool
+    fit: bool
+    library: Paths
+
+
+@spelled_out(ReconstructSettings)
+def reconstruct(
+    recording: PathLike,
+    output: PathLike | None = None,
+    *,
+    format: str | None = None,  # noqa: A002 (as in `import_drives`)
+    road: PathLike | None = None,
+    columns: MappingLike | None = None,
+    force: bool = False,
+    **options: Unpack[ReconstructKeywords],
+) -> Reconstruction:
+    """Turn a recording into maneuvers, a road and drivers.
+
+    Parameters
+    ----------
+    recording : str or Path
+        Tracks of several vehicles: DLR Highway Traffic, levelX, OSI traces, CommonRoad, SUMO's FCD output, or a table.
+    output : str or Path, optional
+        Folder to write to, see `Reconstruction.write`; without it nothing is written.
+    format : str, optional
+        "dlr-ht", "levelx", "osi", "commonroad", "fcd" or "tracks"; without it, told from the file.
+    road : str or Path, optional
+        OpenDRIVE file, for recordings that come without their lanes; SUMO's network, for its FCD output.
+    columns : dict, path or TableMapping, optional
+        Name -> ``COLUMN[:UNIT]`` for tables of tracks, or a saved mapping's file.
+    force : bool
+        Replace files that this package did not write.
+    options
+        `recordings.call.ReconstructSettings`: which part and which vehicles, and what is written of them.
+
+    Raises
+    ------
+    FormatError, NotEnoughDataError
+    """
+    from xosc_lateral.workflows.recordings.reconstruct import reconstruct_recording
+    from xosc_lateral.workflows.recordings.recordings import read_recording
+
+    settings = ReconstructSettings(**values_of(ReconstructSettings, options))
+    traffic = read_recording(Path(recording), kind=format, road=None if road is None else Path(road), columns=columns)
+    result = reconstruct_recording(traffic, settings)
+    if output is not None:
+        result.write(output, force=force)
+    return result

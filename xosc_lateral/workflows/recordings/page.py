@@ -16,14 +16,14 @@ from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.workflows.conversion.result import EntityResult, SampledSegment
 from xosc_lateral.workflows.playing.scene import scene_of
 from xosc_lateral.workflows.recordings.drivers import ChosenDriver
-from xosc_lateral.workflows.recordings.encounters import Beside, Encounter
+from xosc_lateral.workflows.recordings.encounters import Encounter
 from xosc_lateral.workflows.recordings.plan import Residuals, VehiclePlan, planned_motion
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.world.motion.segments import SegmentKind, SegmentSpan
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
 
 if TYPE_CHECKING:
-    from xosc_lateral.workflows.recordings.reconstruct import Reconstructed
+    from xosc_lateral.workflows.recordings.reconstruct import Reconstruction
 
 FRAME = 0.1  # rows of the page's player [s]
 VEHICLES = {
@@ -125,20 +125,18 @@ def maneuver_rows(plans: Sequence[VehiclePlan], relative: Any) -> list[dict[str,
 def encounter_rows(met: Sequence[Encounter]) -> list[dict[str, Any]]:
     """One row per lane change and braking. [s], [m]; None: nobody, or it never comes to it."""
     rows = []
-    for one in met:
-        row: dict[str, Any] = {"kind": one.kind, "entity": one.vehicle, "time": round(one.time, 3), "side": one.side}
-        for word, other in (("ahead", one.ahead), ("behind", one.behind)):
-            row |= {word: None if other is None else other.name} | _numbers(word, other)
+    for encounter in met:
+        row: dict[str, Any] = {"kind": encounter.kind, "entity": encounter.vehicle, "time": round(encounter.time, 3)}
+        row["side"] = encounter.side
+        for word, other in (("ahead", encounter.ahead), ("behind", encounter.behind)):
+            time = np.inf if other is None else other.time_to_collision
+            row |= {
+                word: None if other is None else other.name,
+                f"gap_{word}": None if other is None else round(float(other.gap), 2),
+                f"time_to_collision_{word}": round(float(time), 2) if np.isfinite(time) else None,
+            }
         rows.append(row)
     return rows
-
-
-def _numbers(word: str, other: Beside | None) -> dict[str, float | None]:
-    known = other is not None and np.isfinite(other.time_to_collision)
-    return {
-        f"gap_{word}": None if other is None else round(float(other.gap), 2),
-        f"time_to_collision_{word}": round(float(other.time_to_collision), 2) if known and other is not None else None,
-    }
 
 
 def not_expressed(plans: Sequence[VehiclePlan], residuals: Sequence[Residuals], left_out: Sequence[str]) -> list[str]:
@@ -170,7 +168,7 @@ def recorded_path(plan: VehiclePlan, time: FloatArray, motion: EntityMotion) -> 
     return WorldTrajectory(time, x, y, motion.z, motion.heading, motion.pitch, motion.roll, speed)
 
 
-def facts_of(made: Reconstructed) -> dict[str, Any]:
+def facts_of(made: Reconstruction) -> dict[str, Any]:
     """Everything that is known of a reconstruction, as plain values."""
     recording, plans, residuals = made.recording, made.plans, made.residuals
     return {
@@ -187,22 +185,9 @@ def facts_of(made: Reconstructed) -> dict[str, Any]:
     }
 
 
-def page_of(made: Reconstructed, facts: dict[str, Any]) -> str:
+def page_of(made: Reconstruction, facts: dict[str, Any]) -> str:
     """HTML page, self-contained: the recorded paths in the player, the planned ones as ghosts."""
-    plans, residuals, network = made.plans, made.residuals, made.traffic.network
     numbers = facts["summary"]
-    time = np.arange(0.0, numbers["duration"] + 1e-9, FRAME)
-    pairs = []
-    for plan in plans:
-        motion = planned_motion(plan, time, network)
-        across = np.interp(time, plan.vehicle.time, plan.vehicle.offset + plan.vehicle.levels[0])
-        deviation = across - plan.lateral.at(np.clip(time, *plan.present))
-        span = SegmentSpan(SegmentKind.ROAD_FOLLOWING, 0, len(time) - 1, 0.0, float(time[-1]))
-        shown, path = SampledSegment(span, time, deviation), recorded_path(plan, time, motion)
-        pairs.append((motion, EntityResult(motion, (), None, "", (shown,), deviation, path)))
-    motions = NominalMotion(
-        FRAME, tuple(motion for motion, _ in pairs), (), float(time[-1]), "end of the recording", ()
-    )
     page = Page(f"{facts['name']}: from the recording to maneuvers")
     page.lead(
         f"{numbers['vehicles']} vehicles of `{facts['recording']}`, {facts['window'][0]:.1f} to "
@@ -224,8 +209,7 @@ def page_of(made: Reconstructed, facts: dict[str, Any]) -> str:
         "From above. Filled boxes are the recorded vehicles, dashed outlines (nominal) the places that the maneuvers "
         "give them. Click a vehicle to follow it, point at it for its values, drag to look elsewhere.",
     )
-    scene = scene_of(motions, network, [result for _, result in pairs])
-    page.player(scene, "Recorded and reconstructed traffic from above")
+    page.player(_scene(made, numbers["duration"]), "Recorded and reconstructed traffic from above")
     page.section(
         "Residuals",
         "Recorded less planned. Along the road, the speed profile is at fault: "
@@ -234,34 +218,45 @@ def page_of(made: Reconstructed, facts: dict[str, Any]) -> str:
         f"{numbers['across_in_maneuvers_rms']} m in them.",
     )
     page.figure(
-        _spread(residuals),
+        _spread(made.residuals),
         "Distribution of the residuals of all vehicles.",
         "Histograms of recorded less planned position, along and across the road",
     )
-    page.section("Vehicles")
-    _add_table(page, facts["vehicles"], VEHICLES, "Profile: who drives it in a twin.")
-    page.section("Lateral maneuvers")
     cut = "Residual of the fitted shape. Cut off: the recording begins or ends within it."
-    _add_table(page, facts["maneuvers"], MANEUVERS, cut)
-    page.section("Encounters")
-    _add_table(
-        page,
-        facts["encounters"],
-        ENCOUNTERS,
+    met = (
         "Every lane change, half way, and every braking at its begin: who is ahead and behind in the lane it leads to, "
-        "free space between the bumpers, and time until that is used up.",
+        "free space between the bumpers, and time until that is used up."
     )
+    for title, key, headings, caption in (
+        ("Vehicles", "vehicles", VEHICLES, "Profile: who drives it in a twin."),
+        ("Lateral maneuvers", "maneuvers", MANEUVERS, cut),
+        ("Encounters", "encounters", ENCOUNTERS, met),
+    ):
+        page.section(title)
+        shown = [{heading: row[name] for name, heading in headings.items()} for row in facts[key]]
+        # times to 0.1 s, lengths to 1 cm
+        formats = {heading: ".1f" if "[s]" in heading else ".2f" for heading in headings.values() if "[" in heading}
+        page.table(shown, caption, formats=formats)
     page.section("Not expressed")
     page.items(facts["not_expressed"])
     page.text("" if facts["not_expressed"] else "Nothing was left out.")
     return page.html(facts["provenance"])
 
 
-def _add_table(page: Page, rows: Sequence[dict[str, Any]], headings: dict[str, str], caption: str) -> None:
-    """Rows under readable headings; times to 0.1 s, lengths to 1 cm."""
-    shown = [{heading: row[key] for key, heading in headings.items()} for row in rows]
-    formats = {one: ".1f" if "[s]" in one else ".2f" for one in headings.values() if "[" in one}
-    page.table(shown, caption, formats=formats)
+def _scene(made: Reconstruction, duration: float) -> str:
+    """The player's: recorded paths over planned motions."""
+    time, network = np.arange(0.0, duration + 1e-9, FRAME), made.traffic.network
+    motions, results = list[EntityMotion](), list[EntityResult]()
+    for plan in made.plans:
+        motion = planned_motion(plan, time, network)
+        across = np.interp(time, plan.vehicle.time, plan.vehicle.offset + plan.vehicle.levels[0])
+        deviation = across - plan.lateral.at(np.clip(time, *plan.present))
+        span = SegmentSpan(SegmentKind.ROAD_FOLLOWING, 0, len(time) - 1, 0.0, float(time[-1]))
+        shown, path = SampledSegment(span, time, deviation), recorded_path(plan, time, motion)
+        motions.append(motion)
+        results.append(EntityResult(motion, (), None, "", (shown,), deviation, path))
+    nominal = NominalMotion(FRAME, tuple(motions), (), float(time[-1]), "end of the recording", ())
+    return scene_of(nominal, network, results)
 
 
 def _spread(residuals: Sequence[Residuals]) -> Figure:
