@@ -10,7 +10,7 @@ from xosc_lateral.base.version import __version__
 TYPE_CHECKING = False  # importing `typing` for it would take longer than all the rest
 
 _HOME = {
-    "convert": "workflows.conversion.call",
+    "convert": "workflows.conversion.convert",
     "convert_many": "workflows.batch.call",
     "reconstruct": "workflows.recordings.call",
     "verify": "workflows.batch.verify",
@@ -36,12 +36,13 @@ _HOME = {
     "Moment": "workflows.live.traffic",
     "EsminiTraffic": "workflows.live.esmini",
     "SumoTraffic": "workflows.live.sumo",
+    "export_c": "workflows.live.c_driver",
     "export_fmu": "workflows.live.fmu",
     "LiveRun": "workflows.live.call",
     "OffsetStream": "drivers.model.stream",
     "DriverProfile": "drivers.model.profile",
     "Drive": "drivers.drives.drive",
-    "Conversion": "workflows.conversion.call",
+    "Conversion": "workflows.conversion.conversion",
     "Reconstruction": "workflows.recordings.reconstruct",
     "ConvertSettings": "workflows.conversion.settings",
     "BatchResult": "workflows.batch.call",
@@ -89,6 +90,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "Moment",
     "EsminiTraffic",
     "SumoTraffic",
+    "export_c",
     "export_fmu",
     "LiveRun",
     "OffsetStream",
@@ -129,10 +131,12 @@ if TYPE_CHECKING:
     from xosc_lateral.drivers.model.stream import OffsetStream
     from xosc_lateral.workflows.batch.call import BatchResult, convert_many
     from xosc_lateral.workflows.batch.verify import Verification, reproduce, verify
-    from xosc_lateral.workflows.conversion.call import Conversion, convert
+    from xosc_lateral.workflows.conversion.conversion import Conversion
+    from xosc_lateral.workflows.conversion.convert import convert
     from xosc_lateral.workflows.conversion.settings import ConvertSettings
     from xosc_lateral.workflows.detection.call import detect
     from xosc_lateral.workflows.detection.detection import Detection
+    from xosc_lateral.workflows.live.c_driver import export_c
     from xosc_lateral.workflows.live.call import LiveRun, live_esmini, live_sumo
     from xosc_lateral.workflows.live.esmini import EsminiTraffic
     from xosc_lateral.workflows.live.fmu import export_fmu

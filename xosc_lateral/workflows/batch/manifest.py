@@ -8,6 +8,7 @@ therefore the only file of an output tree that is never twice the same.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from io import BytesIO
@@ -150,15 +151,8 @@ def printable(text: str) -> str:
     return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
-_MAPPINGS = (
-    "parameters",
-    "inputs",
-    "profiles",
-    "profile_sha256",
-    "why_not",
-    "modes",
-    "options",
-)  # JSON text in the file: every reader takes it
+_MAPPINGS = ("parameters", "inputs", "profiles", "profile_sha256", "why_not", "modes", "options")
+"""JSON text in the file: every reader takes it."""
 
 
 def manifest_schema() -> pa.Schema:
@@ -177,22 +171,15 @@ def write_manifest(rows: Iterable[ManifestRow], path: Path) -> None:
 
     Raises `OSError`: the old manifest is still there.
     """
-    schema = manifest_schema()
-    _write_table(path, schema, (_packed(row) for row in rows))
+    _write_table(path, manifest_schema(), map(_packed, rows))
 
 
 def read_manifest(path: Path) -> Iterator[ManifestRow]:
-    """Rows of a manifest; none if there is no file.
-
-    Raises `FormatError`: when it is no manifest.
-    """
+    """Rows of a manifest; none if there is no file. Raises `FormatError`: it is no manifest."""
     for values in _read_table(path):
         try:
-            unpacked = {
-                name: json.loads(value) if name in _MAPPINGS and value is not None else value
-                for name, value in values.items()
-            }
-            yield ManifestRow.from_dict(unpacked)
+            unpacked = {name: json.loads(values[name]) for name in _MAPPINGS if values.get(name) is not None}
+            yield ManifestRow.from_dict(values | unpacked)
         except (TypeError, ValueError, RecursionError) as error:
             raise FormatError(f"not a manifest of this package: {error}", path=path) from error
 
@@ -202,6 +189,14 @@ class Timing(NamedTuple):
 
     seconds: float = 0.0
     state: str = ""
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any]) -> Timing:
+        """Of a row or a journal's line. Raises `ValueError`, `KeyError`, `TypeError`: it is none."""
+        seconds = float(values["seconds"])
+        if not math.isfinite(seconds):
+            raise ValueError(f"{seconds} s")
+        return cls(seconds, str(values.get("state", "")))
 
 
 def is_of_now(path: Path) -> bool:
@@ -220,15 +215,9 @@ def write_timings(timings: Iterable[tuple[str, Timing]], path: Path) -> None:
 
 
 def read_timings(path: Path) -> dict[str, Timing]:
-    """Timing of each output; empty if there is no file.
-
-    Raises `FormatError`: when it is no such file.
-    """
+    """Timing of each output; empty if there is no file. Raises `FormatError`: it is no such file."""
     try:
-        return {
-            str(values["output"]): Timing(float(values["seconds"]), str(values.get("state", "")))
-            for values in _read_table(path)
-        }
+        return {str(values["output"]): Timing.of(values) for values in _read_table(path)}
     except (TypeError, ValueError, KeyError) as error:
         raise FormatError(f"not a timings file of this package: {error}", path=path) from error
 

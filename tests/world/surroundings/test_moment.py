@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from tests.kit.motion import drive, entity, together, two_roads
-from xosc_lateral.workflows.conversion.give_way import SampledVehicle, give_way
-from xosc_lateral.workflows.live.surroundings import OpenDriveRoads, Places, give_way_now, look_around
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.scenario.enums import VehicleCategory
 from xosc_lateral.world.surroundings.context import entity_context
+from xosc_lateral.world.surroundings.give_way import Response, SampledVehicle, give_way, give_way_now
+from xosc_lateral.world.surroundings.moment import OpenDriveRoads, Places, look_around
 
 
 def traffic(network, seed: int, n: int = 24, **changes) -> NominalMotion:
@@ -91,11 +91,9 @@ def test_neighbours_give_way_as_in_a_conversion(tmp_path: Path, rule: str) -> No
     sin, cos = np.sin(nominal.heading), np.cos(nominal.heading)
     x, y = nominal.x - offset * sin, nominal.y + offset * cos
     places = Places(x, y, *(getattr(nominal, name) for name in Places.__dataclass_fields__ if name not in ("x", "y")))
-    known = {
-        f"{word}_{side}": np.array([side in one for one in ones])
-        for word, ones in (("responds", sides), ("alone", alone))
-        for side in ("left", "right")
-    }
+    known = Response(*(
+        np.array([side in one for one in ones]) for ones in (sides, alone) for side in ("left", "right")
+    ))  # fmt: skip
     found = give_way_now(places, offset, offset, free, known, left_hand=rule == "LHT")
     np.testing.assert_allclose(found, wanted, atol=1e-9)
     assert (np.abs(found) > 0.01).sum() > 3

@@ -1,19 +1,17 @@
-"""What every driver sees at one moment: the road, the vehicles around from where they are, and whom to give way to.
+"""What every driver sees at one moment: the road, and the vehicles around from where they are.
 
-Gaps, sides and the law of giving way are those of a conversion (`surroundings.around`, `conversion.give_way`), there
-for one vehicle at many moments, here for many vehicles at one.
+Gaps and sides are those of `around`, as in `context`, there for one vehicle at many moments, here for many at one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
-from xosc_lateral.workflows.conversion.give_way import FADES, Frame, own_share, widened
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.surroundings.around import IN_SIGHT, Around, Extent, Reach, free_space, lane_path, see_along
 from xosc_lateral.world.surroundings.context import lanes_beside, road_columns, spread_out
@@ -116,7 +114,7 @@ def look_around(roads: Roads, places: Places, offset: FloatArray, is_truck: Bool
         seen = see_along(path, u[i], offset[i], places.road[j], places.s[j], t[j], direction[j], roads.centre)
         extents = (Extent(places.length[k], places.center_x[k]) for k in (i, j))
         around.add(i, seen, free_space(seen, *extents), width[i], places.width[j], is_truck[j])
-    lanes = {side: one.astype(np.float64) for side, one in lanes_beside(road).items()}
+    lanes = {side: is_there.astype(np.float64) for side, is_there in lanes_beside(road).items()}
     return road | around.columns(lanes, always_fade=True)
 
 
@@ -134,56 +132,11 @@ def _along_paths(
         group[k], start, path = origins[key]
         u[k] = path[0].sign * (s - start)
     a, b = pairs_now(np.where(group >= 0, places.x, np.nan), places.y, IN_SIGHT)
-    own, other = np.concatenate([a, b]), np.concatenate([b, a])
-    order = np.argsort(group[own], kind="stable")
-    own, other = own[order], other[order]
-    ends = np.searchsorted(group[own], np.arange(len(origins) + 1))
+    who, whom = np.concatenate([a, b]), np.concatenate([b, a])
+    order = np.argsort(group[who], kind="stable")
+    who, whom = who[order], whom[order]
+    ends = np.searchsorted(group[who], np.arange(len(origins) + 1))
     for number, (_, _, path) in enumerate(origins.values()):
         pairs = slice(ends[number], ends[number + 1])
         if pairs.start < pairs.stop:
-            yield path, u, own[pairs], other[pairs]
-
-
-def give_way_now(
-    places: Places,
-    lateral: FloatArray,
-    deviation: FloatArray,
-    can_move: BoolArray,
-    known: Mapping[str, BoolArray],
-    *,
-    left_hand: bool,
-) -> FloatArray:
-    """By how much vehicles move aside for whom they are beside, shape (n,), positive left. [m]
-
-    Of each, shape (n,), `lateral` and `deviation` from its lane's centre, as it is and without what it has moved aside,
-    0 in a maneuver [m]; whether it has a driver that follows the road (`can_move`); and what is `known` of that driver:
-    ``responds_left``, ``responds_right``, ``alone_left``, ``alone_right``, see `give_way.SampledVehicle`.
-    """
-    n = len(places.x)
-    cos, sin = np.cos(places.heading), np.sin(places.heading)
-    x, y = (axis + places.center_x * part for axis, part in ((places.x, cos), (places.y, sin)))
-    longest = float(places.length.max(initial=0.0))
-    a, b = pairs_now(x, y, FADES + longest + 10.0)
-    own, other = np.concatenate([a, b]), np.concatenate([b, a])
-    own, other = own[can_move[own]], other[can_move[own]]
-    left, right = np.zeros(n), np.zeros(n)
-    if not len(own):
-        return left
-    # the lane's centre line, from which a deviation counts
-    x, y = x + lateral * sin, y - lateral * cos
-    columns: tuple[Any, ...] = (x, y, places.heading, deviation, can_move, np.ones(n, dtype=np.bool_))
-    columns = (*columns, places.length, places.width)
-    found = widened(
-        Frame(*(column[own] for column in columns)),
-        Frame(*(column[other] for column in columns)),
-        known["responds_left"][own],
-        known["responds_right"][own],
-    )
-    if found is None:
-        return left
-    aside, is_left, responding = found
-    alone = np.where(is_left, known["alone_left"][own], known["alone_right"][own])
-    aside = aside * own_share(is_left == left_hand, responding, can_move[other], alone)
-    np.maximum.at(right, own, np.where(is_left, aside, 0.0))
-    np.maximum.at(left, own, np.where(is_left, 0.0, aside))
-    return left - right
+            yield path, u, who[pairs], whom[pairs]

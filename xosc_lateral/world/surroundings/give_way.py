@@ -22,12 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
-from xosc_lateral.base.rows import empty, give_back, put, stored
+from xosc_lateral.base.rows import empty, put, stored
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.surroundings.around import smooth_step
 from xosc_lateral.world.surroundings.context import CELLS, STEERING
-from xosc_lateral.world.surroundings.nearby import stretches_within
+from xosc_lateral.world.surroundings.moment import Places
+from xosc_lateral.world.surroundings.nearby import pairs_now, stretches_within
 
 GAPS = (
     np.array([-0.68, -0.05, 0.37, 0.76, 1.29, 1.65, 3.0]),
@@ -75,14 +76,7 @@ def give_way(
 ) -> list[FloatArray | None]:
     """By how much each vehicle moves aside on the rows, positive left, shape (n,); None: not at all. [m]
 
-    Parameters
-    ----------
-    motion : NominalMotion
-    network : RoadNetwork
-    sampled : sequence of SampledVehicle
-        All entities, in the motion's order.
-    rows : array of int, shape (n,)
-        Rows that are looked at, evenly spaced.
+    `sampled`: all entities, in the motion's order; `rows`: those that are looked at, evenly spaced, shape (n,).
     """
     count, n = len(sampled), len(rows)
     left, right, none = empty((count, n)), empty((count, n)), np.zeros(n)
@@ -91,7 +85,6 @@ def give_way(
     for k, one in enumerate(sampled):
         for table, values in zip((left, right, *tables), (none, none, *Frame.of(one, rows)[: len(names)]), strict=True):
             put(table, slice(k, k + 1), np.asarray(values))
-        give_back(len(one.motion.time))
     left_hand = np.array(_left_hand(network, sampled, rows), dtype=bool)
     x, y = (
         (np.where(there, row, np.nan) for row, there in zip(table, tables[-1], strict=True)) for table in tables[:2]
@@ -99,10 +92,10 @@ def give_way(
     boxes = [one.motion.entity.bounding_box for one in sampled]
     length, width = (np.array([getattr(box, name) for box in boxes]) for name in ("length", "width"))
     can_move = [one.can_move.any() for one in sampled]
-    responds, alone = (
-        [np.array([side in getattr(one, name) for one in sampled], dtype=bool) for side in ("left", "right")]
-        for name in ("responds", "alone")
-    )
+    responses = Response(*(
+        np.array([side in getattr(one, name) for one in sampled], dtype=bool)
+        for name in ("responds", "alone") for side in ("left", "right")
+    ))  # fmt: skip
     for stretch, near_pairs in stretches_within(x, y, FADES + length.max(initial=0.0) + MARGIN):
         meeting = [pair for pair in near_pairs if can_move[pair[0]] or can_move[pair[1]]]
         part = [table[:, stretch] for table in tables]
@@ -113,16 +106,9 @@ def give_way(
             first, second = (
                 Frame._make([*(table[who, at] for table in part), length[who], width[who]]) for who in (own, other)
             )
-            widening = widened(first, second, responds[0][own], responds[1][own])
-            if widening is None:
-                continue
-            aside, is_left, responding = widening  # of `own`, by where `other` is
-            known_alone = np.where(is_left, alone[0][own], alone[1][own])
-            aside = aside * own_share(is_left == left_hand[own], responding, second.can_move, known_alone)
-            aside = aside * first.can_move
-            np.maximum.at(right[:, stretch], (own, at), np.where(is_left, aside, 0.0))
-            np.maximum.at(left[:, stretch], (own, at), np.where(is_left, 0.0, aside))
-        give_back()
+            aside = moved_aside(first, second, Response._make(column[own] for column in responses), left_hand[own])
+            np.maximum.at(right[:, stretch], (own, at), np.maximum(0.0 - aside, 0.0))
+            np.maximum.at(left[:, stretch], (own, at), np.maximum(aside, 0.0))
     every = max(1, int(rows[1] - rows[0])) if n > 1 else 1
     smoothed = STEERING / (motion.step * every)
     result: list[FloatArray | None] = []
@@ -130,6 +116,37 @@ def give_way(
         aside = left[k] - right[k]
         result.append(stored(_smoothed(aside, smoothed)) if aside.any() else None)
     return result
+
+
+def give_way_now(
+    places: Places,
+    lateral: FloatArray,
+    deviation: FloatArray,
+    can_move: BoolArray,
+    response: Response,
+    *,
+    left_hand: bool,
+) -> FloatArray:
+    """The same at one moment, shape (n,), of drivers who respond at once. [m]
+
+    `lateral` and `deviation` from the lane's centre, as it is and without what one has moved aside, 0 in a maneuver
+    [m]; `can_move`: there is a driver, who follows the road; shape (n,) each.
+    """
+    n = len(places.x)
+    cos, sin = np.cos(places.heading), np.sin(places.heading)
+    x, y = (axis + places.center_x * part for axis, part in ((places.x, cos), (places.y, sin)))
+    a, b = pairs_now(x, y, FADES + float(places.length.max(initial=0.0)) + MARGIN)
+    own, other = np.concatenate([a, b]), np.concatenate([b, a])
+    own, other = own[can_move[own]], other[can_move[own]]
+    x, y = x + lateral * sin, y - lateral * cos  # on the lane's centre line, from which a deviation counts
+    present = np.ones(n, dtype=np.bool_)
+    columns = (x, y, places.heading, deviation, can_move, present, places.length, places.width)
+    first, second = (Frame._make(column[who] for column in columns) for who in (own, other))
+    aside = moved_aside(first, second, Response._make(column[own] for column in response), left_hand)
+    left, right = np.zeros((2, n))
+    np.maximum.at(right, own, np.maximum(0.0 - aside, 0.0))
+    np.maximum.at(left, own, np.maximum(aside, 0.0))
+    return left - right
 
 
 def _together(meeting: Sequence[tuple[int, int]], n: int) -> Iterator[tuple[IntArray, IntArray]]:
@@ -210,6 +227,26 @@ def widened(
     weight = 1.0 - smooth_step(free / np.where(responding, RESPONDING_FADES, FADES))
     weight *= smooth_step(nominal / ENTERING) * (near & same_way)
     return weight * np.where(responding, wider(gap, responding=True), wider(gap, responding=False)), is_left, responding
+
+
+class Response(NamedTuple):
+    """What is known of drivers, shape (n,) each; see `SampledVehicle`."""
+
+    responds_left: BoolArray
+    responds_right: BoolArray
+    alone_left: BoolArray
+    alone_right: BoolArray
+
+
+def moved_aside(own: Frame, other: Frame, response: Response, left_hand: bool | BoolArray) -> FloatArray:
+    """By how much each moves aside for another, positive left, shape (n,). [m]"""
+    widening = widened(own, other, response.responds_left, response.responds_right)
+    if widening is None:
+        return np.zeros(len(own.deviation))
+    aside, is_left, responding = widening
+    alone = np.where(is_left, response.alone_left, response.alone_right)
+    aside = aside * own_share(is_left == left_hand, responding, other.can_move, alone) * own.can_move
+    return np.where(is_left, 0.0 - aside, aside)  # no negative zeros
 
 
 def own_share(overtakes: BoolArray, responding: BoolArray, other_moves: BoolArray, alone: BoolArray) -> FloatArray:

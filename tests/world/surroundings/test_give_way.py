@@ -10,7 +10,7 @@ import pytest
 from tests.kit.motion import LANE_WIDTH, drive, entity, together, two_roads
 from tests.kit.profiles import simulated_profile
 from xosc_lateral.workflows.conversion.enrich import enrich
-from xosc_lateral.workflows.conversion.give_way import GAPS, OVERTAKING_SHARE, RESPONDING, SampledVehicle, give_way
+from xosc_lateral.world.surroundings.give_way import GAPS, OVERTAKING_SHARE, RESPONDING, SampledVehicle, give_way
 
 ROWS = np.arange(0, 501, 10)
 
