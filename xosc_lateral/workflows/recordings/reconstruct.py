@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -31,10 +31,8 @@ from xosc_lateral.workflows.recordings.plan import Residuals, VehiclePlan, plan_
 from xosc_lateral.workflows.recordings.recorded import Recording, Track, place_tracks
 from xosc_lateral.workflows.recordings.recordings import RecordedTraffic
 from xosc_lateral.workflows.recordings.scenario import Triggers, reconstructed_scenario
+from xosc_lateral.workflows.recordings.settings import ReconstructSettings
 from xosc_lateral.workflows.result import PathLike, Result
-
-if TYPE_CHECKING:
-    from xosc_lateral.workflows.recordings.call import ReconstructSettings
 
 LONG_DRIVE = 100.0
 """Of road-following, for a profile of one vehicle: ten windows that the evaluation compares drivers by. [s]"""
