@@ -23,8 +23,8 @@ from laboratory.fair_null import slow_test
 from laboratory.markers import show
 from laboratory.reconstruction import WINDOW, write
 from xosc_lateral.drivers.drives.drive import Run
-from xosc_lateral.drivers.evaluation.filters import slow_movement
 from xosc_lateral.drivers.evaluation.snippets import Snippets, snippets_of
+from xosc_lateral.drivers.evaluation.spectra import slow_movement
 from xosc_lateral.files.profiles import read_profile
 from xosc_lateral.workflows.conversion.consequences import Gap, gaps_of
 from xosc_lateral.workflows.conversion.enrich import enrich
