@@ -16,9 +16,7 @@ from xosc_lateral.workflows.recordings.settings import ReconstructKeywords, Reco
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths
 
 if TYPE_CHECKING:
-    from xosc_lateral.workflows.recordings.reconstruct import Reconstruction
-
-"""Of the standard that can be written."""
+    from xosc_lateral.workflows.recordings.reconstruction import Reconstruction
 
 
 def import_drives(

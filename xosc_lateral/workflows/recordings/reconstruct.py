@@ -1,4 +1,13 @@
-"""From a recording to maneuvers, a road and drivers, and what is written of them."""
+"""From a recording to maneuvers, a road and drivers.
+
+Which of several profiles drove a vehicle, the likelihood of how it moved in its lane says. A profile has none in closed
+form, but its free runs say how a summary of windows scatters between drivers and within one: a normal model of the
+summary's mean (synthetic likelihood [1]_, with a random effect per driver).
+
+References
+----------
+.. [1] S. N. Wood, "Statistical inference for noisy nonlinear ecological dynamic systems", Nature 466, 2010.
+"""
 
 from __future__ import annotations
 
@@ -6,128 +15,32 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, XoscLateralError
-from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.rows import true_slices
+from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.base.texts import composed
+from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.evaluation.metrics import free_runs
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.files.output_paths import claim, output_folder
-from xosc_lateral.files.output_tables import write_frame
-from xosc_lateral.files.profiles import find_profile, list_profiles, profile_bytes, read_profile
-from xosc_lateral.files.source import parsed_hashes
+from xosc_lateral.files.profiles import find_profile, list_profiles, read_profile
 from xosc_lateral.workflows.conversion.drivers import AUTO_PROFILE
-from xosc_lateral.workflows.recordings.drivers import (
-    ChosenDriver,
-    WindowModel,
-    choose_driver,
-    drive_of,
-    in_lane_offsets,
-)
-from xosc_lateral.workflows.recordings.encounters import Encounter, encounters, relative_triggers
+from xosc_lateral.workflows.recordings.encounters import encounters, relative_triggers
 from xosc_lateral.workflows.recordings.plan import Residuals, VehiclePlan, plan_vehicles, residuals_of
-from xosc_lateral.workflows.recordings.recorded import Recording, Track, place_tracks
+from xosc_lateral.workflows.recordings.reconstruction import ChosenDriver, Reconstruction
+from xosc_lateral.workflows.recordings.recorded import Track, place_tracks
 from xosc_lateral.workflows.recordings.recordings import RecordedTraffic
-from xosc_lateral.workflows.recordings.scenario import Triggers, reconstructed_scenario
+from xosc_lateral.workflows.recordings.scenario import reconstructed_scenario
 from xosc_lateral.workflows.recordings.settings import ReconstructSettings
-from xosc_lateral.workflows.result import PathLike, Result
 
 LONG_DRIVE = 100.0
 """Of road-following, for a profile of one vehicle: ten windows that the evaluation compares drivers by. [s]"""
 LONGEST_WINDOW = 3600.0  # a scenario of more can't be looked at, and times in ms or us instead of s give it [s]
 AROUND = 100.0  # who comes as near as this to the vehicle in question, along or across, belongs to its surroundings [m]
 NO_HOST = "none"  # stands for no vehicle under test
-
-
-@dataclass(eq=False, repr=False, slots=True)
-class Reconstruction(Result):
-    """A scenario with its road and drivers, and how near it is to the recording."""
-
-    traffic: RecordedTraffic
-    recording: Recording
-    plans: tuple[VehiclePlan, ...]
-    scenario: str  # the OpenSCENARIO document
-    residuals: tuple[Residuals, ...]  # residuals, drivers: in the order of the plans
-    encounters: tuple[Encounter, ...]
-    relative: Mapping[str, Triggers]  # by entity, triggers that are distances
-    drivers: tuple[ChosenDriver, ...]
-    fitted: Mapping[str, DriverProfile]  # by name, profiles of single vehicles
-    host: str | None  # entity that is the vehicle under test
-    outputs: tuple[Path, ...] = ()  # files that were written
-
-    @property
-    def name(self) -> str:
-        """Of the files, without suffix."""
-        return self.traffic.name
-
-    @property
-    def left_out(self) -> tuple[str, ...]:
-        """Vehicles, and parts of them, that are not in the scenario: a line each, with the reason."""
-        return self.recording.left_out
-
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """Inputs that are files."""
-        return tuple(path for path in self.traffic.sources if path.is_file())
-
-    def headline(self) -> str:
-        """One line."""
-        return str(self).splitlines()[0]
-
-    def __str__(self) -> str:
-        from xosc_lateral.workflows.recordings.page import as_text
-
-        return as_text(self.to_dict())
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per vehicle: when it is there, its maneuvers, residuals and driver."""
-        return pd.DataFrame(self.to_dict()["vehicles"])
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values, as ``--json`` prints them and the report holds them."""
-        from xosc_lateral.workflows.recordings.page import facts_of
-
-        return facts_of(self) | {"outputs": [str(path) for path in self.outputs]}
-
-    def write(self, folder: PathLike, *, force: bool = False) -> tuple[Path, ...]:
-        """Write NAME.xosc and its road, drivers.csv for `convert`, report.html and report.json, all or none.
-
-        Returns
-        -------
-        tuple of Path
-        """
-        from xosc_lateral.files.atomic import write_atomically
-        from xosc_lateral.files.json_text import canonical_json
-        from xosc_lateral.workflows.recordings.page import facts_of, page_of
-
-        place, facts = output_folder(folder), facts_of(self)
-        files: dict[str, bytes | str] = {
-            self.traffic.road_name: self.traffic.road,
-            f"{self.name}.xosc": self.scenario,
-            **{f"drivers/{name}.json": profile_bytes(profile) for name, profile in self.fitted.items()},
-            "report.html": page_of(self, facts),
-            "report.json": canonical_json(facts),
-        }
-        table, paths = place / "drivers.csv", {place / name: data for name, data in files.items()}
-        kept = {path.resolve() for path in self.traffic.sources if path.exists() and (place / path.name).exists()}
-        new = {path: data for path, data in paths.items() if path.resolve() not in kept}  # a road that lies there stays
-        claim([*new, table], self.traffic.sources, force=force)
-        for path, data in new.items():
-            write_atomically(path, data)
-        drivers_table(self, table)
-        self.outputs = (*paths, table)
-        return self.outputs
-
-
-def drivers_table(made: Reconstruction, path: Path) -> None:
-    """Write the table of one row that `convert` takes: the scenario, who is under test, and everybody's profile."""
-    drivers = {plan.name: driver.profile for plan, driver in zip(made.plans, made.drivers, strict=True)}
-    driven = {name: profile for name, profile in drivers.items() if profile and name != made.host}
-    cells = {"scenario": f"{made.name}.xosc"} | ({} if made.host is None else {"ego": made.host})
-    cells |= {f"profile:{name}": profile for name, profile in driven.items()} | {"only": ";".join(driven)}
-    write_frame(pd.DataFrame([cells]), path, {"inputs": parsed_hashes(made.files)})
 
 
 def reconstruct_recording(traffic: RecordedTraffic, settings: ReconstructSettings) -> Reconstruction:
@@ -237,3 +150,95 @@ def _comes_near(track: Track, centre: Track, begin: float, end: float) -> bool:
         for axis in "xy"
     ]
     return bool((np.hypot(*away) <= AROUND).any())  # nobody where they are not there at once
+
+
+WINDOW, STEP = 10.0, 0.2
+"""Of movement that is summed up, as long as the evaluation's snippets; between rows, as profiles have it. [s]"""
+MINIMUM_LOG_ODDS = 2.0  # another profile than the population's has to be likelier by this: weights of 7 to 1 [nat]
+FREE_RUNS = 40  # of each profile, five minutes each: 30 windows of 40 drivers
+LEAST_SPREAD = 1e-4  # of a path in a window, below which its logarithm would say something about digits [m]
+
+
+def in_lane_offsets(plan: VehiclePlan, residuals: Residuals) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
+    """Stretches of road-following of `WINDOW` and more: time [s], offset and lane width [m] every `STEP`."""
+    vehicle = plan.vehicle
+    rows = len(vehicle.time) - len(residuals.time)
+    time, width = residuals.time, vehicle.lane_width[rows:]
+    following = residuals.in_lane & (np.interp(time, plan.speed.time, plan.speed.speed) >= MINIMUM_SPEED)
+    parts = []
+    for part in true_slices(following):
+        even = np.arange(time[part.start], time[part.stop - 1] + 1e-9, STEP)
+        if len(even) * STEP > WINDOW:
+            across, wide = (np.interp(even, time[part], each[part]) for each in (residuals.across, width))
+            parts.append((even, across, wide))
+    return parts
+
+
+def choose_driver(stretches: Sequence[FloatArray], models: Mapping[str, WindowModel], population: str) -> ChosenDriver:
+    """The likeliest profile of offsets in lane [m], every `STEP`."""
+    seen = [_summaries(_windows(offset)) for offset in stretches]
+    seconds = STEP * sum(map(len, stretches))
+    if not seen:
+        return ChosenDriver("", seconds, 0.0, f"no {WINDOW:g} s of road-following in one piece")
+    windows = np.concatenate(seen)
+    gains = {
+        name: model.log_likelihood(windows) - models[population].log_likelihood(windows)
+        for name, model in models.items()
+    }
+    best = max(gains, key=lambda name: gains[name])
+    if best != population and gains[best] > MINIMUM_LOG_ODDS:
+        return ChosenDriver(best, seconds, gains[best], "likeliest of the library")
+    return ChosenDriver(population, seconds, 0.0, "the population's: no other is clearly likelier")
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class WindowModel:
+    """How window summaries of a profile scatter."""
+
+    mean: FloatArray  # mean offset [m], log spread [log m], log lateral speed [log m/s], shape (3,)
+    # between, within: covariance of drivers' means, and of windows about their driver's mean, shape (3, 3)
+    between: FloatArray
+    within: FloatArray
+
+    @classmethod
+    def of(cls, profile: DriverProfile, seed: int = 0) -> WindowModel:
+        """From free runs."""
+        every = max(1, round(STEP / profile.model.step))
+        runs = free_runs(profile, seed, drivers=FREE_RUNS)[:, ::every]
+        each = [_summaries(_windows(run)) for run in runs]
+        means = np.array([one.mean(axis=0) for one in each])
+        within = np.mean([np.cov(one.T) for one in each], axis=0)
+        between = np.cov(means.T) - within / len(each[0])
+        values, vectors = np.linalg.eigh(between)
+        between = (vectors * np.maximum(values, 0.0)) @ vectors.T
+        return cls(means.mean(axis=0), between, within)
+
+    def log_likelihood(self, windows: FloatArray) -> float:
+        """Of the mean of one driver's windows, shape (k, 3). [nat]"""
+        covariance = self.between + self.within / len(windows)
+        away = windows.mean(axis=0) - self.mean
+        return float(-0.5 * (away @ np.linalg.solve(covariance, away) + np.linalg.slogdet(covariance)[1]))
+
+
+def _windows(offset: FloatArray) -> FloatArray:
+    """Whole windows, shape (k, m). [m]"""
+    length = round(WINDOW / STEP)
+    return offset[: len(offset) // length * length].reshape(-1, length)
+
+
+def _summaries(windows: FloatArray) -> FloatArray:
+    """Mean, log spread, log lateral speed of each window, shape (k, 3)."""
+    spread = np.maximum(windows.std(axis=1), LEAST_SPREAD)
+    speed = np.sqrt((np.diff(windows, axis=1) ** 2).mean(axis=1)) / STEP
+    return np.column_stack([windows.mean(axis=1), np.log(spread), np.log(np.maximum(speed, LEAST_SPREAD))])
+
+
+def drive_of(plan: VehiclePlan, residuals: Residuals) -> Drive | None:
+    """A vehicle's road-following as a drive that a profile can be fitted to; None: there is none."""
+    parts = in_lane_offsets(plan, residuals)
+    if not parts:
+        return None
+    time, offset, width = (np.concatenate([part[k] for part in parts]) for k in range(3))
+    run = np.repeat(np.arange(len(parts)), [len(part[0]) for part in parts])
+    speed = np.interp(time, plan.speed.time, plan.speed.speed)
+    return Drive(plan.name, time, offset, width, {"speed": speed, "lane_width": width}, run=run)

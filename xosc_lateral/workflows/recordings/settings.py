@@ -10,7 +10,7 @@ from typing import TypedDict
 from xosc_lateral.workflows.conversion import options as say
 from xosc_lateral.workflows.conversion.options import Paths, option
 
-VERSIONS = ("1.0", "1.1", "1.2", "1.3")
+VERSIONS = ("1.0", "1.1", "1.2", "1.3")  # of the standard, that can be written
 
 
 def _version(text: str) -> str:
