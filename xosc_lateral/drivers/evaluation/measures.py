@@ -23,9 +23,8 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.drives.periodogram import tapered_powers, without_line
-from xosc_lateral.drivers.evaluation.distances import column_distances
 from xosc_lateral.drivers.evaluation.lane_keeping import INDICATORS, lane_keeping_indicators
-from xosc_lateral.drivers.evaluation.metrics import METRICS, snippet_metrics
+from xosc_lateral.drivers.evaluation.metrics import METRICS, column_distances, snippet_metrics
 
 LAGS = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0)  # Of the autocorrelation; those that fit into half a window are used. [s]
 BANDS = np.geomspace(0.03, 1.0, 13)  # Edges of the spectrum's bands, eight a decade. [Hz]

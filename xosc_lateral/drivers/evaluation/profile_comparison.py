@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.evaluation.distances import wasserstein
 from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, MovementSummary, figures_of
 from xosc_lateral.drivers.evaluation.metrics import (
     DRIVERS,
@@ -17,6 +16,7 @@ from xosc_lateral.drivers.evaluation.metrics import (
     cut_snippets,
     free_runs,
     snippet_metrics,
+    wasserstein,
 )
 from xosc_lateral.drivers.evaluation.scores import SNIPPET
 from xosc_lateral.drivers.evaluation.spectra import Spectrum, spectrum

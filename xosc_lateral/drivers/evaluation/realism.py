@@ -17,16 +17,6 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.evaluation.classifier import TwoSampleResult, classifier_two_sample_test, context_features
-from xosc_lateral.drivers.evaluation.distances import SCORE_UNITS, proper_scores, split_groups
-from xosc_lateral.drivers.evaluation.filters import (
-    PASS_FREQUENCY,
-    STOP_FREQUENCY,
-    comparison_band,
-    dithered,
-    resolution_of,
-    slow_movement,
-    thinned,
-)
 from xosc_lateral.drivers.evaluation.measures import (
     FLOOR_DRAWS,
     UNITS,
@@ -38,8 +28,25 @@ from xosc_lateral.drivers.evaluation.measures import (
     real_against_real,
     windows_with_the_same_start,
 )
-from xosc_lateral.drivers.evaluation.parts import LENGTHS, SnippetCondition
-from xosc_lateral.drivers.evaluation.snippets import Snippets, sample_runs, sample_snippets, sensor_noise, snippets_of
+from xosc_lateral.drivers.evaluation.metrics import SCORE_UNITS, proper_scores, split_groups
+from xosc_lateral.drivers.evaluation.snippets import (
+    LENGTHS,
+    SnippetCondition,
+    Snippets,
+    sample_runs,
+    sample_snippets,
+    sensor_noise,
+    snippets_of,
+)
+from xosc_lateral.drivers.evaluation.spectra import (
+    PASS_FREQUENCY,
+    STOP_FREQUENCY,
+    comparison_band,
+    dithered,
+    resolution_of,
+    slow_movement,
+    thinned,
+)
 from xosc_lateral.drivers.model.profile import DriverProfile
 
 

@@ -16,26 +16,36 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.drives.drive import Run
-from xosc_lateral.drivers.evaluation.distances import Distances, mean_distances, metric_distances, split_groups
-from xosc_lateral.drivers.evaluation.filters import (
-    STOP_FREQUENCY,
-    comparison_band,
-    dithered,
-    resolution_of,
-    slow_movement,
-)
 from xosc_lateral.drivers.evaluation.lane_keeping import Margins, margins
-from xosc_lateral.drivers.evaluation.metrics import METRICS, snippet_metrics
-from xosc_lateral.drivers.evaluation.parts import PartEvaluation, SnippetCondition, evaluate_parts
+from xosc_lateral.drivers.evaluation.metrics import (
+    METRICS,
+    Distances,
+    mean_distances,
+    metric_distances,
+    snippet_metrics,
+    split_groups,
+)
 from xosc_lateral.drivers.evaluation.realism import Realism, score_realism
 from xosc_lateral.drivers.evaluation.snippets import (
+    PartEvaluation,
+    SnippetCondition,
     Snippets,
+    evaluate_parts,
     sample_runs,
     sample_snippets,
     sensor_noise,
     snippets_of,
 )
-from xosc_lateral.drivers.evaluation.spectra import Spectrum, autocorrelation, spectrum
+from xosc_lateral.drivers.evaluation.spectra import (
+    STOP_FREQUENCY,
+    Spectrum,
+    autocorrelation,
+    comparison_band,
+    dithered,
+    resolution_of,
+    slow_movement,
+    spectrum,
+)
 from xosc_lateral.drivers.evaluation.verdict import Verdict, verdict_of
 from xosc_lateral.drivers.model.profile import DriverProfile
 

@@ -63,7 +63,7 @@ def text_width(text: str) -> float:
     return TEXT * sum(1.0 if unicodedata.east_asian_width(letter) in "WF" else 0.56 for letter in text)
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, repr=False)
 class Figure:
     """Panels in rows and columns."""
 
@@ -92,6 +92,9 @@ class Figure:
     def svg(self) -> str:
         """The figure as SVG document, on white."""
         return svg_of(self)
+
+    def __repr__(self) -> str:
+        return f"<Figure {'; '.join(panel.title or panel.y.label for panel in self.panels)}>"
 
     def _repr_svg_(self) -> str:
         return self.svg()
