@@ -9,7 +9,7 @@ import typer
 
 from xosc_lateral.cli import VERBS, group_of_verbs
 from xosc_lateral.cli.words import Mapped, Written, command
-from xosc_lateral.workflows.recordings.reconstruct import ReconstructSettings
+from xosc_lateral.workflows.recordings.settings import ReconstructSettings
 
 # What is said of one option stays together.
 # fmt: off

@@ -31,10 +31,7 @@ class _Lane:
 
 
 def lanes_of(recorded: Recorded) -> tuple[list[Strip], LaneGraph] | None:
-    """Driving lanes with a boundary on both sides: logical lanes where there are any, else physical ones.
-
-    None: the trace has no such lane.
-    """
+    """Driving lanes with a boundary on both sides: logical ones where there are any, else physical ones, else None."""
     lanes = list(_logical(recorded)) or list(_physical(recorded))
     if not lanes:
         return None
