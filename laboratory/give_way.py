@@ -1,4 +1,4 @@
-"""Lateral gaps of vehicles side by side, beside those of any two vehicles of the two lanes: `conversion.give_way.GAPS`.
+"""Lateral gaps of vehicles side by side, beside those of any two vehicles of the two lanes: for `give_way.GAPS`.
 
     python -m laboratory.give_way WHEEL [--profile motorway motorway-refined] [--seeds 12] [--write PAGE.md]
 
@@ -20,10 +20,10 @@ from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampled_offsets import sample_context
 from xosc_lateral.files.drives import drives_of_table
 from xosc_lateral.files.profiles import read_profile
-from xosc_lateral.workflows.conversion.give_way import wider
 from xosc_lateral.workflows.conversion.seen import NEIGHBOURS
 from xosc_lateral.workflows.recordings.importers import dlr_ht
 from xosc_lateral.world.road.road_from_tracks import fit_reference_line
+from xosc_lateral.world.surroundings.give_way import wider
 
 FloatArray = NDArray[np.float64]
 

@@ -31,7 +31,8 @@ from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.drives.cuts import all_runs
 from xosc_lateral.drivers.drives.drive import Drive, Run
 from xosc_lateral.drivers.drives.resampling import PASS_BAND_EDGES, STEP
-from xosc_lateral.drivers.evaluation.metrics import snippet_metrics, summary_of
+from xosc_lateral.drivers.evaluation.lane_keeping import figures_of
+from xosc_lateral.drivers.evaluation.metrics import snippet_metrics
 from xosc_lateral.drivers.evaluation.record import scores_to_dict
 from xosc_lateral.drivers.evaluation.scores import SNIPPET, score_profile
 from xosc_lateral.drivers.evaluation.snippets import sample_runs, snippets_of
@@ -44,7 +45,7 @@ from xosc_lateral.drivers.model.profile import POPULATION as ANSWERS
 from xosc_lateral.drivers.model.profile import DriverProfile, Metadata, Provenance
 from xosc_lateral.drivers.model.sensor.model import SensorModel
 from xosc_lateral.files.drives import drives_of_table, read_drives
-from xosc_lateral.files.hashes import parsed_hash
+from xosc_lateral.files.source import parsed_hash
 from xosc_lateral.workflows.recordings.importers.dlr_ht import HIGHEST_FREQUENCY, import_dlr_ht
 from xosc_lateral.workflows.recordings.importers.openacc import import_openacc
 from xosc_lateral.workflows.recordings.importers.table import write_imported
@@ -298,7 +299,7 @@ def _own_distance(distance: NDArray[np.float64], k: int) -> dict[str, Any]:
 def _describes(profile: DriverProfile, runs: Sequence[Run]) -> bool:
     """Whether free runs of the profile spread about as widely as the drive did: two minutes don't always suffice."""
     measured = float(np.concatenate([run.offset for run in runs]).std())
-    return 1.0 / SPREAD_FACTOR <= summary_of(profile).spread / measured <= SPREAD_FACTOR
+    return 1.0 / SPREAD_FACTOR <= figures_of(profile)[0].spread / measured <= SPREAD_FACTOR
 
 
 def most_different(snippets: Mapping[str, FloatArray], count: int = SINGLE_VEHICLES) -> list[str]:
@@ -367,4 +368,4 @@ def _place_and_spread(runs: Sequence[Run]) -> str:
     side = "left" if mean > 0 else "right"
     place = "to the lane centre" if abs(mean) < 0.08 else f"{abs(mean):.2f} m to the {side} of the lane centre"
     calm = "steady" if spread < 0.13 else "restless" if spread > 0.22 else "ordinary"
-    return f"keeps {place}, {calm} (std {spread:.2f} m)"
+    return f"keeps {place}, {calm} (std {spread:.2f} m in the recording)"

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from laboratory.storyboard import Actor, PlannedEvent, Plot, Vehicle, at_time, lane_change
-from xosc_lateral.files.templates.motorway import Bend, Motorway, Straight
+from xosc_lateral.files.templates.template import Bend, Motorway, Straight
 
 GAP = 35.0
 """[m]"""

@@ -2,7 +2,7 @@
 
 A seeded sample of mutants by cosmic-ray's operators, one place each, of playback, road, model, loop and OpenSCENARIO's
 writer. A mutant is met by those tests of its room that run through its line, the most particular ones first, and is
-killed by the first that fails. Annotations are no places: nobody evaluates them. Works in a copy of what
+killed by the first that fails. Annotations and what classes are declared to be are no places. Works in a copy of what
 is committed; needs cosmic-ray, coverage and pytest-cov, which `make mutants` installs.
 
     python -m laboratory.mutants --count 200 --seed 1
@@ -13,8 +13,10 @@ from __future__ import annotations
 import argparse
 import ast
 import difflib
+import importlib
 import os
 import random
+import resource
 import shutil
 import subprocess
 import sys
@@ -22,7 +24,10 @@ import time
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
+from xml.etree import ElementTree
+
+import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -36,11 +41,16 @@ ROOMS = {
 LEFT_OUT = ("Decorator", "_Is", "ExceptionReplacer")
 """Operators whose mutants fail at once, or are the same program as long as Python keeps small numbers."""
 
-TESTS_AT_MOST = 40
-"""A mutant that so many tests do not notice counts as a survivor. [-]"""
+SECONDS_AT_MOST = 60.0
+"""A mutant that tests of so long together, as measured with coverage, do not notice counts as a survivor. [s]"""
 
-HANG = 240.0
-"""Tests of one mutant that take longer hang, or the machine is busy: they count neither way. [s]"""
+START_TIME, SLOWER = 60.0, 10.0
+"""Tests that compute for longer than this and so many times their usual time hang. [s], [-]"""
+
+QUIETLY = ("-p", "no:cacheprovider", "-p", "no:xdist")
+
+LIBRARIES = ("numpy", "scipy.stats", "scipy.optimize", "pandas", "pyarrow.parquet", "lxml.etree", "msgspec", "numba")
+"""What every test's process would load anew."""
 
 
 class Mutant(NamedTuple):
@@ -53,12 +63,15 @@ class Mutant(NamedTuple):
     code: str
 
 
-def annotated(source: str) -> list[tuple[tuple[int, int], tuple[int, int]]]:
-    """Where annotations begin and end: line from 1, column."""
-    found: list[ast.expr | None] = []
+def declared(source: str) -> list[tuple[tuple[int, int], tuple[int, int]]]:
+    """Where annotations and what classes are declared to be (frozen, with slots) begin and end: line from 1, column."""
+    parts: list[ast.expr | None] = []
     for node in ast.walk(ast.parse(source)):
-        found += [getattr(node, name, None) for name in ("annotation", "returns")]
-    return [((one.lineno, one.col_offset), (one.end_lineno or 0, one.end_col_offset or 0)) for one in found if one]
+        parts += [getattr(node, name, None) for name in ("annotation", "returns")]
+        if isinstance(node, ast.ClassDef):
+            parts += [*node.decorator_list, *(keyword.value for keyword in node.keywords)]
+    return [((part.lineno, part.col_offset), (part.end_lineno or 0, part.end_col_offset or 0))
+            for part in parts if part]  # fmt: skip
 
 
 def places(path: Path) -> dict[tuple[int, int], list[tuple[str, int]]]:
@@ -67,7 +80,7 @@ def places(path: Path) -> dict[tuple[int, int], list[tuple[str, int]]]:
     from cosmic_ray.operators.provider import OperatorProvider
 
     source, provider = path.read_text("utf-8"), OperatorProvider()
-    tree, spans = get_ast(source), annotated(source)
+    tree, spans = get_ast(source), declared(source)
     found: dict[tuple[int, int], list[tuple[str, int]]] = defaultdict(list)
     for name in sorted(provider):
         if any(word in name for word in LEFT_OUT) or provider[name].arguments():
@@ -87,64 +100,120 @@ def draw(rng: random.Random, room: str, count: int, tree: Path) -> Iterator[Muta
     provider = OperatorProvider()
     files = sorted((tree / ROOMS[room][0]).rglob("*.py"))
     sites = [(path, place, ways) for path in files for place, ways in sorted(places(path).items())]
-    for path, (line, _), ways in rng.sample(sites, min(count, len(sites))):
+    rng.shuffle(sites)
+    drawn = 0
+    for path, (line, _), ways in sites:
         name, occurrence = rng.choice(ways)
         code = mutate_code(path.read_text("utf-8"), provider[name](), occurrence)
-        if code is not None:
+        if code is not None and is_python(code):
+            drawn += 1
             yield Mutant(room, path, line, name, code)
+            if drawn == count:
+                return
 
 
-def covering(room: str, tree: Path, out: Path) -> dict[str, dict[int, list[str]]]:
-    """Tests by file and line that they run through; "" stands for what is run when a module is imported."""
+def is_python(code: str) -> bool:
+    """Some changes are none: a star between parameters is no product."""
+    try:
+        ast.parse(code)
+    except SyntaxError:
+        return False
+    return True
+
+
+def covering(room: str, tree: Path, out: Path) -> tuple[dict[str, dict[int, list[str]]], dict[str, float]]:
+    """Tests by file and line that they run through ("" stands for what is run when a module is imported), the most
+    particular ones first, and the seconds that each takes."""
     from coverage import CoverageData
 
     package, tests = ROOMS[room]
-    data = out / f"{room}.coverage"
-    if not data.exists():
-        words = ["-q", tests, "-p", "no:cacheprovider", f"--cov={package}", "--cov-context=test", "--cov-report="]
-        run_tests(words, tree, 3600.0, {"COVERAGE_FILE": str(data)}, check=True)
+    data, times = out / f"{room}.coverage", out / f"{room}.xml"
+    if not times.exists():
+        words = [
+            "-q",
+            tests,
+            *QUIETLY,
+            f"--cov={package}",
+            "--cov-context=test",
+            "--cov-report=",
+            f"--junitxml={times}",
+        ]
+        command = [sys.executable, "-m", "pytest", *words]
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(tree), *sys.path[1:]])}
+        environment |= {"COVERAGE_FILE": str(data)}
+        done = subprocess.run(command, cwd=tree, env=environment, capture_output=True, text=True)
+        if done.returncode:
+            times.unlink(missing_ok=True)
+            raise SystemExit(f"the tests themselves fail:\n{done.stdout[-3000:]}\n{done.stderr[-2000:]}")
+    seconds: dict[str, float] = defaultdict(float)
+    for case in ElementTree.parse(times).iter("testcase"):
+        seconds[f"{case.get('classname')}::{case.get('name')}"] += float(case.get("time", 0.0))
     known = CoverageData(str(data))
     known.read()
     by_file = {
-        str(Path(name).relative_to(tree)): known.contexts_by_lineno(name) for name in sorted(known.measured_files())
+        str(Path(name).relative_to(tree)): {
+            line: {context.split("|")[0] for context in contexts}
+            for line, contexts in known.contexts_by_lineno(name).items()
+        }
+        for name in sorted(known.measured_files())
     }
     breadth = Counter(test for lines in by_file.values() for tests in lines.values() for test in tests)
-    return {
-        name: {line: sorted({test.split("|")[0] for test in tests}, key=lambda test: min(
-            (breadth[f"{test}|{phase}"] for phase in ("run", "setup")), default=0)) for line, tests in lines.items()}
+    order = {test: number for number, test in enumerate(sorted(breadth, key=lambda test: (breadth[test], test)))}
+    chosen = {
+        name: {line: sorted(tests, key=order.__getitem__) for line, tests in lines.items()}
         for name, lines in by_file.items()
-    }  # fmt: skip
+    }
+    return chosen, {test: seconds[test.replace(".py::", "::").replace("/", ".")] for test in breadth}
 
 
-def run_tests(words: list[str], tree: Path, limit: float, more: dict[str, str], *, check: bool = False) -> bool | None:
-    """Whether the tests pass; None for a hang."""
-    environment = (
-        os.environ | {"PYTHONPATH": os.pathsep.join([str(tree), *sys.path[1:]]), "OMP_NUM_THREADS": "1"} | more
-    )
-    command = [sys.executable, "-B", "-m", "pytest", *words]
-    try:
-        done = subprocess.run(command, cwd=tree, env=environment, capture_output=True, text=True, timeout=limit)
-    except subprocess.TimeoutExpired:
-        return None
-    if check and done.returncode:
-        raise SystemExit(f"the tests themselves fail:\n{done.stdout[-3000:]}\n{done.stderr[-2000:]}")
-    return done.returncode in (0, 5)
+def affordable(tests: list[str], seconds: dict[str, float]) -> list[str]:
+    """The first of them, as many as a mutant is worth."""
+    spent, chosen = 0.0, []
+    for test in tests:
+        spent += seconds[test]
+        if spent <= SECONDS_AT_MOST or not chosen:
+            chosen.append(test)
+    return chosen
 
 
-def is_killed(mutant: Mutant, tests: dict[int, list[str]], tree: Path) -> bool | None:
-    """Whether a test of the room notices; None: it hangs."""
-    chosen = [test for test in tests.get(mutant.line, []) if test][:TESTS_AT_MOST]
+def passes(tests: list[str], tree: Path, limit: float) -> bool:
+    """Whether tests pass, in a process of their own that has the libraries loaded already; who computes for longer than
+    `limit` [s] does not end, which is noticed, too."""
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            resource.setrlimit(resource.RLIMIT_CPU, (int(limit), int(limit)))
+            sink = os.open(os.devnull, os.O_RDWR)
+            for descriptor in range(3):
+                os.dup2(sink, descriptor)
+            os.chdir(tree)
+            sys.path[:] = [str(tree), *(path for path in sys.path if Path(path or ".").resolve() != ROOT)]
+            os.environ["PYTHONPATH"] = os.pathsep.join(sys.path)
+            for name in [name for name in sys.modules if name.split(".")[0] in ("laboratory", "xosc_lateral", "tests")]:
+                del sys.modules[name]
+            code = int(pytest.main(["-q", "-x", *QUIETLY, *tests]))
+        finally:
+            os._exit(code)
+    _, status = os.waitpid(child, 0)
+    return os.waitstatus_to_exitcode(status) in (0, 5)
+
+
+def is_killed(mutant: Mutant, tests: dict[int, list[str]], seconds: dict[str, float], tree: Path) -> bool:
+    """Whether a test of the room notices."""
+    chosen = affordable([test for test in tests.get(mutant.line, []) if test], seconds)
     if not chosen and "" not in tests.get(mutant.line, []):
         return False
     before = mutant.path.read_text("utf-8")
-    listed = tree / "tests.txt"
-    listed.write_text("\n".join(chosen or [ROOMS[mutant.room][1]]) + "\n")
+    limit = START_TIME + SLOWER * sum(seconds[test] for test in chosen)
     try:
         mutant.path.write_text(mutant.code, "utf-8")
-        passed = run_tests(["-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist", f"@{listed}"], tree, HANG, {})
-        return None if passed is None else not passed
+        noticed = not passes(chosen or [ROOMS[mutant.room][1]], tree, limit if chosen else 3600.0)
     finally:
         mutant.path.write_text(before, "utf-8")
+    if noticed and chosen and not passes(chosen, tree, limit):
+        raise SystemExit(f"the tests of {mutant.path}:{mutant.line} fail by themselves")
+    return noticed
 
 
 def main() -> int:
@@ -162,19 +231,21 @@ def main() -> int:
     shared, here = ROOT.parent / "shared", given.out.resolve() / "shared"
     if shared.exists() and not here.exists():
         here.symlink_to(shared)  # material that some tests need
-    tally: dict[str, list[Any]] = {}
-    for number, room in enumerate(given.rooms):
-        count = given.count // len(given.rooms)
-        tests = covering(room, tree, given.out.resolve())
+    subprocess.run([sys.executable, "-m", "compileall", "-q", "--invalidation-mode", "checked-hash", "."], cwd=tree)
+    for library in LIBRARIES:
+        importlib.import_module(library)
+    tally: dict[str, list[int]] = {}
+    for room in given.rooms:
+        tests, seconds = covering(room, tree, given.out.resolve())
         tally[room] = [0, 0]
-        for mutant in draw(random.Random(given.seed + number), room, count, tree):
+        for mutant in draw(random.Random(f"{given.seed} {room}"), room, given.count // len(given.rooms), tree):
             begin, path = time.monotonic(), str(mutant.path.relative_to(tree))
-            killed = is_killed(mutant, tests.get(path, {}), tree)
-            tally[room][0] += killed is True
-            tally[room][1] += killed is not None
-            word = "HUNG    " if killed is None else "killed  " if killed else "SURVIVED"
+            killed = is_killed(mutant, tests.get(path, {}), seconds, tree)
+            tally[room][0] += killed
+            tally[room][1] += 1
+            word = "killed  " if killed else "SURVIVED"
             print(f"{word} {path}:{mutant.line} {mutant.operator} ({time.monotonic() - begin:.0f} s)", flush=True)
-            if killed is False:
+            if not killed:
                 lines = (text.splitlines() for text in (mutant.path.read_text("utf-8"), mutant.code))
                 print("\n".join(line for line in difflib.unified_diff(*lines, lineterm="", n=0)
                                 if line[:1] in "+-" and line[:3] not in ("+++", "---")), flush=True)  # fmt: skip

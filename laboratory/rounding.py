@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import msgspec
 import numpy as np
 
-from xosc_lateral.base.digits import significant
+from xosc_lateral.base.numbers import significant
 from xosc_lateral.drivers.model.effects.base import Effect
 
 E = TypeVar("E", bound=Effect)

@@ -16,8 +16,7 @@ from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.workflows.detection.logistic import FEATURES, features, fit_regression
 from xosc_lateral.workflows.detection.observation import View
 from xosc_lateral.workflows.detection.sources import played_scene
-from xosc_lateral.workflows.detection.tracks import STEP, Scene
-from xosc_lateral.workflows.detection.truth import EDGE, MARGIN
+from xosc_lateral.workflows.detection.tracks import EDGE, MARGIN, STEP, Scene
 
 FloatArray = NDArray[np.float64]
 Views = list[tuple[Scene, list[View]]]

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
-from xosc_lateral.files.templates.motorway import FIXED_DATE, ROAD, Motorway, document
+from xosc_lateral.files.templates.template import FIXED_DATE, ROAD, Motorway, document
 
 Value = float | str
 

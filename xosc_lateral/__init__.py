@@ -10,11 +10,11 @@ from xosc_lateral.base.version import __version__
 TYPE_CHECKING = False  # importing `typing` for it would take longer than all the rest
 
 _HOME = {
-    "convert": "workflows.conversion.call",
+    "convert": "workflows.conversion.convert",
     "convert_many": "workflows.batch.call",
     "reconstruct": "workflows.recordings.call",
-    "verify": "workflows.batch.verify_call",
-    "reproduce": "workflows.batch.verify_call",
+    "verify": "workflows.batch.verify",
+    "reproduce": "workflows.batch.verify",
     "play": "workflows.playing.call",
     "segments": "workflows.playing.call",
     "fit": "workflows.profiles.fit",
@@ -23,7 +23,7 @@ _HOME = {
     "close_loop": "workflows.profiles.loop",
     "detect": "workflows.detection.call",
     "read_drives": "workflows.profiles.fit",
-    "import_drives": "workflows.recordings.importing",
+    "import_drives": "workflows.recordings.call",
     "read_profile": "workflows.profiles.profiles",
     "write_profile": "workflows.profiles.profiles",
     "list_profiles": "workflows.profiles.profiles",
@@ -36,23 +36,24 @@ _HOME = {
     "Moment": "workflows.live.traffic",
     "EsminiTraffic": "workflows.live.esmini",
     "SumoTraffic": "workflows.live.sumo",
+    "export_c": "workflows.live.c_driver",
     "export_fmu": "workflows.live.fmu",
     "LiveRun": "workflows.live.call",
     "OffsetStream": "drivers.model.stream",
     "DriverProfile": "drivers.model.profile",
     "Drive": "drivers.drives.drive",
-    "Conversion": "workflows.conversion.call",
-    "Reconstruction": "workflows.recordings.call",
+    "Conversion": "workflows.conversion.conversion",
+    "Reconstruction": "workflows.recordings.reconstruction",
     "ConvertSettings": "workflows.conversion.settings",
     "BatchResult": "workflows.batch.call",
-    "Verification": "workflows.batch.verify_call",
+    "Verification": "workflows.batch.verify",
     "Playback": "workflows.playing.call",
     "Segments": "workflows.playing.call",
     "Offsets": "workflows.profiles.sample",
     "Evaluation": "workflows.profiles.evaluate",
     "ClosedLoop": "workflows.profiles.loop",
-    "Detection": "workflows.detection.call",
-    "ImportedDrives": "workflows.recordings.importing",
+    "Detection": "workflows.detection.detection",
+    "ImportedDrives": "workflows.recordings.call",
     "XoscLateralError": "base.errors",
     "FormatError": "base.errors",
     "PlaybackError": "base.errors",
@@ -89,6 +90,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "Moment",
     "EsminiTraffic",
     "SumoTraffic",
+    "export_c",
     "export_fmu",
     "LiveRun",
     "OffsetStream",
@@ -128,10 +130,13 @@ if TYPE_CHECKING:
     from xosc_lateral.drivers.model.profile import DriverProfile
     from xosc_lateral.drivers.model.stream import OffsetStream
     from xosc_lateral.workflows.batch.call import BatchResult, convert_many
-    from xosc_lateral.workflows.batch.verify_call import Verification, reproduce, verify
-    from xosc_lateral.workflows.conversion.call import Conversion, convert
+    from xosc_lateral.workflows.batch.verify import Verification, reproduce, verify
+    from xosc_lateral.workflows.conversion.conversion import Conversion
+    from xosc_lateral.workflows.conversion.convert import convert
     from xosc_lateral.workflows.conversion.settings import ConvertSettings
-    from xosc_lateral.workflows.detection.call import Detection, detect
+    from xosc_lateral.workflows.detection.call import detect
+    from xosc_lateral.workflows.detection.detection import Detection
+    from xosc_lateral.workflows.live.c_driver import export_c
     from xosc_lateral.workflows.live.call import LiveRun, live_esmini, live_sumo
     from xosc_lateral.workflows.live.esmini import EsminiTraffic
     from xosc_lateral.workflows.live.fmu import export_fmu
@@ -144,8 +149,8 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.profiles.loop import ClosedLoop, close_loop
     from xosc_lateral.workflows.profiles.profiles import compare_profiles, list_profiles, read_profile, write_profile
     from xosc_lateral.workflows.profiles.sample import Offsets, sample
-    from xosc_lateral.workflows.recordings.call import Reconstruction, reconstruct
-    from xosc_lateral.workflows.recordings.importing import ImportedDrives, import_drives
+    from xosc_lateral.workflows.recordings.call import ImportedDrives, import_drives, reconstruct
+    from xosc_lateral.workflows.recordings.reconstruction import Reconstruction
 
 
 def __getattr__(name: str) -> object:

@@ -20,9 +20,9 @@ from laboratory.board.text import board_markdown, board_text
 from xosc_lateral.drivers.drives.cuts import all_runs
 from xosc_lateral.files.atomic import write_atomically
 from xosc_lateral.files.drives import read_drives
-from xosc_lateral.files.hashes import parsed_hashes
 from xosc_lateral.files.mapping import parse_map
 from xosc_lateral.files.profiles import read_profile
+from xosc_lateral.files.source import parsed_hashes
 
 
 def main(argv: Sequence[str] | None = None) -> None:

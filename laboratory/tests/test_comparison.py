@@ -8,7 +8,8 @@ from msgspec.structs import replace
 
 from laboratory.comparison import compare_profiles
 from tests.kit.core_models import POPULATION, STEADY
-from xosc_lateral.drivers.evaluation.metrics import free_runs, summarise
+from xosc_lateral.drivers.evaluation.lane_keeping import summarise
+from xosc_lateral.drivers.evaluation.metrics import free_runs
 from xosc_lateral.drivers.model.profile import DriverProfile
 
 

@@ -3,32 +3,34 @@
 from __future__ import annotations
 
 import re
+from decimal import Decimal
 
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
-P_VALUE = re.compile(r"\(p = [^)]*\)")
-TOLERANCE = 0.25
-"""Relative: another processor, another last digit."""
 
 
-def difference(shown: str, printed: str) -> str | None:
-    """The first line that is not printed as shown, or none. A line ``...`` stands for any lines."""
+def difference(shown: str, printed: str, *, last_digit: float = 0.5) -> str | None:
+    """The first line that is not printed as shown, or none. A line ``...`` stands for any lines.
+
+    A printed number has to round to the one that is shown; `last_digit` is how far it may be away, in units of the last
+    digit that is shown.
+    """
     lines = printed.splitlines()
     skip = False
     for line in shown.splitlines():
         if line == "...":
             skip = True
             continue
-        while skip and lines and not _alike(line, lines[0]):
+        while skip and lines and not _alike(line, lines[0], last_digit):
             lines.pop(0)
         skip = False
-        if not lines or not _alike(line, lines.pop(0)):
+        if not lines or not _alike(line, lines.pop(0), last_digit):
             return line
     return None if skip or not lines else f"more is printed: {lines[0]}"
 
 
-def _alike(shown: str, printed: str) -> bool:
-    ours, theirs = (" ".join(P_VALUE.sub("", text).split()) for text in (shown, printed))
-    if NUMBER.sub("#", ours) != NUMBER.sub("#", theirs):
+def _alike(shown: str, printed: str, last_digit: float) -> bool:
+    page, command = (" ".join(text.split()) for text in (shown, printed))
+    if NUMBER.sub("#", page) != NUMBER.sub("#", command):
         return False
-    pairs = zip(map(float, NUMBER.findall(ours)), map(float, NUMBER.findall(theirs)), strict=True)
-    return all(abs(one - two) <= TOLERANCE * max(abs(one), abs(two)) for one, two in pairs)
+    pairs = [(Decimal(a), Decimal(b)) for a, b in zip(NUMBER.findall(page), NUMBER.findall(command), strict=True)]
+    return all(abs(a - b) <= Decimal(last_digit).scaleb(int(a.as_tuple().exponent)) for a, b in pairs)

@@ -26,12 +26,12 @@ from xosc_lateral.drivers.drives.cuts import all_runs
 from xosc_lateral.drivers.loop.columns import Role
 from xosc_lateral.drivers.model.sampled_offsets import sample_free
 from xosc_lateral.drivers.model.stream import OffsetStream
-from xosc_lateral.files.context_table import read_context
 from xosc_lateral.files.mapping import read_mapping
 from xosc_lateral.files.openscenario.distribution import read_distribution
 from xosc_lateral.files.openscenario.provenance import facts_in, without_provenance
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.profiles import list_profiles, profile_bytes, read_profile
+from xosc_lateral.files.tables import read_context
 from xosc_lateral.workflows.batch.jobs import plan_batch
 from xosc_lateral.workflows.batch.journal import Journal
 from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, read_manifest, write_manifest
@@ -204,14 +204,14 @@ def _output_files(folder: Path) -> Iterable[Path]:
 
 
 def _use_output(path: Path) -> None:
-    (found,) = verify([path], ConvertSettings())
+    (found,) = verify(path).checked
     if not found.problems:
         good, now = (file.read_bytes() for file in (path.with_suffix(".good"), path))
         if without_provenance(good) != without_provenance(now):
             raise NonsenseError("called good")
         return
     try:
-        (again,) = reproduce(path, path.with_name("again.xosc"), ConvertSettings())
+        (again,) = reproduce(path, path.with_name("again.xosc")).checked
     except FormatError as error:  # it names the scenario that the provenance states
         raise FormatError(str(error), path=path) from error
     if not again.problems and facts_in(path.read_bytes()) is None:

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.clock import require_row_step, seconds_of_stamps
+from xosc_lateral.files.columns import require_row_step, seconds_of_stamps
 from xosc_lateral.files.drives import read_drives
 from xosc_lateral.files.mapping import read_mapping
 

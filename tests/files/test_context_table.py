@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.context_table import read_context
+from xosc_lateral.files.tables import read_context
 
 BAD = {
     "no time": ("t,wind\n0,1\n1,2\n", "no column 'time'"),

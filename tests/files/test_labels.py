@@ -10,8 +10,7 @@ import pytest
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main
-from xosc_lateral.files.drives import read_drives
-from xosc_lateral.files.labels import file_labels
+from xosc_lateral.files.drives import file_labels, read_drives
 
 
 def write(path: Path, offset: float, drive: object = None) -> Path:

@@ -11,8 +11,8 @@ import pytest
 
 import xosc_lateral as xl
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.hashes import file_hash
 from xosc_lateral.files.output_paths import claim, is_folder, is_own, output_file, output_folder, template_mark
+from xosc_lateral.files.source import file_hash
 
 SUFFIXES = (".csv", ".csv.gz", ".parquet")
 

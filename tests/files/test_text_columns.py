@@ -8,8 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from xosc_lateral.files.clock import seconds_of_stamps
-from xosc_lateral.files.tables import comma_numbers, indicators, plain_cells
+from xosc_lateral.files.columns import comma_numbers, indicators, plain_cells, seconds_of_stamps
 
 
 def column(*values: object) -> pd.Series:

@@ -10,10 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from xosc_lateral.files.clock import seconds_of_stamps
+from xosc_lateral.files.columns import comma_numbers, indicators, plain_cells, seconds_of_stamps
 from xosc_lateral.files.mapping import UNITS, factor, is_measured, spelled
 from xosc_lateral.files.output_tables import harmless
-from xosc_lateral.files.tables import comma_numbers, indicators, plain_cells
 
 
 # ---- units -----------------------------------------------------------------------------------------------------------

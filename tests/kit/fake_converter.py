@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.atomic import write_atomically
-from xosc_lateral.files.hashes import file_hash
+from xosc_lateral.files.source import file_hash
 from xosc_lateral.workflows.batch.jobs import Job
 from xosc_lateral.workflows.batch.manifest import ManifestRow
 

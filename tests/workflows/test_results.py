@@ -12,7 +12,7 @@ import pytest
 import xosc_lateral as xl
 from examples.driver_simulator import simulate_drive
 from xosc_lateral.base.errors import FormatError, XoscLateralError
-from xosc_lateral.files.hashes import file_hash, parsed_hashes
+from xosc_lateral.files.source import file_hash, parsed_hashes
 from xosc_lateral.workflows.profiles.profiles import add_profile, tag_profile
 
 SECONDS = 6.0

@@ -1,11 +1,13 @@
-"""pandas, imported when something of it is first used: that takes half a second, which most commands don't need."""
+"""Heavy packages, imported when something of them is first used: pandas takes half a second, numba one."""
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
-__all__ = ["pd"]
+__all__ = ["njit", "pd"]
 
 
 class _Lazy:
@@ -20,3 +22,23 @@ if TYPE_CHECKING:
     import pandas as pd
 else:
     pd = _Lazy("pandas")
+
+Body = TypeVar("Body", bound=Callable[..., Any])
+
+
+def njit(body: Body) -> Body:
+    """Compile a loop with numba, without its lock.
+
+    The compiled code is kept beside the module or in the user's cache. Who has neither (a read-only installation, a
+    service without a home) compiles once per process: numba itself would refuse.
+    """
+    # A `.numba_config.yaml` in the working folder, which may be anybody's, must not say where compiled code lies.
+    for name in ("NUMBA_CACHE_DIR", "NUMBA_CACHE_LOCATOR_CLASSES"):
+        os.environ.setdefault(name, "")
+    import numba
+
+    try:
+        compiled = numba.njit(cache=True, nogil=True)(body)
+    except RuntimeError:
+        compiled = numba.njit(nogil=True)(body)
+    return cast(Body, compiled)

@@ -35,9 +35,9 @@ class Limit:
     def __str__(self) -> str:
         return self._with_unit(self.value)
 
-    def refusal(self, found: float) -> str:
-        """``WHAT: FOUND, at most LIMIT``."""
-        return f"{self.what}: {self._with_unit(found)}, at most {self}"
+    def refusal(self, value: float) -> str:
+        """``WHAT: VALUE, at most LIMIT``."""
+        return f"{self.what}: {self._with_unit(value)}, at most {self}"
 
     def _with_unit(self, value: float) -> str:
         number = f"{value:.0f}" if abs(value) < 1e15 and value == round(value) else f"{value:.6g}"

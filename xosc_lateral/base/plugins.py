@@ -43,7 +43,7 @@ def plugins(group: str) -> dict[str, Any]:
     Exception
         Whatever the import of a broken plug-in raises: it is that package's bug, and its traceback names it.
     """
-    return {point.name: point.load() for point in sorted(entry_points(group=group), key=lambda one: one.name)}
+    return {point.name: point.load() for point in sorted(entry_points(group=group), key=lambda point: point.name)}
 
 
 @lru_cache(maxsize=len(GROUPS))
@@ -69,11 +69,14 @@ def defined_in(package: str, kind: type[T]) -> tuple[type[T], ...]:
     """
     names = sorted(module.name for module in iter_modules(sys.modules[package].__path__))
     modules = [import_module(f"{package}.{name}") for name in names]
-    own = [(one, module.__name__) for module in modules for one in vars(module).values() if isinstance(one, type)]
-    return tuple(one for one, home in own if one.__module__ == home and issubclass(one, kind) and _can_be_made(one))
+    members = [(member, module.__name__) for module in modules for member in vars(module).values()]
+    classes = [member for member, home in members if isinstance(member, type) and member.__module__ == home]
+    return tuple(each for each in classes if issubclass(each, kind) and _can_be_made(each))
 
 
-def _can_be_made(one: type) -> bool:
+def _can_be_made(cls: type) -> bool:
     """Public, and nothing of it is abstract; structs don't keep count of that, as `abc.ABC` would."""
-    members = (getattr(one, name, None) for name in dir(one))
-    return not one.__name__.startswith("_") and not any(getattr(one, "__isabstractmethod__", False) for one in members)
+    members = (getattr(cls, name, None) for name in dir(cls))
+    return not cls.__name__.startswith("_") and not any(
+        getattr(member, "__isabstractmethod__", False) for member in members
+    )

@@ -6,13 +6,16 @@ import contextlib
 import errno
 import os
 import re
+import stat
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
+from typing import IO
 
-from xosc_lateral.files.source import refuse_guarded
+from xosc_lateral.base.errors import FormatError
+from xosc_lateral.files.source import LOG, refuse_guarded
 
 _RUN: ContextVar[str] = ContextVar("run", default="")
 
@@ -35,10 +38,8 @@ def temporary_files(runs: Iterable[str]) -> re.Pattern[str]:
 def write_atomically(path: Path | str, data: bytes | str, *, durable: bool = False) -> Path:
     """Write bytes or UTF-8 text to a temporary file beside the output, then move it there; missing folders are made.
 
-    Raises `OSError`: Disk full, no permission: the output is as it was, and no temporary file stays behind.
-
-    `durable`: return only when the disk has it, so that not even a power cut takes it back. On a busy disk that is a
-    tenth of a second: for what ten thousand others depend on, not for each of the ten thousand.
+    A full disk (`OSError`) leaves the output as it was. `durable`: return only when the disk has it, so that not even a
+    power cut takes it back: a tenth of a second on a busy disk, for what ten thousand others depend on.
     """
     content = data.encode() if isinstance(data, str) else data
 
@@ -53,11 +54,7 @@ def write_atomically(path: Path | str, data: bytes | str, *, durable: bool = Fal
 
 
 def replace_atomically(path: Path | str, write: Callable[[Path], object]) -> Path:
-    """Let `write` fill a temporary file beside the output, then move it there: for writers that want a path.
-
-    Raises `FormatError`: The output is a file that was opened as an input (`source.guarding_inputs`); `OSError`: As for
-    `write_atomically`.
-    """
+    """Let `write` fill a temporary file beside the output, then move it there; an input (`guarding_inputs`) stays."""
     path = Path(path)
     refuse_guarded(path)
     try:
@@ -66,6 +63,7 @@ def replace_atomically(path: Path | str, write: Callable[[Path], object]) -> Pat
             temporary.replace(path)
     except OSError as error:  # of a full disk, say: libraries name no file, or one that nobody knows
         raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
+    LOG.info("wrote %s", path)
     return path
 
 
@@ -85,3 +83,53 @@ def _temporary_beside(path: Path) -> Iterator[Path]:
     finally:
         with contextlib.suppress(FileNotFoundError):
             temporary.unlink()
+
+
+_PLAIN = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+_LINKS = (errno.ELOOP, errno.EMLINK, errno.ENOTDIR)  # what systems answer where ``O_NOFOLLOW`` meets a link
+_LINK = "is a link, which is not followed here: remove it"
+
+
+def open_own(path: Path) -> IO[bytes]:
+    """Open a file for reading and writing, made if it is not there; links and files of others are refused."""
+    if not hasattr(os, "O_DIRECTORY"):  # Windows: links need a privilege there
+        return os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT | _PLAIN), "r+b")
+    here = path.parent
+    try:
+        folder = os.open(here, os.O_RDONLY | os.O_DIRECTORY | _PLAIN)
+        try:
+            here = path
+            descriptor = os.open(path.name, os.O_RDWR | os.O_CREAT | _PLAIN, 0o666, dir_fd=folder)
+        finally:
+            os.close(folder)
+    except OSError as error:
+        if error.errno in _LINKS:
+            raise FormatError(_LINK, path=here) from error
+        error.filename = str(here)
+        raise
+    state = os.fstat(descriptor)
+    why = ""
+    if not stat.S_ISREG(state.st_mode):
+        why = "is no file"
+    elif state.st_nlink > 1:
+        why = "has another name elsewhere (a hard link)"
+    elif state.st_uid != os.geteuid() and state.st_uid != _owner_of_new_files(path.parent):
+        why = f"belongs to another user ({state.st_uid})"
+    if why:
+        os.close(descriptor)
+        raise FormatError(f"{why}, and is left alone: remove it", path=path)
+    return os.fdopen(descriptor, "r+b")
+
+
+def _owner_of_new_files(folder: Path) -> int:
+    """Some network folders give all files to one user."""
+    with tempfile.TemporaryFile(dir=folder) as file:
+        return os.fstat(file.fileno()).st_uid
+
+
+def make_own_folder(folder: Path, depth: int) -> None:
+    """Make a folder that is so many levels below the one that the user named; links on the way are refused."""
+    for place in (folder, *folder.parents)[:depth]:
+        if place.is_symlink():
+            raise FormatError(_LINK, path=place)
+    folder.mkdir(parents=True, exist_ok=True)

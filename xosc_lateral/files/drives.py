@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,41 +17,40 @@ from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.drivers.drives.cleaning import DRIVE_COLUMNS, LANE_WIDTHS, MAX_MEDIAN_SPEED, MAX_OUTSIDE, clean_drive
 from xosc_lateral.drivers.drives.cuts import MIN_RUN
 from xosc_lateral.drivers.drives.drive import Drive
-from xosc_lateral.drivers.model.plausibility import drives_nobody, first_implausible, implausible, implausible_rows
-from xosc_lateral.files.clock import seconds_of_stamps
-from xosc_lateral.files.labels import file_label
-from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping
-from xosc_lateral.files.rows import chosen_rows, without_markers
-from xosc_lateral.files.tables import comma_numbers, indicators, listed, numbers_of, plain_cells, read_table
+from xosc_lateral.drivers.model.plausibility import drives_nobody, implausible, implausible_rows
+from xosc_lateral.files.columns import (
+    chosen_rows,
+    comma_numbers,
+    indicators,
+    listed,
+    numbers_of,
+    plain_cells,
+    seconds_of_stamps,
+)
+from xosc_lateral.files.mapping import ColumnSource, MappingLike, TableMapping, as_mapping
+from xosc_lateral.files.tables import read_table
 
-LABELS = ("drive", "driver")
-"""Columns that say which drive a row is of, and whose."""
+LABELS = ("drive", "driver")  # columns that say which drive a row is of, and whose
 
 WHEEL_WIDTH = 2.5
 """Lanes of roads driven at 40 km/h and more are wider but for the left one at roadworks; from the wheels of a car
 (1.5 to 1.6 m apart) one of 3.0 to 3.75 m has 1.4 to 2.25 m. [m]"""
 
-MAX_LEVELS = 12
-"""A column of whole numbers with at most so many values holds levels, not a quantity."""
+MAX_LEVELS = 12  # a column of whole numbers with at most so many values holds levels, not a quantity
 
 
 def read_drives(paths: str | Path | Sequence[str | Path], mapping: MappingLike | None = None) -> list[Drive]:
-    """Read the drives of one or several tables.
+    """Read the drives of one or several tables, in the order of the files and of first appearance.
 
-    Raises `FormatError` when a file can't be read, a column is missing, or its values can't be in the unit meant;
-    `NotEnoughDataError` when a file holds no drive with two rows of time, offset and lane width.
-
-    `paths`: tables; the suffix gives the format. `mapping`: what columns are called, and how tables are written; see
-    `files.mapping`. Returns list of Drive: in the order of the files and of first appearance; a drive without a name
-    is called after its file. Rows are sorted by time, repeated times dropped, rows with a missing value left out (a
-    gap).
+    `mapping`: what columns are called, and how tables are written, see `files.mapping`. A drive without a name is
+    called after its file. Rows are sorted by time, repeated times dropped, rows with a missing value left out (a gap).
     """
     known = as_mapping(mapping)
     files = [Path(path) for path in ([paths] if isinstance(paths, str | Path) else paths)]
     if twice := {str(path) for path in files if files.count(path) > 1}:
         raise FormatError("the table is named twice", path=min(twice))
     return with_distinct_names(
-        [drive for path in files for drive in drives_of_table(read_table(path, known)[0], known, path)]
+        [drive for path in files for drive in drives_of_table(read_table(path, known), known, path)]
     )
 
 
@@ -74,20 +73,24 @@ def drives_of_table(table: pd.DataFrame, mapping: MappingLike, path: Path | str 
     table = translated(table, as_mapping(mapping), path)
     if not len(table):
         raise NotEnoughDataError(f"{path}: the table has no rows; {MIN_RUN:g} s of driving are needed")
-    columns = _numeric_columns(table, path)
-    levels = frozenset(name for name, values in columns.items() if _holds_levels(name, values))
+    columns: dict[str, FloatArray] = {}
+    for name in table.columns:
+        columns |= {} if name in LABELS else _numeric_columns(name, table, path)
     _require_columns(columns, path)
-    names, every = _drive_names(table, path)
-    drives = [
-        clean_drive(name, {key: values[rows] for key, values in columns.items()}, levels, path)
-        for name, rows in zip(names, every, strict=True)
-    ]
-    drivers = [_driver(table, name, rows, path) for name, rows in zip(names, every, strict=True)]
-    found = [replace(drive, driver=driver) for drive, driver in zip(drives, drivers, strict=True) if drive is not None]
-    if not found:
+    levels = frozenset(name for name, values in columns.items() if _holds_levels(name, values))
+    drives = []
+    for name, rows in _rows_of_drives(table, path):
+        drive = clean_drive(name, {key: values[rows] for key, values in columns.items()}, levels, path)
+        drivers = list(table["driver"].iloc[rows].dropna().unique()) if "driver" in table.columns else []
+        if len(drivers) > 1:
+            what = f"drive {name}: {drivers[0]} and {drivers[1]}; a drive has one driver"
+            raise FormatError(what, path=path, element="column 'driver'")
+        if drive is not None:
+            drives.append(replace(drive, driver=str(drivers[0]) if len(drivers) else ""))
+    if not drives:
         what = f"no drive has two rows with time, offset and lane width; {MIN_RUN:g} s are needed"
         raise NotEnoughDataError(f"{path}: {what}")
-    return found
+    return drives
 
 
 def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.DataFrame:
@@ -96,15 +99,15 @@ def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.Dat
     if not table.columns.is_unique:
         twice = sorted(set(table.columns[table.columns.duplicated()]))
         raise FormatError(f"column {twice[0]!r} appears twice", path=path, line=1)
-    taken = {source.column for source in mapping.columns.values()}
     for name, source in mapping.columns.items():
         if source.column not in table.columns:
             what = f"no column {source.column!r} for {name}; there are {listed(table.columns)}"
             raise FormatError(what, path=path, line=1)
-    table = chosen_rows(without_markers(table, mapping.missing, path), mapping.rows, path)
-    own = [name for name in table.columns if name not in taken and name not in mapping.columns]
-    kept = {name: mapping.numbers(name, plain_cells(table[name]), path) for name in own}
-    for name, source in mapping.columns.items():
+    table = chosen_rows(table, mapping.missing, mapping.rows, path)
+    taken = {source.column for source in mapping.columns.values()} | mapping.columns.keys()
+    sources = {name: ColumnSource(name) for name in table.columns if name not in taken} | dict(mapping.columns)
+    kept = {}
+    for name, source in sources.items():
         column = mapping.numbers(name, plain_cells(table[source.column]), path)
         if name not in LABELS and source.factor != 1.0:
             column = pd.Series(numbers_of(column, path, name) * source.factor, index=column.index)
@@ -117,10 +120,7 @@ def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.Dat
 
 
 def from_middle(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.DataFrame:
-    """The table with distances to the markings from the vehicle's middle: those from its wheels make lanes narrow.
-
-    Raises `FormatError`: they do, and the mapping does not say how far apart the wheels are.
-    """
+    """Distances to the markings; those of wheels (`wheel_track`) as offset and width: narrow lanes ask for it."""
     if not {"distance_left", "distance_right"} <= set(table.columns):
         return table
     left, right = (numbers_of(table[name], path, name) for name in ("distance_left", "distance_right"))
@@ -140,44 +140,32 @@ def from_middle(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.Da
     return table.drop(columns=["distance_left", "distance_right"]).assign(offset=0.5 * (right - left), lane_width=width)
 
 
-def _numeric_columns(table: pd.DataFrame, path: Path) -> dict[str, FloatArray]:
-    """Columns that hold numbers or categories, as float64; infinite values count as missing, but for those of distances
-    to others: nobody is within reach."""
+def _numeric_columns(name: str, table: pd.DataFrame, path: Path) -> dict[str, FloatArray]:
+    """A column as float64, or as one column per category; nothing where it holds labels.
 
-    columns: dict[str, FloatArray] = {}
-    for name in table.columns:
-        if name in LABELS:
-            continue
-        if name in (*DRIVE_COLUMNS, "speed") or pd.api.types.is_numeric_dtype(table[name]):
-            columns[name] = _cleaned(table, name, path)
-        elif table[name].isna().all():
-            columns[name] = np.full(len(table), np.nan)
-        elif (numbers := comma_numbers(table[name])) is not None:
-            columns[name] = numbers.to_numpy(dtype=np.float64)
-        else:
-            columns |= indicators(name, table[name], table.get("drive"), MAX_LEVELS)
-    return columns
-
-
-def _cleaned(table: pd.DataFrame, name: str, path: Path) -> FloatArray:
-    """A column of numbers without what is none."""
-    values = numbers_of(table[name], path, name)
+    Infinite values are missing, but where nobody is within reach; so are glitches of a context column, unless it is
+    full.
+    """
+    column = table[name]
+    is_needed = name in (*DRIVE_COLUMNS, "speed")
+    if not is_needed and not pd.api.types.is_numeric_dtype(column):
+        if column.isna().all():
+            return {name: np.full(len(table), np.nan)}
+        numbers = comma_numbers(column)
+        if numbers is None:
+            return indicators(name, column, table.get("drive"), MAX_LEVELS)
+        return {name: numbers.to_numpy(dtype=np.float64)}
+    values = numbers_of(column, path, name)
     values[np.isinf(values) & ~drives_nobody(name, values)] = np.nan
-    if name not in DRIVE_COLUMNS:
-        _leave_out_nonsense(values, name, path)
-    return values
-
-
-def _leave_out_nonsense(values: FloatArray, name: str, path: Path) -> None:
-    """Glitches of a context column count as missing; a column that is full of them is another quantity."""
-    row = first_implausible(name, values)
-    if row is None or (name == "speed" and np.nanmedian(values) > MAX_MEDIAN_SPEED):
-        return  # a wrong unit is said per drive, with what to do
-    wrong = implausible_rows(name, values)
-    if wrong.mean() > MAX_OUTSIDE:
-        what = f"{implausible(name, float(values[row]))}, and {100 * wrong.mean():.0f} % of the rows are not"
-        raise FormatError(f"{what}; name the unit with --map", path=path, line=row + 2, element=f"column {name!r}")
-    values[wrong] = np.nan
+    wrong = np.zeros(0, dtype=np.bool_) if name in DRIVE_COLUMNS else implausible_rows(name, values)
+    # a wrong unit of speed is said per drive, with what to do
+    if wrong.any() and not (name == "speed" and np.nanmedian(values) > MAX_MEDIAN_SPEED):
+        if wrong.mean() > MAX_OUTSIDE:
+            row = int(np.argmax(wrong))
+            what = f"{implausible(name, float(values[row]))}, and {100 * wrong.mean():.0f} % of the rows are not"
+            raise FormatError(f"{what}; name the unit with --map", path=path, line=row + 2, element=f"column {name!r}")
+        values[wrong] = np.nan
+    return {name: values}
 
 
 def _holds_levels(name: str, values: FloatArray) -> bool:
@@ -199,23 +187,47 @@ def _require_columns(columns: Mapping[str, FloatArray], path: Path) -> None:
         raise FormatError(what, path=path, line=1)
 
 
-def _drive_names(table: pd.DataFrame, path: Path) -> tuple[list[str], list[NDArray[np.intp]]]:
+def _rows_of_drives(table: pd.DataFrame, path: Path) -> Iterator[tuple[str, NDArray[np.intp]]]:
+    """Name and rows of each drive."""
     if "drive" not in table.columns:
-        return [file_label(path)], [np.arange(len(table))]
+        yield file_label(path), np.arange(len(table))
+        return
     codes, names = table["drive"].factorize()
     if (codes < 0).any():
         raise FormatError("no value", path=path, line=int(np.argmax(codes < 0)) + 2, element="column 'drive'")
     order = np.argsort(codes, kind="stable")
     bounds = np.searchsorted(codes[order], np.arange(1, len(names)))
-    return [str(name) for name in names], list(np.split(order, bounds))
+    yield from zip(map(str, names), np.split(order, bounds), strict=True)
 
 
-def _driver(table: pd.DataFrame, name: str, rows: NDArray[np.intp], path: Path) -> str:
-    """Who drove, empty where the table doesn't say."""
-    if "driver" not in table.columns:
-        return ""
-    found = table["driver"].iloc[rows].dropna().unique()
-    if len(found) > 1:
-        what = f"drive {name}: {found[0]} and {found[1]}; a drive has one driver"
-        raise FormatError(what, path=path, element="column 'driver'")
-    return str(found[0]) if len(found) else ""
+# ---- what drives are called: a drive is its file, and its own label where the file gives one -------------------------
+FORMAT_ENDINGS = (".csv.gz", ".csv", ".parquet", ".mf4", ".mdf", ".dat", ".mcap", ".osi", ".xml")
+"""Ends of file names that say how a file is written; whatever else has a dot belongs to the name (``2026.11.21``)."""
+
+
+def file_label(path: Path) -> str:
+    """A file's name without the ending that gives its format."""
+    ending = next((end for end in FORMAT_ENDINGS if path.name.lower().endswith(end)), "")
+    return path.name[: len(path.name) - len(ending)] or path.name
+
+
+def file_labels(paths: Sequence[Path]) -> list[str]:
+    """Different labels for several files: with folders where names are equal, whole where these are."""
+    if twice := [path for path in paths if paths.count(path) > 1]:
+        raise FormatError("the file is named twice", path=twice[0])
+    short = [file_label(path) for path in paths]
+    longer = [str(path.parent / label) for path, label in zip(paths, short, strict=True)]
+    return [
+        label if short.count(label) == 1 else long if longer.count(long) == 1 else str(path)
+        for path, label, long in zip(paths, short, longer, strict=True)
+    ]
+
+
+def labels_apart(paths: Sequence[Path], labels: Sequence[Iterable[str]]) -> list[dict[str, str]]:
+    """For every file, its drives' own labels and what they are called beside the others': with the file where two
+    files have the same."""
+    every = [label for own in labels for label in set(own)]
+    return [
+        {label: label if every.count(label) == 1 else f"{name}:{label}" for label in own}
+        for name, own in zip(file_labels(paths), labels, strict=True)
+    ]

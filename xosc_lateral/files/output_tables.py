@@ -1,33 +1,34 @@
-"""Tables that this package writes: Parquet with the provenance inside, others with a provenance file beside them."""
+"""Tables that this package writes, with their provenance inside (Parquet) or in a file beside them; that of states."""
 
 from __future__ import annotations
 
 import gzip
 import hashlib
 import io
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
 
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.version import __version__
 from xosc_lateral.files.atomic import write_atomically
 from xosc_lateral.files.json_text import canonical_json
 from xosc_lateral.files.output_paths import SIDECAR_SUFFIX
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
+from xosc_lateral.world.road import RoadNetwork
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 def harmless(text: str) -> str:
-    """Text that no spreadsheet takes for a formula: what begins like one gets an apostrophe before it.
-
-    Reference: OWASP, "CSV Injection".
-    """
+    """Text that no spreadsheet takes for a formula, by an apostrophe before it (OWASP, "CSV Injection")."""
     return f"'{text}" if text.startswith(_FORMULA) else text
 
 
-METADATA_KEY = b"xosc-lateral"
-"""Key of the provenance in a Parquet file's schema metadata."""
+METADATA_KEY = b"xosc-lateral"  # key of the provenance in a Parquet file's schema metadata
 
 Encoder: TypeAlias = "Callable[[Callable[[], pd.DataFrame], Callable[[], str]], bytes]"
 """A table's bytes, from what gives it as a frame and what gives it as CSV; only one of both is asked for."""
@@ -47,21 +48,14 @@ def output_suffixes() -> tuple[str, ...]:
 
 
 def write_frame(frame: pd.DataFrame, path: Path, provenance: Mapping[str, Any]) -> None:
-    """Write a table; the same frame and provenance give the same bytes.
-
-    `path`: its suffix, one of `output_suffixes`, decides the format. `provenance`: JSON values; the package's version
-    is added. A CSV has six decimals, Parquet every bit.
-    """
+    """Write a table in the format of the suffix, six decimals in CSV, every bit in Parquet; same frame, same bytes."""
     write_table(path, provenance, frame=lambda: frame, text=lambda: csv_text(frame))
 
 
 def write_table(
     path: Path, provenance: Mapping[str, Any], *, frame: Callable[[], pd.DataFrame], text: Callable[[], str]
 ) -> None:
-    """As `write_frame`, for tables that have a CSV of their own; whole or not at all.
-
-    `frame`, `text`: give the table, and its CSV, when they are wanted.
-    """
+    """As `write_frame`, for tables that have a CSV of their own; whole or not at all."""
     name = path.name.lower()
     if name.endswith(PARQUET):
         write_atomically(path, _parquet(frame(), stamped(provenance)))
@@ -102,3 +96,54 @@ def _parquet(frame: pd.DataFrame, provenance: Mapping[str, Any]) -> bytes:
     buffer = io.BytesIO()
     pq.write_table(table.replace_schema_metadata(metadata), buffer, compression="zstd")
     return buffer.getvalue()
+
+
+COLUMNS = ("time", "name", "x", "y", "z", "h", "speed", "road", "lane", "offset_t", "s")
+"""[s], -, [m], [m], [m], [rad], [m/s], road id, lane id, [m] from the lane centre along +t, [m]."""
+
+_NUMBERS = "%.3f,%s,%.4f,%.4f,%.4f,%.6f,%.4f,%s,%d,%.4f,%.4f"
+
+
+def states_csv(motion: NominalMotion, network: RoadNetwork) -> str:
+    """Inertial states of all entities that exist at a time, ordered by time and then as in the scenario, as CSV."""
+    lines = [",".join(COLUMNS)]
+    for rows in zip(*(_lines(entity, network) for entity in motion.entities), strict=True):
+        lines += [row for row in rows if row]
+    return "\n".join(lines) + "\n"
+
+
+def _lines(motion: EntityMotion, network: RoadNetwork) -> Iterator[str]:
+    """One per row, empty where the entity does not exist."""
+    columns = [values.tolist() for values in _columns(motion, network, _quoted).values()]
+    for row, activity in zip(zip(*columns, strict=True), motion.activity.tolist(), strict=True):
+        yield _NUMBERS % row if activity & Activity.ACTIVE else ""
+
+
+def states_frame(motion: NominalMotion, network: RoadNetwork) -> pd.DataFrame:
+    """The same rows as a frame, every digit kept."""
+    frames = [
+        pd.DataFrame(_columns(entity, network, str) | {"entity": number}).loc[(entity.activity & Activity.ACTIVE) != 0]
+        for number, entity in enumerate(motion.entities)
+    ]
+    if not frames:
+        return pd.DataFrame(columns=list(COLUMNS))
+    rows: pd.DataFrame = pd.concat(frames, ignore_index=True)
+    return rows.sort_values(["time", "entity"], kind="stable", ignore_index=True)[list(COLUMNS)]
+
+
+def _columns(motion: EntityMotion, network: RoadNetwork, text: Callable[[str], str]) -> dict[str, NDArray[Any]]:
+    """By their names in the table, shape (n,) each; `text`: how names are written."""
+    on_road = motion.road >= 0
+    offset_t = np.zeros(len(motion.time))
+    offset_t[on_road] = network.travel_directions(motion.road[on_road], motion.lane[on_road]) * motion.offset[on_road]
+    ids = np.array([*map(text, network.road_ids), ""], dtype=object)
+    name = np.full(len(motion.time), text(motion.name), dtype=object)
+    pose = network.header_offset.apply(motion.x, motion.y, motion.z, motion.heading)
+    columns = motion.time, name, *pose, motion.speed, ids[motion.road], motion.lane, offset_t, motion.s
+    return dict(zip(COLUMNS, columns, strict=True))
+
+
+def _quoted(text: str) -> str:
+    """As a CSV field."""
+    text = harmless(text)
+    return '"' + text.replace('"', '""') + '"' if any(c in text for c in ',"\r\n') else text

@@ -15,18 +15,21 @@ import hashlib
 import io
 import os
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
+from functools import lru_cache
+from logging import getLogger
 from pathlib import Path
 from typing import IO, Any
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.limits import FILE_SIZE, PACKING_RATIO, UNPACKED_SIZE, UNPACKED_UNASKED, Limit
 
-IN_MEMORY = 64_000_000
-"""Files up to this are read once and parsed from memory. [byte]"""
+LOG = getLogger(__name__)
+
+IN_MEMORY = 64_000_000  # files up to this are read once and parsed from memory [byte]
 
 _KINDS = (
     (stat.S_ISDIR, "a folder"),
@@ -36,8 +39,7 @@ _KINDS = (
     (stat.S_ISSOCK, "a socket"),
 )
 
-REMEMBERED = 1000
-"""Hashes of so many files that were parsed are kept; a command states what it has just read."""
+REMEMBERED = 1000  # hashes of so many files that were parsed are kept; a command states what it has just read
 
 _LAST_READ: dict[str, str] = {}  # path -> SHA-256 of the bytes that were parsed, the oldest first
 _GUARDED: ContextVar[set[tuple[int, int]] | None] = ContextVar("inputs", default=None)
@@ -52,10 +54,7 @@ class Source:
     size: int  # [byte]
 
     def unpacked(self, size: int) -> None:
-        """Refuse a packed file that would take all memory; `size`: unpacked so far. [byte]
-
-        Raises `FormatError`: above `limits.UNPACKED_SIZE`, or above `UNPACKED_UNASKED` and `PACKING_RATIO`.
-        """
+        """Refuse a packed file that would take all memory, see `limits`; `size`: unpacked so far. [byte]"""
         if size > UNPACKED_SIZE.bytes:
             raise FormatError(UNPACKED_SIZE.refusal(size / 1e6), path=self.path)
         ratio = size / max(self.size, 1)
@@ -95,11 +94,7 @@ def read_toml(path: Path, otherwise: str) -> dict[str, Any]:
 
 @contextmanager
 def open_source(path: Path | str, limit: Limit = FILE_SIZE) -> Iterator[Source]:
-    """Open an input file for reading.
-
-    Raises `FormatError`: It is not there, can't be read, is no regular file or larger than the limit, or changed while
-    it was being read.
-    """
+    """Open an input file for reading. Raises `FormatError`."""
     path = Path(path)
     with _opened(path) as file:
         before = os.fstat(file.fileno())
@@ -168,10 +163,7 @@ def edit_in_place(path: Path) -> None:
 
 
 def refuse_guarded(target: Path) -> None:
-    """Refuse to replace an input; links of both kinds are seen through.
-
-    Raises `FormatError`: The target is a file that was opened as an input.
-    """
+    """Refuse to replace an input; links of both kinds are seen through. Raises `FormatError`."""
     guarded = _GUARDED.get()
     if guarded and target.exists():
         state = target.stat()
@@ -180,6 +172,7 @@ def refuse_guarded(target: Path) -> None:
 
 
 def _remember(path: Path, digest: str) -> None:
+    LOG.info("read %s, sha256 %s", path, digest)
     _LAST_READ.pop(str(path), None)
     _LAST_READ[str(path)] = digest
     if len(_LAST_READ) > REMEMBERED:
@@ -214,3 +207,39 @@ def _opened(path: Path) -> Iterator[IO[bytes]]:
 def _unreadable(error: OSError | ValueError, path: Path) -> FormatError:
     what = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
     return FormatError(f"{what[:1].lower()}{what[1:]}", path=path)
+
+
+def file_hash(path: Path) -> str:
+    """SHA-256 of a file's bytes as they are now; read once per process for as long as it stays the same."""
+    return _file_hash(path, state_key(check_regular(path)))
+
+
+def file_state(path: Path) -> str:
+    """Text that is another one whenever the file was replaced or written to since; empty if it is not there."""
+    try:
+        return " ".join(map(str, state_key(path.stat())))
+    except OSError:
+        return ""
+
+
+def parsed_hash(path: Path) -> str:
+    """SHA-256 of the bytes that this process parsed, whatever the file is since; a file not parsed is hashed now."""
+    try:
+        return last_read(path)
+    except KeyError:
+        return file_hash(path)
+
+
+def parsed_hashes(paths: Iterable[Path]) -> dict[str, str]:
+    """`parsed_hash` of each file by its name; files of one name by as much of their paths as differs."""
+    names = {path: path.name for path in paths}
+    for depth in range(2, max((len(path.parts) for path in names), default=0) + 1):
+        given = list(names.values())
+        names |= {path: "/".join(path.parts[-depth:]) for path, name in names.items() if given.count(name) > 1}
+    return {name: parsed_hash(path) for path, name in names.items()}
+
+
+@lru_cache(maxsize=1024)
+def _file_hash(path: Path, _state: tuple[int, ...]) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,4 +1,4 @@
-"""Tables from strangers: CSV, CSV.gz and Parquet as data frames, within `limits`, and the texts in their cells."""
+"""Tables from strangers: CSV, CSV.gz and Parquet as data frames, within `limits`; context over time."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import gzip
 import io
 import json
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
@@ -17,104 +17,32 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.base.limits import TABLE_CELLS, TABLE_COLUMNS
+from xosc_lateral.base.limits import TABLE_CELLS, TABLE_COLUMNS, TIME
 from xosc_lateral.base.texts import composed
-from xosc_lateral.files.clock import seconds_of_stamps
-from xosc_lateral.files.hashes import parsed_hash
-from xosc_lateral.files.source import Source, open_source
+from xosc_lateral.drivers.model.plausibility import first_implausible, implausible
+from xosc_lateral.files.columns import plain_cells
+from xosc_lateral.files.source import Source, open_source, parsed_hash
 
 if TYPE_CHECKING:
     from xosc_lateral.files.mapping import TableMapping
 
-_COMMA_NUMBER = r"\s*[+-]?(?:\d{1,3}(?:\.\d{3})+|\d*)(?:,\d+)?(?:[eE][+-]?\d+)?\s*"
-
-
-def plain_cells(column: pd.Series) -> pd.Series:
-    """The column with lists, records and bytes, which Parquet has, as text: then a cell can be compared and named."""
-    if column.dtype != object:
-        return column
-    strange = column.map(lambda cell: isinstance(cell, list | dict | tuple | bytes | np.ndarray))
-    return column.mask(strange, column[strange].map(str)) if strange.any() else column
-
-
-def comma_numbers(column: pd.Series) -> pd.Series | None:
-    """Numbers such as ``3,75`` or ``1.234,5``; None if a value is no such number or none has a comma."""
-    known = column.dropna().astype(str)
-    if known.empty or not known.str.contains(",", regex=False).any() or not known.str.fullmatch(_COMMA_NUMBER).all():
-        return None
-    plain = known.str.replace(".", "", regex=False).str.replace(",", ".", regex=False)
-    return pd.to_numeric(plain, errors="coerce").reindex(column.index)
-
-
-def listed(columns: Iterable[object]) -> str:
-    """The first twenty names, and how many more there are."""
-    names = [str(name) for name in columns]
-    return ", ".join(names[:20]) + (f" and {len(names) - 20} more" if len(names) > 20 else "")
-
-
-def numbers_of(column: pd.Series, path: Path, name: str) -> FloatArray:
-    """Numbers, also with decimal commas, and of `time` seconds, shape (n,); NaN where a cell is empty.
-
-    Raises `FormatError` for a cell that is no number.
-    """
-    is_text = not pd.api.types.is_numeric_dtype(column)
-    if is_text and name == "time" and (seconds := seconds_of_stamps(column, path)) is not None:
-        return seconds
-    if pd.api.types.is_datetime64_any_dtype(column):
-        return np.array((column - column.min()).dt.total_seconds(), dtype=np.float64)
-    numbers = pd.to_numeric(column, errors="coerce")
-    if is_text and numbers.isna().any():
-        commas = comma_numbers(column)
-        numbers = numbers if commas is None else commas
-    strange = numbers.isna() & column.notna()
-    if strange.any():
-        row = int(np.flatnonzero(strange)[0])
-        what = "is neither a number nor a time" if name == "time" else "is not a number"
-        raise FormatError(f"{column.iloc[row]!r} {what}", path=path, line=row + 2, element=f"column {name!r}")
-    return np.array(numbers.to_numpy(dtype=np.float64, na_value=np.nan))
-
-
-def indicators(name: str, column: pd.Series, drives: pd.Series | None, most: int) -> dict[str, FloatArray]:
-    """A text column as one column ``name=value`` of 0 and 1 per value.
-
-    Empty if it has more than `most` values, or changes in no drive: then it is a label, not a context.
-    """
-    codes, values = column.factorize()
-    if not 2 <= len(values) <= most:
-        return {}
-    if drives is not None:
-        by_drive = pd.Series(codes).groupby(drives.to_numpy())
-        if not (by_drive.max() > by_drive.min()).any():
-            return {}
-    return {f"{name}={value}": (codes == k).astype(np.float64) for k, value in enumerate(values)}
-
-
 PARQUET = ".parquet"
 TABLE_SUFFIXES = (".csv", ".csv.gz", PARQUET)
 
-LONGEST_MESSAGE = 300
-"""Of what a library says about a file; some quote half of it."""
+LONGEST_MESSAGE = 300  # of what a library says about a file; some quote half of it
 
 _CHUNK = 1 << 20
 
 _DOUBLE = 8
 
 
-def read_table(path: Path, mapping: TableMapping | None = None) -> tuple[pd.DataFrame, str]:
-    """Read a CSV, CSV.gz or Parquet file as it is; a mapping may say how text is written.
-
-    Raises `FormatError` when it isn't one, or is beyond the limits.
-
-    Returns DataFrame, str: the table, and the SHA-256 of the bytes that it was parsed from.
-    """
-    name = path.name.lower()
-    if not name.endswith(TABLE_SUFFIXES):
+def read_table(path: Path, mapping: TableMapping | None = None) -> pd.DataFrame:
+    """Read a CSV, CSV.gz or Parquet file as it is; a mapping may say how text is written. Raises `FormatError`."""
+    if not path.name.lower().endswith(TABLE_SUFFIXES):
         raise FormatError(f"not a drive table: expected a name ending in {', '.join(TABLE_SUFFIXES)}", path=path)
     if mapping is None:
-        table = _read(path, low_memory=False)
-    else:
-        table = _read(path, mapping.encoding, mapping.separator, decimal=mapping.decimal, low_memory=False)
-    return table, parsed_hash(path)
+        return _read(path, low_memory=False)
+    return _read(path, mapping.encoding, mapping.separator, decimal=mapping.decimal, low_memory=False)
 
 
 def read_text_table(path: Path) -> pd.DataFrame:
@@ -140,10 +68,7 @@ def as_text(table: pd.DataFrame) -> pd.DataFrame:
 
 @contextmanager
 def foreign_errors(path: Path, what: str) -> Iterator[None]:
-    """Whatever a library raises about a file becomes one line that names the file.
-
-    Raises `FormatError` in place of anything that is no error of ours.
-    """
+    """Whatever a library raises about a file becomes one line that names the file."""
     try:
         yield
     except XoscLateralError:
@@ -156,6 +81,7 @@ def foreign_errors(path: Path, what: str) -> Iterator[None]:
 
 _FIELDS = re.compile(r"Expected (\d+) fields in line (\d+), saw (\d+)")
 _OPEN_QUOTE = re.compile(r"EOF inside string starting at row (\d+)")
+_READERS = {"pandas", "pyarrow", "gzip", "zlib"}  # whose own texts say nothing to a reader of ours
 
 
 def _plain_reason(error: Exception) -> str:
@@ -165,6 +91,8 @@ def _plain_reason(error: Exception) -> str:
         return f"line {match[2]} has {match[3]} cells, the head has {match[1]}"
     if match := _OPEN_QUOTE.search(reason):
         return f"a quotation mark in line {int(match[1]) + 1} is not closed"
+    if type(error).__module__.partition(".")[0] in _READERS or isinstance(error, EOFError):
+        return "it is empty, damaged, or laid out otherwise"
     if isinstance(error, LookupError | TypeError | AttributeError | ArithmeticError) and not isinstance(
         error, UnicodeError
     ):
@@ -173,10 +101,7 @@ def _plain_reason(error: Exception) -> str:
 
 
 def unpacked_text(source: Source) -> IO[bytes]:
-    """The file, unpacked if it is gzip (by its first bytes, whatever its name).
-
-    Raises `FormatError`: It unpacks to more than `limits` allow.
-    """
+    """The file, unpacked within `limits` if it is gzip (by its first bytes, whatever its name)."""
     packed = source.file.read(2) == b"\x1f\x8b"
     source.file.seek(0)
     if not packed:
@@ -262,3 +187,54 @@ def _as_text(value: object) -> str:
     if value is None or type(value).__name__ in ("NAType", "NaTType") or (isinstance(value, float) and value != value):
         return ""
     return json.dumps(value) if isinstance(value, dict | list) else str(value)
+
+
+class ContextTable(dict[str, tuple[FloatArray, FloatArray]]):
+    """Context over time: name -> (time, values), shape (n,) each."""
+
+    sha256: str = ""  # of the file's bytes
+
+
+def read_context(path: Path) -> ContextTable:
+    """Read a table with a `time` column [s from scenario start], increasing, and context columns, all of them numbers.
+
+    NaN values are left out row by row: between what is stated, values are interpolated.
+    """
+    table = read_table(path)
+    if "time" not in table:
+        raise FormatError("no column 'time'", path=path)
+    if table["time"].dtype.kind not in "fiu":
+        raise FormatError("times have to be numbers", path=path, element="column 'time'")
+    time = table["time"].to_numpy(dtype=np.float64)
+    if len(time) and np.abs(time[[0, -1]]).max() > TIME.value:
+        raise FormatError(TIME.refusal(float(np.abs(time[[0, -1]]).max())), path=path, element="column 'time'")
+    if len(time) == 0 or not np.isfinite(time).all() or (np.diff(time) <= 0).any():
+        raise FormatError("times have to increase from row to row", path=path, element="column 'time'")
+    context = ContextTable()
+    context.sha256 = parsed_hash(path)
+    for name in map(str, table.columns.drop("time")):
+        values = _context_values(table[name], name, time, path)
+        known = np.isfinite(values)
+        if known.any():
+            context[name] = (time[known], values[known])
+    if not context:
+        raise FormatError("no column with values besides 'time'", path=path)
+    return context
+
+
+def _context_values(column: pd.Series, name: str, time: FloatArray, path: Path) -> FloatArray:
+    """A column's numbers, shape (n,) [own unit]; NaN: not stated."""
+    if column.dtype.kind not in "fiub":
+        column = plain_cells(column)
+        row = int(np.argmin(pd.to_numeric(column.astype("string"), errors="coerce").notna() | column.isna()))
+        cell = f"{str(column.iloc[row])!r} at {time[row]:g} s"
+        what = f"{cell} is not a number; leave the column out if it is no context"
+        raise FormatError(what, path=path, element=f"column {name!r}")
+    values = column.to_numpy(dtype=np.float64)
+    if (endless := np.flatnonzero(np.isinf(values))).size:
+        what = f"{values[endless[0]]} at {time[endless[0]]:g} s is not finite"
+        raise FormatError(what, path=path, element=f"column {name!r}")
+    if (wrong := first_implausible(name, values)) is not None:
+        what = f"{implausible(name, float(values[wrong]))} at {time[wrong]:g} s"
+        raise FormatError(what, path=path, element=f"column {name!r}")
+    return values

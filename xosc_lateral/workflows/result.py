@@ -15,7 +15,7 @@ import numpy as np
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.files.hashes import parsed_hashes
+from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.workflows.conversion.options import PathLike, Paths, ProfileLike
 from xosc_lateral.workflows.conversion.options import paths as as_paths
 
@@ -96,7 +96,7 @@ class GivenDrives:
 
 
 @contextmanager
-def naming(given: GivenDrives) -> Iterator[None]:
+def naming(drives: GivenDrives) -> Iterator[None]:
     """What finds too little in the drives does not know their files: they are named here.
 
     Raises
@@ -107,7 +107,7 @@ def naming(given: GivenDrives) -> Iterator[None]:
     try:
         yield
     except NotEnoughDataError as error:
-        names = [str(path) for path in given.files] or list(given.inputs)
+        names = [str(path) for path in drives.files] or list(drives.inputs)
         if not names or any(name in str(error) for name in names):
             raise
         more = f" and {len(names) - 3} more" if len(names) > 3 else ""
@@ -136,18 +136,18 @@ def given_drives(drives: DrivesLike, columns: MappingLike | None = None) -> Give
     files = [Path(item) for item in items if isinstance(item, str | Path)]
     if len(files) == len(items):
         return GivenDrives(read_drives(files, mapping), parsed_hashes(files), tuple(files))
-    found: list[Drive] = []
+    read: list[Drive] = []
     inputs: dict[str, str] = {}
     for number, item in enumerate(items, start=1):
         if isinstance(item, Drive):
-            found.append(item)
+            read.append(item)
         elif isinstance(item, str | Path):
-            found += read_drives(item, mapping)
+            read += read_drives(item, mapping)
         else:
             name = "DataFrame" if len(items) == 1 else f"DataFrame {number}"
-            found += drives_of_table(item, mapping, name)
+            read += drives_of_table(item, mapping, name)
             inputs[name] = frame_hash(item)
-    return GivenDrives(with_distinct_names(found), parsed_hashes(files) | inputs, tuple(files))
+    return GivenDrives(with_distinct_names(read), parsed_hashes(files) | inputs, tuple(files))
 
 
 def frame_hash(frame: pd.DataFrame) -> str:

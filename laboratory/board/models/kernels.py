@@ -7,7 +7,7 @@ from math import sin
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.base.jit import njit
+from xosc_lateral.base.lazy import njit
 
 FloatArray = NDArray[np.float64]
 

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from xosc_lateral.drivers.evaluation.lane_keeping import (
     INDICATORS,
@@ -70,7 +71,7 @@ def test_figures_of_an_hour_are_those_of_a_known_process() -> None:
     drives[:, 0] = size * rng.standard_normal(20)
     for k in range(1, drives.shape[1]):
         drives[:, k] = keep * drives[:, k - 1] + np.sqrt(1 - keep**2) * size * rng.standard_normal(20)
-    found = lane_keeping(0.3 + drives, 3.5, step)
+    found = lane_keeping(0.3 + drives, 3.5, step, recorded=(20 * 3600.0, 20))
     assert abs(found.sdlp - size) < 4.0 * found.errors["sdlp"] < 0.006
     assert found.mean == pytest.approx(0.3, abs=4.0 * found.errors["mean"])
     assert found.restlessness == pytest.approx(size * np.sqrt(2.0 * (1.0 - keep)) / step, rel=0.01)
@@ -78,6 +79,20 @@ def test_figures_of_an_hour_are_those_of_a_known_process() -> None:
     assert found.limit_near_line == pytest.approx(1.75 - 0.9 - 0.2)
     assert found.near_line == pytest.approx(0.0401, rel=0.1)  # normal: above 0.65 m at 0.3 +- 0.2 m
     assert found.drifts == 0.0
+
+
+def test_errors_are_those_of_as_much_driving_as_was_recorded() -> None:
+    """An autoregression: the variance of a mean over T is 2 size^2 memory / T, of a variance 2 size^4 memory / T."""
+    rng, step, memory, size, seconds = np.random.default_rng(4), 0.2, 3.0, 0.2, 180.0
+    keep = np.exp(-step / memory)
+    noise = np.sqrt(1 - keep**2) * size * rng.standard_normal((60, 18_000))
+    noise[:, 0] = size * rng.standard_normal(60)
+    drives = lfilter([1.0], [1.0, -keep], noise, axis=1)
+    once, four = (lane_keeping(drives, 3.5, step, recorded=(n * seconds, n)).errors for n in (1, 4))
+    assert once["mean"] == pytest.approx(size * np.sqrt(2 * memory / seconds), rel=0.3)  # 60 drives: 9 % of an error
+    assert once["sdlp"] == pytest.approx(size * np.sqrt(0.5 * memory / seconds), rel=0.35)
+    assert four["mean"] == pytest.approx(0.5 * once["mean"])
+    assert lane_keeping(drives, 3.5, step).errors == {}
 
 
 def test_a_lane_drift_is_a_metre_for_eight_seconds_on_one_side() -> None:

@@ -9,9 +9,8 @@ from msgspec.structs import replace
 from tests.kit.runs import smooth_runs
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.resampling import STEP
-from xosc_lateral.drivers.evaluation.parts import SnippetCondition
 from xosc_lateral.drivers.evaluation.realism import Beside, Realism, score_realism
-from xosc_lateral.drivers.evaluation.snippets import sample_runs, sensor_noise, snippets_of
+from xosc_lateral.drivers.evaluation.snippets import SnippetCondition, sample_runs, sensor_noise, snippets_of
 from xosc_lateral.drivers.fitting.fitting import fit_runs
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sensor.model import SensorModel
@@ -71,7 +70,14 @@ def test_every_indicator_stands_beside_its_floor(realism: Realism):
         assert set(one.means) < set(one.named) and len(one.named) == 17
         assert all(value.floor >= 0.0 for value in one.named.values())
     text = "\n".join(realism_lines(realism))
-    for words in ("SDLP", "time to line crossing", "wandering zone", "jerk", "variance between drivers", "same start"):
+    for words in (
+        "within a snippet",
+        "time to line crossing",
+        "wandering zone",
+        "jerk",
+        "variance between drivers",
+        "same start",
+    ):
         assert words in text
 
 

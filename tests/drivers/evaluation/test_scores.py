@@ -12,14 +12,17 @@ from laboratory.comparison import compare_profiles, driver_distances
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.resampling import STEP
-from xosc_lateral.drivers.evaluation.distances import (
+from xosc_lateral.drivers.evaluation.lane_keeping import figures_of, margins
+from xosc_lateral.drivers.evaluation.metrics import (
+    METRICS,
+    cut_snippets,
+    free_runs,
     metric_distances,
     snippet_distances,
+    snippet_metrics,
     split_groups,
     wasserstein,
 )
-from xosc_lateral.drivers.evaluation.lane_keeping import margins
-from xosc_lateral.drivers.evaluation.metrics import METRICS, cut_snippets, free_runs, snippet_metrics, summary_of
 from xosc_lateral.drivers.evaluation.record import scores_to_dict
 from xosc_lateral.drivers.evaluation.scores import score_profile, score_snippets
 from xosc_lateral.drivers.evaluation.snippets import snippets_of
@@ -257,6 +260,6 @@ def test_profiles_know_their_drivers():
 
 def test_comparison_tells_left_from_right(profile):
     left = fit_runs(_swaying(30, 20, mean=0.4), name="left", model="two-level")
-    assert summary_of(left).mean_offset == pytest.approx(0.4, abs=0.08)
+    assert figures_of(left)[0].mean_offset == pytest.approx(0.4, abs=0.08)
     assert compare_profiles(left, profile).by_metric["mean"] > 1.0
     assert compare_profiles(profile, profile).mean < 0.15

@@ -11,8 +11,7 @@ import xosc_lateral as xl
 from xosc_lateral.base.errors import XoscLateralError
 from xosc_lateral.base.shipped import shipped_folder
 from xosc_lateral.files.output_paths import template_mark
-from xosc_lateral.files.templates import TEMPLATES
-from xosc_lateral.files.templates.plain import PlainTemplate, plain_templates
+from xosc_lateral.files.templates import TEMPLATES, PlainTemplate, plain_templates
 
 SCENARIO = """<?xml version="1.0"?>
 <OpenSCENARIO>

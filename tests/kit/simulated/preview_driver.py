@@ -23,7 +23,7 @@ import numpy as np
 import pandas as pd
 from scipy.ndimage import gaussian_filter1d
 
-from xosc_lateral.base.jit import njit
+from xosc_lateral.base.lazy import njit
 
 Values = np.ndarray
 Context = Mapping[str, Values]

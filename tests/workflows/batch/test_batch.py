@@ -18,7 +18,7 @@ import pytest
 
 from tests.kit.fake_converter import convert, convert_and_log
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.hashes import file_hash
+from xosc_lateral.files.source import file_hash
 from xosc_lateral.workflows.batch.batch import STATE, BatchStoppedError, JobOutcome, JobState, convert_many
 from xosc_lateral.workflows.batch.guard import JobLimits
 from xosc_lateral.workflows.batch.jobs import Job, plan_batch

@@ -7,21 +7,22 @@ from dataclasses import replace
 
 import pytest
 
-from xosc_lateral.workflows.batch.page import BatchEntry, batch_page
+from tests.workflows.batch.test_manifest import ROW
+from xosc_lateral.workflows.batch.convert_job import batch_page
 
-CALM = BatchEntry("calm.xosc", "calm.xosc", "calm.html", "calm.svg", 2, 3, 40.0, 0.2, 2.0, 1.9, (), "")
+CALM = replace(ROW, output="calm.xosc", gap_before=2.0, gap_after=1.9, warnings=(), error="")
 
 
 @pytest.fixture
 def page() -> str:
-    entries = [
+    rows = [
         CALM,
-        replace(CALM, output="warned.xosc", page="warned.html", warnings=("one", "two <b>")),
-        replace(CALM, output="broken.xosc", page="", thumbnail="", error="broken.xosc:3: no road"),
-        replace(CALM, output="touching.xosc", page="touching.html", gap_after=0.0),
-        replace(CALM, output="touching_before.xosc", page="tb.html", gap_before=0.0, gap_after=0.0),
+        replace(CALM, output="warned.xosc", warnings=("one", "two <b>")),
+        replace(CALM, output="broken.xosc", error="broken.xosc:3: no road"),
+        replace(CALM, output="touching.xosc", gap_after=0.0),
+        replace(CALM, output="touching_before.xosc", gap_before=0.0, gap_after=0.0),
     ]
-    return batch_page(entries, "out")
+    return batch_page(rows, {row.output: f"{row.output}.html" for row in rows if not row.error}, "out")
 
 
 def test_failures_come_first_then_contacts_then_warnings(page):

@@ -15,8 +15,8 @@ from tests.kit.profiles import simulated_profile
 from tests.workflows.batch.test_batch import tree
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main
-from xosc_lateral.files.hashes import file_hash
 from xosc_lateral.files.profiles import write_profile
+from xosc_lateral.files.source import file_hash
 from xosc_lateral.files.templates import find_template
 from xosc_lateral.workflows.batch.batch import JobState, convert_many
 from xosc_lateral.workflows.batch.jobs import plan_batch

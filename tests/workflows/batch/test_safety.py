@@ -70,6 +70,24 @@ def test_state_files_that_lead_elsewhere_are_refused(tmp_path: Path, name: str, 
     assert [outcome.state for outcome in run(inputs, out)] == [JobState.WRITTEN]
 
 
+@pytest.mark.parametrize("inner", ["sub", "sub/deep"])
+@pytest.mark.parametrize("root", ["out", "pages"])
+def test_a_link_in_place_of_a_folder_of_outputs_or_pages_is_not_followed(tmp_path: Path, root: str, inner: str) -> None:
+    victim, place = tmp_path / "victim", tmp_path / root / inner
+    for folder in ("in/sub/deep", "in/other"):
+        xl.write_template("cut-in", tmp_path / folder)
+    victim.mkdir()
+    place.parent.mkdir(parents=True)
+    place.symlink_to(victim)
+    made = xl.convert_many(tmp_path / "in", tmp_path / "out", report=tmp_path / "pages", time_limit=1.0)
+    failed, done = made.to_dict()["outputs"][::-1]
+    assert (failed["output"], done["error"]) == ("sub/deep/cut-in.xosc", "")
+    assert failed["error"] == f"{place}: is a link, which is not followed here: remove it"
+    assert not list(victim.iterdir())
+    place.unlink()
+    assert not xl.convert_many(tmp_path / "in", tmp_path / "out", report=tmp_path / "pages", time_limit=1.0).failed
+
+
 def test_a_run_leaves_the_temporary_files_of_others_alone_and_removes_those_of_killed_ones(tmp_path: Path) -> None:
     inputs, out = make_inputs(tmp_path / "in", 2), tmp_path / "out"
     (out / STATE).mkdir(parents=True)

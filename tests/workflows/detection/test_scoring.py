@@ -9,8 +9,7 @@ from tests.kit.lane_tracks import LANE, lane_change, scene, track, weave
 from xosc_lateral.workflows.detection.detectors import LateralSpeed, MarkingDistance, WanderingZone
 from xosc_lateral.workflows.detection.observation import PERFECT, RATE_WINDOW, Sensor, views_of
 from xosc_lateral.workflows.detection.scoring import Tally, count_onsets, lead_times
-from xosc_lateral.workflows.detection.tracks import STEP
-from xosc_lateral.workflows.detection.truth import MARGIN, LaneChange
+from xosc_lateral.workflows.detection.tracks import MARGIN, STEP, LaneChange
 
 
 def curve_of(detector, *scenes, sensor=PERFECT):

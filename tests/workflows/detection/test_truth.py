@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from tests.kit.lane_tracks import LANE, WIDTH, lane_change, track
-from xosc_lateral.workflows.detection.tracks import STEP
-from xosc_lateral.workflows.detection.truth import moves_in_lane, truth_of
+from xosc_lateral.workflows.detection.tracks import STEP, moves_in_lane, truth_of
 
 TIME = 0.1 * np.arange(600)
 

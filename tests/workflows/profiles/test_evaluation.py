@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from typing import get_type_hints
 
 import numpy as np
 import pandas as pd
@@ -13,7 +14,8 @@ import pytest
 from laboratory.library import POPULATION, SINGLE_VEHICLES, most_different
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.cli import main
-from xosc_lateral.drivers.evaluation.metrics import free_runs, summary_of
+from xosc_lateral.drivers.evaluation.lane_keeping import figures_of
+from xosc_lateral.drivers.evaluation.metrics import free_runs
 from xosc_lateral.drivers.evaluation.profile_comparison import compare
 from xosc_lateral.files.profiles import list_profiles, read_profile
 from xosc_lateral.workflows.profiles.cards import card_text
@@ -147,7 +149,7 @@ def test_the_refined_profile_says_what_the_loop_found_and_differs_little_from_th
     assert {"memory beyond one step", "drivers that differ"} <= set(loop["found"])
     assert refined.model.kind == "autoregressive"
     assert f"found: {', '.join(loop['found'])}" in card_text(refined)
-    summary, others = summary_of(refined), summary_of(direct)
+    summary, others = figures_of(refined)[0], figures_of(direct)[0]
     assert summary.spread == pytest.approx(others.spread, rel=0.1)
     assert summary.lateral_speed == pytest.approx(others.lateral_speed, rel=0.2)
 
@@ -185,6 +187,57 @@ def test_profiles_list_show_and_compare_see_own_folders(profile, capsys):
     assert main(["profiles", "compare", "mine", "motorway", *folder, "--json"]) == 0
     compared = json.loads(capsys.readouterr().out)
     assert compared["distance"][0][1] == compared["distance"][1][0] > compared["distance"][0][0] > 0
+
+
+def test_a_profile_has_the_same_figures_wherever_they_are_stated(capsys):
+    """List, card and comparison, alone and in company."""
+    assert main(["profiles", "show", "rural"]) == 0
+    card = capsys.readouterr().out
+    rows = []
+    for others in (["motorway"], ["motorway-vehicle-2", "motorway"]):
+        assert main(["profiles", "compare", *others, "rural"]) == 0
+        rows.append(next(line for line in capsys.readouterr().out.splitlines() if line.startswith("rural ")))
+    assert " ".join(rows[0].split()) == " ".join(rows[1].split())
+    mean, sdlp = re.findall(r"-?[\d.]+ \+- [\d.]+", rows[0])[:2]
+    assert f"mean       {mean} m" in card and f"SDLP {sdlp} m" in card
+    assert main(["profiles", "compare", "motorway", "rural", "--json"]) == 0
+    compared = json.loads(capsys.readouterr().out)["profiles"][1]
+    assert main(["profiles", "show", "rural", "--json"]) == 0
+    shown = json.loads(capsys.readouterr().out)
+    assert {key: shown[key] for key in ("summary", "lane_keeping")} == {
+        key: compared[key] for key in ("summary", "lane_keeping")
+    }
+    assert shown["summary"]["mean_offset"] == shown["lane_keeping"]["mean"]
+    assert main(["profiles", "list", "--tag", "single-vehicle"]) == 0
+    listed = capsys.readouterr().out.splitlines()
+    assert listed and all("in the recording" in line for line in listed)
+
+
+def test_each_pair_of_profiles_has_a_verdict_and_none_is_alike_that_differs(capsys):
+    assert main(["profiles", "compare", "motorway", "motorway-vehicle-1", "motorway-vehicle-2", "rural"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    pairs = [re.split(r" {2,}", line) for line in lines if re.match(r"\S+, \S+  ", line)]
+    assert len(pairs) == 6
+    for *_, verdict in pairs:
+        assert verdict.startswith("differ" if float(verdict.rpartition("= ")[2]) <= 0.05 else "not told apart")
+    differing = {frozenset(names.split(", ")) for names, *_, verdict in pairs if verdict.startswith("differ")}
+    for line in (line for line in lines if line.startswith("alike: ")):
+        assert not any(pair <= set(line.removeprefix("alike: ").split(", ")) for pair in differing)
+
+
+def test_a_fit_without_a_name_is_called_after_its_table(table):
+    import xosc_lateral as xl
+
+    assert xl.fit(table, model="two-level").name == "drives"
+    assert xl.fit(pd.read_parquet(table), model="two-level").name == "profile"
+
+
+def test_frames_are_data_frames_for_type_checkers_too():
+    import xosc_lateral as xl
+
+    results = [value for value in vars(xl).values() if isinstance(value, type) and hasattr(value, "to_frame")]
+    results += [xl.compare_profiles("rural", "motorway").__class__, xl.list_profiles().__class__]
+    assert all(get_type_hints(result.to_frame)["return"] is pd.DataFrame for result in results)
 
 
 def test_an_unknown_profile_is_answered_with_the_known_ones(capsys):

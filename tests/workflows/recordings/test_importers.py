@@ -22,8 +22,8 @@ from xosc_lateral.workflows.recordings.cuts import CutSettings, lane_changes, lo
 from xosc_lateral.workflows.recordings.importers.dlr_ht import import_dlr_ht, read_tracks
 from xosc_lateral.workflows.recordings.importers.levelx import import_levelx
 from xosc_lateral.workflows.recordings.importers.table import Imported
+from xosc_lateral.workflows.recordings.lane_graph import REACH, find_neighbours
 from xosc_lateral.workflows.recordings.lanes_from_tracks import fit_lane_centre
-from xosc_lateral.workflows.recordings.neighbours import REACH, find_neighbours
 from xosc_lateral.world.road.road_from_tracks import fit_reference_line
 
 # ---- neighbours and cuts ---------------------------------------------------------------------------------------------

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from xosc_lateral.workflows.recordings.lateral import lateral_plan
+from xosc_lateral.workflows.recordings.motion_fits import SHAPES
 from xosc_lateral.workflows.recordings.recorded import RecordedVehicle
-from xosc_lateral.workflows.recordings.transitions import SHAPES
 from xosc_lateral.world.scenario.enums import DynamicsShape
 
 WIDTH = 3.5

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
-from xosc_lateral.base.normal import MAD_TO_SD
+from xosc_lateral.base.numbers import MAD_TO_SD
 from xosc_lateral.drivers.drives.cuts import MAX_GAP, lane_steps
 from xosc_lateral.drivers.drives.drive import MarkingShares
 from xosc_lateral.drivers.drives.resampling import STEP

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.drives.cuts import HALF_WIDTH
 from xosc_lateral.drivers.model.jit_kernel import prepare
@@ -28,10 +29,7 @@ class Margins:
 
 
 def margins(offsets: Sequence[FloatArray], lane_widths: Sequence[FloatArray], step: float) -> Margins:
-    """Time near a marking and rate of excursions over several runs (offset and lane width [m] at an even step [s]).
-
-    Shape (n_i,) each.
-    """
+    """Time near a marking and rate of excursions over runs, shape (n_i,) each [m], at an even step [s]."""
     near = [np.abs(x) > 0.5 * w - NEAR_MARKING for x, w in zip(offsets, lane_widths, strict=True)]
     rows = sum(len(one) for one in near)
     entries = sum(int((one[1:] & ~one[:-1]).sum()) for one in near)
@@ -50,8 +48,8 @@ def time_to_line_crossing(
 ) -> FloatArray:
     """Time until the side that the vehicle moves towards reaches its marking, at constant lateral speed.
 
-    `offset` and `lane_width`, shape (..., m). [m] Returns shape (..., m - 1): 0 where the side is beyond the marking
-    already, at most `LONGEST_TLC`. [s]
+    0 where the side is beyond the marking already, at most `LONGEST_TLC`, shape (..., m - 1); from `offset` and
+    `lane_width`, shape (..., m).
     """
     speed = np.diff(offset, axis=-1) / step
     towards = np.sign(speed) * offset[..., 1:]
@@ -80,23 +78,11 @@ WANDERING_ZONE = 0.375
 def lane_keeping_indicators(
     offset: FloatArray, lane_width: FloatArray, step: float, *, half_width: float = HALF_WIDTH
 ) -> FloatArray:
-    """Indicators of each window.
+    """Indicators of each window, shape (n, 7), from `offset` and `lane_width`, shape (n, m >= 4) [m].
 
-    Parameters
-    ----------
-    offset, lane_width : array, shape (n, m)
-        One window a row, m >= 4. [m]
-    step : float
-        [s]
-    half_width : float
-        Of the vehicles. [m]
-
-    Returns
-    -------
-    array, shape (n, 7)
-        Columns as in `INDICATORS`, units as in `UNITS`: standard deviation of lateral position [1]_; smallest and
-        median time to line crossing [2]_; shares of time beyond the wandering zone of UN R157 [3]_ and near a marking;
-        root mean square of lateral acceleration and jerk, from differences of the offset (no steering in them).
+    Columns as in `INDICATORS`, units as in `UNITS`: standard deviation of lateral position [1]_; smallest and median
+    time to line crossing [2]_; shares of time beyond the wandering zone of UN R157 [3]_ and near a marking; root mean
+    square of lateral acceleration and jerk, from differences of the offset.
 
     References
     ----------
@@ -126,7 +112,7 @@ def lane_keeping_indicators(
 # The test's speed [m/s] and the length of its drive [s]: 100 km at 95 km/h [4]_.
 HIGHWAY_SPEED, HIGHWAY_DRIVE = 95.0 / 3.6, 3600.0
 HIGHWAY_DRIVES = 60  # Sampled drives: the standard error of an SDLP is below 0.5 % then.
-SHOWN_DRIVES = 20  # For a card: enough for two digits.
+WITHIN_DRIVER = 300.0  # Windows of which the deviation within one driver is taken besides. [s]
 NEAR_LINE = 0.2  # A side of the vehicle so near to a marking is near the line. [m]
 DRIFT, DRIFT_LASTS = 1.0, 8.0  # A lane drift is so far from the drive's mean [m] for so long [s] [5]_.
 
@@ -137,9 +123,8 @@ class LaneKeeping:
 
     References
     ----------
-    .. [4] J. C. Verster, T. Roth, "Standard operation procedures for conducting the on-the-road driving test, and
-       measurement of the standard deviation of lateral position (SDLP)", International J. of General Medicine 4, 2011,
-       pp. 359-371, doi:10.2147/IJGM.S19639.
+    .. [4] J. C. Verster, T. Roth, "Standard operation procedures for conducting the on-the-road driving test",
+       International J. of General Medicine 4, 2011, doi:10.2147/IJGM.S19639.
     .. [5] "Validating lane drifts as a predictive measure of drug or sleepiness induced driving impairment",
        Psychopharmacology, 2020: deviations of more than 100 cm from the mean for 8 s.
     """
@@ -151,13 +136,13 @@ class LaneKeeping:
     near_line: float  # Share of time with a side within `NEAR_LINE` of a marking or beyond. [-]
     drifts: float  # Lane drifts. [1/h]
     line_crossing: float  # Time to line crossing that is undercut in 5 % of the time. [s]
-    errors: Mapping[str, float] = field(default_factory=dict)  # Standard errors, from drive to drive, by field.
+    errors: Mapping[str, float] = field(default_factory=dict)  # Standard errors by field; empty: not known.
     limit_near_line: float = 0.0  # |offset| from which on a side is near the line. [m]
 
-    def line(self, name: str, unit: str, digits: int = 3) -> str:
-        """A figure with its 95 % interval."""
-        value, error = getattr(self, name), 1.96 * self.errors.get(name, 0.0)
-        return f"{value:.{digits}f} +- {error:.{digits}f}{unit and ' '}{unit}"
+    def line(self, name: str, unit: str = "", digits: int = 2) -> str:
+        """A figure with its 95 % interval, where that is known."""
+        interval = f" +- {NORMAL_95 * self.errors[name]:.{digits}f}" if name in self.errors else ""
+        return f"{getattr(self, name):.{digits}f}{interval}{unit and ' '}{unit}"
 
     @property
     def words(self) -> str:
@@ -165,8 +150,47 @@ class LaneKeeping:
         return (
             f"SDLP {self.line('sdlp', 'm')}, lane drifts {self.line('drifts', 'an hour', 1)}, "
             f"5 % of times to line crossing below {self.line('line_crossing', 's', 1)}, "
-            f"near a line {self.line('near_line', '')} of the time"
+            f"near a line {self.line('near_line', digits=3)} of the time"
         )
+
+
+@dataclass(frozen=True)
+class MovementSummary:
+    """What a profile does in even traffic, in figures that a person can picture."""
+
+    mean_offset: float  # Positive: left of the lane centre. [m]
+    spread: float  # Standard deviation over all drivers and times. [m]
+    spread_within: float  # Mean standard deviation of one driver over 5 min. [m]
+    low: float  # 5 % and 95 % quantile. [m]
+    high: float  # 5 % and 95 % quantile. [m]
+    lateral_speed: float  # Root mean square. [m/s]
+
+
+def summarise(drives: FloatArray, step: float) -> MovementSummary:
+    """Sum up drives, shape (drivers, n) [m], with rows `step` seconds apart."""
+    low, high = np.quantile(drives, [0.05, 0.95])
+    rows = min(round(WITHIN_DRIVER / step), drives.shape[1])
+    windows = drives[:, : drives.shape[1] // rows * rows].reshape(-1, rows)
+    return MovementSummary(
+        mean_offset=float(drives.mean()),
+        spread=float(drives.std()),
+        spread_within=float(windows.std(axis=1).mean()),
+        low=float(low),
+        high=float(high),
+        lateral_speed=float(np.sqrt((np.diff(drives, axis=1) ** 2).mean()) / step),
+    )
+
+
+def figures_of(
+    profile: DriverProfile, seed: int = 0, drives: FloatArray | None = None
+) -> tuple[MovementSummary, LaneKeeping]:
+    """The figures by which a profile is known everywhere, of one set of sampled drives in even traffic."""
+    drives, step = highway_drives(profile, seed) if drives is None else drives, profile.model.step
+    known = profile.provenance
+    recorded = None
+    if known.hours > 0.0 and known.drives and "derived_from" not in known.fit:
+        recorded = (3600.0 * known.hours, known.drives)
+    return summarise(drives, step), lane_keeping(drives, profile.lane_width, step, recorded=recorded)
 
 
 def highway_drives(
@@ -179,40 +203,46 @@ def highway_drives(
     return np.array([sample_offsets(profile, segment, child(root, k)) for k in range(drives)])
 
 
-def keeping_of(profile: DriverProfile, seed: int = 0) -> LaneKeeping:
-    """Lane keeping of a profile in even traffic, from `SHOWN_DRIVES` drives: the errors include that they are few."""
-    drives = highway_drives(profile, seed, drives=SHOWN_DRIVES)
-    return lane_keeping(drives, profile.lane_width, profile.model.step)
+def lane_keeping(
+    drives: FloatArray,
+    lane_width: float,
+    step: float,
+    *,
+    half_width: float | None = None,
+    recorded: tuple[float, int] | None = None,
+) -> LaneKeeping:
+    """Measure drives, shape (drives, n) [m], in a lane of a width [m], with rows `step` seconds apart.
 
-
-def lane_keeping(drives: FloatArray, lane_width: float, step: float, *, half_width: float | None = None) -> LaneKeeping:
-    """Measure drives, shape (drives, n) [m], in a lane of a width [m], with rows `step` seconds apart."""
+    The errors say how far the figures of as much recorded driving (seconds, drives) would differ if it were driven
+    again: as far as stretches of that length differ from drive to drive. Without `recorded` there are none.
+    """
     half_width = HALF_WIDTH if half_width is None else half_width
-    mean = drives.mean(axis=1)
-    within = drives - mean[:, None]
-    variance = (within**2).mean(axis=1)
-    squared_speed = (np.diff(drives, axis=1) ** 2).mean(axis=1) / step**2
+    within = drives - drives.mean(axis=1, keepdims=True)
     limit = 0.5 * lane_width - half_width - NEAR_LINE
     crossing = time_to_line_crossing(drives, np.full_like(drives, lane_width), step, half_width=half_width)
-    single = {
-        "mean": mean,
-        "near_line": (np.abs(drives) > limit).mean(axis=1),
-        "drifts": np.array([_drifts(one, step) for one in within]) / (drives.shape[1] * step / 3600.0),
-        "line_crossing": np.quantile(crossing, 0.05, axis=1),
-    }
-    sdlp, restlessness = float(np.sqrt(variance.mean())), float(np.sqrt(squared_speed.mean()))
-    of_mean = {name: _error(values) for name, values in single.items()}
-    of_roots = {"sdlp": _error(variance) / (2.0 * sdlp or 1.0), "restlessness": _error(squared_speed)}
-    of_roots["restlessness"] /= 2.0 * restlessness or 1.0
-    means = {name: float(values.mean()) for name, values in single.items()}
-    memory = _memory(within, step)
-    return LaneKeeping(
-        sdlp, restlessness=restlessness, memory=memory, errors=of_mean | of_roots, limit_near_line=limit, **means
-    )
 
+    def by_drive(rows: int) -> dict[str, FloatArray]:
+        return {
+            "mean": drives[:, :rows].mean(axis=1),
+            "near_line": (np.abs(drives[:, :rows]) > limit).mean(axis=1),
+            "drifts": np.array([_drifts(deviation[:rows], step) for deviation in within]) / (rows * step / 3600.0),
+            "line_crossing": np.quantile(crossing[:, :rows], 0.05, axis=1),
+            "sdlp": (within[:, :rows] ** 2).mean(axis=1),  # squares, until they are averaged
+            "restlessness": (np.diff(drives[:, :rows], axis=1) ** 2).mean(axis=1) / step**2,
+        }
 
-def _error(values: FloatArray) -> float:
-    return float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else 0.0
+    figures = {name: float(values.mean()) for name, values in by_drive(drives.shape[1]).items()}
+    for name in ("sdlp", "restlessness"):
+        figures[name] = float(np.sqrt(figures[name]))
+    errors = {}
+    if recorded is not None and len(drives) > 1:
+        seconds, count = recorded
+        rows = min(max(round(seconds / count / step), 2), drives.shape[1])
+        stretches = max(seconds / (rows * step), 1.0)
+        errors = {name: float(values.std(ddof=1)) / stretches**0.5 for name, values in by_drive(rows).items()}
+        for name in ("sdlp", "restlessness"):
+            errors[name] /= 2.0 * figures[name] or 1.0
+    return LaneKeeping(**figures, memory=_memory(within, step), errors=errors, limit_near_line=limit)
 
 
 def _drifts(deviation: FloatArray, step: float) -> int:

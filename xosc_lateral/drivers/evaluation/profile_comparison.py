@@ -9,25 +9,23 @@ from itertools import combinations
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.evaluation.distances import wasserstein
-from xosc_lateral.drivers.evaluation.lane_keeping import SHOWN_DRIVES, LaneKeeping, highway_drives, lane_keeping
+from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, MovementSummary, figures_of, highway_drives
 from xosc_lateral.drivers.evaluation.metrics import (
     DRIVERS,
     DURATION,
     METRICS,
-    MovementSummary,
     cut_snippets,
     free_runs,
     snippet_metrics,
-    summarise,
+    wasserstein,
 )
 from xosc_lateral.drivers.evaluation.scores import SNIPPET
-from xosc_lateral.drivers.evaluation.sizes import LEVEL, Difference, Sizes, differences, sizes_of_samples
+from xosc_lateral.drivers.evaluation.sizes import LEVEL, Difference, Sizes, differences, sizes_of_samples, surest
 from xosc_lateral.drivers.evaluation.spectra import Spectrum, spectrum
 from xosc_lateral.drivers.model.profile import DriverProfile
 
 HALVINGS, HALVING_COUNT_AND_SHARE = 40, 0.95
-"""Random halves of a profile's drivers, and how many of them are no further apart than the 95 % quantile. [-]"""
+"""Random halves of a profile's drivers, and how many of them are no further apart than what counts as alike. [-]"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -35,15 +33,12 @@ class ComparedProfile:
     """A profile and its free runs in even traffic."""
 
     profile: DriverProfile
-    runs: FloatArray
-    """Shape (drivers, n). [m]"""
+    runs: FloatArray  # Shape (drivers, n). [m]
     summary: MovementSummary
     keeping: LaneKeeping
+    measured: Sizes | None  # Of the drives that it was fitted on, where it knows them.
+    sampled: Sizes  # Of its own drives, as sure as if it had been fitted on such.
     spectrum: Spectrum
-    measured: Sizes | None
-    """Of the drives that it was fitted on, where it knows them."""
-    sampled: Sizes
-    """Of its own drives, as sure as if it had been fitted on such."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -57,17 +52,20 @@ class Compared:
         Wasserstein distance per metric, in standard deviations over all profiles' snippets. On the diagonal: of a
         profile from itself, as much driving as it was fitted on from as much other driving, half of its drivers at
         most, where the mean over the metrics is the 95 % quantile of random choices.
+    scale : array, shape (10,)
+        Those standard deviations. [m]
     seed : int
     """
 
     profiles: tuple[ComparedProfile, ...]
     metrics: FloatArray
+    scale: FloatArray
     seed: int
 
     @property
     def names(self) -> list[str]:
         """Of the profiles."""
-        return [one.profile.name for one in self.profiles]
+        return [each.profile.name for each in self.profiles]
 
     @property
     def distance(self) -> FloatArray:
@@ -76,13 +74,9 @@ class Compared:
 
     @property
     def floors(self) -> FloatArray:
-        """How far apart two profiles of one driver may be, shape (k, k): root mean square of both from themselves. [-]
-
-        From itself is one piece of its free runs from another, each as long as the drives that it was fitted on, at
-        most half of them: so far apart are two profiles of one driver by the chance of what was recorded.
-        """
-        own = np.diag(self.distance)
-        return np.sqrt(0.5 * (own[:, None] ** 2 + own[None, :] ** 2))
+        """Up to which distance two profiles are alike, shape (k, k): root mean square of both from themselves. [-]"""
+        itself = np.diag(self.distance)
+        return np.sqrt(0.5 * (itself[:, None] ** 2 + itself[None, :] ** 2))
 
     @property
     def differences(self) -> dict[tuple[str, str], list[Difference]]:
@@ -91,13 +85,11 @@ class Compared:
 
     @property
     def groups(self) -> tuple[tuple[str, ...], ...]:
-        """Profiles that are alike (average linkage): they differ by no more than two fits of one driver do."""
+        """Profiles that are alike, each with each (complete linkage): they differ no more than two fits of a driver."""
         from scipy.cluster.hierarchy import fcluster, linkage
-        from scipy.stats import norm
 
-        p_values = [min((part.p_value for part in parts), default=1.0) for parts in self.differences.values()]
-        apart = norm.isf(0.5 * np.array(p_values)) / norm.isf(0.5 * LEVEL)
-        labels = fcluster(linkage(apart, "average"), 1.0, "distance")
+        apart = np.array([surest(parts) for parts in self.differences.values()])
+        labels = fcluster(linkage(1.0 - apart, "complete"), 1.0 - LEVEL, "distance")
         names = self.names
         return tuple(tuple(names[k] for k in np.flatnonzero(labels == label)) for label in dict.fromkeys(labels))
 
@@ -110,34 +102,33 @@ def _between(one: ComparedProfile, two: ComparedProfile) -> list[Difference]:
 
 def compare(profiles: Sequence[DriverProfile], seed: int) -> Compared:
     """Sample every profile in even traffic and measure each against each; the first's luck is no other's."""
-    found = []
+    compared = []
     for number, profile in enumerate(profiles):
-        runs, step = free_runs(profile, seed + number), profile.model.step
-        drives = highway_drives(profile, seed + number, drives=SHOWN_DRIVES)
-        own = summarise(runs, step), lane_keeping(drives, profile.lane_width, step), spectrum(list(runs), step)
+        runs, drives, step = free_runs(profile, seed + number), highway_drives(profile, seed), profile.model.step
         known = profile.provenance.fit
         measured = None if "derived_from" in known else Sizes.from_dict(known.get("sizes", {}))
         sampled = sizes_of_samples(drives, step, *_fitted_drives(profile))
-        found.append(ComparedProfile(profile, runs, *own, measured, sampled))
-    return Compared(tuple(found), _distances(found, seed), seed)
+        figures = figures_of(profile, seed, drives)
+        compared.append(ComparedProfile(profile, runs, *figures, measured, sampled, spectrum(list(runs), step)))
+    return Compared(tuple(compared), *_distances(compared, seed), seed)
 
 
-def _distances(profiles: Sequence[ComparedProfile], seed: int) -> FloatArray:
-    """Distance per metric in standard deviations, shape (k, k, metrics); the diagonal is between halves. [-]"""
+def _distances(profiles: Sequence[ComparedProfile], seed: int) -> tuple[FloatArray, FloatArray]:
+    """Distance per metric in standard deviations, shape (k, k, metrics), and these [m]; the diagonal is of halves."""
     drivers = [
-        [snippet_metrics(cut_snippets(run, round(SNIPPET / one.profile.model.step) + 1)) for run in one.runs]
-        for one in profiles
+        [snippet_metrics(cut_snippets(run, round(SNIPPET / each.profile.model.step) + 1)) for run in each.runs]
+        for each in profiles
     ]
-    pooled = [np.concatenate(own) for own in drivers]
+    pooled = [np.concatenate(metrics) for metrics in drivers]
     scale = np.concatenate(pooled).std(axis=0)
     scale = np.where(scale > 0.0, scale, 1.0)
-    found = np.empty((len(profiles), len(profiles), len(METRICS)))
-    for one in range(len(profiles)):
-        fitted = round(_fitted_drives(profiles[one].profile)[1] / DURATION)
-        found[one, one] = _from_itself(drivers[one], fitted, scale, np.random.default_rng([seed, one]))
-        for other in range(one):
-            found[one, other] = found[other, one] = _per_metric(pooled[one], pooled[other]) / scale
-    return found
+    distances = np.empty((len(profiles), len(profiles), len(METRICS)))
+    for row in range(len(profiles)):
+        fitted = round(_fitted_drives(profiles[row].profile)[1] / DURATION)
+        distances[row, row] = _from_itself(drivers[row], fitted, scale, np.random.default_rng([seed, row]))
+        for column in range(row):
+            distances[row, column] = distances[column, row] = _per_metric(pooled[row], pooled[column]) / scale
+    return distances, scale
 
 
 def _fitted_drives(profile: DriverProfile) -> tuple[int, float]:
@@ -151,13 +142,13 @@ def _fitted_drives(profile: DriverProfile) -> tuple[int, float]:
 def _from_itself(drivers: Sequence[FloatArray], fitted: int, scale: FloatArray, rng: np.random.Generator) -> FloatArray:
     """Distance per metric, shape (10,), between those random pieces that are further apart than 95 % of them."""
     count = min(max(fitted, 1), len(drivers) // 2)
-    found = []
+    distances = []
     for _ in range(HALVINGS):
         order = rng.permutation(len(drivers)).tolist()
         half, rest = order[:count], order[-count:]
-        found.append(_per_metric(*(np.concatenate([drivers[k] for k in part]) for part in (half, rest))) / scale)
-    means = [float(gaps.mean()) for gaps in found]
-    return found[int(np.argsort(means)[round(HALVING_COUNT_AND_SHARE * (HALVINGS - 1))])]
+        distances.append(_per_metric(*(np.concatenate([drivers[k] for k in part]) for part in (half, rest))) / scale)
+    means = [float(gaps.mean()) for gaps in distances]
+    return distances[int(np.argsort(means)[round(HALVING_COUNT_AND_SHARE * (HALVINGS - 1))])]
 
 
 def _per_metric(one: FloatArray, other: FloatArray) -> FloatArray:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from math import isfinite
 from typing import Any
 
-from xosc_lateral.base.digits import all_significant, significant
+from xosc_lateral.base.numbers import all_significant, significant
 from xosc_lateral.drivers.evaluation.lane_keeping import UNITS, Margins
 from xosc_lateral.drivers.evaluation.realism import Beside, ConditionScores, VarianceParts
 from xosc_lateral.drivers.evaluation.scores import LAGS, ProfileScores, SnippetScores

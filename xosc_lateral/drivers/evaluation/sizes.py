@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IndexArray
-from xosc_lateral.base.normal import NORMAL_95
+from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.drivers.drives.drive import Run
 
 QUANTITIES = ("mean offset", "slow movement", "fast movement")  # Of the movements the standard deviation.
@@ -154,3 +154,8 @@ def differences(first: Sizes, second: Sizes) -> list[Difference]:
         Difference(QUANTITIES[k], float(size[k]), float(error[k]), least * float(error[k]), float(p_value))
         for k, p_value in zip(known, p_values, strict=True)
     ]
+
+
+def surest(parts: Sequence[Difference]) -> float:
+    """Smallest p-value, 1 where nothing is known of both. [-]"""
+    return min((part.p_value for part in parts), default=1.0)

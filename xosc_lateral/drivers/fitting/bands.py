@@ -8,8 +8,8 @@ import numpy as np
 from msgspec.structs import replace
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.digits import all_significant, significant
 from xosc_lateral.base.errors import DriverProfileError
+from xosc_lateral.base.numbers import all_significant, significant
 from xosc_lateral.drivers.drives.drive import Drive, Run
 from xosc_lateral.drivers.drives.resampling import PASS_BAND_EDGES, STEP
 from xosc_lateral.drivers.fitting.fast_part import (

@@ -28,8 +28,8 @@ import numpy as np
 from msgspec.structs import replace
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.digits import all_significant, significant
 from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
+from xosc_lateral.base.numbers import all_significant, significant
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.filters import filtered, low_pass_between
 from xosc_lateral.drivers.drives.periodogram import Detrend, periodograms

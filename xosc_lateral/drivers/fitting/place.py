@@ -14,8 +14,8 @@ import numpy as np
 from msgspec.structs import replace as with_fields
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
-from xosc_lateral.base.digits import all_significant
 from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.base.numbers import all_significant
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.fitting.answers import NEIGHBOURS, SCALE, cluster_robust_slopes, most_beside, neighbour_shapes

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from xosc_lateral.base.normal import NORMAL_95
+from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.base.plugins import defined_in
 from xosc_lateral.drivers.loop import terms
 from xosc_lateral.drivers.loop.model import Fitted, Stage, Term

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from xosc_lateral.base.jit import njit
+from xosc_lateral.base.lazy import njit
 
 WORTH_IMPORTING = 50_000
 """Loop steps from which on numba is imported for them: three hours of driving. Who samples that much does so often."""

@@ -52,7 +52,7 @@ class Beside(Record, frozen=True):
 
 
 POPULATION = {side: Beside(Basis.POPULATION) for side in SIDES}
-"""Of profiles whose effects are of the recording that the law of `conversion.give_way` was measured in."""
+"""Of profiles whose effects are of the recording that the law of `surroundings.give_way` was measured in."""
 
 
 class Provenance(Record, frozen=True):

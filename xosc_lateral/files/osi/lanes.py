@@ -9,23 +9,16 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.files.osi.extra import osi
+from xosc_lateral.files.osi import osi
 from xosc_lateral.world.road.geometry import simplify
 from xosc_lateral.world.road.lanes import DRIVING, Lane, LaneSection, beside
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.road.positions import RoadMark
 
-STEP = 1.0
-"""Between two points of a line before it is simplified. [m]"""
-
-TOLERANCE = 2.5e-4
-"""Points that change a line by less are left out. [m]"""
-
-BEFORE_END = 1e-6
-"""The last point of a section lies this much before its end, where the next one begins. [m]"""
-
-Piece = tuple[int, int, int]
-"""Road, lane section, lane."""
+STEP = 1.0  # between two points of a line before it is simplified [m]
+TOLERANCE = 2.5e-4  # points that change a line by less are left out [m]
+BEFORE_END = 1e-6  # the last point of a section lies this much before its end, where the next one begins [m]
+Piece = tuple[int, int, int]  # road, lane section, lane
 
 SUBTYPES: Mapping[str, str] = {
     **dict.fromkeys(("driving", "bidirectional", "HOV", "bus", "taxi"), "NORMAL"),

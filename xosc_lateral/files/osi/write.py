@@ -16,7 +16,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.version import __version__
 from xosc_lateral.files.atomic import replace_atomically
-from xosc_lateral.files.osi.extra import SUFFIXES, osi
+from xosc_lateral.files.osi import SUFFIXES, osi
 from xosc_lateral.files.osi.lanes import RoadIds, write_lanes
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion, axes
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
@@ -26,8 +26,7 @@ from xosc_lateral.world.scenario.enums import EntityCategory, VehicleCategory
 from xosc_lateral.world.scenario.private_actions import LightStateAction
 
 TOPIC = "ground_truth"
-VERSION = (3, 8, 0)
-"""Of OSI, that is written."""
+VERSION = (3, 8, 0)  # of OSI, that is written
 
 NANOSECONDS = 1_000_000_000
 
@@ -63,11 +62,9 @@ def write_osi(
 ) -> Path:
     """Write a trace, ``.mcap``, or ``.osi`` (messages alone); same motion, same bytes.
 
-    Raises `FormatError`: another suffix; `XoscLateralError`: the extra `osi` is not installed; `OSError`: the file
-    can't be written; it is as it was then.
-
-    `trajectories`: one per entity, in its order, where they are not the nominal ones. `host`: entity that is the host
-    vehicle; without it the trace has none. `description`: for the metadata of the file.
+    `trajectories`: one per entity, where they are not the nominal ones. `host`: entity that is the host vehicle;
+    without it the trace has none. `description`: for the file's metadata. Raises `FormatError`, `XoscLateralError`,
+    `OSError`.
     """
     if path.suffix.lower() not in SUFFIXES:
         raise FormatError(f"an OSI trace ends in {' or '.join(SUFFIXES)}", path=path)

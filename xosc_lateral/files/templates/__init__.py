@@ -6,19 +6,104 @@ They lie as plain files in the top-level folder ``templates``, where anybody can
 
 from __future__ import annotations
 
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from xml.sax.saxutils import quoteattr, unescape
 
-from xosc_lateral.base.errors import XoscLateralError, did_you_mean
+from xosc_lateral.base.errors import FormatError, XoscLateralError, did_you_mean
 from xosc_lateral.base.plugins import plugins
 from xosc_lateral.base.shipped import shipped_folder
-from xosc_lateral.files.templates.plain import PlainTemplate, plain_templates
+from xosc_lateral.files.templates.parameter import Declared
 from xosc_lateral.files.templates.plots import TEMPLATES
 from xosc_lateral.files.templates.template import Template
 
 __all__ = ["TEMPLATES", "AnyTemplate", "PlainTemplate", "Template", "all_templates", "find_template"]
 
-GROUP = "xosc_lateral.templates"
-"""Entry points of further templates."""
+GROUP = "xosc_lateral.templates"  # entry points of further templates
+
+SCENARIO, ROAD = ".xosc", ".xodr"
+
+# A comment (to be left alone), or a declaration; a value may hold ">", which ends no tag there.
+_COMMENT_OR_DECLARATION = re.compile(
+    r"""<!--.*?-->|<ParameterDeclaration\b(?:[^>"']|"[^"]*"|'[^']*')*>""",
+    re.DOTALL,
+)
+_ATTRIBUTE = re.compile(r"""(?P<name>[\w:.-]+)(?P<equals>\s*=\s*)(?P<quoted>"[^"]*"|'[^']*')""")
+
+
+@dataclass(frozen=True)
+class PlainTemplate:
+    """A scenario file and the road beside it."""
+
+    path: Path  # the scenario; the road has the same name
+
+    @property
+    def name(self) -> str:
+        """As on the command line, and of the files."""
+        return self.path.stem
+
+    @property
+    def summary(self) -> str:
+        """The description in its header."""
+        header = self._root.find("FileHeader")
+        return "" if header is None else header.get("description", "")
+
+    @property
+    def parameters(self) -> tuple[Declared, ...]:
+        """What the scenario declares."""
+        return tuple(
+            Declared(one.get("name", ""), one.get("value", ""), one.get("parameterType", "string"))
+            for one in self._root.iterfind("ParameterDeclarations/ParameterDeclaration")
+        )
+
+    def files(self, chosen: Mapping[str, str] | None = None) -> dict[str, str]:
+        """File name -> text of the scenario, with the chosen values as declared ones, and of its road."""
+        by_name = {parameter.name: parameter for parameter in self.parameters}
+        text = self._text
+        for name, value in (chosen or {}).items():
+            if name not in by_name:
+                raise XoscLateralError(
+                    f"unknown setting {name!r}{did_you_mean(name, by_name)}; "
+                    f"there are {', '.join(sorted(by_name)) or 'none'}"
+                )
+            text = _declared(text, name, by_name[name].read(value))
+        return {self.path.name: text, f"{self.name}{ROAD}": self.path.with_suffix(ROAD).read_text(encoding="utf-8")}
+
+    @cached_property
+    def _text(self) -> str:
+        return self.path.read_text(encoding="utf-8")
+
+    @cached_property
+    def _root(self) -> ET.Element:
+        try:
+            return ET.fromstring(self._text)
+        except ET.ParseError as error:
+            raise FormatError(f"not XML: {error}", path=self.path) from error
+
+
+def plain_templates(folder: Path) -> Iterator[PlainTemplate]:
+    """Scenarios of a folder that have a road of their name beside them, by name."""
+    for path in sorted(folder.glob(f"*{SCENARIO}")):
+        if path.with_suffix(ROAD).is_file():
+            yield PlainTemplate(path)
+
+
+def _declared(text: str, name: str, value: str) -> str:
+    """The text with another value of a declared parameter; all else, comments and layout, stays."""
+    for found in _COMMENT_OR_DECLARATION.finditer(text):
+        attributes = {one["name"]: one["quoted"][1:-1] for one in _ATTRIBUTE.finditer(found[0])}
+        if found[0].startswith("<!--") or unescape(attributes.get("name", "")) != name:
+            continue
+        replaced = _ATTRIBUTE.sub(
+            lambda one: one["name"] + one["equals"] + quoteattr(value) if one["name"] == "value" else one[0], found[0]
+        )
+        return text[: found.start()] + replaced + text[found.end() :]
+    raise AssertionError("it is among the parsed declarations")
+
 
 AnyTemplate = Template | PlainTemplate
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import time
+import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
@@ -16,7 +17,7 @@ from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.base.signals import deferring_signals
 from xosc_lateral.base.version import BEHAVIOUR, __version__
 from xosc_lateral.files.atomic import files_of_run, temporary_files
-from xosc_lateral.files.hashes import file_hash, file_state
+from xosc_lateral.files.source import file_hash, file_state
 from xosc_lateral.workflows.batch.guard import JobLimitError, JobLimits, within_limits
 from xosc_lateral.workflows.batch.jobs import Batch, Job
 from xosc_lateral.workflows.batch.journal import Journal, folder_lock
@@ -48,16 +49,12 @@ class JobState(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class JobOutcome:
-    """What became of a job.
-
-    `row`: as in the manifest; `seconds`: the conversion took. [s]; `why`: why an output that was there is made anew, or
-    would be; empty: there was none.
-    """
+    """What became of a job."""
 
     state: JobState
     row: ManifestRow
-    seconds: float
-    why: str = ""
+    seconds: float  # the conversion took
+    why: str = ""  # why an output that was there is made anew, or would be
 
 
 PROGRAM, SETTINGS, INPUTS = "another version made it", "settings differ", "inputs changed"
@@ -85,129 +82,96 @@ def convert_many(
     The outputs, and the manifest written at the end, do not depend on the number of workers, on the order, or on how
     often the run was interrupted. To stop early, close the iterator: what is finished is kept.
 
-    Parameters
-    ----------
-    batch : Batch
-        From `plan_batch`.
-    workers : int
-        Processes on this machine; -1: one per core; 0: this process itself, which a scenario can then take down.
-    cluster : str, optional
-        Address of a dask.distributed scheduler: its workers are used instead.
-    again : bool
-        Convert also what is up to date.
-    keep_old : bool
-        Leave outputs as they are whose inputs, settings or program have changed since.
-    converter : callable, optional
-        In place of `convert_job`; has to be picklable.
-    limits : JobLimits, optional
-        What one job may take.
-    notify : callable, optional
-        Gets a line for what a user has to know besides the outcomes (a manifest that can't be read, say).
+    - `workers`: processes on this machine; -1: one per core; 0: this process itself, which a scenario can then take
+      down; `cluster`: address of a dask.distributed scheduler, whose workers are used instead
+    - `again`: convert also what is up to date; `keep_old`: leave outputs whose inputs, settings or program have changed
+    - `converter`: in place of `convert_job`; has to be picklable; `limits`: what one job may take
+    - `notify`: gets a line for what a user has to know besides the outcomes (a manifest that can't be read, say)
 
-    Raises
-    ------
-    FolderInUseError
-        Another run writes into the folder.
-    BatchStoppedError
-        The folder can't be written, the disk is full. Everything finished so far is kept.
-    ClusterError
-        The cluster can't be reached, is gone, or its workers have another version of this package.
-
-    Examples
-    --------
-    >>> batch = plan_batch(["scenarios/"], "enriched/", variants=3)
-    >>> failed = [outcome.row for outcome in convert_many(batch, workers=-1) if outcome.row.error]
+    Raises `FolderInUseError`: another run writes into the folder; `BatchStoppedError`: the folder can't be written, the
+    disk is full; `ClusterError`: the cluster can't be reached, is gone, or has another version of this package.
     """
     if converter is None:
         from xosc_lateral.workflows.batch.convert_job import convert_job
 
         converter = convert_job
+    run = _Run(batch, partial(_run_job, converter, limits or JobLimits()), workers, cluster, again, keep_old)
+    new = [folder for folder in (batch.folder, *batch.folder.parents) if not folder.exists()]
     try:
-        yield from _outcomes(
-            batch, partial(_run, converter, limits or JobLimits()), workers, cluster, again, keep_old, notify or _silent
-        )
+        try:
+            yield from run.outcomes(notify or (lambda line: None))
+        except OSError as error:
+            if error.errno not in (errno.EROFS, errno.EACCES) or again:
+                raise
+            done = list(run.up_to_date())
+            if len(done) < len(batch):
+                raise
+            yield from done
     except OSError as error:
         where = error.filename or batch.folder
         raise BatchStoppedError(f"{where}: {error.strerror or error}; {_GOES_ON}") from error
-
-
-def _silent(_: str) -> None:
-    pass
-
-
-def _outcomes(
-    batch: Batch,
-    work: Callable[[str, Job], _Reply],
-    workers: int,
-    cluster: str | None,
-    again: bool,
-    keep_old: bool,
-    notify: Callable[[str], None],
-) -> Iterator[JobOutcome]:
-    state = batch.folder / STATE
-    new = [folder for folder in (batch.folder, *batch.folder.parents) if not folder.exists()]
-    try:
-        yield from _locked(batch, work, workers, cluster, again, keep_old, notify, state)
-    except OSError as error:
-        if error.errno not in (errno.EROFS, errno.EACCES) or again:
-            raise
-        done = list(_up_to_date(batch))
-        if len(done) < len(batch):
-            raise
-        yield from done
     finally:
-        _remove_empty([state, *new])
+        _remove_empty([run.state, *new])
 
 
-def _locked(
-    batch: Batch,
-    work: Callable[[str, Job], _Reply],
-    workers: int,
-    cluster: str | None,
-    again: bool,
-    keep_old: bool,
-    notify: Callable[[str], None],
-    state: Path,
-) -> Iterator[JobOutcome]:
-    with (
-        folder_lock(state / "lock") as runs,
-        _sweeping(batch.folder, runs),
-        Journal(batch.folder, state / "journal.jsonl", notify) as journal,
-    ):
-        todo, anew = [], {}
-        failed: set[Path] = set()
-        for job in batch.jobs:
-            former = journal.row(job.name) if job.name in journal else None
-            why = _why_anew(job, former, "" if former is None else journal.timing(job.name).state)
-            if former is not None and not again and (not why or (keep_old and why in CHANGES)):
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """A batch, what makes a job of it, and how."""
+
+    batch: Batch
+    work: Callable[[str, Job], _Reply]
+    workers: int
+    cluster: str | None
+    again: bool
+    keep_old: bool
+
+    @property
+    def state(self) -> Path:
+        return self.batch.folder / STATE
+
+    def outcomes(self, notify: Callable[[str], None]) -> Iterator[JobOutcome]:
+        batch = self.batch
+        with (
+            folder_lock(self.state / "lock") as runs,
+            _sweeping(batch.folder, runs),
+            Journal(batch.folder, self.state / "journal.jsonl", notify) as journal,
+        ):
+            todo: dict[str, tuple[Job, str]] = {}
+            failed: set[Path] = set()
+            for job in batch.jobs:
+                former = journal.row(job.name) if job.name in journal else None
+                why = _why_anew(job, former, "" if former is None else journal.timing(job.name).state)
+                if former is None or self.again or (why and not (self.keep_old and why in CHANGES)):
+                    todo[job.name] = job, why
+                    continue
                 row = replace(former, error="", stale=bool(why))
                 if row != former:
                     journal.add(row, journal.timing(job.name))
                 yield JobOutcome(JobState.KEPT if why else JobState.UP_TO_DATE, row, 0.0, why)
-            else:
-                todo.append(job)
-                anew[job.name] = why
-        if todo:
-            with deferring_signals(), open_pool(min(workers, len(todo)), cluster) as pool:
-                for job, reply in run_tasks(pool, partial(work, runs[0]), todo):
-                    outcome = _noted(job, reply, journal, anew[job.name])
-                    failed |= {job.output.parent} if outcome.row.error else set()
-                    yield outcome
-        _forget_missing(batch, journal)
-        with files_of_run(runs[0]):
-            journal.finish()
-        _remove_empty(
-            place for folder in failed for place in (folder, *folder.parents) if batch.folder in place.parents
-        )
+            if todo:
+                with deferring_signals(), open_pool(min(self.workers, len(todo)), self.cluster) as pool:
+                    jobs = (job for job, _ in todo.values())
+                    for job, reply in run_tasks(pool, partial(self.work, runs[0]), jobs):
+                        outcome = _noted(job, reply, journal, todo[job.name][1])
+                        failed |= {job.output.parent} if outcome.row.error else set()
+                        yield outcome
+            planned = {job.name for job in batch.jobs}
+            for output in journal:  # rows of former runs stay as long as their output does
+                if output not in planned and not (batch.folder / output).is_file():
+                    journal.forget(output)
+            with files_of_run(runs[0]):
+                journal.finish()
+            _remove_empty(
+                place for folder in failed for place in (folder, *folder.parents) if batch.folder in place.parents
+            )
 
-
-def _up_to_date(batch: Batch) -> Iterator[JobOutcome]:
-    """Jobs with nothing to do, in a folder that can't be written."""
-    rows = {row.output: row for row in read_manifest(batch.folder / MANIFEST)}
-    for job in batch.jobs:
-        row = rows.get(job.name)
-        if row is not None and not row.error and not row.stale and not _why_anew(job, row, ""):
-            yield JobOutcome(JobState.UP_TO_DATE, row, 0.0)
+    def up_to_date(self) -> Iterator[JobOutcome]:
+        """Jobs with nothing to do, in a folder that can't be written."""
+        rows = {row.output: row for row in read_manifest(self.batch.folder / MANIFEST)}
+        for job in self.batch.jobs:
+            row = rows.get(job.name)
+            if row is not None and not row.error and not row.stale and not _why_anew(job, row, ""):
+                yield JobOutcome(JobState.UP_TO_DATE, row, 0.0)
 
 
 def _remove_empty(folders: Iterable[Path]) -> None:
@@ -228,7 +192,7 @@ class _Reply:
     """`file_state` of the output."""
 
 
-def _run(converter: Converter, limits: JobLimits, run: str, job: Job) -> _Reply:
+def _run_job(converter: Converter, limits: JobLimits, run: str, job: Job) -> _Reply:
     """One job, in a worker. Whatever goes wrong with this one scenario ends up in its row."""
     start = time.perf_counter()
     if job.package_version != __version__:  # a worker of a cluster that came later
@@ -239,14 +203,14 @@ def _run(converter: Converter, limits: JobLimits, run: str, job: Job) -> _Reply:
             row = job.row(job.error) if job.error else within_limits(converter, job, limits)
     except JobLimitError as error:
         row = job.row(f"{job.source}: {error}")
-    except OSError as error:
-        if error.errno in _STOPPING:
+    except (XoscLateralError, OSError) as error:
+        if isinstance(error, OSError) and error.errno in _STOPPING:
             return _Reply(job.row(str(error)), 0.0, f"{job.output}: {error.strerror or error}")
-        row = job.row(_one_line(error))
-    except XoscLateralError as error:
-        row = job.row(_one_line(error))
+        row = job.row(" ".join(str(error).split()))
     except Exception as error:  # a bug of ours must not cost the other ten thousand; the row says that it is one
-        row = job.row(f"{job.source}: internal error: {type(error).__name__}: {_one_line(error)}{_origin(error)}")
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        what = f"{type(error).__name__}: {' '.join(str(error).split())} ({Path(place.filename).name}:{place.lineno})"
+        row = job.row(f"{job.source}: internal error: {what}")
     written = not row.error and job.page is None  # while a page is written, much can happen to an output
     return _Reply(row, time.perf_counter() - start, state=file_state(job.output) if written else "")
 
@@ -257,16 +221,12 @@ def _noted(job: Job, reply: _Reply | WorkerDiedError, journal: Journal, why: str
     if reply.stop:
         raise BatchStoppedError(f"{reply.stop}; {_GOES_ON}")
     row = reply.row
-    if row.error and job.name in journal:
-        row = _kept_row(job, journal.row(job.name), row)
+    if row.error and job.name in journal:  # what the output of a former run was made of, and why not now
+        former = journal.row(job.name)
+        if former.output_sha256 and _are({job.output: former.output_sha256}):
+            row = replace(former, error=row.error, stale=True)
     journal.add(row, Timing(reply.seconds, reply.state))
     return JobOutcome(JobState.FAILED if row.error else JobState.WRITTEN, row, reply.seconds, why)
-
-
-def _kept_row(job: Job, former: ManifestRow, failed: ManifestRow) -> ManifestRow:
-    """The row of an output of a former run that can't be made anew: what it was made of, and why not now."""
-    there = bool(former.output_sha256) and _are({job.output: former.output_sha256})
-    return replace(former, error=failed.error, stale=True) if there else failed
 
 
 def _why_anew(job: Job, row: ManifestRow | None, state: str) -> str:
@@ -296,37 +256,18 @@ def _are(files: Mapping[Path, str]) -> bool:
         return False
 
 
-def _forget_missing(batch: Batch, journal: Journal) -> None:
-    """Rows of former runs stay as long as their output does; those of this run stay."""
-    planned = {job.name for job in batch.jobs}
-    for output in journal:
-        if output not in planned and not (batch.folder / output).is_file():
-            journal.forget(output)
-
-
 @contextmanager
 def _sweeping(folder: Path, runs: Sequence[str]) -> Iterator[None]:
     """Remove what killed runs were just writing, and afterwards what killed workers of this one were; nobody else's."""
+
+    def sweep(runs: Sequence[str]) -> None:
+        names = temporary_files(runs)
+        for path in folder.rglob(".*.tmp*") if runs else ():
+            if names.fullmatch(path.name):
+                path.unlink(missing_ok=True)
+
     try:
-        _sweep(folder, runs[1:])
+        sweep(runs[1:])
         yield
     finally:
-        _sweep(folder, runs[:1])
-
-
-def _sweep(folder: Path, runs: Sequence[str]) -> None:
-    names = temporary_files(runs)
-    for path in folder.rglob(".*.tmp*") if runs else ():
-        if names.fullmatch(path.name):
-            path.unlink(missing_ok=True)
-
-
-def _one_line(error: BaseException) -> str:
-    return " ".join(str(error).split())
-
-
-def _origin(error: BaseException) -> str:
-    trace = error.__traceback__
-    while trace is not None and trace.tb_next is not None:
-        trace = trace.tb_next
-    return "" if trace is None else f" ({Path(trace.tb_frame.f_code.co_filename).name}:{trace.tb_lineno})"
+        sweep(runs[:1])

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import sys
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Unpack
 
@@ -96,10 +99,9 @@ def convert_many(
     outcomes = outcomes_of(
         batch, workers=workers, cluster=cluster, keep_old=keep_old, limits=limits, notify=_notifier(show)
     )
-    became: dict[str, tuple[JobState, float]] = {}
-    summary = follow(_noted(outcomes, became, on_outcome), len(batch), Display(show))
+    summary = follow(outcomes, len(batch), Display(show), report=on_outcome and partial(_report_row, on_outcome))
     index = None if report is None else write_batch_index(batch, Path(report))
-    return BatchResult(batch, summary, became, index)
+    return BatchResult(batch, summary, index)
 
 
 def _refuse_unknown_names(batch: Batch) -> None:
@@ -107,28 +109,20 @@ def _refuse_unknown_names(batch: Batch) -> None:
     asked = dict[tuple[str, str], bool]()
     texts = dict[Path, str]()
     for job in batch.jobs:
-        given = job.settings
-        for option, names in (("--entity", given.entity), ("--only", given.only), ("--ego", given.ego)):
+        for option in ("entity", "only", "ego"):
+            names = getattr(job.settings, option)
             for name in names or ():
                 if not asked.get((option, name)):
                     text = texts.setdefault(job.source, job.source.read_text("utf-8", errors="replace"))
                     # A name may stand in an escaped form or in a parameter: then the conversion looks at it.
                     asked[option, name] = f'"{name}"' in text or f"'{name}'" in text or not name.isidentifier()
-    for (option, name), found in asked.items():
-        if not found:
-            raise FormatError(f"{option} {name!r}: no scenario has such an entity", path=batch.base)
+    for (option, name), is_there in asked.items():
+        if not is_there:
+            raise FormatError(f"--{option} {name!r}: no scenario has such an entity", path=batch.base)
 
 
-def _noted(
-    outcomes: Iterator[JobOutcome],
-    became: dict[str, tuple[JobState, float]],
-    report_row: Callable[[Mapping[str, Any]], None] | None,
-) -> Iterator[JobOutcome]:
-    for outcome in outcomes:
-        became[outcome.row.output] = outcome.state, outcome.seconds
-        if report_row is not None:
-            report_row(_row(outcome.state, outcome.seconds, outcome.row))
-        yield outcome
+def _report_row(report: Callable[[Mapping[str, Any]], None], outcome: JobOutcome) -> None:
+    report(_row(outcome.state, outcome.seconds, outcome.row))
 
 
 def _row(state: JobState, seconds: float, row: ManifestRow) -> dict[str, Any]:
@@ -136,20 +130,16 @@ def _row(state: JobState, seconds: float, row: ManifestRow) -> dict[str, Any]:
 
 
 def _notifier(show: str) -> Callable[[str], None] | None:
-    import sys
-
     return None if show == "nothing" else lambda line: print(f"xosc-lateral: {line}", file=sys.stderr, flush=True)
 
 
 class BatchResult(Result):
     """What became of a batch; of single outputs, `to_frame` and `to_dict` read it from the manifest."""
 
-    __slots__ = ("_batch", "_became", "_summary", "report")
+    __slots__ = ("_batch", "_summary", "report")
 
-    def __init__(
-        self, batch: Batch, summary: Summary, became: dict[str, tuple[JobState, float]], report: Path | None
-    ) -> None:
-        self._batch, self._summary, self._became = batch, summary, became
+    def __init__(self, batch: Batch, summary: Summary, report: Path | None) -> None:
+        self._batch, self._summary = batch, summary
         self.report = report
         """Index of the pages, if there are any."""
 
@@ -206,8 +196,8 @@ class BatchResult(Result):
         if not manifest.is_file():
             raise FormatError("is gone, so what became of single outputs is not known", path=manifest)
         for row in read_manifest(manifest):
-            if row.output in self._became:
-                yield _row(*self._became[row.output], row)
+            if row.output in self._summary.became:
+                yield _row(*self._summary.became[row.output], row)
 
     def totals(self) -> dict[str, Any]:
         """Plain values of the whole batch: the last line that ``--json`` prints."""
@@ -221,8 +211,6 @@ class BatchResult(Result):
 
 
 def _left_out(batch: Batch) -> str:
-    from collections import Counter
-
     kinds = Counter(kind.value for _, kind in batch.left_out)
     listed = ", ".join(f"{count} {kind}{'s' if count > 1 else ''}" for kind, count in kinds.items())
     return f"; left out: {listed}" if listed else ""

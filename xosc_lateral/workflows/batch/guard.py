@@ -1,8 +1,8 @@
 """One job within limits of time and memory: what exceeds them ends as an error of that job.
 
-Time is watched from a thread beside the job, which raises an exception inside it; a job that does not even come to
-that (stuck in a library's code) takes its worker process with it, and the batch counts that as its row. Memory is
-limited by the system (`RLIMIT_AS`), so that one call that asks for too much fails at once, and watched as well.
+A thread beside the job watches both and raises an exception inside it; a job that does not even come to that (stuck in
+a library's code) takes its worker process with it, and the batch counts that as its row. Memory is limited by the
+system as well (`RLIMIT_AS`), so that one call that asks for too much fails at once.
 """
 
 from __future__ import annotations
@@ -42,7 +42,6 @@ def address_space(megabytes: float) -> Iterator[None]:
 
 
 Task = TypeVar("Task")
-
 Result = TypeVar("Result")
 
 POLL = 0.2
@@ -64,13 +63,15 @@ class _Interrupted(BaseException):
 
 @dataclass(frozen=True, slots=True)
 class JobLimits:
-    """What one job may take.
-
-    `timeout`: [s]; `memory`: on top of what the process has when the job begins. [MB]
-    """
+    """What one job may take: time [s], and memory on top of what the process has when the job begins [MB]."""
 
     timeout: float = JOB_TIMEOUT.value
     memory: float = JOB_MEMORY.value
+
+    @property
+    def too_much(self) -> str:
+        """Why a job was ended that took more memory."""
+        return f"took more than {self.memory:g} MB of memory; --job-memory raises the limit"
 
 
 def let_worker_die() -> None:
@@ -80,16 +81,13 @@ def let_worker_die() -> None:
 
 
 def within_limits(work: Callable[[Task], Result], task: Task, limits: JobLimits) -> Result:
-    """Run ``work(task)``.
-
-    Raises `JobLimitError`: it took too long, or too much memory.
-    """
+    """Run ``work(task)``. Raises `JobLimitError`: it took too long, or too much memory."""
     watch = _Watch(limits)
     try:
         with address_space(limits.memory), watch:
             return work(task)
     except MemoryError as error:
-        raise JobLimitError(_too_much(limits)) from error
+        raise JobLimitError(limits.too_much) from error
     except _Interrupted as error:
         raise JobLimitError(watch.why) from error
 
@@ -134,9 +132,5 @@ class _Watch:
         if time.monotonic() - self._begin > self._limits.timeout:
             return f"took longer than {self._limits.timeout:g} s; --job-timeout raises the limit"
         if status_bytes(1) - self._resident > 1e6 * self._limits.memory:
-            return _too_much(self._limits)
+            return self._limits.too_much
         return ""
-
-
-def _too_much(limits: JobLimits) -> str:
-    return f"took more than {limits.memory:g} MB of memory; --job-memory raises the limit"

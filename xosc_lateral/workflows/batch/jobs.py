@@ -13,10 +13,10 @@ from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.base.limits import BATCH_JOBS, VARIANTS
 from xosc_lateral.base.version import BEHAVIOUR, __version__
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.files.hashes import file_hash
 from xosc_lateral.files.openscenario.catalogs import require_folders
 from xosc_lateral.files.output_paths import real_path
 from xosc_lateral.files.profiles import find_profile, profile_hash
+from xosc_lateral.files.source import file_hash
 from xosc_lateral.workflows.batch.manifest import ManifestRow, printable
 from xosc_lateral.workflows.batch.request import DocumentKind, Request, concrete, document_kind, find_requests
 from xosc_lateral.workflows.conversion.convert import numbered
@@ -26,33 +26,23 @@ from xosc_lateral.workflows.conversion.settings import AUTO, ConvertSettings
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """One output to make; plain values, so that it can be sent to another process.
+    """One output to make; plain values, so that it can be sent to another process. Paths are absolute."""
 
-    - `name`: path of the output below the output folder, with forward slashes: names its row in the manifest
-    - `scenario`: path of the input below `base`, with forward slashes
-    - `source`, `output`: absolute
-    - `base`: folder that the output tree mirrors. Absolute
-    - `fingerprint`: SHA-256 over everything but the input files and the program that decides on the output's bytes
-    - `error`: why it can't even be tried (a distribution that can't be read); empty normally
-    - `page`: where a report page about it is written, and its thumbnail beside that. Absolute
-    - `package_version`: of the process that planned it: a worker with another one refuses
-    """
-
-    name: str
-    scenario: str
+    name: str  # path of the output below the output folder, with forward slashes: names its row in the manifest
+    scenario: str  # path of the input below `base`, with forward slashes
     source: Path
     output: Path
-    base: Path
+    base: Path  # folder that the output tree mirrors
     settings: ConvertSettings
     variant: int
-    fingerprint: str
-    error: str = ""
-    page: Path | None = None
-    package_version: str = __version__
+    fingerprint: str  # SHA-256 over all but the input files and the program that decides on the output's bytes
+    error: str = ""  # why it can't even be tried (a distribution that can't be read)
+    page: Path | None = None  # where a report page about it is written, and its thumbnail beside that
+    package_version: str = __version__  # of the process that planned it: a worker with another one refuses
 
     def row(self, error: str = "") -> ManifestRow:
-        """Its row as far as it is known before the conversion."""
-        scenario_sha256 = self._scenario_hash()
+        """Its row as far as it is known before the conversion; no hash of a scenario that can't be read."""
+        scenario_sha256 = _hash_or(self.source, "")
         return ManifestRow(
             output=self.name,
             scenario=self.scenario,
@@ -71,31 +61,16 @@ class Job:
             error=error,
         )
 
-    def _scenario_hash(self) -> str:
-        """Of its file; empty where that can't be read."""
-        try:
-            scenario_sha256 = file_hash(self.source)
-        except (OSError, FormatError):
-            scenario_sha256 = ""
-        return scenario_sha256
-
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """What `convert_many` does.
-
-    - `folder`: output tree. Absolute
-    - `base`: folder that it mirrors. Absolute
-    - `jobs`: by name
-    - `left_out`: files found in folders that are not to be converted: catalogs, outputs of former conversions
-    - `notes`: what a user has to know before it begins, a line each
-    """
+    """What `convert_many` does. Paths are absolute."""
 
     folder: Path
-    base: Path
-    jobs: tuple[Job, ...]
-    left_out: tuple[tuple[Path, DocumentKind], ...] = ()
-    notes: tuple[str, ...] = ()
+    base: Path  # folder that the output tree mirrors
+    jobs: tuple[Job, ...]  # by name
+    left_out: tuple[tuple[Path, DocumentKind], ...] = ()  # found, but catalogs, or outputs of former conversions
+    notes: tuple[str, ...] = ()  # what a user has to know before it begins, a line each
 
     def __len__(self) -> int:
         return len(self.jobs)
@@ -158,25 +133,23 @@ def plan_batch(
             if len(jobs) > BATCH_JOBS.value:
                 raise FormatError(BATCH_JOBS.refusal(len(jobs)), path=request.scenario)
     _refuse_overwriting(jobs.values())
-    pages = None if report is None else _normal(Path(report))
-    planned = (jobs[name] if pages is None else _with_page(jobs[name], pages) for name in sorted(jobs))
+    planned = [jobs[name] for name in sorted(jobs)]
+    if report is not None:
+        pages = _normal(Path(report))
+        planned = [replace(job, page=(pages / job.name).with_suffix(".html")) for job in planned]
     libraries = dict.fromkeys(request.settings.library for request in requests if uses_auto(request.settings))
     notes = dict.fromkeys(note for folders in libraries for note in hidden_by_libraries(folders))
     return Batch(root, base, tuple(planned), tuple(left_out), tuple(notes))
 
 
-def _with_page(job: Job, pages: Path) -> Job:
-    return replace(job, page=(pages / job.name).with_suffix(".html"))
-
-
 def _all_requests(
     inputs: Sequence[str | Path | Request], settings: ConvertSettings, variants: int, root: Path
 ) -> Iterator[Request]:
-    for given in inputs:
-        if isinstance(given, Request):
-            yield given
+    for item in inputs:
+        if isinstance(item, Request):
+            yield item
         else:
-            yield from find_requests([given], settings, variants=variants, leave_out=root)
+            yield from find_requests([item], settings, variants=variants, leave_out=root)
 
 
 def _absolute(request: Request) -> Request:
@@ -203,9 +176,8 @@ def _common_folder(requests: Sequence[Request]) -> Path:
 def _jobs(request: Request, kind: DocumentKind, base: Path, root: Path, fingerprints: _Fingerprints) -> Iterator[Job]:
     relative = request.scenario.relative_to(base)
     stem = request.name.removesuffix(relative.suffix) or f"{relative.stem}{request.label}"
-    for one in concrete(request, kind):
-        source, settings, error = one.source, one.settings, one.error
-        named = relative.with_name(f"{stem}{one.suffix}{relative.suffix}")
+    for source, suffix, settings, error in concrete(request, kind):
+        named = relative.with_name(f"{stem}{suffix}{relative.suffix}")
         scenario = printable(Path(os.path.relpath(source, base)).as_posix())
         for variant in range(request.variants):
             output = numbered(named, variant, request.variants)
@@ -241,7 +213,7 @@ def fingerprint(settings: ConvertSettings, variant: int) -> str:
 
 @dataclass(slots=True)
 class _Fingerprints:
-    """Hashes of settings; files that settings name count by their bytes, not by their place."""
+    """Hashes of settings; files that they name count by their bytes, not by their place."""
 
     _profiles: dict[tuple[str, tuple[Path, ...]], str] = field(default_factory=dict)
     _last: tuple[ConvertSettings, dict[str, str]] | None = None
@@ -259,7 +231,7 @@ class _Fingerprints:
         values["profile"] = self._profile(settings.profile, settings.library)
         values["entity"] = {name: self._profile(one, settings.library) for name, one in settings.entity.items()}
         for name, path in (("context", settings.context), ("road", settings.road)):
-            values[name] = None if path is None else _hash_or_missing(path)
+            values[name] = None if path is None else _hash_or(path, MISSING)
         return {name: json.dumps(value, sort_keys=True) for name, value in values.items()}
 
     def _profile(self, name: str | DriverProfile, libraries: tuple[Path, ...]) -> str:
@@ -267,23 +239,20 @@ class _Fingerprints:
             return profile_hash(name)
         key = (name, libraries)
         if key not in self._profiles:
-            self._profiles[key] = _profile_state(name, libraries)
+            try:  # "auto": that of what it chooses
+                path = find_profile(AUTO_PROFILE if name == AUTO else name, libraries)
+                self._profiles[key] = _hash_or(path, MISSING)
+            except (XoscLateralError, OSError):
+                self._profiles[key] = MISSING
         return self._profiles[key]
 
 
-def _profile_state(name: str, libraries: tuple[Path, ...]) -> str:
-    """What a profile's name means now: its file's hash; "auto": that of what it chooses."""
-    try:
-        return _hash_or_missing(find_profile(AUTO_PROFILE if name == AUTO else name, libraries))
-    except (XoscLateralError, OSError):
-        return MISSING
-
-
-def _hash_or_missing(path: Path) -> str:
+def _hash_or(path: Path, otherwise: str) -> str:
+    """Hash of a file; something else where it can't be read."""
     try:
         return file_hash(path)
     except (FormatError, OSError):
-        return MISSING
+        return otherwise
 
 
 MISSING = "missing"

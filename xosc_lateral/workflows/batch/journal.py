@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import re
 import secrets
@@ -14,10 +13,10 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Self
+from typing import IO, Any, Self
 
 from xosc_lateral.base.errors import FormatError, XoscLateralError
-from xosc_lateral.files.own_files import open_own
+from xosc_lateral.files.atomic import open_own
 from xosc_lateral.workflows.batch.manifest import (
     MANIFEST,
     TIMINGS,
@@ -48,7 +47,9 @@ def folder_lock(path: Path) -> Iterator[Sequence[str]]:
     """
     file = _open_locked(path)
     try:
-        runs = [secrets.token_hex(RUN_DIGITS // 2), *_killed_runs(file)]
+        killed = stated if isinstance(stated := _stated(file).get("runs"), list) else []
+        killed = [run for run in map(str, killed) if re.fullmatch(rf"[0-9a-f]{{{RUN_DIGITS}}}", run)]
+        runs = [secrets.token_hex(RUN_DIGITS // 2), *killed]
         values = {"pid": os.getpid(), "host": socket.gethostname(), "runs": runs}
         file.seek(0)
         file.truncate()
@@ -64,14 +65,14 @@ RUN_DIGITS = 12
 """Hexadecimal digits of a run's id."""
 
 
-def _killed_runs(file: IO[bytes]) -> list[str]:
-    """What a lock file says that no run has taken away."""
+def _stated(file: IO[bytes]) -> dict[str, Any]:
+    """What a lock file says, whoever wrote it."""
     file.seek(0)
     try:
-        runs = json.loads(file.read())["runs"]
-        return [run for run in map(str, runs) if re.fullmatch(rf"[0-9a-f]{{{RUN_DIGITS}}}", run)]
-    except (ValueError, KeyError, TypeError, RecursionError):
-        return []
+        values = json.loads(file.read())
+    except (ValueError, RecursionError):
+        values = None
+    return values if isinstance(values, dict) else {}
 
 
 def _open_locked(path: Path) -> IO[bytes]:
@@ -82,8 +83,10 @@ def _open_locked(path: Path) -> IO[bytes]:
         except FileNotFoundError:
             continue  # a run that just ended has taken the folder away again
         if not _lock(file):
-            holder = _holder(file)
+            values = _stated(file)
             file.close()
+            is_stated = {"pid", "host"} <= values.keys()
+            holder = f"process {values['pid']} on {values['host']}" if is_stated else "starting right now"
             raise FolderInUseError(
                 f"{path.parent.parent}: another run ({holder}) is writing into this folder; wait for it, or use another"
             )
@@ -93,15 +96,6 @@ def _open_locked(path: Path) -> IO[bytes]:
         except FileNotFoundError:
             pass
         file.close()  # its owner has removed it between our opening and locking it
-
-
-def _holder(file: IO[bytes]) -> str:
-    file.seek(0)
-    try:
-        values = json.loads(file.read())
-        return f"process {values['pid']} on {values['host']}"
-    except (ValueError, KeyError, TypeError, RecursionError):
-        return "starting right now"
 
 
 def _lock(file: IO[bytes]) -> bool:
@@ -148,7 +142,6 @@ class Journal:
         self._timings: dict[str, Timing] = {}
         self._file = open_own(path)
         self._end = self._intact_end()
-        self._changed = bool(self._begin)
         self._file.truncate(self._end)
         self._adopt_manifest()
 
@@ -186,9 +179,6 @@ class Journal:
         Raises `OSError`: when the disk is full; rows added before are still there.
         """
         self._changed = True
-        self._append(row, timing)
-
-    def _append(self, row: ManifestRow, timing: Timing) -> None:
         line = json.dumps({"row": row.to_dict(), **timing._asdict()}).encode() + b"\n"
         self._file.seek(self._end)
         self._file.write(line)
@@ -220,10 +210,7 @@ class Journal:
         for line in self._file:
             try:
                 values = json.loads(line)
-                output = ManifestRow.from_dict(values["row"]).output
-                timing = Timing(float(values["seconds"]), str(values.get("state", "")))
-                if not math.isfinite(timing.seconds):
-                    break
+                output, timing = ManifestRow.from_dict(values["row"]).output, Timing.of(values)
             except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
                 break
             if not line.endswith(b"\n"):
@@ -233,14 +220,15 @@ class Journal:
         return end
 
     def _adopt_manifest(self) -> None:
+        recovered = bool(self._begin)
         timings, timings_path, path = dict[str, Timing](), self._folder / TIMINGS, self._folder / MANIFEST
         with self._put_aside_if_damaged(TIMINGS):
             timings = read_timings(timings_path)
         with self._put_aside_if_damaged(MANIFEST):
             for row in read_manifest(path):
                 if row.output not in self._begin:
-                    self._append(row, timings.get(row.output, Timing()))
-        self._changed |= not (timings_path.exists() and path.exists() and is_of_now(path))
+                    self.add(row, timings.get(row.output, Timing()))
+        self._changed = recovered or not (timings_path.exists() and path.exists() and is_of_now(path))
 
     @contextmanager
     def _put_aside_if_damaged(self, name: str) -> Iterator[None]:

@@ -8,6 +8,7 @@ therefore the only file of an output tree that is never twice the same.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from io import BytesIO
@@ -44,40 +45,10 @@ _OLD_NAMES = {
 
 @dataclass(frozen=True, slots=True)
 class ManifestRow:
-    """One output, or why there is none.
+    """One output, or why there is none; `output` names it. The page of pipelines describes the columns.
 
-    - `output`: path of the output below the output folder, with forward slashes; names the row
-    - `scenario`, `scenario_sha256`: path of the input below the inputs' common folder, and SHA-256 of the file
-    - `variant`, `seed`: the variant from 1, as in file names
-    - `profile`: as asked for (a name, a path, "auto")
-    - `parameters`: scenario parameters that were replaced
-    - `settings`: SHA-256 over settings, variant, profile files and context table
-    - `with_sensor`: offsets hold the sensor error of the drives that profiles were fitted on; else the driver alone
-    - `output_sha256`: SHA-256 of the output
-    - `road`, `road_sha256`: as for the scenario; empty if it has none
-    - `inputs`: every file that was read -> SHA-256
-    - `profiles`: enriched entity -> name of its profile
-    - `profile_sha256`: profile name -> SHA-256
-    - `entities`: in the scenario
-    - `enriched`: names of the entities that got offsets
-    - `why_not`: entity that got none -> why
-    - `segment_seconds`: road-following time of all enriched entities together. [s]
-    - `offset_spread`: standard deviation of all sampled offsets. [m]
-    - `gap_before`, `gap_after`: smallest gap between any two vehicles, nominal and enriched; None: no two come near
-      each other. [m]
-    - `player`, `version`: what it was written for; version of the standard
-    - `mode`: how offsets are written: "trajectory", "lane-offset", "mixed"; empty: nobody got any
-    - `modes`: the same by vehicle
-    - `only`: who alone was to be enriched; None: everybody
-    - `ego`: vehicles under test: left as they are; empty: there is none
-    - `behaviour`: `version.BEHAVIOUR` of the program that wrote it
-    - `options`: what was asked for: `ConvertSettings.record`, files as seen from the scenario
-    - `content_sha256`: SHA-256 of the output without its provenance
-    - `cut_off`: the run ends at the time limit, though its scenario goes on
-    - `error`: one line; empty if the output is what the inputs and settings give
-    - `stale`: the output is that of a former run, which the other columns describe: it could not be made anew, or was
-      to be kept
-    - `schema`: version of these columns. Rows without it are of version 1, whose variants count from 0
+    Paths are with forward slashes, below the folder of outputs or the common one of inputs; distances in [m], times in
+    [s]. Rows without a `schema` are of version 1, whose variants count from 0.
     """
 
     output: str
@@ -150,15 +121,8 @@ def printable(text: str) -> str:
     return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
-_MAPPINGS = (
-    "parameters",
-    "inputs",
-    "profiles",
-    "profile_sha256",
-    "why_not",
-    "modes",
-    "options",
-)  # JSON text in the file: every reader takes it
+_MAPPINGS = ("parameters", "inputs", "profiles", "profile_sha256", "why_not", "modes", "options")
+"""JSON text in the file: every reader takes it."""
 
 
 def manifest_schema() -> pa.Schema:
@@ -177,22 +141,15 @@ def write_manifest(rows: Iterable[ManifestRow], path: Path) -> None:
 
     Raises `OSError`: the old manifest is still there.
     """
-    schema = manifest_schema()
-    _write_table(path, schema, (_packed(row) for row in rows))
+    _write_table(path, manifest_schema(), map(_packed, rows))
 
 
 def read_manifest(path: Path) -> Iterator[ManifestRow]:
-    """Rows of a manifest; none if there is no file.
-
-    Raises `FormatError`: when it is no manifest.
-    """
+    """Rows of a manifest; none if there is no file. Raises `FormatError`: it is no manifest."""
     for values in _read_table(path):
         try:
-            unpacked = {
-                name: json.loads(value) if name in _MAPPINGS and value is not None else value
-                for name, value in values.items()
-            }
-            yield ManifestRow.from_dict(unpacked)
+            unpacked = {name: json.loads(values[name]) for name in _MAPPINGS if values.get(name) is not None}
+            yield ManifestRow.from_dict(values | unpacked)
         except (TypeError, ValueError, RecursionError) as error:
             raise FormatError(f"not a manifest of this package: {error}", path=path) from error
 
@@ -202,6 +159,14 @@ class Timing(NamedTuple):
 
     seconds: float = 0.0
     state: str = ""
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any]) -> Timing:
+        """Of a row or a journal's line. Raises `ValueError`, `KeyError`, `TypeError`: it is none."""
+        seconds = float(values["seconds"])
+        if not math.isfinite(seconds):
+            raise ValueError(f"{seconds} s")
+        return cls(seconds, str(values.get("state", "")))
 
 
 def is_of_now(path: Path) -> bool:
@@ -220,15 +185,9 @@ def write_timings(timings: Iterable[tuple[str, Timing]], path: Path) -> None:
 
 
 def read_timings(path: Path) -> dict[str, Timing]:
-    """Timing of each output; empty if there is no file.
-
-    Raises `FormatError`: when it is no such file.
-    """
+    """Timing of each output; empty if there is no file. Raises `FormatError`: it is no such file."""
     try:
-        return {
-            str(values["output"]): Timing(float(values["seconds"]), str(values.get("state", "")))
-            for values in _read_table(path)
-        }
+        return {str(values["output"]): Timing.of(values) for values in _read_table(path)}
     except (TypeError, ValueError, KeyError) as error:
         raise FormatError(f"not a timings file of this package: {error}", path=path) from error
 

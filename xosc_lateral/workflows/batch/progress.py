@@ -7,8 +7,8 @@ import math
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TextIO
 
@@ -33,36 +33,27 @@ class Display(StrEnum):
 
 @dataclass(slots=True)
 class Summary:
-    """How a batch went.
-
-    - `total`, `written`, `up_to_date`, `failed`: jobs
-    - `anew`, `kept`: why outputs that were there were made anew, or are no longer what a conversion would write but
-      were to be kept -> how many
-    - `seconds`: from start to end. [s]
-    - `stale`: of the failed ones: those whose output of a former run is kept
-    - `failures`: output and error
-    - `with_warnings`: outputs with at least one
-    - `cut_off`: outputs of runs that the time limit cut off
-    - `nobody_enriched`: why no entity of an output got offsets -> how many outputs
-    """
+    """How a batch went, in jobs."""
 
     total: int
     written: int = 0
     up_to_date: int = 0
     failed: int = 0
-    stale: int = 0
-    seconds: float = 0.0
-    failures: list[tuple[str, str]] = field(default_factory=list)
+    stale: int = 0  # of the failed ones: those whose output of a former run is kept
+    seconds: float = 0.0  # from start to end
+    failures: list[tuple[str, str]] = field(default_factory=list)  # output and error
     with_warnings: int = 0
-    anew: dict[str, int] = field(default_factory=dict)
-    kept: dict[str, int] = field(default_factory=dict)
-    cut_off: list[str] = field(default_factory=list)
-    nobody_enriched: dict[str, int] = field(default_factory=dict)
-    _said: set[tuple[str, str]] = field(default_factory=set, repr=False)
+    anew: dict[str, int] = field(default_factory=dict)  # why outputs that were there were made anew -> how many
+    kept: dict[str, int] = field(default_factory=dict)  # the same of those that were to be kept as they are
+    cut_off: list[str] = field(default_factory=list)  # outputs of runs that the time limit cut off
+    nobody_enriched: dict[str, int] = field(default_factory=dict)  # why no entity got offsets -> in how many outputs
+    became: dict[str, tuple[JobState, float]] = field(default_factory=dict, repr=False)  # by output; what it took [s]
+    _shown: set[tuple[str, str]] = field(default_factory=set, repr=False)
 
     def count(self, outcome: JobOutcome) -> None:
         """Take one more outcome into account."""
         row = outcome.row
+        self.became[row.output] = outcome.state, outcome.seconds
         if outcome.state is JobState.FAILED:
             self.failed += 1
             self.stale += row.stale
@@ -83,9 +74,9 @@ class Summary:
     def new_failure(self, outcome: JobOutcome) -> str:
         """A failure's line, if it was not met yet: one that all variants of a scenario share is one line."""
         key = (outcome.row.scenario, outcome.row.error)
-        if outcome.state is not JobState.FAILED or key in self._said:
+        if outcome.state is not JobState.FAILED or key in self._shown:
             return ""
-        self._said.add(key)
+        self._shown.add(key)
         return f"xosc-lateral: {outcome.row.error}"
 
     @property
@@ -105,8 +96,9 @@ class Summary:
 
     def remarks(self) -> list[str]:
         """What a person has to know besides the counts, a line each."""
-        said = f"  {self.with_warnings} with warnings (column `warnings` of the manifest)"
-        lines = [said] if self.with_warnings else []
+        lines = []
+        if self.with_warnings:
+            lines.append(f"  {self.with_warnings} with warnings (column `warnings` of the manifest)")
         if self.nobody_enriched:
             lines.append(f"  {sum(self.nobody_enriched.values())} in which nobody was enriched:")
             reasons = sorted(self.nobody_enriched.items(), key=lambda item: (-item[1], item[0]))
@@ -117,7 +109,7 @@ class Summary:
 
     def to_dict(self) -> dict[str, object]:
         """Plain JSON values."""
-        values = {name: value for name, value in asdict(self).items() if name not in ("failures", "_said")}
+        values = {name: getattr(self, name) for name in self.__slots__ if name not in ("failures", "became", "_shown")}
         failures = [{"output": output, "error": error} for output, error in self.failures]
         return values | {"seconds": round(self.seconds, 3), "failures": failures}
 
@@ -132,11 +124,15 @@ class Summary:
 
 
 def follow(
-    outcomes: Iterable[JobOutcome], total: int, display: Display = Display.AUTO, stream: TextIO | None = None
+    outcomes: Iterable[JobOutcome],
+    total: int,
+    display: Display = Display.AUTO,
+    stream: TextIO | None = None,
+    report: Callable[[JobOutcome], object] | None = None,
 ) -> Summary:
-    """Run a batch to its end and show how it goes.
+    """Run a batch to its end and show how it goes, on standard error unless on a `stream`.
 
-    `outcomes`: from `convert_many`; `total`: how many there will be; `stream`: default: standard error.
+    `outcomes`: from `convert_many`; `total`: how many there will be; `report`: gets each.
     """
     stream = stream or sys.stderr
     summary = Summary(total)
@@ -145,6 +141,8 @@ def follow(
         for outcome in outcomes:
             summary.seconds = time.monotonic() - start
             summary.count(outcome)
+            if report is not None:
+                report(outcome)
             show(outcome)
         summary.seconds = time.monotonic() - start
     return summary
@@ -159,18 +157,14 @@ def _counted(reasons: Mapping[str, int], what: str) -> str:
 Show = Callable[[JobOutcome], None]
 
 
-@contextmanager
-def _shower(display: Display, summary: Summary, stream: TextIO) -> Iterator[Show]:
+def _shower(display: Display, summary: Summary, stream: TextIO) -> AbstractContextManager[Show]:
     if display is Display.JSON:
-        with _json_lines(summary, stream) as show:
-            yield show
-    elif display is Display.NOTHING:
-        yield lambda outcome: None
-    elif display is Display.AUTO and stream.isatty():
-        with _bar(summary, stream) as show:
-            yield show
-    else:
-        yield _lines(summary, stream, LINES_EVERY if display is Display.AUTO else math.inf)
+        return _json_lines(summary, stream)
+    if display is Display.NOTHING:
+        return nullcontext(lambda outcome: None)
+    if display is Display.AUTO and stream.isatty():
+        return _bar(summary, stream)
+    return nullcontext(_lines(summary, stream, LINES_EVERY if display is Display.AUTO else math.inf))
 
 
 @contextmanager

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from lxml import etree
 
@@ -48,14 +48,8 @@ def document_kind(path: Path) -> DocumentKind:
     is_ours = False
     try:
         with open_source(path, XML_TREE) as source:
-            for _, element in etree.iterparse(
-                source.file,
-                events=("start",),
-                resolve_entities=False,
-                no_network=True,
-                load_dtd=False,
-                remove_comments=True,
-            ):
+            safe = {"resolve_entities": False, "no_network": True, "load_dtd": False, "remove_comments": True}
+            for _, element in etree.iterparse(source.file, events=("start",), **safe):
                 parent = element.getparent()
                 if parent is None or parent.getparent() is not None or not isinstance(element.tag, str):
                     continue
@@ -103,22 +97,16 @@ class Request:
     name: str = ""
 
 
-class Concrete(NamedTuple):
-    """A scenario's file, a suffix of its output's name, its settings, and why it can't be converted, normally empty."""
+def concrete(request: Request, kind: DocumentKind) -> Iterator[tuple[Path, str, ConvertSettings, str]]:
+    """The scenarios that a file stands for: itself, or those of its distribution.
 
-    source: Path
-    suffix: str
-    settings: ConvertSettings
-    error: str = ""
-
-
-def concrete(request: Request, kind: DocumentKind) -> Iterator[Concrete]:
-    """The scenarios that a file stands for: itself, or those of its distribution."""
+    Each its file, a suffix of its output's name, its settings, and why it can't be converted, normally empty.
+    """
     from xosc_lateral.files.openscenario.distribution import read_distribution
 
     scenario, settings = request.scenario, request.settings
     if kind is not DocumentKind.DISTRIBUTION:
-        yield Concrete(scenario, "", settings)
+        yield scenario, "", settings, ""
         return
     try:
         logical = read_distribution(scenario, allowed=settings.allow)
@@ -133,10 +121,10 @@ def concrete(request: Request, kind: DocumentKind) -> Iterator[Concrete]:
         why = f"{scenario}: internal error: {type(error).__name__}: {error}"
     else:
         for index, values in enumerate(sets):
-            own = replace(settings, parameters={**values, **settings.parameters})
-            yield Concrete(logical.scenario_file, f"_p{index:05d}", own)
+            parameters = {**values, **settings.parameters}
+            yield logical.scenario_file, f"_p{index:05d}", replace(settings, parameters=parameters), ""
         return
-    yield Concrete(scenario, "", settings, " ".join(why.split()))
+    yield scenario, "", settings, " ".join(why.split())
 
 
 def find_requests(
@@ -149,22 +137,22 @@ def find_requests(
     that is not searched: the output's. Raises `FormatError`: an input that is not there, a glob that matches nothing, a
     table that can't be read.
     """
-    for given in inputs:
-        path = Path(given)
+    for text in inputs:
+        path = Path(text)
         if path.is_dir():
-            found = list(_search(path, leave_out))
-            if not found:
+            scenarios = list(_search(path, leave_out))
+            if not scenarios:
                 raise FormatError(f"no {SCENARIO_SUFFIX} file in this folder or below", path=path)
-            yield from (Request(scenario, settings, variants, path, listed=False) for scenario in found)
+            yield from (Request(scenario, settings, variants, path, listed=False) for scenario in scenarios)
         elif path.exists() and path.name.lower().endswith(TABLE_SUFFIXES):
             yield from read_request_table(path, settings, variants=variants)
         elif path.exists():
             yield Request(path, settings, variants)  # a device or a fifo: its reader says so
-        elif _GLOB_CHARACTERS & set(str(given)):
-            base, found = _matches(str(given), leave_out)
-            yield from (Request(scenario, settings, variants, base, listed=False) for scenario in found)
+        elif _GLOB_CHARACTERS & set(str(text)):
+            base, scenarios = _matches(str(text), leave_out)
+            yield from (Request(scenario, settings, variants, base, listed=False) for scenario in scenarios)
         else:
-            raise FormatError("no such file or folder", path=given)
+            raise FormatError("no such file or folder", path=text)
 
 
 def read_request_table(path: Path, settings: ConvertSettings, *, variants: int = 1) -> Iterator[Request]:
@@ -212,23 +200,23 @@ def _table_requests(
 
 def _label(cells: Mapping[str, str]) -> str:
     """What a row says of the settings, in short: the same in whatever table and at whatever place it stands."""
-    said = {name: text for name, text in cells.items() if name not in ("variants", "name") and name[:5] != "user:"}
-    profile = Path(said.get("profile", "")).stem
+    stated = {name: text for name, text in cells.items() if name not in ("variants", "name") and name[:5] != "user:"}
+    profile = Path(stated.get("profile", "")).stem
     if not re.fullmatch(r"[\w.-]{1,60}", profile):
         profile = ""
-    elif said.get("profile") == profile:  # a name says all, a path may be another folder's
-        del said["profile"]
-    listed = json.dumps(said, sort_keys=True).encode()
-    return "".join(f"_{part}" for part in (profile, hashlib.sha256(listed).hexdigest()[:8] if said else "") if part)
+    elif stated.get("profile") == profile:  # a name says all, a path may be another folder's
+        del stated["profile"]
+    listed = json.dumps(stated, sort_keys=True).encode()
+    return "".join(f"_{part}" for part in (profile, hashlib.sha256(listed).hexdigest()[:8] if stated else "") if part)
 
 
-def is_single(given: str | Path) -> bool:
+def is_single(text: str | Path) -> bool:
     """Whether an input is one scenario, or nothing that is there: neither folder, glob, table nor distribution."""
-    path = Path(given)
+    path = Path(text)
     if path.is_file():
         is_table = path.name.lower().endswith(TABLE_SUFFIXES)
         return not is_table and document_kind(path) is not DocumentKind.DISTRIBUTION
-    return not path.is_dir() and not _GLOB_CHARACTERS & set(str(given))
+    return not path.is_dir() and not _GLOB_CHARACTERS & set(str(text))
 
 
 def _search(folder: Path, leave_out: Path | None) -> Iterator[Path]:
@@ -238,10 +226,8 @@ def _search(folder: Path, leave_out: Path | None) -> Iterator[Path]:
     avoided = None if leave_out is None else leave_out.resolve()
     for name, folders, files in os.walk(folder):
         here = Path(name)
-        inner = sorted(one for one in folders if not one.startswith("."))
-        folders[:] = [
-            one for one in inner if (here / one).resolve() != avoided and not (here / one / MANIFEST).exists()
-        ]
+        folders[:] = [inner for inner in sorted(folders) if not inner.startswith(".")
+                      and (here / inner).resolve() != avoided and not (here / inner / MANIFEST).exists()]  # fmt: skip
         for file in sorted(files):
             if file.lower().endswith(SCENARIO_SUFFIX) and not file.startswith("."):
                 yield here / file
@@ -253,8 +239,8 @@ def _matches(pattern: str, leave_out: Path | None) -> tuple[Path, list[Path]]:
     wild = next(index for index, part in enumerate(parts) if _GLOB_CHARACTERS & set(part))
     base = Path(*parts[:wild]) if wild else Path()
     matching = sorted(base.glob(str(Path(*parts[wild:]))))
-    found = [path for path in matching if not any(part.startswith(".") for part in path.relative_to(base).parts)]
-    if not found:
+    shown = [path for path in matching if not any(part.startswith(".") for part in path.relative_to(base).parts)]
+    if not shown:
         raise FormatError("nothing matches", path=pattern)
     avoided = None if leave_out is None else leave_out.resolve()
-    return base, [one for one in found if one.is_file() and (avoided is None or avoided not in one.resolve().parents)]
+    return base, [path for path in shown if path.is_file() and avoided not in path.resolve().parents]

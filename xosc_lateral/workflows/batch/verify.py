@@ -1,4 +1,4 @@
-"""Whether outputs are what their provenance says, and what today's inputs and program would give; and made again."""
+"""`verify` and `reproduce`: whether outputs are what their provenance says, and still would be made; and made again."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from xosc_lateral.base.errors import FormatError, XoscLateralError
+from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.version import BEHAVIOUR
-from xosc_lateral.files.hashes import file_hash
 from xosc_lateral.files.openscenario.provenance import CONTENT, content_hash, facts_in, without_provenance
-from xosc_lateral.files.output_paths import path_below
+from xosc_lateral.files.output_paths import claim, output_file, output_folder, path_below
 from xosc_lateral.files.profiles import profile_hash, read_profile
-from xosc_lateral.files.source import check_regular, read_source
+from xosc_lateral.files.source import check_regular, file_hash, read_source
 from xosc_lateral.workflows.batch.batch import convert_many
 from xosc_lateral.workflows.batch.guard import JobLimits, within_limits
 from xosc_lateral.workflows.batch.jobs import Batch, Job, fingerprint
@@ -28,6 +28,7 @@ from xosc_lateral.workflows.batch.workers import WorkerDiedError, open_pool, run
 from xosc_lateral.workflows.conversion.convert import convert_scenario
 from xosc_lateral.workflows.conversion.drivers import AUTO_PROFILE
 from xosc_lateral.workflows.conversion.settings import AUTO, ConvertSettings
+from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths
 
 
 class Problem(StrEnum):
@@ -45,13 +46,45 @@ class Problem(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """An output, and what is wrong with it.
-
-    `problems`: empty: nothing.
-    """
+    """An output, and what is wrong with it."""
 
     output: Path
     problems: tuple[tuple[Problem, str], ...] = ()
+
+
+class Verification(Result):
+    """Outputs, and what is wrong with which."""
+
+    __slots__ = ("_done", "checked")
+
+    def __init__(self, checked: Sequence[Checked], done: str) -> None:
+        self.checked, self._done = tuple(checked), done
+
+    @property
+    def failing(self) -> tuple[Checked, ...]:
+        """Outputs with a problem."""
+        return tuple(checked for checked in self.checked if checked.problems)
+
+    def headline(self) -> str:
+        """One line."""
+        return f"{len(self.checked) - len(self.failing)} of {len(self.checked)} {self._done}"
+
+    def __str__(self) -> str:
+        lines = [f"{one.output}: {kind}: {what}" for one in self.failing for kind, what in one.problems]
+        return "\n".join([*lines, self.headline()])
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per output: `output`, `problem` (the first one's kind; empty: none), `what`."""
+        rows = [(str(checked.output), *map(str, (*checked.problems, ("", ""))[0])) for checked in self.checked]
+        return pd.DataFrame(rows, columns=["output", "problem", "what"])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them: of outputs, those with a problem."""
+        outputs = [
+            {"output": str(one.output), "problems": [{"kind": str(kind), "what": what} for kind, what in one.problems]}
+            for one in self.failing
+        ]
+        return {"checked": len(self.checked), "failing": len(outputs), "outputs": outputs}
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +108,7 @@ class _Origin:
             for name in ("inputs", "profiles"):
                 if not isinstance(facts[name], dict):
                     raise TypeError(f"{name} are no object")
-            if not all(isinstance(one, str) for one in (settings.profile, *settings.entity.values())):
+            if not all(isinstance(profile, str) for profile in (settings.profile, *settings.entity.values())):
                 raise TypeError("a profile is no text")
             variant = int(facts["variant"])
             if variant < 1:
@@ -90,21 +123,45 @@ class _Origin:
 
 
 def verify(
-    outputs: Sequence[Path], search: ConvertSettings, *, fast: bool = False, workers: int = 0
-) -> Iterator[Checked]:
-    """Check outputs: files, and folders by their manifests, which may be named as well.
+    outputs: Paths,
+    *,
+    library: Paths = (),
+    allow: Paths = (),
+    road_path: Paths = (),
+    fast: bool = False,
+    workers: int = 0,
+) -> Verification:
+    """Whether outputs are what their provenance says, and what today's inputs and program would give.
 
-    Each is made again in memory, unless `fast`; `workers`: processes, 0: this one. Raises `FormatError`: there is no
-    such file, or no manifest in a folder.
+    Each is made again in memory from what it states, within the limits of a batch, and compared byte for byte.
+
+    Parameters
+    ----------
+    outputs : path or paths
+        Converted scenarios, and folders with a manifest.
+    library, allow, road_path : path or paths
+        As for `convert`: where files are looked for is in no output.
+    fast : bool
+        Nothing is converted: only the hashes of content, inputs and profiles that an output states itself, and the
+        behaviour version, are compared.
+    workers : int
+        Processes; -1: one per core; 0: this one.
+
+    Raises
+    ------
+    FormatError
+        There is no such file, or a folder has no manifest.
     """
-    tasks = [_Task(number, *task) for number, task in enumerate(_tasks(outputs))]
-    found: dict[int, Checked] = {}
+    search = ConvertSettings(library=as_paths(library), allow=as_paths(allow), road_path=as_paths(road_path))
+    tasks = [_Task(number, *task) for number, task in enumerate(_tasks(as_paths(outputs)))]
+    by_number: dict[int, Checked] = {}
     with open_pool(min(workers, len(tasks)), None) as pool:
         for task, checked in run_tasks(pool, partial(_checked, search, fast), tasks):
             if isinstance(checked, WorkerDiedError):
                 checked = Checked(task.path, ((Problem.FAILED, str(checked)),))
-            found[task.number] = checked
-    yield from (found[task.number] for task in tasks)
+            by_number[task.number] = checked
+    done = "outputs have the hashes that they state; none was made again" if fast else "outputs are what is made today"
+    return Verification([by_number[task.number] for task in tasks], done)
 
 
 class _Task(NamedTuple):
@@ -117,18 +174,19 @@ class _Task(NamedTuple):
 
 
 def _tasks(outputs: Sequence[Path]) -> Iterator[tuple[Any, ...]]:
-    for given in outputs:
-        given = given.parent if given.name == MANIFEST else given
-        if not given.is_dir():
-            check_regular(given)
-            yield (given,)
+    for path in outputs:
+        folder = path.parent if path.name == MANIFEST else path
+        if not folder.is_dir():
+            check_regular(path)
+            yield (path,)
             continue
-        named = {path_below(given, row.output, "output"): row for row in _rows(given)}
-        yield from ((path, row, None if path.exists() else (Problem.MISSING, "is gone")) for path, row in named.items())
-        for path in sorted(given.rglob("*.xosc")):
-            folders = path.parents[: len(path.relative_to(given).parts) - 1]
-            if path not in named and not any((folder / MANIFEST).exists() for folder in folders):
-                yield path, None, (Problem.FOREIGN, "is not in the manifest")
+        named = {path_below(folder, row.output, "output"): row for row in _rows(folder)}
+        for output, row in named.items():
+            yield output, row, None if output.exists() else (Problem.MISSING, "is gone")
+        for output in sorted(folder.rglob("*.xosc")):
+            folders = output.parents[: len(output.relative_to(folder).parts) - 1]
+            if output not in named and not any((inner / MANIFEST).exists() for inner in folders):
+                yield output, None, (Problem.FOREIGN, "is not in the manifest")
 
 
 def _rows(folder: Path) -> Iterator[ManifestRow]:
@@ -174,18 +232,16 @@ def _other_row(row: ManifestRow, data: bytes, origin: _Origin) -> Iterator[str]:
 
 def _made_otherwise(output: Path, data: bytes, origin: _Origin) -> list[tuple[Problem, str]]:
     """How today's program makes it otherwise, from what its provenance states."""
-    made = convert_scenario(origin.scenario, output, origin.settings, variant=origin.variant - 1, save=False).data
+    made = convert_scenario(origin.scenario, output, origin.settings, variant=origin.variant - 1, saves=False).data
     stated, now = origin.facts, facts_in(made) or {}
     if made.replace(_version_of(now), _version_of(stated), 1) == data:
         return []
     same = without_provenance(made) == without_provenance(data)
-    found = [] if same else [(Problem.DIFFERS, "another content comes out of what its provenance states")]
+    problems = [] if same else [(Problem.DIFFERS, "another content comes out of what its provenance states")]
     names = sorted(name for name in stated.keys() | now.keys() if stated.get(name) != now.get(name))
-    found += [(Problem.EDITED, f"its provenance states another {name}") for name in names if name not in _FREE]
-    return found or [(Problem.EDITED, "its provenance is not as it was written")]
-
-
-_FREE = (CONTENT, "package_version")
+    names = [name for name in names if name not in (CONTENT, "package_version")]
+    problems += [(Problem.EDITED, f"its provenance states another {name}") for name in names]
+    return problems or [(Problem.EDITED, "its provenance is not as it was written")]
 
 
 def _version_of(facts: Mapping[str, Any]) -> bytes:
@@ -195,66 +251,103 @@ def _version_of(facts: Mapping[str, Any]) -> bytes:
 
 def _changes(data: bytes, origin: _Origin) -> list[tuple[Problem, str]]:
     """What was edited in an output, and what would come out otherwise today, and why."""
-    facts, found = origin.facts, list[tuple[Problem, str]]()
+    facts, problems = origin.facts, list[tuple[Problem, str]]()
     if facts.get(CONTENT) != content_hash(data):
-        found.append((Problem.EDITED, "its content is not what was written"))
+        problems.append((Problem.EDITED, "its content is not what was written"))
     if facts.get("behaviour") != BEHAVIOUR:
         made = f"behaviour {facts.get('behaviour')} of version {facts.get('package_version')}"
-        found.append((Problem.VERSION, f"made by {made}; this program has behaviour {BEHAVIOUR}"))
+        problems.append((Problem.VERSION, f"made by {made}; this program has behaviour {BEHAVIOUR}"))
     for name, sha256 in facts["inputs"].items():
         try:
             if file_hash(Path(os.path.normpath(origin.scenario.parent / name))) != sha256:
-                found.append((Problem.INPUT, f"{name} has changed"))
+                problems.append((Problem.INPUT, f"{name} has changed"))
         except (OSError, FormatError, ValueError):
-            found.append((Problem.INPUT, f"{name} is gone"))
+            problems.append((Problem.INPUT, f"{name} is gone"))
     for name, sha256 in sorted({str(entity): profile for entity, profile in facts["profiles"].items()}.items()):
         if (why := _other_profile(origin.settings, name, sha256)) is not None:
-            found.append((Problem.PROFILE, why))
-    return found
+            problems.append((Problem.PROFILE, why))
+    return problems
 
 
 def _other_profile(settings: ConvertSettings, entity: str, recorded: Any) -> str | None:
     """Why an entity would get another profile today."""
     named = settings.entity.get(entity, settings.profile)
     try:
-        found = read_profile(AUTO_PROFILE if named == AUTO else str(named), settings.library)
+        profile = read_profile(AUTO_PROFILE if named == AUTO else str(named), settings.library)
     except (XoscLateralError, OSError) as error:
         return f"profile of {entity!r}: {error}"
-    same = isinstance(recorded, list) and recorded[1:] == [profile_hash(found)]
-    return None if same else f"profile {found.name!r} of {entity!r} has changed"
+    same = isinstance(recorded, list) and recorded[1:] == [profile_hash(profile)]
+    return None if same else f"profile {profile.name!r} of {entity!r} has changed"
 
 
-def reproduce(output: Path, new: Path, search: ConvertSettings, *, workers: int = 1) -> Iterator[Checked]:
-    """Make an output, or all of a folder's manifest, again from the provenance, and compare.
+def reproduce(
+    output: PathLike,
+    new: PathLike,
+    *,
+    library: Paths = (),
+    allow: Paths = (),
+    road_path: Paths = (),
+    workers: int = 1,
+    force: bool = False,
+) -> Verification:
+    """Make an output again from what it carries, or all outputs of a folder with a manifest, and compare the content.
 
-    `new`: file or folder to write to; `search`: where profiles, roads and catalogs are looked for; `workers`:
-    processes, for a folder. Raises `XoscLateralError`: an output has no provenance; what it was made from can't be
-    converted.
+    Parameters
+    ----------
+    output, new : path
+        The output, or the folder; and where to write to.
+    library, allow, road_path : path or paths
+        As for `convert`: where files are looked for is in no output.
+    workers : int
+        Processes, for a folder.
+    force : bool
+        Replace files that this package did not write.
+
+    Raises
+    ------
+    FormatError
+        The output carries no provenance.
+    XoscLateralError
+        What it was made from can't be converted any more.
     """
-    if not output.is_dir():
-        origin = _Origin.of(output, output.read_bytes(), search)
-        convert_scenario(origin.scenario, new, origin.settings, variant=origin.variant - 1)
-        yield _compared(output, new, origin)
-        return
+    old = Path(output)
+    if not old.exists():
+        raise FormatError("no such file or folder", path=old)
+    search = ConvertSettings(library=as_paths(library), allow=as_paths(allow), road_path=as_paths(road_path))
+    target = output_folder(new) if old.is_dir() else output_file(new, old.name, (".xosc",))
+    if target.resolve() == old.resolve():
+        raise FormatError("is what is to be made again: choose another output", path=target)
+    if old.is_dir():
+        return Verification(list(_reproduce_folder(old, target.absolute(), search, workers)), _SAME)
+    claim([target], [old], force=force)
+    origin = _Origin.of(old, read_source(old).data, search)
+    convert_scenario(origin.scenario, target, origin.settings, variant=origin.variant - 1)
+    return Verification([_compared(old, target, origin)], _SAME)
+
+
+_SAME = "outputs came out the same again"
+
+
+def _reproduce_folder(folder: Path, new: Path, search: ConvertSettings, workers: int) -> Iterator[Checked]:
     origins: dict[str, _Origin] = {}
     jobs = []
-    for row in _rows(output):
-        old = path_below(output, row.output, "output")
+    for row in _rows(folder):
+        old = path_below(folder, row.output, "output")
         try:
-            origin = _Origin.of(old, old.read_bytes(), search)
+            origin = _Origin.of(old, read_source(old).data, search)
         except (FormatError, OSError) as error:
             yield Checked(old, ((Problem.FAILED, str(error)),))
             continue
         origins[row.output] = origin
-        jobs.append(_job(row, origin, path_below(new.absolute(), row.output, "output")))
+        jobs.append(_job(row, origin, path_below(new, row.output, "output")))
     base = Path(os.path.commonpath([job.base for job in jobs])) if jobs else new
-    batch = Batch(new.absolute(), base, tuple(sorted(jobs, key=lambda job: job.name)))
+    batch = Batch(new, base, tuple(sorted(jobs, key=lambda job: job.name)))
     for outcome in convert_many(batch, workers=workers):
         name = outcome.row.output
         if outcome.row.error:
-            yield Checked(output / name, ((Problem.FAILED, outcome.row.error),))
+            yield Checked(folder / name, ((Problem.FAILED, outcome.row.error),))
         else:
-            yield _compared(output / name, new / name, origins[name])
+            yield _compared(folder / name, new / name, origins[name])
 
 
 def _job(row: ManifestRow, origin: _Origin, output: Path) -> Job:

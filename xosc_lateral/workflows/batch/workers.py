@@ -1,8 +1,7 @@
 """Where jobs run: in this process, on this machine's cores (joblib's executor), on a dask.distributed cluster.
 
-Workers may die: what was lost is tried again, what kills its worker is found. All of them are pools around
-`concurrent.futures` executors, so the loop that feeds them is the same. joblib's `Parallel` is not in between because
-it ends, and on dask waits for ever, when one task takes its worker down; here that costs one row.
+Workers may die: what was lost is tried again, what kills its worker is found. joblib's `Parallel` is not in between
+because it ends, and on dask waits for ever, when one task takes its worker down; here that costs one row.
 """
 
 from __future__ import annotations
@@ -17,7 +16,6 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from concurrent.futures import ALL_COMPLETED, FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from contextlib import contextmanager
 from itertools import islice
-from types import TracebackType
 from typing import Any, Self, TypeVar
 
 from xosc_lateral.base.errors import XoscLateralError
@@ -56,20 +54,14 @@ class WorkerDiedError(XoscLateralError):
 
 
 class Pool:
-    """Workers, used as a context: here none, a task runs in this process when it is handed out.
-
-    Attributes
-    ----------
-    tries_alone : int
-        How often a task that may have killed its worker is tried by itself.
-    """
+    """Workers, used as a context: here none, a task runs in this process when it is handed out."""
 
     tries_alone = TRIES_ALONE
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
+    def __exit__(self, *raised: object) -> None:
         """End the workers: at once after an error."""
 
     def capacity(self) -> int:
@@ -107,8 +99,8 @@ class _LocalProcesses(Pool):
         self._count = count
         self._executor = self._start()
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
-        self._executor.shutdown(wait=True, kill_workers=error is not None)
+    def __exit__(self, *raised: object) -> None:
+        self._executor.shutdown(wait=True, kill_workers=raised[1] is not None)
 
     def capacity(self) -> int:
         return AHEAD * self._count
@@ -129,9 +121,7 @@ class _LocalProcesses(Pool):
         from joblib.externals.loky import ProcessPoolExecutor
 
         # One thread each for numpy's and numba's libraries: as many workers as cores are busy already.
-        threads = dict.fromkeys(
-            ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
-        )
+        environment = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")} | {_SAFE: "1"}
         if sys.platform != "win32":
             from multiprocessing.resource_tracker import ensure_running
 
@@ -139,11 +129,11 @@ class _LocalProcesses(Pool):
                 ensure_running()  # it unblocks signals: before workers start, which are to have them blocked
         with _safe_path():
             return ProcessPoolExecutor(
-                max_workers=self._count, env=threads | _SAFE, initializer=_end_with_parent, initargs=(os.getpid(),)
+                max_workers=self._count, env=environment, initializer=_end_with_parent, initargs=(os.getpid(),)
             )
 
 
-_SAFE = {"PYTHONSAFEPATH": "1"}
+_SAFE = "PYTHONSAFEPATH"
 
 
 @contextmanager
@@ -153,23 +143,22 @@ def _safe_path() -> Iterator[None]:
     Workers are told in their own environment; joblib's process that tracks their resources has this one's. And no
     signal that a terminal sends to everybody reaches them: the run decides what becomes of its workers.
     """
-    before = os.environ.get(next(iter(_SAFE)))
-    os.environ.update(_SAFE)
+    before = os.environ.get(_SAFE)
+    os.environ[_SAFE] = "1"
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING) if hasattr(signal, "pthread_sigmask") else None
     try:
         yield
     finally:
         if mask is not None:
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        del os.environ[next(iter(_SAFE))]
-        os.environ.update({name: before for name in _SAFE if before is not None})
+        del os.environ[_SAFE]
+        if before is not None:
+            os.environ[_SAFE] = before
 
 
 def _end_with_parent(parent: int) -> None:
-    """End this worker with the run that it works for, even if that was killed and could not say so.
-
-    On Linux the kernel sees to it at once: nothing is left that could still write when the next run begins. Elsewhere,
-    and if the run was gone before this was said, a thread looks every `PARENT_CHECK`.
+    """End this worker with its run, even if that was killed: on Linux at once, so that nothing is left that could still
+    write when the next run begins; elsewhere, and if the run was gone already, a thread looks every `PARENT_CHECK`.
     """
     let_worker_die()
     for number in ENDING:
@@ -193,11 +182,9 @@ WORKERLESS = 120.0
 
 
 class _Cluster(Pool):
-    """Workers of a dask.distributed cluster that runs at an address such as ``tcp://10.0.0.1:8786``.
+    """Workers of a dask.distributed cluster, whose scheduler itself gives a dead worker's tasks to another.
 
-    They have to see the same files under the same paths, and have the same version of this package. The scheduler
-    itself gives a dead worker's tasks to another. Whoever can talk to the scheduler can run code on the workers and
-    here: it has to be trusted.
+    They have to see the same files under the same paths, and have the same version of this package.
     """
 
     tries_alone = 1  # the scheduler has had a task on several workers before it gives it up, and a try costs some more
@@ -217,8 +204,8 @@ class _Cluster(Pool):
         # pure=False: the key of a task must not come from its arguments, a repeated task has to run again
         self._executor: Executor = self._client.get_executor(pure=False)
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
-        self._executor.shutdown(wait=error is None)
+    def __exit__(self, *raised: object) -> None:
+        self._executor.shutdown(wait=raised[1] is None)
         self._client.close()
 
     def capacity(self) -> int:
@@ -226,20 +213,21 @@ class _Cluster(Pool):
         return AHEAD * max(1, sum(map(int, self._client.nthreads().values())))
 
     def submit(self, work: Callable[[Task], Result], task: Task) -> Future[Result]:
-        self._check()
+        self.recover()
         return self._executor.submit(work, task)
 
     def recover(self) -> None:
-        self._check()  # the scheduler sees to it
+        if self._client.status != "running":  # else the scheduler sees to it
+            raise ClusterError(f"the dask scheduler at {self._address} is gone; what is finished is kept, run it again")
 
     def lost(self, error: BaseException) -> bool:
         from distributed import KilledWorker
 
-        self._check()
+        self.recover()
         return isinstance(error, KilledWorker | CancelledError)
 
     def check(self) -> None:
-        self._check()
+        self.recover()
         if self._client.nthreads():
             self._had_workers = time.monotonic()
         elif time.monotonic() - self._had_workers > WORKERLESS:
@@ -248,22 +236,18 @@ class _Cluster(Pool):
     def _check_versions(self) -> None:
         """Before the first job: afterwards every one of them would fail."""
         try:
-            found: dict[str, str] = self._client.run(installed_version)
+            versions: dict[str, str] = self._client.run(installed_version)
         except Exception as error:  # what a worker without this package raises, dask hands on
             self._client.close()
             raise ClusterError(f"the workers at {self._address} can't run xosc-lateral: {error}") from error
-        wrong = {worker: version for worker, version in found.items() if version != __version__}
+        wrong = {worker: version for worker, version in versions.items() if version != __version__}
         if wrong:
             self._client.close()
             worker, version = min(wrong.items())
             raise ClusterError(
-                f"{len(wrong)} of {len(found)} workers at {self._address} have another version of xosc-lateral "
+                f"{len(wrong)} of {len(versions)} workers at {self._address} have another version of xosc-lateral "
                 f"({worker}: {version}, here: {__version__}); nothing was converted"
             )
-
-    def _check(self) -> None:
-        if self._client.status != "running":
-            raise ClusterError(f"the dask scheduler at {self._address} is gone; what is finished is kept, run it again")
 
 
 def installed_version() -> str:
@@ -295,14 +279,8 @@ def run_tasks(
     When a worker dies, whatever had been handed out is tried again, one by one: what kills its worker then as well is
     the culprit and gives a `WorkerDiedError`; the rest is fine.
 
-    Raises
-    ------
-    ClusterError
-        When the cluster is gone.
-    Interrupted
-        A signal has come (`deferring_signals`); results of what was at work have come as well.
-    Exception
-        What `work` raises.
+    Raises `ClusterError`: the cluster is gone; `Interrupted`: a signal has come (`deferring_signals`), and results of
+    what was at work have come as well; whatever `work` raises.
     """
     waiting = iter(tasks)
     running: dict[Future[Result], Task] = {}

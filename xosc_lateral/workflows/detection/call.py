@@ -4,26 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.mapping import MappingLike, as_mapping
-from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
 from xosc_lateral.workflows.detection.command import ANSWER_TIME, Command
-from xosc_lateral.workflows.detection.detected import Detected
+from xosc_lateral.workflows.detection.detection import Detection
 from xosc_lateral.workflows.detection.detectors import RULES, Detector, read_rule
 from xosc_lateral.workflows.detection.logistic import train
 from xosc_lateral.workflows.detection.observation import PERFECT, Sensor, View, read_numbers, read_sensor, views_of
-from xosc_lateral.workflows.detection.scoring import Curve, Tally
+from xosc_lateral.workflows.detection.scoring import Tally
 from xosc_lateral.workflows.detection.sources import SourceSettings, checked, sources_of
-from xosc_lateral.workflows.detection.truth import moves_in_lane
-from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths, write_page
+from xosc_lateral.workflows.detection.tracks import moves_in_lane
+from xosc_lateral.workflows.result import PathLike, Paths, as_paths
 
 if TYPE_CHECKING:
-    from xosc_lateral.files.pages.figure import Figure
+    pass
 
 ALL = "all"
 TRAINED = "logistic"
@@ -93,9 +90,9 @@ def detect(
     if not paths:
         raise ValueError("no source to look at")
     seen_with = read_sensor(sensor) if isinstance(sensor, str) else sensor
-    said = [detectors] if isinstance(detectors, str) else list(detectors)
+    requested = [detectors] if isinstance(detectors, str) else list(detectors)
     names = (profiles,) if isinstance(profiles, str) else tuple(profiles)
-    for word in said:  # before anything is read that takes long
+    for word in requested:  # before anything is read that takes long
         _read_detector(word, threshold, answer_time)
     convert = ConvertSettings.of(
         seed=seed, library=library, allow=allow, road=road, road_path=road_path, time_limit=time_limit
@@ -104,22 +101,24 @@ def detect(
     looked_at = [source for path in paths for source in sources_of(path, settings)]
     trainers = as_paths(train)
     chosen = [
-        one for word in said for one in _detectors(word, threshold, answer_time, trainers, settings, seen_with, seed)
+        detector
+        for word in requested
+        for detector in _detectors(word, threshold, answer_time, trainers, settings, seen_with, seed)
     ]
     needs_others = any(detector.needs_observer for detector in chosen)
     tallies, still = list[Tally](), set[str]()
     for source in looked_at:
-        own = [Tally(detector, source.label) for detector in chosen]
+        source_tallies = [Tally(detector, source.label) for detector in chosen]
         moves = False
         for scene in checked(source):
             views = views_of(scene, seen_with, seed, with_observers=needs_others)
             moves = moves or any(moves_in_lane(view.track, view.truth) for view in views)
-            for tally in own:
+            for tally in source_tallies:
                 tally.add(scene, views)
-        tallies += own
+        tallies += source_tallies
         still |= set() if moves else {source.label}
     files = [path for path in (*paths, *trainers) if path.is_file()]
-    return Detection(Detected(tallies, looked_at, seen_with, seed, frozenset(still)), files)
+    return Detection(tallies, looked_at, seen_with, seed, frozenset(still), files)
 
 
 def _read_detector(word: str, threshold: float, answer_time: float) -> Detector | float | None:
@@ -141,20 +140,20 @@ def _detectors(
     sensor: Sensor,
     seed: int,
 ) -> Iterator[Detector]:
-    found = _read_detector(word, threshold, answer_time)
-    if isinstance(found, Detector):
-        yield found
+    detector = _read_detector(word, threshold, answer_time)
+    if isinstance(detector, Detector):
+        yield detector
         return
-    if found is None:
+    if detector is None:
         yield from (rule() for rule in RULES.values())
         if not trainers:
             return
-        found = 0.5
+        detector = 0.5
     if not trainers:
         raise ValueError(f"{TRAINED} has to be trained: name a source with --train")
     as_they_are = replace(settings, variants=0)
     views = _training_views(trainers, as_they_are, sensor, seed)
-    yield train(views, found, ", ".join(path.name for path in trainers))
+    yield train(views, detector, ", ".join(path.name for path in trainers))
 
 
 def _training_views(trainers: Sequence[Path], settings: SourceSettings, sensor: Sensor, seed: int) -> Iterator[View]:
@@ -162,70 +161,3 @@ def _training_views(trainers: Sequence[Path], settings: SourceSettings, sensor: 
         for source in sources_of(path, settings):
             for scene in checked(source):
                 yield from views_of(scene, sensor, seed, with_observers=False)
-
-
-class Detection(Result):
-    """What detectors did on sources."""
-
-    __slots__ = ("_detected", "_files")
-
-    def __init__(self, detected: Detected, files: Sequence[Path]) -> None:
-        self._detected, self._files = detected, tuple(files)
-
-    @property
-    def curves(self) -> tuple[Curve, ...]:
-        """Of each detector on each source, in the order of the sources."""
-        return self._detected.curves
-
-    @property
-    def sources(self) -> tuple[str, ...]:
-        """Their labels."""
-        return tuple(source.label for source in self._detected.sources)
-
-    @property
-    def still(self) -> frozenset[str]:
-        """Sources in which no vehicle moves inside its lane."""
-        return self._detected.still
-
-    def headline(self) -> str:
-        """One line."""
-        return self._detected.headline()
-
-    def __str__(self) -> str:
-        from xosc_lateral.workflows.detection.text import as_text
-
-        return as_text(self._detected)
-
-    def rows(self, *, every: bool = False) -> list[dict[str, Any]]:
-        """A row for each source and detector at the threshold that is set, or at every threshold."""
-        return self._detected.rows(every=every)
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per source, detector and threshold; `is_set` marks the one that is set. [1/h], [s], shares."""
-        return pd.DataFrame(self.rows(every=True))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values, as ``--json`` prints them."""
-        return self._detected.to_dict()
-
-    def plot(self) -> Figure:
-        """Cut-ins seen in time, and the median time before the marking, over false alarms an hour."""
-        from xosc_lateral.workflows.detection.page import curves_figure
-
-        return curves_figure(self.curves)
-
-    def write(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write the table with every threshold: ``.csv``, ``.csv.gz`` or ``.parquet``."""
-        from xosc_lateral.files.output_tables import output_suffixes, write_frame
-
-        output = output_file(path, "detection.csv", output_suffixes())
-        claim([output], self._files, force=force)
-        write_frame(self.to_frame(), output, self._detected.provenance())
-        return output
-
-    def write_report(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write the HTML page: table, curves, and the worst cases in the player."""
-        from xosc_lateral.workflows.detection.page import detection_page
-
-        html = partial(detection_page, self._detected)
-        return write_page(path, "detection.html", html, inputs=self._files, force=force)

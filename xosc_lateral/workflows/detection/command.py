@@ -47,9 +47,9 @@ class Command(Detector):
 
     def scores(self, scene: Scene, views: Sequence[View]) -> list[FloatArray]:
         """See `Detector`."""
-        found = [np.zeros(len(view.track)) for view in views]
+        scores = [np.zeros(len(view.track)) for view in views]
         if not views:
-            return found
+            return scores
         watched: dict[tuple[int, str], list[int]] = {}
         for number, view in enumerate(views):
             watched.setdefault((view.number, view.track.name), []).append(number)
@@ -63,8 +63,8 @@ class Command(Detector):
                             view = views[number]
                             row = present[1] - view.track.first
                             if 0 <= row < len(view.track):
-                                found[number][row] = _score(answers[name], view.side, name, line["time"], scene.name)
-        return found
+                                scores[number][row] = _score(answers[name], view.side, name, line["time"], scene.name)
+        return scores
 
 
 def _steps(scene: Scene, views: Sequence[View]) -> Iterator[tuple[dict[str, Any], tuple[float, int]]]:
@@ -109,12 +109,12 @@ def _score(answer: Any, side: int, name: str, time: float, scene: str) -> float:
     value = answer.get("score") if isinstance(answer, dict) else None
     if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
         raise SimulationError(f"{scene}, {time:g} s: vehicle {name!r}: score is {json.dumps(value)}, expected a number")
-    said = answer.get("side")
-    if said is not None and said not in SIDES:
+    stated_side = answer.get("side")
+    if stated_side is not None and stated_side not in SIDES:
         raise SimulationError(
-            f"{scene}, {time:g} s: vehicle {name!r}: side is {json.dumps(said)}, expected left or right"
+            f"{scene}, {time:g} s: vehicle {name!r}: side is {json.dumps(stated_side)}, expected left or right"
         )
-    return float(value) if said is None or SIDES[said] == side else 0.0
+    return float(value) if stated_side is None or SIDES[stated_side] == side else 0.0
 
 
 @contextmanager
@@ -128,7 +128,7 @@ def _started(words: Sequence[str], scene: str) -> Iterator[Callable[[dict[str, A
         raise SimulationError(what) from error
     lines: Queue[str | None] = Queue()
     assert program.stdin is not None and program.stdout is not None
-    given, output = program.stdin, program.stdout
+    questions, output = program.stdin, program.stdout
 
     def listen() -> None:
         try:
@@ -144,8 +144,8 @@ def _started(words: Sequence[str], scene: str) -> Iterator[Callable[[dict[str, A
     def talk(line: dict[str, Any], limit: float) -> dict[str, Any]:
         where = f"{scene}, {line['time']:g} s: detector {words[0]!r}"
         with suppress(OSError):  # where it has ended, its exit code is told below
-            given.write(json.dumps(line) + "\n")
-            given.flush()
+            questions.write(json.dumps(line) + "\n")
+            questions.flush()
         try:
             answer = lines.get(timeout=limit)
         except Empty:
@@ -164,7 +164,7 @@ def _started(words: Sequence[str], scene: str) -> Iterator[Callable[[dict[str, A
         program.kill()
         program.wait()
         listener.join(ANSWER_TIME)  # its children may still hold the pipe
-        for pipe in (given, output):
+        for pipe in (questions, output):
             with suppress(OSError):
                 pipe.close()
 

@@ -124,6 +124,6 @@ def train(views: Iterable[View], threshold: float, source: str) -> Logistic:
     columns, positive = training_rows(views)
     counts = int(positive.sum()), int((~positive).sum())
     if min(counts) * EVERY < WINDOW:
-        found = f"{counts[0] * EVERY * STEP:.1f} s of cut-ins and {counts[1] * EVERY * STEP:.1f} s of lane keeping"
-        raise NotEnoughDataError(f"{source}: {found}, training needs 1 s of each")
+        amounts = f"{counts[0] * EVERY * STEP:.1f} s of cut-ins and {counts[1] * EVERY * STEP:.1f} s of lane keeping"
+        raise NotEnoughDataError(f"{source}: {amounts}, training needs 1 s of each")
     return Logistic(fit_regression(columns, positive), threshold)

@@ -9,8 +9,7 @@ from zlib import crc32
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
-from xosc_lateral.workflows.detection.tracks import STEP, Scene, Track
-from xosc_lateral.workflows.detection.truth import Truth, truth_of
+from xosc_lateral.workflows.detection.tracks import STEP, Scene, Track, Truth, truth_of
 
 RATE_WINDOW = 0.5
 """Lateral speed is the change of position over the last so many seconds, lateral acceleration that of the lateral
@@ -57,19 +56,19 @@ def read_sensor(text: str) -> Sensor:
 
 def read_numbers(text: str, limits: Mapping[str, tuple[float, float]], what: str) -> dict[str, float]:
     """``NAME=VALUE,...`` with names and inclusive limits; raises `ValueError`."""
-    found = dict[str, float]()
+    numbers = dict[str, float]()
     for word in filter(None, text.split(",")):
         name, equals, value = word.partition("=")
         if not equals or name not in limits:
             raise ValueError(f"{word!r}: {what} has {', '.join(f'{one}=VALUE' for one in limits) or 'no options'}")
         low, high = limits[name]
         try:
-            found[name] = float(value)
+            numbers[name] = float(value)
         except ValueError:
-            found[name] = np.nan
-        if not low <= found[name] <= high:
+            numbers[name] = np.nan
+        if not low <= numbers[name] <= high:
             raise ValueError(f"{word!r}: expected a number from {low:g} to {high:g}")
-    return found
+    return numbers
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -148,7 +147,7 @@ def views_of(scene: Scene, sensor: Sensor, seed: int, *, with_observers: bool = 
     """Every vehicle but the ego, from both sides where it is ever watched from there."""
     root = (seed, crc32(scene.name.encode()))
     several = len({track.name for track in scene.tracks}) > 1
-    found = []
+    views = []
     for number, track in enumerate(scene.tracks):
         if track.name == scene.ego:
             continue
@@ -162,8 +161,8 @@ def views_of(scene: Scene, sensor: Sensor, seed: int, *, with_observers: bool = 
                 assert observer is not None
                 watched = watched & np.isfinite(observer.gap)
             if watched.any():
-                found.append(View(number, track, side, truth, measured, watched, observer))
-    return found
+                views.append(View(number, track, side, truth, measured, watched, observer))
+    return views
 
 
 def _observer(scene: Scene, track: Track, side: int, taken: IntArray) -> Observer:

@@ -2,50 +2,58 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from xosc_lateral.files.pages.chart import ENRICHED, INK, color_of
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import Html, Page
-from xosc_lateral.workflows.detection.clip import clip_scene
 from xosc_lateral.workflows.detection.scoring import Case, Curve
-from xosc_lateral.workflows.detection.text import HEADINGS, cells, notes
-
-if TYPE_CHECKING:
-    from xosc_lateral.workflows.detection.detected import Detected
+from xosc_lateral.workflows.detection.tracks import STEP, Track
+from xosc_lateral.workflows.playing.scene import scene_of
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
+from xosc_lateral.world.scenario import BoundingBox, Entity
+from xosc_lateral.world.scenario.enums import EntityCategory
+from xosc_lateral.world.scenario.place import Place
 
 LEAST_RATE = 0.1
 """False alarms below this are drawn there: the axis is logarithmic. [1/h]"""
+NEAR_DISTANCE = 120.0
+"""Vehicles farther from the case's are left out. [m]"""
+VEHICLE_HEIGHT = 1.5
+"""Nobody sees it from above. [m]"""
 AROUND = 6.0
 """Of a case, before and after its moment. [s]"""
 
 
-def detection_page(result: Detected) -> str:
+def detection_page(
+    lead: Sequence[str],
+    table: Sequence[Mapping[str, object]],
+    curves: Sequence[Curve],
+    worst: Sequence[tuple[str, str, Case]],
+    provenance: Mapping[str, object],
+) -> str:
     """HTML page, self-contained; same input, same bytes."""
     page = Page("Cut-in detectors")
-    page.lead(f"{result.headline()}.", *notes(result))
+    page.lead(*lead)
     page.section("Table")
-    rows = [dict(zip(HEADINGS, cells(row), strict=True)) for row in result.rows()]
-    page.table(rows, "At the thresholds that are set; in brackets 95 % intervals")
+    page.table(table, "At the thresholds that are set; in brackets 95 % intervals")
     page.section(
         "Curves", "From left to right, thresholds become more sensitive. The dot is the threshold that is set."
     )
-    page.figure(curves_figure(result.curves), "Cut-ins seen before the marking is crossed, and how long before")
+    page.figure(curves_figure(curves), "Cut-ins seen before the marking is crossed, and how long before")
     page.section("Worst cases")
-    cases = result.worst()
-    found = [_case_row(number, *case) for number, case in enumerate(cases, 1)]
-    page.table(found, "Cut-ins that were missed or seen late, then false alarms farthest above their threshold")
-    for number, (_, detector, case) in enumerate(cases, 1):
+    case_rows = [_case_row(number, *case) for number, case in enumerate(worst, 1)]
+    page.table(case_rows, "Cut-ins that were missed or seen late, then false alarms farthest above their threshold")
+    for number, (_, detector, case) in enumerate(worst, 1):
         title = f"{number}: {case.kind}, {case.view.track.name} at {case.time:.1f} s"
         page.heading(title, anchor=f"case-{number}")
-        scene = clip_scene(case, AROUND)
+        scene = clip_scene(case)
         if scene is not None:
             page.player(scene, f"Case {number} from above", anchor=f"scene-{number}")
         page.figure(_case_figure(case), f"Towards the neighbouring lane; shaded: alarm of {detector}")
-    return page.html(result.provenance())
+    return page.html(provenance)
 
 
 def _case_row(number: int, source: str, detector: str, case: Case) -> dict[str, object]:
@@ -95,3 +103,47 @@ def _case_figure(case: Case) -> Figure:
     panel.level(0.5 * float(track.rows.lane_width[rows[0]]) - 0.5 * track.size.width, dashes="3 2")
     panel.x.label, panel.y.label = "time [s]", "offset [m]"
     return figure
+
+
+# ---- the player's scene ----
+def clip_scene(case: Case) -> str | None:
+    """JSON for the player, the case's vehicle first; None: nobody knows where on a road it is."""
+    network = case.scene.network
+    if network is None:
+        return None
+    middle = round(case.time / STEP)
+    half = round(AROUND / STEP)
+    instants = np.arange(middle - half, middle + half + 1)
+    watched = case.view.track
+    rows = (instants - watched.first).clip(0, len(watched) - 1)
+    here = watched.rows.x[rows], watched.rows.y[rows]
+    tracks = [
+        watched,
+        *(track for track in case.scene.tracks if track is not watched and _is_near(track, instants, here)),
+    ]
+    entities = tuple(_motion(track, instants) for track in tracks)
+    motion = NominalMotion(STEP, entities, (), float(len(instants) * STEP), "clip", ())
+    return scene_of(motion, network)
+
+
+def _is_near(track: Track, instants: np.ndarray, here: tuple[np.ndarray, np.ndarray]) -> bool:
+    rows = instants - track.first
+    there = (rows >= 0) & (rows < len(track))
+    away = np.hypot(track.rows.x[rows[there]] - here[0][there], track.rows.y[rows[there]] - here[1][there])
+    return bool((away < NEAR_DISTANCE).any())
+
+
+def _motion(track: Track, instants: np.ndarray) -> EntityMotion:
+    rows = instants - track.first
+    there = (rows >= 0) & (rows < len(track))
+    rows, c = rows.clip(0, len(track) - 1), track.rows  # c: columns
+    size = track.size
+    box = BoundingBox(size.ahead, 0.0, 0.5 * VEHICLE_HEIGHT, size.length, size.width, VEHICLE_HEIGHT)
+    entity = Entity(name=track.name, category=EntityCategory.VEHICLE, bounding_box=box, place=Place("", 0, ""))
+    none = np.zeros(len(rows))
+    numbers = c.road[rows].astype(np.int32), c.lane[rows].astype(np.int32)
+    activity = np.where(there, np.uint8(Activity.ACTIVE), np.uint8(0)).astype(np.uint8)
+    return EntityMotion(
+        entity, STEP * (instants - instants[0]), c.x[rows], c.y[rows], none, c.heading[rows], none, none,
+        c.speed[rows], *numbers, c.s[rows], c.offset[rows], none, activity,
+    )  # fmt: skip

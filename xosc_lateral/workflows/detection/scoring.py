@@ -11,8 +11,7 @@ import numpy as np
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.workflows.detection.detectors import NO_DANGER, Detector
 from xosc_lateral.workflows.detection.observation import View
-from xosc_lateral.workflows.detection.tracks import STEP, Scene
-from xosc_lateral.workflows.detection.truth import MARGIN, LaneChange
+from xosc_lateral.workflows.detection.tracks import MARGIN, STEP, LaneChange, Scene
 
 RESAMPLES = 500
 """Of the bootstrap: the ends of a 95 % interval lie then at the 12th value from either side."""
@@ -38,12 +37,12 @@ class Case:
 
 def worst_of(cases: Sequence[tuple[str, str, Case]]) -> list[tuple[str, str, Case]]:
     """The worst of all detectors and sources, of no vehicle twice."""
-    found: list[tuple[str, str, Case]] = []
-    for one in sorted(cases, key=lambda each: -each[2].badness):
-        vehicle = one[2].scene.name, one[2].view.track.name
-        if all(vehicle != (case.scene.name, case.view.track.name) for *_, case in found):
-            found.append(one)
-    return found[:CASES]
+    worst: list[tuple[str, str, Case]] = []
+    for candidate in sorted(cases, key=lambda each: -each[2].badness):
+        vehicle = candidate[2].scene.name, candidate[2].view.track.name
+        if all(vehicle != (case.scene.name, case.view.track.name) for *_, case in worst):
+            worst.append(candidate)
+    return worst[:CASES]
 
 
 @dataclass(eq=False)
@@ -99,7 +98,7 @@ class Tally:
             self._add_case(Case("late", scene, view, time, 1e3 - lead, score, limit))
 
     def _add_case(self, case: Case) -> None:
-        self.cases = sorted([*self.cases, case], key=lambda one: -one.badness)[:CASES]
+        self.cases = sorted([*self.cases, case], key=lambda each: -each.badness)[:CASES]
 
     def curve(self) -> Curve:
         """What was counted, as arrays."""

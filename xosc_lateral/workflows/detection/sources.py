@@ -19,7 +19,7 @@ from xosc_lateral.files.tables import TABLE_SUFFIXES
 from xosc_lateral.workflows.batch.request import SCENARIO_SUFFIX, DocumentKind, document_kind
 from xosc_lateral.workflows.conversion.convert import convert_scenario
 from xosc_lateral.workflows.conversion.load import Played, play_scenario
-from xosc_lateral.workflows.conversion.modes import chosen_egos
+from xosc_lateral.workflows.conversion.plan import chosen_egos
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
 from xosc_lateral.workflows.detection.tracks import STEP, Rows, Scene, Size, Track, tracks_of
 from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH
@@ -66,9 +66,9 @@ def sources_of(path: Path, settings: SourceSettings) -> list[Source]:
         return [_measured(path, settings)]
     base = path if path.is_dir() else path.parent
     named = [(scenario, scenario.relative_to(base).with_suffix("").as_posix()) for scenario in scenarios]
-    found = [Source(path.stem, lambda: _written(named, settings), tuple(scenarios))]
+    sources = [Source(path.stem, lambda: _written(named, settings), tuple(scenarios))]
     profiles = settings.profiles if settings.variants else ()
-    return [*found, *(_lifelike(path.stem, named, profile, settings) for profile in profiles)]
+    return [*sources, *(_lifelike(path.stem, named, profile, settings) for profile in profiles)]
 
 
 def _scenarios(path: Path) -> list[Path]:
@@ -104,8 +104,8 @@ def _lifelike(label: str, named: Sequence[tuple[Path, str]], profile: str, setti
 
     def scenes() -> Iterator[Scene]:
         for scenario, name in named:
-            given = _play(scenario, settings).scenario
-            around = [path.parent for path in (*given.input_files, given.road_file or scenario)]
+            source = _play(scenario, settings).scenario
+            around = [path.parent for path in (*source.input_files, source.road_file or scenario)]
             for variant in range(settings.variants):
                 with TemporaryDirectory() as folder:
                     output = Path(folder) / scenario.name
@@ -118,9 +118,8 @@ def _lifelike(label: str, named: Sequence[tuple[Path, str]], profile: str, setti
 
 
 def _play(scenario: Path, settings: SourceSettings) -> Played:
-    given = settings.convert
-    roads = given.roads
-    return play_scenario(scenario, step=STEP, time_limit=given.time_limit, allowed=given.allow, roads=roads)
+    convert = settings.convert
+    return play_scenario(scenario, step=STEP, time_limit=convert.time_limit, allowed=convert.allow, roads=convert.roads)
 
 
 def played_scene(played: Played, name: str, ego: str | None, *, cluster: str = "") -> Scene:

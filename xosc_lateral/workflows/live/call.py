@@ -243,7 +243,7 @@ class LiveRun(Result):
         SimulationError
             If the run says nothing of its vehicles, or SUMO's network can't be made a road.
         """
-        from xosc_lateral.files.osi.extra import SUFFIXES
+        from xosc_lateral.files.osi import SUFFIXES
         from xosc_lateral.files.osi.write import host_of, write_osi
         from xosc_lateral.workflows.live.scene import motion_of
 

@@ -24,16 +24,16 @@ TURN = 0.03
 LEADING_OVER = 0.5
 """Part of `TURN` that leading over to the driver's path may take; the driver's own movement has the rest. [-]"""
 
-_PEAK = 10.0 / np.sqrt(3.0)
+STEP_PEAK = 10.0 / np.sqrt(3.0)
 """Largest second derivative of the smooth step from 0 to 1 in unit time (of 10 u^3 - 15 u^4 + 6 u^5, by hand). [-]"""
 
-_STANDSTILL = 0.1
+STANDSTILL = 0.1
 """Below this speed a path has no direction. [m/s]"""
 
 SPEEDS = 6
 """Model steps of speed remembered: acceleration is over one second, as in a conversion. [-]"""
 
-_NEGLIGIBLE_REST = 1e-12
+NEGLIGIBLE_REST = 1e-12
 """A remainder this small is none. [m]"""
 
 DRIVER = np.dtype(
@@ -84,8 +84,8 @@ def drive_on(
     """
     is_first, passed = passed is None, passed or 0.0
     powers = u ** np.arange(6)
-    own = state["curve"] @ powers
-    own_rate = state["curve"][:, 1:] @ (np.arange(1, 6) * powers[:-1]) / step
+    driver = state["curve"] @ powers
+    driver_rate = state["curve"][:, 1:] @ (np.arange(1, 6) * powers[:-1]) / step
     pace = _pace(speed)
     is_driven = following & state["begun"]
     taken_over = is_driven & ~state["following"]
@@ -97,22 +97,22 @@ def drive_on(
     elif taken_over.any():
         was_rate = np.where(np.abs(was_rate) < np.maximum(0.2 * np.abs(speed), 0.1), was_rate, 0.0)  # placed anew
         was_rate = np.where(state["place"] == 0.0, 0.0, was_rate)
-        gap_rate = was_rate - own_rate * pace - aside_rate
-        gap = offset - base - own - aside + (own_rate * pace + aside_rate) * passed  # a step ago
+        gap_rate = was_rate - driver_rate * pace - aside_rate
+        gap = offset - base - driver - aside + (driver_rate * pace + aside_rate) * passed  # a step ago
         _lead_over(state, taken_over, gap, gap_rate, speed)
     went_on = is_driven & state["following"]
-    state["slip"] = np.where(went_on, state["slip"] - (1.0 - pace) * (own - state["own"]), 0.0)
-    slipped = is_driven & (state["over"] <= 0.0) & (np.abs(state["slip"]) > _NEGLIGIBLE_REST)
+    state["slip"] = np.where(went_on, state["slip"] - (1.0 - pace) * (driver - state["own"]), 0.0)
+    slipped = is_driven & (state["over"] <= 0.0) & (np.abs(state["slip"]) > NEGLIGIBLE_REST)
     if slipped.any():
         _lead_over(state, slipped, state["slip"], np.zeros(len(state)), speed)
         state["slip"][slipped] = 0.0
     rest_rate = _settle(state, passed * pace) * pace
-    place = np.where(is_driven, base + own + state["rest"] + state["slip"] + aside, offset)
-    rate = np.where(is_driven, own_rate * pace + rest_rate + aside_rate, was_rate * (passed > 0.0))
-    moving = np.abs(speed) > _STANDSTILL
+    place = np.where(is_driven, base + driver + state["rest"] + state["slip"] + aside, offset)
+    rate = np.where(is_driven, driver_rate * pace + rest_rate + aside_rate, was_rate * (passed > 0.0))
+    moving = np.abs(speed) > STANDSTILL
     sine = np.divide(rate, speed, out=np.zeros(len(state)), where=moving)
     heading = np.arcsin(np.clip(sine, -1.0, 1.0))
-    state["following"], state["place"], state["own"] = is_driven, place, own
+    state["following"], state["place"], state["own"] = is_driven, place, driver
     return state, Moves(place, np.where(is_driven, rate, 0.0), np.where(is_driven, heading, 0.0), is_driven)
 
 
@@ -138,7 +138,7 @@ def _move_aside(state: NDArray[Any], passed: FloatArray) -> None:
 def _lead_over(state: NDArray[Any], which: BoolArray, gap: FloatArray, rate: FloatArray, speed: FloatArray) -> None:
     """Begin to lead over from a gap [m] that changes at a rate [m/s], within what is no corner at this speed. [m/s]"""
     bound = LEADING_OVER * TURN * np.maximum(np.abs(speed), MINIMUM_SPEED)
-    over = np.maximum(SETTLING_TIME, np.maximum(np.sqrt(_PEAK * np.abs(gap) / bound), 4.0 * np.abs(rate) / bound))
+    over = np.maximum(SETTLING_TIME, np.maximum(np.sqrt(STEP_PEAK * np.abs(gap) / bound), 4.0 * np.abs(rate) / bound))
     for name, values in (("from", gap), ("from_rate", rate), ("share", 0.0), ("over", over)):
         state[name] = np.where(which, values, state[name])
 

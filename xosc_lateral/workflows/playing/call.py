@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 from msgspec import structs
 
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.files.hashes import parsed_hashes
 from xosc_lateral.files.openscenario.read import RoadSearch
 from xosc_lateral.files.output_paths import claim, output_file
+from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.workflows.conversion.load import Played, play_scenario
 from xosc_lateral.workflows.conversion.settings import STEP
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths, write_page
@@ -143,7 +143,7 @@ class Playback(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """One row per entity and step: `time,name,x,y,z,h,speed,road,lane,offset_t,s`, SI units."""
-        from xosc_lateral.files.states import states_frame
+        from xosc_lateral.files.output_tables import states_frame
 
         return states_frame(self._played.motion, self._played.network)
 
@@ -169,7 +169,7 @@ class Playback(Result):
 
     def csv(self) -> str:
         """The table as text."""
-        from xosc_lateral.files.states import states_csv
+        from xosc_lateral.files.output_tables import states_csv
 
         return states_csv(self._played.motion, self._played.network)
 
@@ -197,7 +197,7 @@ class Playback(Result):
 
     def write_osi(self, path: PathLike, *, force: bool = False) -> Path:
         """Write an ASAM OSI trace (extra `osi`): ``.mcap`` or ``.osi``, one `GroundTruth` per step."""
-        from xosc_lateral.files.osi.extra import SUFFIXES
+        from xosc_lateral.files.osi import SUFFIXES
         from xosc_lateral.files.osi.write import host_of, write_osi
         from xosc_lateral.world.scenario.under_test import vehicles_under_test
 
@@ -251,10 +251,9 @@ class Segments(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them."""
-
         rows = [structs.asdict(row) for row in self._rows]
-        found = [row | {"start": round(row["start"], 6), "end": round(row["end"], 6)} for row in rows]
-        return {"segments": found, "controllers": list(self.controllers)}
+        rounded = [row | {"start": round(row["start"], 6), "end": round(row["end"], 6)} for row in rows]
+        return {"segments": rounded, "controllers": list(self.controllers)}
 
 
 def scenario_segments(played: Played) -> tuple[SegmentRow, ...]:

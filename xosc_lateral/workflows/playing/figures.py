@@ -11,7 +11,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.files.pages.chart import DASHED, GRID, MUTED, NOMINAL, SHADE, Panel, color_of, label_of
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.workflows.conversion.result import Enriched, EntityResult
-from xosc_lateral.workflows.playing.road_lines import lane_surfaces, markings
+from xosc_lateral.workflows.playing.scene import lane_surfaces, markings
 from xosc_lateral.world.motion.crossings import Crossing
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import DRIVING
@@ -181,13 +181,19 @@ def speeds_over_time(motion: NominalMotion, entities: Sequence[EntityResult] = (
     motions = [entity.motion for entity in entities] or motion.entities
     figure = Figure(height=160.0, legend=0 < len(motions) <= MOST_NAMED)
     (panel,) = figure.panels
-    for number, one in enumerate(motions):
-        rows = shown_rows(one)
-        absent = (one.activity[rows] & Activity.ACTIVE) == 0
-        speed = entities[number].trajectory.speed if entities else one.speed
-        panel.line(one.time[rows], broken(speed[rows], absent), color_of(number), label=label_of(one.name))
+    for number, vehicle in enumerate(motions):
+        rows = shown_rows(vehicle)
+        absent = (vehicle.activity[rows] & Activity.ACTIVE) == 0
+        speed = entities[number].trajectory.speed if entities else vehicle.speed
+        panel.line(vehicle.time[rows], broken(speed[rows], absent), color_of(number), label=label_of(vehicle.name))
         if entities:
-            panel.line(one.time[rows], broken(one.speed[rows], absent), NOMINAL, dashes=DASHED, label="nominal")
+            panel.line(
+                vehicle.time[rows],
+                broken(vehicle.speed[rows], absent),
+                NOMINAL,
+                dashes=DASHED,
+                label="nominal",
+            )
     panel.y.holds = (0.0,)
     panel.x.label, panel.y.label = "time [s]", "speed [m/s]"
     return figure
@@ -206,7 +212,7 @@ def accelerations_over_time(enriched: Enriched, entities: Sequence[EntityResult]
 
 
 PEAKS = (0.52, 0.95)
-"""Largest lateral speed of real lane changes, 5 and 95 % of 323 on one motorway. [m/s]"""
+"""Largest lateral speed of real lane changes, 5 and 95 % of 323 on vehicle motorway. [m/s]"""
 
 SHOWN_BESIDE = 3.0
 """Time before and after a lane change that is drawn with it. [s]"""

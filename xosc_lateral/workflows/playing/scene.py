@@ -13,12 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.rows import true_slices
 from xosc_lateral.workflows.conversion.result import EntityResult
-from xosc_lateral.workflows.playing.road_lines import lane_surfaces, markings
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.road import RoadNetwork
 from xosc_lateral.world.road.geometry import simplify
 from xosc_lateral.world.road.network import DRIVING
+from xosc_lateral.world.road.positions import RoadMark
 
 RowArray = NDArray[np.int64]
 
@@ -49,9 +49,9 @@ TOLERANCE = 0.01
 
 def scene_of(motion: NominalMotion, network: RoadNetwork, results: Sequence[EntityResult] = ()) -> str:
     """JSON for the player: results with the nominal motion as ghosts, or the nominal motion alone."""
-    given: list[tuple[EntityMotion, EntityResult | None]] = [(one.motion, one) for one in results]
-    given = given or [(one, None) for one in motion.entities]
-    shown = [(number, entity, result) for number, (entity, result) in enumerate(given) if _present(entity).any()]
+    pairs: list[tuple[EntityMotion, EntityResult | None]] = [(result.motion, result) for result in results]
+    pairs = pairs or [(entity, None) for entity in motion.entities]
+    shown = [(number, entity, result) for number, (entity, result) in enumerate(pairs) if _present(entity).any()]
     rows = _rows(motion, len(shown))
     places = [np.column_stack([entity.x, entity.y])[_present(entity)] for _, entity, _ in shown]
     # whole metres near the first place: coordinates stay small on roads with geographic ones
@@ -203,3 +203,45 @@ def _pieces_near(network: RoadNetwork, road: int, near: set[tuple[int, int]]) ->
         cells = np.floor(np.column_stack([poses.x, poses.y]) / ROAD_REACH)
         if last > first and any((int(i), int(k)) in near for i, k in cells):
             yield first, last
+
+
+# ---- lanes and markings of roads as lines of t over s ----
+LINE_STEP = 2.0
+"""Between two points of a line. [m]"""
+
+NO_MARK = frozenset({"none", "curb", "grass", "edge"})
+"""Road marks that are no paint."""
+
+
+def lane_surfaces(
+    network: RoadNetwork, road: int, first: float, last: float
+) -> Iterator[tuple[str, FloatArray, FloatArray, FloatArray]]:
+    """Lanes of one road between two s: the type, and t of the right and of the left edge over s. [m]"""
+    start, last = max(0.0, first), min(network.roads[road].length, last)
+    while start < last:
+        section_start, section_end = network.section_at(road, start)
+        if section_end <= start:  # a section of no length: OpenDRIVE forbids it, field files have it
+            return
+        s = _grid(start, min(section_end, last))
+        for lane in network.lanes_at(road, 0.5 * (max(section_start, start) + min(section_end, last))):
+            if lane.type != "none":
+                centre, half = network.lane_centre_t(road, lane.id, s), 0.5 * network.lane_width(road, lane.id, s)
+                yield lane.type, s, centre - half, centre + half
+        start = section_end
+
+
+def markings(
+    network: RoadNetwork, road: int, first: float, last: float
+) -> Iterator[tuple[RoadMark, FloatArray, FloatArray]]:
+    """Paint on one road between two s: the mark, and its t over s. [m]"""
+    for mark in network.road_marks(road):
+        start, stop = max(first, mark.s_start), min(last, mark.s_end)
+        if start < stop and mark.type not in NO_MARK:
+            s = _grid(start, stop)
+            outer = 0.5 * np.sign(mark.lane) * network.lane_width(road, mark.lane, s) if mark.lane else 0.0
+            yield mark, s, network.lane_centre_t(road, mark.lane, s) + outer
+
+
+def _grid(start: float, stop: float) -> FloatArray:
+    """From start to just before stop, where the next section begins."""
+    return np.linspace(start, max(start, stop - 1e-6), max(2, int(np.ceil((stop - start) / LINE_STEP)) + 1))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
@@ -10,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.normal import NORMAL_95
-from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, keeping_of
-from xosc_lateral.drivers.evaluation.metrics import DURATION, MovementSummary, free_runs, summarise, summary_of
+from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, MovementSummary, figures_of
+from xosc_lateral.drivers.evaluation.metrics import free_runs
 from xosc_lateral.drivers.evaluation.spectra import spectrum
 from xosc_lateral.drivers.fitting.answers import basis_of, responses_in_words
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect
@@ -30,14 +30,9 @@ CHANGED: Mapping[Acts, str] = {
 }
 """What a column effect changes, in words."""
 
-SINGLE_DRIVER_DRIVES = 10
-"""Drives below which a profile is taken to be of one driver."""
-
-SHOWN_DRIVERS, SHOWN_S = 4, 120.0
-"""Sample paths that are drawn, and their length. [s]"""
-
-WRAPPED_ROWS = ("", "lane", "known to", "source", "licence")
-"""Rows of a card that are wrapped in the terminal."""
+SINGLE_DRIVER_DRIVES = 10  # Drives below which a profile is taken to be of one driver.
+SHOWN_DRIVERS, SHOWN_S = 4, 120.0  # Sample paths that are drawn, and their length. [s]
+WRAPPED_ROWS = ("", "lane", "+-", "source", "licence")  # Rows of a card that are wrapped in the terminal.
 
 
 # ---- the list --------------------------------------------------------------------------------------------------------
@@ -57,7 +52,7 @@ def _list_line(name: str, profile: DriverProfile, width: int) -> str:
     known, tags = profile.provenance, "".join(f"#{tag} " for tag in profile.metadata.tags)
     return (
         f"{name:{width}s}  {profile.model.kind:14s} {known.hours:6.2f} h  {known.drives:4d} drives  "
-        f"{len(profile.effects)} effects  {tags}{known.notes or known.source}{_licence_note(profile)}"
+        f"{len(profile.effects)} effects  {tags}{noted(profile) or known.source}{_licence_note(profile)}"
     ).rstrip()
 
 
@@ -111,37 +106,39 @@ def card(profile: DriverProfile) -> dict[str, Any]:
         "effects": [effect.to_dict() for effect in profile.effects],
         "neighbours": {side: basis_of(profile, side).value for side in SIDES},
         "lane_width": profile.lane_width,
-        "summary": rounded(asdict(summary_of(profile))),
-        "lane_keeping": keeping_record(keeping_of(profile)),
+        **figures_record(*figures_of(profile)),
         "provenance": profile.provenance.to_dict(),
     }
 
 
-def rounded(values: Mapping[str, float]) -> dict[str, float]:
-    """To 0.1 mm and the like."""
-    return {name: round(value, 4) for name, value in values.items()}
+def figures_record(summary: MovementSummary, keeping: LaneKeeping) -> dict[str, Any]:
+    """The figures by which a profile is known, as plain values to 0.1 mm and the like."""
 
+    def rounded(values: Mapping[str, float]) -> dict[str, float]:
+        return {name: round(value, 4) for name, value in values.items()}
 
-def keeping_record(keeping: LaneKeeping) -> dict[str, Any]:
-    """The figures of lane keeping and their standard errors, as plain values."""
     values = asdict(keeping)
     errors = rounded(values.pop("errors"))
-    return {**rounded(values), "errors": errors}
+    return {"summary": rounded(asdict(summary)), "lane_keeping": {**rounded(values), "errors": errors}}
 
 
 def card_text(profile: DriverProfile) -> str:
     """The card for the terminal."""
     lines = [profile.name]
-    for label, value in [("", profile.provenance.notes), *card_rows(profile, summary_of(profile))]:
+    for label, value in [("", noted(profile)), *card_rows(profile, *figures_of(profile))]:
         parts = textwrap.wrap(value, 100) if label in WRAPPED_ROWS else [value]
         lines += [f"  {label if k == 0 else '':10s} {part}" for k, part in enumerate(parts)]
     return "\n".join([*lines, f"  {'sha256':10s} {profile_hash(profile)}"])
 
 
-def card_rows(profile: DriverProfile, summary: MovementSummary) -> list[tuple[str, str]]:
+def noted(profile: DriverProfile) -> str:
+    """The notes; a deviation in them is that of the recording, which is shorter than what a profile is measured by."""
+    return re.sub(r"\(std ([\d.]+ m)\)", r"(std \1 in the recording)", profile.provenance.notes)
+
+
+def card_rows(profile: DriverProfile, summary: MovementSummary, keeping: LaneKeeping) -> list[tuple[str, str]]:
     """What there is to know of a profile, a line each: label and words; an empty one has nothing to say."""
-    known, keeping = profile.provenance, keeping_of(profile)
-    side = "left" if summary.mean_offset > 0 else "right"
+    known = profile.provenance
     count = len(profile.effects)
     effects = "1 effect" if count == 1 else f"{count or 'no'} effects"
     rows = [
@@ -149,11 +146,11 @@ def card_rows(profile: DriverProfile, summary: MovementSummary) -> list[tuple[st
         ("model", f"{profile.model.kind}, {effects}, lane width {profile.lane_width:.2f} m"),
         *(("effect", effect_line(effect)) for effect in profile.effects),
         ("neighbours", responses_in_words(profile)),
-        ("mean", f"{abs(summary.mean_offset):.2f} m to the {side} of the lane centre"),
+        ("mean", f"{keeping.line('mean', 'm')}, {_side(keeping)} of the lane centre"),
         ("spread", f"{_spread(known, summary)}; 90 % within {summary.low:+.2f} to {summary.high:+.2f} m"),
         ("speed", f"{summary.lateral_speed:.3f} m/s lateral (rms)"),
         ("lane", keeping.words),
-        ("known to", _sureness(known, keeping)),
+        ("+-", interval_note(profile) if keeping.errors else ""),
         ("fitted on", _amount(known)),
         ("source", known.source),
         ("licence", known.licence),
@@ -175,23 +172,20 @@ def effect_line(effect: Effect) -> str:
     return f"{kind}: " + ", ".join(f"{name} {format_value(value)}" for name, value in plain.items())
 
 
+def _side(keeping: LaneKeeping) -> str:
+    return "left" if keeping.mean > 0 else "right"
+
+
 def _spread(known: Provenance, summary: MovementSummary) -> str:
-    """Standard deviation of the offset: of one driver, or of all and within one."""
-    within = f" over all drivers, {summary.spread_within:.2f} m within one driver over {DURATION / 60:g} min"
-    return f"{summary.spread:.2f} m{'' if known.drives == 1 else within}"
+    """Standard deviation of the offset: of one driver, or of all."""
+    return f"{summary.spread:.2f} m{'' if known.drives == 1 else ' over all drivers'}"
 
 
-def _sureness(known: Provenance, keeping: LaneKeeping) -> str:
-    """How well one driver's mean and spread are known from so much driving; empty where it is of many or unknown."""
-    independent = 3600.0 * known.hours / (2.0 * keeping.memory) if keeping.memory else 0.0
-    if "derived_from" in known.fit or not 0.0 < known.drives < SINGLE_DRIVER_DRIVES or independent < 1.0:
-        return ""
-    mean = NORMAL_95 * keeping.sdlp / independent**0.5
-    spread = NORMAL_95 * keeping.sdlp / (2.0 * independent) ** 0.5
-    return (
-        f"mean within {mean:.2f} m, SDLP within {spread:.2f} m (95 %, from {60 * known.hours:.3g} min of driving; on "
-        "another day the same driver may differ by more)"
-    )
+def interval_note(profile: DriverProfile) -> str:
+    """What the intervals beside a profile's figures say."""
+    known = profile.provenance
+    more = "; on another day the same driver may differ by more" if known.drives < SINGLE_DRIVER_DRIVES else ""
+    return f"95 %: if as much driving as it was fitted on ({_amount(known)}) were recorded again{more}"
 
 
 def _amount(known: Provenance) -> str:
@@ -228,24 +222,15 @@ def _outcome_items(loop: Mapping[str, Any] | None, evaluation: Mapping[str, Any]
 
 # ---- the page --------------------------------------------------------------------------------------------------------
 def card_page(profile: DriverProfile, seed: int = 0) -> str:
-    """HTML page; same profile and seed, same bytes.
-
-    Parameters
-    ----------
-    profile : DriverProfile
-    seed : int
-        Of the free runs that are drawn and summed up.
-    """
+    """HTML page; same profile and seed (of the free runs that are drawn), same bytes."""
     runs, step = free_runs(profile, seed), profile.model.step
-    summary, known = summarise(runs, step), profile.provenance
-    side = "left" if summary.mean_offset > 0 else "right"
-    within = "" if known.drives == 1 else f"one driver over {DURATION / 60:g} min: {summary.spread_within:.2f} m"
+    (summary, keeping), known = figures_of(profile, seed), profile.provenance
     page = Page(f"Driver profile {profile.name}")
-    page.lead(known.notes)
+    page.lead(noted(profile))
     page.key_figures(
         [
-            KeyFigure(f"{abs(summary.mean_offset):.2f} m", f"mean offset, to the {side}"),
-            KeyFigure(f"{summary.spread:.2f} m", "standard deviation over all drivers", within),
+            KeyFigure(f"{keeping.mean:+.2f} m", f"mean offset: {_side(keeping)} of the lane centre"),
+            KeyFigure(f"{keeping.sdlp:.2f} m", "SDLP: standard deviation within a drive", _spread(known, summary)),
             KeyFigure(
                 f"{summary.low:+.2f} to {summary.high:+.2f}\N{NO-BREAK SPACE}m",
                 "5 % to 95 %",
@@ -267,8 +252,8 @@ def card_page(profile: DriverProfile, seed: int = 0) -> str:
         "Density of the offset, and its spectrum",
     )
     page.section("What it is and where it comes from")
-    rows = [(label, words.replace("+-", "±")) for label, words in card_rows(profile, summary) if label != "input"]
-    page.table([{"": label, "what is known": words} for label, words in rows])
+    rows = [{"": label, "what is known": words} for label, words in card_rows(profile, summary, keeping)]
+    page.table([{name: text.replace("+-", "±") for name, text in row.items()} for row in rows if row[""] != "input"])
     return page.html(
         {
             "profile sha256": profile_hash(profile),

@@ -2,87 +2,98 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.drivers.evaluation.lane_keeping import HIGHWAY_DRIVES, HIGHWAY_SPEED
 from xosc_lateral.drivers.evaluation.metrics import METRICS
 from xosc_lateral.drivers.evaluation.profile_comparison import Compared, ComparedProfile
 from xosc_lateral.drivers.evaluation.scores import SNIPPET
-from xosc_lateral.drivers.evaluation.sizes import LEVEL, Difference
+from xosc_lateral.drivers.evaluation.sizes import FAST_S, LEVEL, QUANTITIES, SLOW_S, Difference, surest
 from xosc_lateral.files.pages.chart import color_of
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import Page
 from xosc_lateral.files.profiles import profile_hash
-from xosc_lateral.workflows.profiles.cards import keeping_record, rounded
+from xosc_lateral.workflows.profiles.cards import figures_record
 
-SHOWN_S = 120.0
-"""Length of the sample paths in the figure. [s]"""
-
-SPACING = 0.8
-"""Between the zero lines of two sample paths. [m]"""
-
-MAXIMUM_DRAWN = 12
-"""So many profiles are drawn at most; the distances are of all."""
-
-MAXIMUM_WORDED = 4
-"""Of so many profiles at most, what each pair differs by stands in the text; the JSON has all."""
+SHOWN_S = 120.0  # Length of the sample paths in the figure. [s]
+SPACING = 0.8  # Between the zero lines of two sample paths. [m]
+MAXIMUM_DRAWN = 12  # So many profiles are drawn at most; the distances are of all.
 
 
 def comparison_text(compared: Compared) -> str:
-    """Table of summaries, distances, and who is alike."""
-    rows = [_row(one) for one in compared.profiles]
+    """A table of the profiles, and one of their pairs: distance, what chance alone may bring, verdict."""
+    lines = [*_table([_row(each) for each in compared.profiles]), f"{FIGURES_NOTE}.", "", *_table(_pairs(compared))]
+    lines.append(f"{_distance_note(compared)}.")
+    lines += [f"alike: {', '.join(group)}" for group in compared.groups if len(group) > 1]
+    return "\n".join(lines)
+
+
+def _table(rows: list[dict[str, str]]) -> list[str]:
+    """Aligned columns under their names."""
     widths = [max(len(column), *(len(row[column]) for row in rows)) for column in rows[0]]
-    lines = [
-        "  ".join(f"{text:<{width}}" for text, width in zip(texts, widths, strict=True))
+    return [
+        "  ".join(f"{text:<{width}}" for text, width in zip(texts, widths, strict=True)).rstrip()
         for texts in (list(rows[0]), *(list(row.values()) for row in rows))
     ]
-    lines.append(
-        f"mean distance of ten metrics of {SNIPPET:g} s snippets, in standard deviations "
-        "(diagonal: from itself, by the chance of as much driving as it was fitted on, 95 % quantile):"
+
+
+FIGURES_NOTE = (
+    f"sampled in even traffic at {3.6 * HIGHWAY_SPEED:.0f} km/h, {HIGHWAY_DRIVES} drives of an hour; +-: 95 %, if as "
+    "much driving as each was fitted on were recorded again"
+)
+"""What the figures of a profile are."""
+
+
+def _distance_note(compared: Compared) -> str:
+    """What a distance means, in metres, and what is by chance."""
+    scale = dict(zip(METRICS, compared.scale.tolist(), strict=True))
+    return (
+        f"distance: of the ten metrics of {SNIPPET:g} s snippets, on average; 1.00 is as far as single snippets "
+        f"differ: {scale['mean']:.2f} m in their mean, {scale['std']:.2f} m in their standard deviation. Mean offset "
+        f"and the second's movement over the first's, slow (beyond {SLOW_S:g} s) and fast (from {FAST_S:g} s): "
+        "95 % intervals by the drives of the fits, and in brackets the least that as much driving would show in "
+        f"4 of 5 cases. Told apart is what has a p below {LEVEL:g}, all three considered"
     )
-    width = max(map(len, compared.names))
-    for name, distances in zip(compared.names, compared.distance, strict=True):
-        lines.append(f"  {name:<{width}}  " + " ".join(f"{value:5.2f}" for value in distances))
-    if len(compared.profiles) <= MAXIMUM_WORDED:
-        lines.append("second beside first (95 % interval; in brackets the least that as much driving would show):")
-        lines += [f"  {' and '.join(pair)}: {_pair_words(parts)}" for pair, parts in compared.differences.items()]
-    lines += [f"alike: {', '.join(group)}" for group in compared.groups if len(group) > 1]
-    return "\n".join(line.rstrip() for line in lines)
 
 
-def _pair_words(parts: Sequence[Difference]) -> str:
-    """What two profiles differ by, and whether that is more than chance."""
-    words = []
-    for part in parts:
-        low, high = part.interval
-        if part.is_factor:
-            size, least = f"{np.exp(part.size):.2f} times ({np.exp(low):.2f} to {np.exp(high):.2f})", np.exp(part.least)
-        else:
-            size, least = f"{part.size:+.3f} m ({low:+.3f} to {high:+.3f})", part.least
-        words.append(f"{part.quantity} {size} [{least:.2f}]")
-    p_value = min((part.p_value for part in parts), default=1.0)
-    verdict = "differ" if p_value <= LEVEL else "not told apart"
-    return f"{', '.join(words)}: {verdict} (p = {p_value:.2g})" if parts else "nothing is known of both"
+def _pairs(compared: Compared) -> list[dict[str, str]]:
+    """A row for each pair of profiles, the most different first."""
+    distance, names, differences = compared.distance, compared.names, compared.differences
+    rows = []
+    for a, b in sorted(combinations(range(len(names)), 2), key=lambda pair: -distance[pair]):
+        parts = differences[names[a], names[b]]
+        words = {part.quantity: _difference_words(part) for part in parts}
+        verdict = "differ" if surest(parts) <= LEVEL else "not told apart"
+        rows.append(
+            {"profiles": f"{names[a]}, {names[b]}", "distance": f"{distance[a, b]:.2f}"}
+            | {quantity: words.get(quantity, "not known") for quantity in QUANTITIES}
+            | {"verdict": f"{verdict}, p = {surest(parts):.1g}"}
+        )
+    return rows
 
 
-def _row(one: ComparedProfile) -> dict[str, str]:
-    summary, keeping = one.summary, one.keeping
+def _difference_words(part: Difference) -> str:
+    low, high = part.interval
+    if part.is_factor:
+        return f"{np.exp(part.size):.2f} ({np.exp(low):.2f} to {np.exp(high):.2f}) [{np.exp(part.least):.2f}]"
+    return f"{part.size:+.2f} ({low:+.2f} to {high:+.2f}) m [{part.least:.2f}]"
+
+
+def _row(each: ComparedProfile) -> dict[str, str]:
+    summary, keeping = each.summary, each.keeping
     return {
-        "profile": one.profile.name,
-        "model": one.profile.model.kind,
-        "mean [m]": f"{summary.mean_offset + 0.0:+.2f}".replace("-0.00", "0.00").replace("+0.00", "0.00"),
-        "spread [m]": f"{summary.spread:.2f}",
-        "of one driver [m]": f"{summary.spread_within:.2f}",
+        "profile": each.profile.name,
+        "mean [m]": keeping.line("mean"),
+        "SDLP [m]": keeping.line("sdlp"),
+        "over all drivers [m]": f"{summary.spread:.2f}",
         "5 % to 95 % [m]": f"{summary.low:+.2f} to {summary.high:+.2f}",
         "lateral speed [m/s]": f"{summary.lateral_speed:.3f}",
-        "SDLP [m]": keeping.line("sdlp", ""),
-        "lane drifts [1/h]": keeping.line("drifts", "", 1),
-        "to the line [s]": keeping.line("line_crossing", "", 1),
-        "effects": ", ".join(_effects(one)) or "none",
+        "to the line [s]": keeping.line("line_crossing", digits=1),
+        "effects": str(len(each.profile.effects)),
     }
 
 
@@ -102,8 +113,7 @@ def comparison_record(compared: Compared) -> dict[str, Any]:
                 "id": one.profile.name,
                 "sha256": profile_hash(one.profile),
                 "model": one.profile.model.kind,
-                "summary": rounded(asdict(one.summary)),
-                "lane_keeping": keeping_record(one.keeping),
+                **figures_record(one.summary, one.keeping),
                 "effects": _effects(one),
             }
             for one in compared.profiles
@@ -113,20 +123,21 @@ def comparison_record(compared: Compared) -> dict[str, Any]:
         "floor": round(float(compared.floors.max()), 4),
         "floors": _rounded_rows(compared.floors),
         "differences": [
-            {"profiles": list(pair), "quantity": part.quantity, "p_value": part.p_value}
-            | {"unit": "-" if part.is_factor else "m"}
-            | {
-                name: round(float(np.exp(value) if part.is_factor else value), 4)
-                for name, value in zip(
-                    ("difference", "low", "high", "least"), (part.size, *part.interval, part.least), strict=True
-                )
-            }
+            {"profiles": list(pair), **_difference_record(part)}
             for pair, parts in compared.differences.items()
             for part in parts
         ],
         "alike": [list(group) for group in compared.groups],
         "seed": compared.seed,
     }
+
+
+def _difference_record(part: Difference) -> dict[str, Any]:
+    """In metres, or as a factor."""
+    low, high = part.interval
+    sizes = {"difference": part.size, "low": low, "high": high, "least": part.least}
+    sizes = {name: round(float(np.exp(size) if part.is_factor else size), 4) for name, size in sizes.items()}
+    return {"quantity": part.quantity, "unit": "-" if part.is_factor else "m", **sizes, "p_value": part.p_value}
 
 
 def _rounded_rows(values: FloatArray) -> list[list[float]]:
@@ -163,11 +174,8 @@ def comparison_page(compared: Compared) -> str:
     )
     page.section("Summary")
     page.table(
-        [
-            {name: text.replace(" +- ", "\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}") for name, text in _row(one).items()}
-            | {"effects": len(one.profile.effects)}
-            for one in compared.profiles
-        ]
+        [{name: text.replace("+-", "±") for name, text in _row(each).items()} for each in compared.profiles],
+        FIGURES_NOTE.replace("+-", "±"),
     )
     more = f"; {len(names) - MAXIMUM_DRAWN} more are left out of the figure" if len(names) > MAXIMUM_DRAWN else ""
     page.figure(
@@ -175,16 +183,7 @@ def comparison_page(compared: Compared) -> str:
         f"Distribution of the offset, power spectral density and a sample path of each profile{more}.",
         "Densities, spectra and sample paths of the profiles",
     )
-    page.section("Distances")
-    page.table(
-        [
-            {"profile": name, **dict(zip(names, row, strict=True))}
-            for name, row in zip(names, compared.distance.tolist(), strict=True)
-        ],
-        f"Mean Wasserstein distance of the ten metrics of snippets of {SNIPPET:g} s, in standard deviations over the "
-        "snippets of all profiles. The diagonal shows how far random halves of a profile's own drivers are apart at "
-        "most (95 % of them), which is sampling error alone.",
-        formats=dict.fromkeys(names, ".2f"),
-    )
+    page.section("Which differ")
+    page.table(_pairs(compared), _distance_note(compared))
     hashes = {one.profile.name: profile_hash(one.profile)[:12] for one in compared.profiles}
     return page.html({"seed": compared.seed, **hashes})

@@ -8,15 +8,15 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from xosc_lateral.base.normal import NORMAL_95
+from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.base.version import __version__
-from xosc_lateral.drivers.evaluation.distances import Distances
+from xosc_lateral.drivers.evaluation.metrics import Distances
 from xosc_lateral.drivers.loop.close import Finding, LoopResult
 from xosc_lateral.drivers.loop.feedback import Feedback
 from xosc_lateral.drivers.loop.selection import Gain
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.files.hashes import parsed_hashes
 from xosc_lateral.files.profiles import profile_hash
+from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.workflows.profiles.loop_words import feedback_words, lack_of_fit_words, meaning
 
 MEASURE = (

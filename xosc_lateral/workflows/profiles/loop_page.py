@@ -9,9 +9,9 @@ from xosc_lateral.drivers.loop.close import Finding, LoopResult
 from xosc_lateral.drivers.loop.held_out import SNIPPET_ROWS
 from xosc_lateral.drivers.loop.residual import GroupError
 from xosc_lateral.drivers.model.effects import ColumnEffect
-from xosc_lateral.files.hashes import parsed_hashes
 from xosc_lateral.files.pages.page import KeyFigure, Page, Tone
 from xosc_lateral.files.profiles import profile_hash
+from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.workflows.profiles.loop_figures import (
     DRAWINGS,
     effect_figure,

@@ -27,7 +27,7 @@ AREAS: Mapping[str, str] = {
 }
 
 INDICATOR_LABELS: Mapping[str, str] = {
-    "sdlp": "SDLP [m]",
+    "sdlp": "standard deviation within a snippet [m]",
     "tlc_min": "smallest time to line crossing [s]",
     "tlc_median": "median time to line crossing [s]",
     "beyond_wandering_zone": "share of time beyond the wandering zone (UN R157)",

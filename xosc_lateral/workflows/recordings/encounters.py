@@ -11,8 +11,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.workflows.recordings.plan import VehiclePlan
 from xosc_lateral.world.road.network import RoadNetwork
 
-REACH = 150.0
-"""Who is farther away has nothing to do with it: 5 s at 30 m/s. [m]"""
+REACH = 150.0  # who is farther away has nothing to do with it: 5 s at 30 m/s [m]
 BRAKING = 1.0
 """Deceleration from which a piece of the speed profile is braking: coasting in gear gives less (about 0.5 at 100 km/h).
 [m/s2]"""
@@ -20,8 +19,7 @@ SURE_RATE = 1.0
 """A distance that passes its value more slowly is no trigger: 0.1 m of error would be more than 0.1 s. [m/s]"""
 WATCHED = 5.0
 """So long before, a relative trigger is not armed: the same distance may come about earlier, behind the other. [s]"""
-BORNE_OUT = 0.2
-"""So near to the recorded moment the trigger has to come. [s]"""
+BORNE_OUT = 0.2  # so near to the recorded moment the trigger has to come [s]
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,14 +19,9 @@ from xosc_lateral.world.road.network import RoadNetwork
 MOVING_SPEED = 3.0
 """Slower vehicles have no direction: 2 cm of noise over 0.4 s turn the way of one at 3 m/s by 1 degree. [m/s]"""
 
-LANE_AGREEMENT = 0.7
-"""Cosine of a vehicle's direction and that of the lane that it is taken to follow: 45 degrees. [-]"""
-
-HEADING_AGREEMENT = 0.94
-"""Cosine of a vehicle's heading and of its way: 20 degrees, as of its front at R = 10 m. [-]"""
-
-WITHIN_EARTH = 4e7
-"""Places beyond are none: the earth's girth. [m]"""
+LANE_AGREEMENT = 0.7  # cosine of a vehicle's direction and that of the lane that it is taken to follow: 45 degrees [-]
+HEADING_AGREEMENT = 0.94  # cosine of a vehicle's heading and of its way: 20 degrees, as of its front at R = 10 m [-]
+WITHIN_EARTH = 4e7  # places beyond are none: the earth's girth [m]
 
 MAX_AGAINST = 0.1
 """Share of the moving rows that may contradict: mirrored or turned recordings have all, or half where headings are
@@ -35,8 +30,7 @@ random; overtaking in the oncoming lane and vehicles that reverse have a few in 
 STRAIGHT_AGREEMENT = np.cos(np.radians(3.0))
 """Cosine of a vehicle's heading and its edge's that is of a straight edge. [-]"""
 
-LEAST_SPREAD = 0.1
-"""Standard deviation of places across the road from which their side can be told. [m]"""
+LEAST_SPREAD = 0.1  # standard deviation of places across the road from which their side can be told [m]
 
 CLOCKWISE, NORTH = "counted clockwise", "counted clockwise from north"
 
@@ -64,10 +58,7 @@ def require_headings(heading: FloatArray, way: FloatArray, speed: FloatArray, pa
 
 
 def require_lane_direction(agreement: FloatArray, speed: FloatArray, where: str, path: Path) -> BoolArray:
-    """Rows that drive against their lane, shape (n,); refuse a recording that does so.
-
-    `agreement`: cosine of the way and the lane's direction of travel, NaN in no lane. [-] `where`: what lanes are from.
-    """
+    """Rows against their lane by the cosine of way and lane (NaN: in none), shape (n,); refuse a recording of them."""
     against = (speed > MOVING_SPEED) & (agreement < 0.0)
     share = _share(against[(speed > MOVING_SPEED) & np.isfinite(agreement)])
     if share > MAX_AGAINST:

@@ -1,4 +1,4 @@
-"""How pieces of lanes hang together, and who drives ahead and beside in them."""
+"""How pieces of lanes hang together, who is on them at one instant, and who drives ahead and beside."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
-from xosc_lateral.workflows.recordings.instants import pool_of
-from xosc_lateral.workflows.recordings.neighbours import find_neighbours
+from xosc_lateral.drivers.drives.cuts import MAX_GAP
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,12 +24,10 @@ class LaneGraph:
     facing: Mapping[tuple[int, int], tuple[FloatArray, FloatArray]] = field(default_factory=dict)
 
     def layout(self) -> tuple[IntArray, list[tuple[FloatArray, FloatArray]], IntArray]:
-        """Part of the network, ways along each piece with the stations that they lie at [m], and its rank (growing to
-        the left).
+        """Part of the network, ways along each piece with their stations [m], and its rank, growing to the left.
 
-        Breadth first from the first piece of each part. Where ways meet that are of different length, as in a ring or
-        beyond a junction, the first one found counts; pieces that come to lie on one another there (two ways into one
-        place of a layout) get parts of their own.
+        Breadth first from the first piece of each part. Where ways of different length meet, the first one counts;
+        pieces that come to lie on one another there get parts of their own.
         """
         n = len(self.length)
         part, rank = np.full(n, -1), np.zeros(n, dtype=np.int64)
@@ -62,10 +59,7 @@ class LaneGraph:
         return np.array([0.0, self.length[piece]]), np.array([start, start + self.length[piece]])
 
     def stations(self, piece: IntArray, along: FloatArray) -> tuple[IntArray, FloatArray, IntArray, FloatArray]:
-        """Part, station [m] and rank of places in pieces, and metres along the piece per metre of station [-].
-
-        Shape (n,) each; `along`: from the piece's start. [m]
-        """
+        """Part, station [m], rank of places `along` pieces [m], and metres along a piece per metre of station."""
         part, lines, rank = self.layout()
         station, scale = np.array(along, dtype=np.float64), np.ones(len(along))
         for number in np.unique(piece):
@@ -90,8 +84,7 @@ class LaneGraph:
         return steps
 
 
-SLOPE_LENGTH = 10.0
-"""To each side: over which metres of a lane are compared with those of its neighbour. [m]"""
+SLOPE_LENGTH = 10.0  # to each side: over which metres of a lane are compared with those of its neighbour [m]
 
 
 def follow(values: FloatArray, line: tuple[FloatArray, FloatArray]) -> FloatArray:
@@ -114,12 +107,11 @@ def neighbour_columns(
     *,
     scale: FloatArray | float = 1.0,
 ) -> dict[str, FloatArray]:
-    """Columns of leader and neighbours, shape (n,) each, see `find_neighbours`; rows sorted by vehicle and time.
+    """Columns of leader and neighbours, see `find_neighbours`, at every instant, whoever is missing in a frame
+    included.
 
-    At every instant of the recording everybody is where it is then, whoever is missing in a frame included.
-
-    `piece`: -1: in no lane. `middle`: of the vehicle, along its piece. [m] `time`, `step`: usual from row to row. [s]
-    `speed`: [m/s] `length`: [m] `scale`: metres along the lane per metre of `middle`. [-]
+    Rows sorted by vehicle and time, shape (n,); `piece`: -1: in no lane; `middle`: of the vehicle, along its piece. [m]
+    `step`: usual from row to row. [s] `scale`: metres along the lane per metre of `middle`. [-]
     """
     inside, piece = piece >= 0, np.maximum(piece, 0)
     part, station, rank, own_scale = graph.stations(piece, middle)
@@ -138,3 +130,142 @@ def neighbour_columns(
         scale=scale[row],
     )
     return {name: values[pool.of_row] for name, values in near.items()}
+
+
+REACH = 200.0  # [m]; who is farther away is none, as in `surroundings.around`
+MAXIMUM_LENGTH = 30.0  # [m]; no vehicle is longer (German road traffic regulations: 25.25 m)
+
+
+def find_neighbours(
+    frame: IntArray,
+    lane: IntArray,
+    s: FloatArray,
+    length: FloatArray,
+    is_truck: BoolArray,
+    *,
+    lane_on_left: BoolArray,
+    lane_on_right: BoolArray,
+    scale: FloatArray | float = 1.0,
+) -> dict[str, FloatArray]:
+    """Leader in the same lane and nearest vehicle in the lanes beside: columns of the drive table, shape (n,) each.
+
+    Distances are free space along the road, 0 while side by side; infinite where nobody is within `REACH`, NaN where
+    there is no such lane [m]. `frame`: equal for rows of one instant and carriageway. `lane`: 0 = rightmost driving
+    lane, counting up to the left; negative: in none. `s`: vehicle centres, growing in the direction of travel. [m]
+    `scale`: metres along the own lane per metre of `s`. [-]
+    """
+    known = lane >= 0
+    group = np.where(known, frame * 64 + lane, -1)
+    order = np.lexsort((s, group))
+    # One sorted axis for all groups: each gets its own, far apart from the next.
+    span = float(np.ptp(s)) + 4.0 * (REACH + MAXIMUM_LENGTH) if len(s) else 1.0
+    base = float(s.min()) if len(s) else 0.0
+    axis = group[order] * span + (s[order] - base)
+
+    def nearest(target: IntArray, there: BoolArray, *, ahead_only: bool = False) -> tuple[FloatArray, FloatArray]:
+        place = target * span + (s - base)
+        after = np.searchsorted(axis, place, side="right")
+        best, truck = np.full(len(s), np.inf), np.zeros(len(s))
+        for candidate in (after,) if ahead_only else (after, after - 1):
+            inside = (candidate >= 0) & (candidate < len(axis)) & known
+            who = order[np.clip(candidate, 0, len(axis) - 1)]
+            free = np.maximum(scale * np.abs(s[who] - s) - 0.5 * (length[who] + length), 0.0)
+            gap = np.where(inside & (group[who] == target), free, np.inf)
+            closer = (gap < best) & (gap <= REACH)
+            best, truck = np.where(closer, gap, best), np.where(closer, is_truck[who], truck)
+        return np.where(there & known | np.isfinite(best), best, np.nan), truck
+
+    found = {
+        "lead": nearest(group, known, ahead_only=True),
+        "left": nearest(np.where(known, group + 1, -2), lane_on_left),
+        "right": nearest(np.where(known & (lane > 0), group - 1, -2), lane_on_right),
+    }
+    return {
+        f"{who}_{what}": values
+        for who, both in found.items()
+        for what, values in zip(("distance", "is_truck"), both, strict=True)
+    }
+
+
+STAMP_DISTANCE = 0.25
+"""Stamps farther apart than this are of two instants ... [steps]"""
+
+INSTANT_WIDTH = 0.5
+"""... if no instant is then wider than this; else every vehicle has a clock of its own. [steps]"""
+
+FIRST_STEPS = 100
+"""A common clock is fitted to so many steps first, then to twice as many, and so on: never off by half a step."""
+
+
+def instants(time: FloatArray, vehicle: IntArray, step: float) -> tuple[IntArray, FloatArray]:
+    """Number of each row's instant, counted up from 0, and its time, shape (n,); `step`: median of a vehicle. [s]"""
+    stamps, at = np.unique(time, return_inverse=True)
+    new = np.r_[True, np.diff(stamps) > STAMP_DISTANCE * step]
+    number = np.cumsum(new) - 1
+    first = stamps[new]
+    if (np.r_[stamps[:-1][new[1:]], stamps[-1]] - first <= INSTANT_WIDTH * step).all():
+        return number[at], first[number][at]
+    step, start = _clock(time, vehicle, step)
+    number = np.round((time - start) / step).astype(np.int64)
+    return number - number.min(), start + step * number
+
+
+def _clock(time: FloatArray, vehicle: IntArray, step: float) -> tuple[float, float]:
+    """Step and time of instant 0 of the even clock that fits all stamps best. [s]"""
+    passed = np.diff(time)[np.diff(vehicle) == 0]
+    count = np.round(passed / step)
+    near = (count >= 1.0) & (count <= 3.0)
+    step = float(passed[near].sum() / count[near].sum())
+    start, span = float(time.min()), FIRST_STEPS * step
+    begin = start
+    while True:
+        rows = time <= begin + span
+        number = np.round((time[rows] - start) / step)
+        if np.ptp(number) > 0.0:
+            step, start = (float(one) for one in np.polyfit(number, time[rows], 1))
+        if rows.all():
+            return step, start
+        span *= 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Pool:
+    """Every vehicle at every instant from its first to its last, those that it misses for a moment too; shape (m,)."""
+
+    row: IntArray  # row of the recording, or of the last one before
+    after: IntArray  # row of the vehicle's next instant with a row; only where `share` is not 0
+    instant: IntArray
+    later: FloatArray  # time of the instant less that of `row` [s]
+    share: FloatArray  # of the way from `row` to the vehicle's next, 0 where the instant is its own [-]
+    of_row: IntArray  # place of each row of the recording in the pool, shape (n,)
+
+    def moved(self, along: FloatArray, part: IntArray, speed: FloatArray) -> FloatArray:
+        """Way along the road at the instants: between two rows of one part of the road, else as fast as before. [m]"""
+        after = self.after
+        between = (self.share > 0.0) & (part[after] == part[self.row])
+        on = along[self.row] + speed[self.row] * self.later
+        return np.where(between, along[self.row] + self.share * (along[after] - along[self.row]), on)
+
+
+def pool_of(time: FloatArray, vehicle: IntArray, step: float, longest: float = MAX_GAP) -> Pool:
+    """See `Pool`; instants missing for at most `longest` [s] are filled."""
+    instant, when = instants(time, vehicle, step)
+    new = np.r_[True, (np.diff(vehicle) != 0) | (np.diff(instant) != 0)]
+    row = np.flatnonzero(new)
+    missing = np.r_[np.diff(instant[row]) - 1, 0]
+    passed = np.r_[np.diff(time[row]), 0.0]
+    missing = np.where(np.r_[np.diff(vehicle[row]) == 0, False] & (passed <= longest + 1e-9), missing, 0)
+    missing = np.maximum(missing, 0)
+    last, following = np.repeat(row, missing), np.repeat(np.r_[row[1:], row[-1]], missing)  # about what is filled
+    after = np.arange(len(last)) - np.repeat(np.cumsum(missing) - missing, missing) + 1
+    times = np.full(int(instant.max()) + 1, np.nan)
+    times[instant] = when
+    filled = instant[last] + after
+    known = np.isfinite(times[filled])  # nobody was seen at others
+    last, following, filled = last[known], following[known], filled[known]
+    later = times[filled] - time[last]
+    share = later / np.maximum(time[following] - time[last], 1e-9)
+    return Pool(
+        np.r_[row, last], np.r_[row, following], np.r_[instant[row], filled], np.r_[when[row] - time[row], later],
+        np.r_[np.zeros(len(row)), np.clip(share, 0.0, 1.0)], np.cumsum(new) - 1,
+    )  # fmt: skip

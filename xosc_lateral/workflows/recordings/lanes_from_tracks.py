@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.base.normal import MAD_TO_SD
+from xosc_lateral.base.numbers import MAD_TO_SD
 from xosc_lateral.base.rows import true_slices
 
 KNOT_SPACING = 50.0  # [m]; chosen by leave-vehicles-out error on DLR HT (docs/real_data.md)
@@ -71,14 +71,11 @@ class LaneCentreLine:
 def fit_lane_centre(
     s: FloatArray, d: FloatArray, height: FloatArray, passage: IntArray, *, knot_spacing: float = KNOT_SPACING
 ) -> LaneCentreLine:
-    """Fit one lane's centre.
+    """Fit one lane's centre to rows of vehicles that keep to it, one a second, sorted by passage and time, shape (n,).
+    [m]
 
-    Raises `NotEnoughDataError` if fewer than `MIN_PASSAGES` share any 100 m.
-
-    `s`, `d`: positions of vehicles that keep to this lane, one row a second, sorted by passage and time, shape (n,).
-    [m] `height`: of the vehicles, shape (n,). [m] `passage`: which uninterrupted passage of which vehicle a row belongs
-    to, shape (n,). `knot_spacing`: of the splines; longer: blind to the bends that camera calibration puts into the
-    tracks; shorter: follows single drivers. [m]
+    `passage`: uninterrupted, of one vehicle. `knot_spacing`: longer is blind to the bends that camera calibration puts
+    into the tracks, shorter follows single drivers. [m]
     """
     start, end = _covered(s, passage)
     keep = (s >= start) & (s <= end)

@@ -10,23 +10,17 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.rows import true_slices
+from xosc_lateral.workflows.recordings.motion_fits import SHAPES, Rough, Transition, fit_transition
 from xosc_lateral.workflows.recordings.recorded import MOVING_SPEED, RecordedVehicle
-from xosc_lateral.workflows.recordings.transitions import SHAPES, Rough, Transition, fit_transition
 
-SETTLED = 0.7
-"""Nobody has settled in a lane who is farther from its centre, see `recordings.cuts`. [m]"""
-CALM = 0.1
-"""A lane change reaches to where the lateral speed falls below this, see there. [m/s]"""
+SETTLED = 0.7  # nobody has settled in a lane who is farther from its centre, see `recordings.cuts` [m]
+CALM = 0.1  # a lane change reaches to where the lateral speed falls below this, see there [m/s]
 CROSSING_RATE = 0.3
 """A side that crosses a marking faster is in a lane change, see there; one that returns, in an aborted one. [m/s]"""
-MAXIMUM_HALF_DURATION = 8.0
-"""From the crossing to either end, see there. [s]"""
-STILL, STEADY = 1e-3, 0.5
-"""Lateral speed below which a vehicle stands still sideways [m/s], for at least so long [s]."""
-LEVEL = 0.02
-"""Movement between two still stretches that is worth a maneuver. [m]"""
-RATE_WINDOW = 0.5
-"""The lateral speed is a difference over this. [s]"""
+MAXIMUM_HALF_DURATION = 8.0  # from the crossing to either end, see there [s]
+STILL, STEADY = 1e-3, 0.5  # lateral speed below which a vehicle stands still sideways [m/s], for at least so long [s]
+LEVEL = 0.02  # movement between two still stretches that is worth a maneuver [m]
+RATE_WINDOW = 0.5  # the lateral speed is a difference over this [s]
 
 
 @dataclass(frozen=True, eq=False, slots=True)

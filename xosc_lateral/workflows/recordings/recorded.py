@@ -13,27 +13,19 @@ from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.road.positions import Poses
 
-BESIDE = 1.0
-"""So far beside every driving lane a vehicle still keeps to one: it drives on its marking. [m]"""
-LONGEST_GAP = 1.0
-"""Rows farther apart than this are not of one passage, as in `recordings.cuts`. [s]"""
-FARTHEST = 1e8
-"""No map projection gives such a position: the Earth's circumference is 4e7 m. [m]"""
-SHORTEST_STEP = 1e-4
-"""Rows that follow sooner are of the same moment: no sensor has 10 kHz. [s]"""
-MINIMUM_PASSAGE = 2.0
-"""Passages below this are left out: a speed and its change can't be told in less. [s]"""
+BESIDE = 1.0  # so far beside every driving lane a vehicle still keeps to one: it drives on its marking [m]
+LONGEST_GAP = 1.0  # rows farther apart than this are not of one passage, as in `recordings.cuts` [s]
+FARTHEST = 1e8  # no map projection gives such a position: the Earth's circumference is 4e7 m [m]
+SHORTEST_STEP = 1e-4  # rows that follow sooner are of the same moment: no sensor has 10 kHz [s]
+MINIMUM_PASSAGE = 2.0  # passages below this are left out: a speed and its change can't be told in less [s]
 LEAP = 1.5
 """Farther than it can have driven by this much (half a narrow lane): an identifier that has gone to another vehicle.
 [m]"""
-BACKWARDS = 0.5
-"""Who falls back so far drives backwards; less is an error of standing vehicles' positions. [m]"""
+BACKWARDS = 0.5  # who falls back so far drives backwards; less is an error of standing vehicles' positions [m]
 MOVING_SPEED = 0.25
 """Below this a vehicle stands, and the direction of its movement is that of errors: half a walking pace. [m/s]"""
-VELOCITY_WINDOW = 2.0
-"""Rows whose positions a velocity is fitted to: 0.2 m of noise at 10 Hz are 0.08 m/s in it. [s]"""
-HEADING_WINDOW = 2.0
-"""Way over which a heading is averaged, so that positions' noise does not turn a slow vehicle. [m]"""
+VELOCITY_WINDOW = 2.0  # rows whose positions a velocity is fitted to: 0.2 m of noise at 10 Hz are 0.08 m/s in it [s]
+HEADING_WINDOW = 2.0  # way over which a heading is averaged, so that positions' noise does not turn a slow vehicle [m]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -80,10 +72,9 @@ class Recording:
 
 
 def lane_levels(offset: FloatArray, lane_width: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Lateral position of each row's lane centre from the first row's [m], and how many lanes to its left it is.
+    """Lateral position of each row's lane centre from the first row's [m], and how many lanes to its left; shape (n,).
 
-    A step of the offset by more than half a lane is a new lane; one lane that goes over into another one ahead has
-    none. Shape (n,) each, as the arguments.
+    A step of the offset by more than half a lane is a new lane; one lane that goes over into another ahead has none.
     """
     step, width = np.diff(offset), 0.5 * (lane_width[1:] + lane_width[:-1])
     lanes = np.where(np.abs(step) > 0.5 * width, -np.round(step / width), 0.0)
@@ -108,10 +99,7 @@ class Track:
 
 
 def place_tracks(tracks: Sequence[Track], network: RoadNetwork, start: float, end: float) -> Recording:
-    """Each vehicle's longest passage in driving lanes within a window of time.
-
-    Raises `NotEnoughDataError`: if no vehicle is left.
-    """
+    """Each vehicle's longest passage in driving lanes within a window of time. Raises `NotEnoughDataError`."""
     vehicles, left_out = list[RecordedVehicle](), list[str]()
     for track in tracks:
         inside = (np.hypot(track.x, track.y) < FARTHEST) & np.isfinite(track.heading)
@@ -193,8 +181,7 @@ def _steady_heading(
 ) -> FloatArray:
     """Headings averaged over `HEADING_WINDOW` of way: those of a vehicle that stands are from when it last moved.
 
-    One that never moves points along its lane; against it only where its headings agree on that. They tell nothing
-    where all of them are 0, as differences of equal positions are.
+    One that never moves points along its lane, or against it where its headings agree, and are not all 0.
     """
     speed = np.hypot(*velocity)
     driven = np.where(speed >= MOVING_SPEED, speed, 0.0) * np.gradient(time) if len(time) > 1 else np.zeros(1)

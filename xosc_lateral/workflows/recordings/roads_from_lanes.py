@@ -15,12 +15,10 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.files.opendrive.write import Connections, WrittenLane, WrittenRoad, curved_plan, roads_xml
 from xosc_lateral.world.road.road_from_tracks import ReferenceLine
 
-PIECE_LENGTH = 5.0
-"""Of a curved reference line: a cubic is off by 2 mm on a radius of 10 m, see `curved_plan`. [m]"""
+PIECE_LENGTH = 5.0  # of a curved reference line: a cubic is off by 2 mm on a radius of 10 m, see `curved_plan` [m]
 SAMPLE_LENGTH = 0.5
 """Between points of a line that widths are measured at: its chord is off by 3 mm on a radius of 10 m. [m]"""
-WIDTH_TOLERANCE = 1e-3
-"""Widths go in straight pieces that are within this. [m]"""
+WIDTH_TOLERANCE = 1e-3  # widths go in straight pieces that are within this [m]
 WHOLE_LENGTH = 0.8
 """A line of this share of the longest runs along the whole road: what it lacks is that it cuts corners. [-]"""
 ABSENCE_LENGTH = 2.0
@@ -85,8 +83,7 @@ def _groups(lanes: Sequence[DrivenLane]) -> list[list[int]]:
     return groups
 
 
-Place = tuple[int, int]
-"""Number of a road, and lane."""
+Place = tuple[int, int]  # number of a road, and lane
 
 
 def _links(
@@ -203,10 +200,7 @@ def _turning(points: FloatArray) -> float:
 
 
 def _aside(edge: FloatArray, line: ReferenceLine, s: FloatArray, samples: FloatArray) -> FloatArray:
-    """How far to the left of a line an edge lies, at places along it where these are its samples; NaN where it is not.
-
-    Shape as `s`. [m]
-    """
+    """How far to the left of a line an edge lies, at its samples, shape as `s`; NaN where the edge is not. [m]"""
     from scipy.spatial import cKDTree
 
     way = np.r_[0.0, np.cumsum(np.hypot(*np.diff(edge[:, :2], axis=0).T))]

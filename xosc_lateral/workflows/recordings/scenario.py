@@ -12,13 +12,12 @@ from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.build import Version, decimal, sub
 from xosc_lateral.files.output_paths import template_mark
 from xosc_lateral.workflows.recordings.encounters import RelativeTrigger
+from xosc_lateral.workflows.recordings.motion_fits import Transition, peak_acceleration
 from xosc_lateral.workflows.recordings.plan import VehiclePlan
-from xosc_lateral.workflows.recordings.transitions import Transition, peak_acceleration
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.enums import Priority
 
-DATE = "2024-01-01T00:00:00"
-"""The format asks for a date: the same recording gives the same bytes."""
+DATE = "2024-01-01T00:00:00"  # the format asks for a date: the same recording gives the same bytes
 
 MODELS = {"car": "car", "van": "van", "truck": "truck", "bus": "bus", "trailer": "trailer"}
 MODELS |= {"motorcycle": "motorbike", "motorbike": "motorbike", "bicycle": "bicycle"}
@@ -36,8 +35,7 @@ HALF_FRAME = 0.01
 which is therefore written as much later; for frames of 0.02 s, those of `play`. Else braking from 30 m/s to a stop ends
 0.3 m short. [s]"""
 
-VERTICES = 0.2
-"""Between the vertices of a recorded path. [s]"""
+VERTICES = 0.2  # between the vertices of a recorded path [s]
 
 
 def reconstructed_scenario(
@@ -52,26 +50,10 @@ def reconstructed_scenario(
     relative: Mapping[str, Triggers] | None = None,
     exact: bool = False,
 ) -> str:
-    """The document, the same bytes each time.
+    """The document, the same bytes each time; it ends after `duration` [s].
 
-    Parameters
-    ----------
-    plans : sequence of VehiclePlan
-    network : RoadNetwork
-    road_file : str
-        As seen from the scenario.
-    duration : float
-        The scenario ends then. [s]
-    version : (int, int)
-        Of the standard.
-    host : str, optional
-        Entity that is the vehicle under test.
-    description : str
-        For the header.
-    relative : mapping of str to triggers, optional
-        Entity -> what of it begins by a distance instead of the clock.
-    exact : bool
-        Recorded paths as trajectories, instead of maneuvers.
+    `host`: entity under test. `relative`: entity -> what of it begins by a distance instead of the clock. `exact`:
+    recorded paths as trajectories, instead of maneuvers.
     """
     entities, actions = etree.Element("Entities"), etree.Element("Actions")
     story = build.story("Recorded")
@@ -122,10 +104,7 @@ def plain_text(text: str) -> str:
 
 
 class _Vehicle:
-    """One vehicle: its entity, where it starts and what it does.
-
-    `values` gets the parameters that are used by name, with their values.
-    """
+    """One vehicle: its entity, where it starts and what it does; `values` gets the parameters used by name."""
 
     def __init__(
         self, plan: VehiclePlan, network: RoadNetwork, version: Version, act: etree._Element, values: dict[str, str]

@@ -15,7 +15,7 @@ from msgspec import Struct
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
-from xosc_lateral.base.rows import BLOCK, give_back
+from xosc_lateral.base.rows import BLOCK
 from xosc_lateral.world.surroundings.nearby import stretches_within
 
 MAXIMUM_GAP = 30.0
@@ -92,7 +92,6 @@ def _near_pairs(paths: Sequence[BoxPath], reach: float) -> Iterator[_NearPair]:
                 # the exact distance is only needed where a lower bound of it undercuts the best upper bound
                 upper = np.min(between[near]) + abs(a.centre) + abs(b.centre)
                 yield (first, second), rows.start + near[apart[near] <= upper]
-        give_back()
 
 
 def _together(pairs: Iterator[_NearPair]) -> Iterator[list[_NearPair]]:

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from xosc_lateral.base.digits import significant
+from xosc_lateral.base.numbers import significant
 from xosc_lateral.drivers.fitting.sensor.likelihood import Colour, Measured, Solution, solve
 from xosc_lateral.drivers.fitting.sensor.second_view import SecondView
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.digits import significant
+from xosc_lateral.base.numbers import significant
 from xosc_lateral.drivers.drives.drive import Drive, Run
 from xosc_lateral.drivers.drives.resampling import STEP, resample
 from xosc_lateral.drivers.fitting.sensor.periodogram import PASSED, WINDOWS

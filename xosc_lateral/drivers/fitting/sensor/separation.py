@@ -15,9 +15,8 @@ from functools import partial
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.digits import all_significant
 from xosc_lateral.base.errors import DriverProfileError
-from xosc_lateral.base.normal import NORMAL_95
+from xosc_lateral.base.numbers import NORMAL_95, all_significant
 from xosc_lateral.drivers.drives.filters import scale_frequencies
 from xosc_lateral.drivers.fitting.sensor.explanations import Explanation, explanations
 from xosc_lateral.drivers.fitting.sensor.likelihood import Colour, Known, Measured, Solution, solve

@@ -20,7 +20,7 @@ from typing import ClassVar
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
-from xosc_lateral.base.jit import njit
+from xosc_lateral.base.lazy import njit
 from xosc_lateral.drivers.loop.dictionary import beside, in_another_order
 from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Removal, Stage, Term
 from xosc_lateral.drivers.loop.search import Search

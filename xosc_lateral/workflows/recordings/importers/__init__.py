@@ -33,8 +33,7 @@ IMPORTERS = {
 }
 """Format -> its reader, loaded when it is wanted."""
 
-GROUP = "xosc_lateral.importers"
-"""Entry points of further readers."""
+GROUP = "xosc_lateral.importers"  # entry points of further readers
 
 
 def find_importer(name: str) -> Importer:

@@ -45,8 +45,8 @@ from xosc_lateral.workflows.recordings.cuts import (
     number_runs,
 )
 from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
+from xosc_lateral.workflows.recordings.lane_graph import find_neighbours
 from xosc_lateral.workflows.recordings.lanes_from_tracks import LaneCentreLine, fit_lane_centre
-from xosc_lateral.workflows.recordings.neighbours import find_neighbours
 from xosc_lateral.world.road.road_from_tracks import ReferenceLine, fit_reference_line
 
 LANES = 2  # through lanes per direction of the A39 there; ramps and their merging lanes are left out
@@ -59,14 +59,10 @@ COLUMNS = (
 )
 PIECES = (0.5, 0.6)
 """Frequencies below which movement across the road is kept, and above which none is: half a jump a period. [Hz]"""
-ATTENUATION = 40.0
-"""Of what is faster; a third of a millimetre of its 3 cm is left. [dB]"""
-HIGHEST_FREQUENCY = 0.1
-"""Of what these tracks show of driving. [Hz]"""
-POSITION_RESOLUTION = 0.01
-"""That positions are given in. [m]"""
-WIDTH = "dimension_width"
-"""Read where it is there: nothing of an import needs it."""
+ATTENUATION = 40.0  # of what is faster; a third of a millimetre of its 3 cm is left [dB]
+HIGHEST_FREQUENCY = 0.1  # of what these tracks show of driving [Hz]
+POSITION_RESOLUTION = 0.01  # that positions are given in [m]
+WIDTH = "dimension_width"  # read where it is there: nothing of an import needs it
 LICENCE = (
     "DLR Highway Traffic dataset (Deutsches Zentrum für Luft- und Raumfahrt, doi:10.5281/zenodo.14012005), said by "
     "others to be under CC BY-NC-SA 4.0; its first file lies in the wheel of tasi, licensed Apache-2.0. No tracks are "
@@ -76,11 +72,7 @@ LICENCE = (
 
 @guarded
 def import_dlr_ht(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cut: bool = False) -> Imported:
-    """Read the trajectory CSV, the data set's zip or the wheel of `tasi` that holds it.
-
-    Returns Imported: table with columns drive, time, offset, lane_width, speed, context, vehicle_class, and (with
-    `keep_cut`) `state` naming why a row would have been cut.
-    """
+    """Read the trajectory CSV, the data set's zip or the wheel of `tasi` that holds it."""
     tracks = read_tracks(source)
     found = find_lanes(tracks, settings)
     forward, reference, s_road = found.forward, found.reference, found.s

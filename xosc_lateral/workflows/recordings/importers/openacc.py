@@ -34,59 +34,45 @@ from xosc_lateral.drivers.drives.cleaning import RESOLUTION, RUN, VALID_BELOW
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import unpacked_text
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
-from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
+from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded, paths_of
 
 LICENCE = (
     "OpenACC, AstaZero campaign: (c) European Union, Joint Research Centre, CC BY 4.0 (doi:10.1016/j.trc.2021.103047). "
     "No tracks are passed on with a profile, only fitted parameters."
 )
-LANE_WIDTH = 3.5
-"""Assumed: usual on rural roads; the campaign gives none. [m]"""
+LANE_WIDTH = 3.5  # assumed: usual on rural roads; the campaign gives none [m]
 
 HIGHEST_FREQUENCY = 1.5
 """Runs at 5 Hz keep what is slower; the noise there (2e-8 m2/Hz at most) is a tenth of the movement. [Hz]"""
 
-POSITION_RESOLUTION = 1e-3
-"""Noise of the positions. [m]"""
-
-GRID_STEP = 1.0
-"""Points of the centre line are so far apart. [m]"""
+POSITION_RESOLUTION = 1e-3  # noise of the positions [m]
+GRID_STEP = 1.0  # points of the centre line are so far apart [m]
 
 SMOOTHING, ROUNDS = 12.0, 5
 """Standard deviation of the Gaussian by which the centre line follows the mean path [m], and how often."""
 
-RETURN_DISTANCE = 5.0
-"""A lap is over where a car is as near to where it began [m] ..."""
+RETURN_DISTANCE = 5.0  # a lap is over where a car is as near to where it began [m] ...
 
 MINIMUM_LAP = 500.0
 """... and has come so far since. [m]"""
 
-MINIMUM_SPEED = 5.0
-"""Slower rows (standing start, end of a test) say nothing about the lane's centre. [m/s]"""
-
-LANE_SHARE = 0.5
-"""Of the lane's width: rows further from its centre are elsewhere. [-]"""
-
-MAXIMUM_STEP = 0.25
-"""Rows further apart in time are no longer one run. [s]"""
+MINIMUM_SPEED = 5.0  # slower rows (standing start, end of a test) say nothing about the lane's centre [m/s]
+LANE_SHARE = 0.5  # of the lane's width: rows further from its centre are elsewhere [-]
+MAXIMUM_STEP = 0.25  # rows further apart in time are no longer one run [s]
 
 FROZEN_TIME = 10.0
 """A speed of a moving car that stands to the last digit for so long is none that was measured: in some recordings of
 the campaigns it does for minutes, the engine's too; measured ones here repeat for 1.6 s at most. [s]"""
 
-HEADER_LINES = 50
-"""Lines before the header, at most: the campaign's files have five. [-]"""
+HEADER_LINES = 50  # lines before the header, at most: the campaign's files have five [-]
 
 
 @guarded
 def import_openacc(
     source: Path | Sequence[Path], *, lane_width: float = LANE_WIDTH, keep_cut: bool = False
 ) -> Imported:
-    """AstaZero's files, one or several, as they are in the catalogue (.csv, .csv.gz): a drive for each car and file.
-
-    `lane_width`: of the road, which nobody measured. [m]
-    """
-    paths = [source] if isinstance(source, Path) else list(source)
+    """A drive for each car of AstaZero's files (.csv, .csv.gz). `lane_width`: of the road, not measured. [m]"""
+    paths = paths_of(source)
     cars = [car for path in paths for car in _cars(path)]
     if not cars:
         raise NotEnoughDataError(f"{paths[0]}: no car moves")
@@ -200,10 +186,7 @@ class _Loop:
         return np.asarray(cross / np.hypot(*first.T) ** 3)
 
     def place(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Index along the points, with its fraction, and distance to the left, shape (n,) each. [-], [m]
-
-        Across the line it is as between the normals of both neighbours, so that nothing jumps from point to point.
-        """
+        """Index along the points with its fraction, and distance to the left [m], as between two normals."""
         from scipy.spatial import cKDTree
 
         points, normals = self.points, self.normals()

@@ -15,12 +15,11 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.files.clock import require_row_step, seconds_of_stamps
+from xosc_lateral.files.columns import chosen_rows, listed, numbers_of, require_row_step, seconds_of_stamps
 from xosc_lateral.files.mapping import UNITS, MappingLike, TableMapping, as_mapping, parse_map
-from xosc_lateral.files.rows import chosen_rows, without_markers
+from xosc_lateral.files.output_tables import COLUMNS
 from xosc_lateral.files.source import open_source
-from xosc_lateral.files.states import COLUMNS
-from xosc_lateral.files.tables import foreign_errors, listed, numbers_of, read_table, unpacked_text
+from xosc_lateral.files.tables import foreign_errors, read_table, unpacked_text
 from xosc_lateral.workflows.recordings.gate import MOVING_SPEED, require_headings
 
 if TYPE_CHECKING:
@@ -76,8 +75,7 @@ class Tracks:
 MAX_SPEED_RATIO = 1.39
 """A speed off by more is in another unit: the nearest, knots, are 1.94 times as many, and this is its root. [-]"""
 
-SPEED_WINDOW = 0.4
-"""Positions are differenced over this where no speed was recorded. [s]"""
+SPEED_WINDOW = 0.4  # positions are differenced over this where no speed was recorded [s]
 
 
 def ground_speed(x: FloatArray, y: FloatArray, vehicle: IntArray, time: FloatArray, step: float) -> FloatArray:
@@ -101,15 +99,10 @@ def rate(values: FloatArray, vehicle: IntArray, time: FloatArray, step: float, w
 
 
 def read_tracks(path: Path, columns: Sequence[str] = (), mapping: MappingLike | None = None) -> Tracks:
-    """Read a table of tracks.
-
-    `columns`: ``NAME=COLUMN[:UNIT]`` for headers that aren't understood, and for units other than m, s, rad, m/s.
-    Raises `FormatError`: a missing column, no number where one is needed. Raises `NotEnoughDataError`: no vehicle with
-    two rows.
-    """
+    """Read a table of tracks. `columns`: ``NAME=COLUMN[:UNIT]`` for other headers and units than usual."""
     saved = as_mapping(mapping)
     is_log = is_esmini_log(path)
-    table = read_esmini_log(path) if is_log else read_table(path, saved)[0]
+    table = read_esmini_log(path) if is_log else read_table(path, saved)
     return tracks_of(table, path, columns, saved, is_log=is_log)
 
 
@@ -191,7 +184,7 @@ def _columns(table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequen
         raise FormatError(f"--map {min(unknown)}: tracks have {', '.join(HEADERS)}", path=path)
     by_lower = {str(name).strip().lower(): name for name in reversed(list(table.columns))}
     found: dict[str, pd.Series] = {}
-    table = chosen_rows(without_markers(table, saved.missing, path), saved.rows, path)
+    table = chosen_rows(table, saved.missing, saved.rows, path)
     for name, headers in HEADERS.items():
         source = mapping.get(name)
         header = next((by_lower[one] for one in headers if one in by_lower), None) if source is None else source.column
@@ -216,13 +209,11 @@ def _columns(table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequen
     return made.dropna(subset=["vehicle", "time", "x", "y"])
 
 
-FIRST = b"esmini "
-"""Begins the lines before the table, which name the player's version."""
+FIRST = b"esmini "  # begins the lines before the table, which name the player's version
 
 HEAD = "Index [-]"
 
-MOST_LINES = 50
-"""Before the table's head; a player writes seven."""
+MOST_LINES = 50  # before the table's head; a player writes seven
 
 _LOGGED = {
     "vehicle": "Entity_Name",
@@ -246,11 +237,7 @@ def is_esmini_log(path: Path) -> bool:
 
 
 def read_esmini_log(path: Path) -> pd.DataFrame:
-    """Rows of all vehicles, one below the other: the columns of `_LOGGED`, and `time`.
-
-    A line holds a group of columns for every vehicle that is there at that time, the head those for the first line.
-    Raises `FormatError`: a column is missing, or the table is damaged.
-    """
+    """Columns of `_LOGGED` and `time`, one vehicle below the other: a line has a group of columns for each."""
     with open_source(path) as source, foreign_errors(path, "can't be read as a log of esmini"):
         text = unpacked_text(source)
         head = (text.readline().decode("utf-8", "replace") for _ in range(MOST_LINES))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
-from xosc_lateral.files.osi.extra import osi
+from xosc_lateral.files.osi import osi
 from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH, Tracks, ground_speed, travel_heading
-from xosc_lateral.workflows.recordings.osi.horizon import extend_thing
 from xosc_lateral.workflows.recordings.osi.trace import Trace
 from xosc_lateral.world.motion.nominal import axes
 
@@ -29,11 +28,8 @@ KINDS = {
 THINGS = ("lane", "lane_boundary", "logical_lane", "logical_lane_boundary")
 """Fields of a `GroundTruth` that are kept besides moving objects: lanes in both encodings."""
 
-LEAP = 3.0
-"""Farther than twice what it drives in a step, and by this much: not the same vehicle any more. [m]"""
-
-COLUMNS = 12
-"""Number, time, x, y, yaw, speed, length, pitch, roll; the rear axle, on the ground, from the middle."""
+LEAP = 3.0  # farther than twice what it drives in a step, and by this much: not the same vehicle any more [m]
+COLUMNS = 12  # number, time, x, y, yaw, speed, length, pitch, roll; the rear axle, on the ground, from the middle
 
 
 @dataclass
@@ -51,11 +47,7 @@ class Recorded:
 
 
 def read_osi(path: Path, channel: str | None = None) -> Recorded:
-    """Read a trace, message by message.
-
-    Raises `FormatError`: No trace; a vehicle without a position; times that are none; `NotEnoughDataError`: No vehicle
-    in two messages.
-    """
+    """Read a trace, message by message. Raises `FormatError`, `NotEnoughDataError`."""
     with Trace(path, channel) as trace:
         collected = _Collected(path)
         for number, message in enumerate(trace, 1):
@@ -185,3 +177,54 @@ class _Collected:
         length, behind = np.where(np.isfinite(length), length, usual), -rear[0] if rear[0].any() else None
         when, place = (time - float(time.min()), step), (x + arm[:, 0], y + arm[:, 1], heading)
         return Tracks(tuple(names), vehicle, *when, *place, speed, length, kinds, rear=behind)
+
+
+BEYOND_END = 1e-3  # points farther than this past the end of a line go on with it [m]
+
+
+def extend_thing(kept: Any, seen: Any) -> None:
+    """Add to a lane or boundary what a later message shows of it: points beyond its ends, further identifiers."""
+    kind = type(kept).__name__
+    if kind in ("LaneBoundary", "LogicalLaneBoundary"):
+        _extend(kept.boundary_line, seen.boundary_line, lambda point: point.position)
+    elif kind == "Lane":
+        _extend(kept.classification.centerline, seen.classification.centerline, lambda point: point)
+        for name in ("left_lane_boundary_id", "right_lane_boundary_id", "left_adjacent_lane_id",
+                     "right_adjacent_lane_id", "lane_pairing"):  # fmt: skip
+            _unite(getattr(kept.classification, name), getattr(seen.classification, name))
+    else:
+        kept.start_s, kept.end_s = min(kept.start_s, seen.start_s), max(kept.end_s, seen.end_s)
+        for name in ("left_boundary_id", "right_boundary_id", "left_adjacent_lane", "right_adjacent_lane",
+                     "predecessor_lane", "successor_lane"):  # fmt: skip
+            _unite(getattr(kept, name), getattr(seen, name))
+
+
+def _unite(kept: Any, seen: Any) -> None:
+    for thing in seen:
+        if thing not in kept:
+            kept.add().CopyFrom(thing)
+
+
+def _extend(line: Any, seen: Any, place: Callable[[Any], Any]) -> None:
+    if len(seen) < 2:
+        return
+    if len(line) < 2:
+        del line[:]
+        line.extend(seen)
+        return
+    line.extend(_beyond(place(line[-2]), place(line[-1]), list(reversed(seen)), place)[::-1])
+    for point in reversed(_beyond(place(line[1]), place(line[0]), list(seen), place)):
+        line.insert(0, point)
+
+
+def _beyond(before: Any, end: Any, points: list[Any], place: Callable[[Any], Any]) -> list[Any]:
+    """Of points from the far end inwards, those past a line's end."""
+    dx, dy = end.x - before.x, end.y - before.y
+    size = max((dx * dx + dy * dy) ** 0.5, 1e-9)
+    found = []
+    for point in points:
+        at = place(point)
+        if ((at.x - end.x) * dx + (at.y - end.y) * dy) / size <= BEYOND_END:
+            break
+        found.append(point)
+    return found

@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.files.osi.extra import osi
+from xosc_lateral.files.osi import osi
 from xosc_lateral.workflows.recordings.gate import MOVING_SPEED
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
 from xosc_lateral.workflows.recordings.lane_shapes import Strip, lane_graph, middle
 from xosc_lateral.workflows.recordings.osi.read import Recorded
 
-SHOWING_ROWS = 20_000
-"""So many rows of a trace show which way its lanes are driven. [-]"""
+SHOWING_ROWS = 20_000  # so many rows of a trace show which way its lanes are driven [-]
 
 
 @dataclass(frozen=True)
@@ -32,10 +31,7 @@ class _Lane:
 
 
 def lanes_of(recorded: Recorded) -> tuple[list[Strip], LaneGraph] | None:
-    """Driving lanes with a boundary on both sides: logical lanes where there are any, else physical ones.
-
-    None: the trace has no such lane.
-    """
+    """Driving lanes with a boundary on both sides: logical ones where there are any, else physical ones, else None."""
     lanes = list(_logical(recorded)) or list(_physical(recorded))
     if not lanes:
         return None

@@ -20,8 +20,8 @@ import numpy as np
 from msgspec.structs import replace
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.digits import all_significant, significant
 from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.base.numbers import all_significant, significant
 from xosc_lateral.drivers.fitting.models.autoregressive.fit_coarse import fit_coarse, fit_spectrum
 from xosc_lateral.drivers.fitting.models.autoregressive.fit_matching import matched, with_volatility
 from xosc_lateral.drivers.fitting.models.autoregressive.settings import DEFAULT_SETTINGS, FitSettings

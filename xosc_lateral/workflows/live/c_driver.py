@@ -1,0 +1,83 @@
+"""A driver as C source: templates that hold the model, in `resources/driver_c`, and the profile's numbers as tables."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+
+from xosc_lateral.base.segment import CONTEXT_UNITS
+from xosc_lateral.base.version import __version__
+from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.files.atomic import write_atomically
+from xosc_lateral.workflows.live.c_numbers import inputs_of, numbers_of
+
+
+def identifier(profile: DriverProfile) -> str:
+    """What names in C begin with."""
+    return "driver_" + re.sub(r"[^0-9A-Za-z]", "_", profile.name)
+
+
+def export_c(profile: DriverProfile, folder: str | Path) -> list[Path]:
+    """Write a driver as C99: header, source, the profile's numbers, a CMake file and an example loop.
+
+    Parameters
+    ----------
+    profile : DriverProfile
+    folder : path
+        Made where there is none; files of the same names are replaced.
+
+    Raises `DriverProfileError` if the profile has an effect or a core model of a plug-in.
+    """
+    texts = c_sources(profile) | {name: _filled(name, profile) for name in ("CMakeLists.txt", "example.c")}
+    written = [Path(folder) / name for name in texts]
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    for path, text in zip(written, texts.values(), strict=True):
+        write_atomically(path, text.encode())
+    return written
+
+
+def c_sources(profile: DriverProfile) -> dict[str, str]:
+    """Header, source and numbers of a driver, by file name."""
+    name = identifier(profile)
+    sizes, numbers = numbers_of(profile)
+    words = {
+        "WHAT": f"Driver {profile.name} of xosc-lateral {__version__}, in C99.",
+        "SIZES": "\n".join(f"#define DRIVER_{key} {value}" for key, value in sizes.items()),
+        "MEMORY": str(_memory(sizes)),
+        "PREVIEW": repr(round(sizes["LOOKS"] * profile.model.step, 9)),
+        "INPUTS": "\n".join(_input(column) for column in inputs_of(profile)),
+        "KNOWN": "\n".join(
+            f"#define DRIVER_KNOWS_{column} UINT64_C({1 << k})" for k, column in enumerate(inputs_of(profile))
+        ),
+        "ALL_KNOWN": str((1 << len(inputs_of(profile))) - 1),
+    }
+    return {
+        f"{name}.h": _filled("driver.h", profile, words),
+        f"{name}.c": _filled("driver.c", profile),
+        f"{name}_profile.h": _named("\n".join(numbers) + "\n", profile),
+    }
+
+
+def _filled(template: str, profile: DriverProfile, words: Mapping[str, str] | None = None) -> str:
+    text = files("xosc_lateral").joinpath("resources", "driver_c", template).read_text(encoding="utf-8")
+    for word, value in (words or {}).items():
+        text = text.replace(f"@{word}@", value)
+    return _named(text, profile)
+
+
+def _named(text: str, profile: DriverProfile) -> str:
+    return re.sub(r"\bDRIVER(?=_|\.h|\b)", identifier(profile), text)
+
+
+def _input(column: str) -> str:
+    unit = CONTEXT_UNITS.get(column, "as in the profile")
+    return f"    double {column}; /* [{unit}] */"
+
+
+def _memory(sizes: Mapping[str, int]) -> int:
+    """Bytes of `DRIVER_state`, whose fields all have eight; the C compiler checks it."""
+    history = sizes["ROWS"] * (sizes["COMPONENTS"] + 1)
+    per_size = sum(sizes[name] for name in ("STEPS", "EVERY", "TAPS", "COMPONENTS", "LAGS")) + 10 * sizes["HIDDEN"]
+    return 8 * (90 + history + per_size)

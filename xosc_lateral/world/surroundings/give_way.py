@@ -1,0 +1,286 @@
+"""Vehicles side by side give way to each other: sampled paths, moved apart as real neighbours are.
+
+Every vehicle's path is sampled by itself first. Where two drive side by side, the lateral gap that this leaves
+between them is mapped to the gap that real neighbours leave at the same quantile: gaps between vehicles side by side
+beside those between any two vehicles of the two lanes (`GAPS`), or beside those that profiles leave which keep away
+from neighbours by themselves, in the mean (`RESPONDING`). The narrower the gap would be, the more it is widened; both
+vehicles take their part, the one in the overtaking lane the larger one, as measured. The mapping fades with the free
+space lengthwise. Of what profiles leave, all is the overtaking one's: the other keeps as far away as real ones do, by
+itself. All displacements follow from the paths as first sampled, so nobody's depends on the order of entities, and a
+vehicle far away changes nobody's.
+
+Our own rule: quantile mapping to gaps that were measured in DLR Highway Traffic v1.1.0 (laboratory/give_way.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.base.rows import empty, put, stored
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
+from xosc_lateral.world.road.network import RoadNetwork
+from xosc_lateral.world.surroundings.around import smooth_step
+from xosc_lateral.world.surroundings.context import CELLS, STEERING
+from xosc_lateral.world.surroundings.moment import Places
+from xosc_lateral.world.surroundings.nearby import pairs_now, stretches_within
+
+GAPS = (
+    np.array([-0.68, -0.05, 0.37, 0.76, 1.29, 1.65, 3.0]),
+    np.array([0.41, 0.75, 0.99, 1.27, 1.59, 1.86, 3.0]),
+)
+"""Lateral gap between any vehicles of neighbouring lanes, and between those side by side, at the same quantiles (the
+least, 0.1, 1, 5, 25 and 50 %): DLR Highway Traffic, 744 encounters (`laboratory/give_way.py`). From 3 m on nobody
+gives way, which is assumed. [m]"""
+
+RESPONDING = np.array([0.04, 0.26, 0.56, 0.95, 1.43, 1.75, 3.0])
+"""Lateral gap that vehicles leave by themselves whose profiles know what neighbours do, at the quantiles of `GAPS`:
+those side by side in the same recording, sampled from `motorway` under its context, 12 seeds
+(`laboratory/give_way.py`; `motorway-refined` is within 0.03 m of it). [m]"""
+
+OVERTAKING_SHARE = 0.84
+"""Part of the one in the overtaking lane, by the law alone: it moves 0.239 m, the other 0.045 m (same recording,
+alongside; `laboratory/clearance.py`). [-]"""
+
+FADES, RESPONDING_FADES = 60.0, 20.0
+"""Free space lengthwise within which neighbours matter less and less, to profiles that do not respond to them, and
+beyond what profiles do that respond: `motorway` leaves 0.030 m of what real vehicles move from whom they overtake
+alongside, 0.002 m of it at up to 20 m of free space, and nothing farther away (same recording). [m]"""
+
+ENTERING = 0.5
+"""Nominal lateral gap over which a vehicle that crosses into a lane becomes its neighbour. [m]"""
+
+
+@dataclass(frozen=True, eq=False)
+class SampledVehicle:
+    """A vehicle and its sampled path."""
+
+    motion: EntityMotion  # nominal
+    deviation: FloatArray  # from it on the rows that are looked at, positive left, shape (n,) [m]
+    can_move: BoolArray  # on which of them its path is sampled and may be moved, shape (n,)
+    # responds: sides, "left" and "right", on which its profile responds to neighbours by itself: there, gaps are
+    # widened by what that leaves to be widened
+    responds: frozenset[str] = frozenset()
+    # alone: sides on which its answer to neighbours is known to be what its profile says: there the law moves it
+    # nowhere
+    alone: frozenset[str] = frozenset()
+
+
+def give_way(
+    motion: NominalMotion, network: RoadNetwork, sampled: Sequence[SampledVehicle], rows: IntArray
+) -> list[FloatArray | None]:
+    """By how much each vehicle moves aside on the rows, positive left, shape (n,); None: not at all. [m]
+
+    `sampled`: all entities, in the motion's order; `rows`: those that are looked at, evenly spaced, shape (n,).
+    """
+    count, n = len(sampled), len(rows)
+    left, right, none = empty((count, n)), empty((count, n)), np.zeros(n)
+    names = ("x", "y", "heading", "deviation", "can_move", "present")
+    tables = [empty((count, n), bool if name in names[4:] else np.float64) for name in names]
+    for k, one in enumerate(sampled):
+        for table, values in zip((left, right, *tables), (none, none, *Frame.of(one, rows)[: len(names)]), strict=True):
+            put(table, slice(k, k + 1), np.asarray(values))
+    left_hand = np.array(_left_hand(network, sampled, rows), dtype=bool)
+    x, y = (
+        (np.where(there, row, np.nan) for row, there in zip(table, tables[-1], strict=True)) for table in tables[:2]
+    )
+    boxes = [one.motion.entity.bounding_box for one in sampled]
+    length, width = (np.array([getattr(box, name) for box in boxes]) for name in ("length", "width"))
+    can_move = [one.can_move.any() for one in sampled]
+    responses = Response(*(
+        np.array([side in getattr(one, name) for one in sampled], dtype=bool)
+        for name in ("responds", "alone") for side in ("left", "right")
+    ))  # fmt: skip
+    for stretch, near_pairs in stretches_within(x, y, FADES + length.max(initial=0.0) + MARGIN):
+        meeting = [pair for pair in near_pairs if can_move[pair[0]] or can_move[pair[1]]]
+        part = [table[:, stretch] for table in tables]
+        for own, other in _together(meeting, part[0].shape[1]):
+            near = np.flatnonzero(_rows_near(part, length, own, other))
+            who, at = np.divmod(near, part[0].shape[1])
+            own, other = own[who], other[who]
+            first, second = (
+                Frame._make([*(table[who, at] for table in part), length[who], width[who]]) for who in (own, other)
+            )
+            aside = moved_aside(first, second, Response._make(column[own] for column in responses), left_hand[own])
+            np.maximum.at(right[:, stretch], (own, at), np.maximum(0.0 - aside, 0.0))
+            np.maximum.at(left[:, stretch], (own, at), np.maximum(aside, 0.0))
+    every = max(1, int(rows[1] - rows[0])) if n > 1 else 1
+    smoothed = STEERING / (motion.step * every)
+    result: list[FloatArray | None] = []
+    for k in range(count):
+        aside = left[k] - right[k]
+        result.append(stored(_smoothed(aside, smoothed)) if aside.any() else None)
+    return result
+
+
+def give_way_now(
+    places: Places,
+    lateral: FloatArray,
+    deviation: FloatArray,
+    can_move: BoolArray,
+    response: Response,
+    *,
+    left_hand: bool,
+) -> FloatArray:
+    """The same at one moment, shape (n,), of drivers who respond at once. [m]
+
+    `lateral` and `deviation` from the lane's centre, as it is and without what one has moved aside, 0 in a maneuver
+    [m]; `can_move`: there is a driver, who follows the road; shape (n,) each.
+    """
+    n = len(places.x)
+    cos, sin = np.cos(places.heading), np.sin(places.heading)
+    x, y = (axis + places.center_x * part for axis, part in ((places.x, cos), (places.y, sin)))
+    a, b = pairs_now(x, y, FADES + float(places.length.max(initial=0.0)) + MARGIN)
+    own, other = np.concatenate([a, b]), np.concatenate([b, a])
+    own, other = own[can_move[own]], other[can_move[own]]
+    x, y = x + lateral * sin, y - lateral * cos  # on the lane's centre line, from which a deviation counts
+    present = np.ones(n, dtype=np.bool_)
+    columns = (x, y, places.heading, deviation, can_move, present, places.length, places.width)
+    first, second = (Frame._make(column[who] for column in columns) for who in (own, other))
+    aside = moved_aside(first, second, Response._make(column[own] for column in response), left_hand)
+    left, right = np.zeros((2, n))
+    np.maximum.at(right, own, np.maximum(0.0 - aside, 0.0))
+    np.maximum.at(left, own, np.maximum(aside, 0.0))
+    return left - right
+
+
+def _together(meeting: Sequence[tuple[int, int]], n: int) -> Iterator[tuple[IntArray, IntArray]]:
+    """Both of each pair, each as the one who looks at the other, as many pairs as are looked at at once."""
+    pairs = np.array([pair for i, j in meeting for pair in ((i, j), (j, i))], dtype=np.int64).reshape(-1, 2)
+    step = max(1, CELLS // max(n, 1))
+    for begin in range(0, len(pairs), step):
+        yield pairs[begin : begin + step, 0], pairs[begin : begin + step, 1]
+
+
+def _rows_near(tables: Sequence[NDArray[Any]], length: FloatArray, own: IntArray, other: IntArray) -> BoolArray:
+    """Where pairs of vehicles are near enough for `widened`, shape (pairs, n); `tables`: x, y ... of all vehicles."""
+    x, y, present = tables[0], tables[1], tables[-1]
+    reach = (FADES + 0.5 * (length[own] + length[other]) + MARGIN)[:, None]
+    away = (x[other] - x[own]) ** 2 + (y[other] - y[own]) ** 2
+    return np.asarray(present[own] & present[other] & (away < reach**2))
+
+
+MARGIN = 10.0
+"""Added to the reach for what lies aside: more than two widths and deviations. [m]"""
+
+
+class Frame(NamedTuple):
+    """A vehicle on the rows that are looked at: middle, heading, size, and where it is present and may move.
+
+    Or one of two vehicles each row, of a moment: size is then an array, too. Shape (n,).
+    """
+
+    x: FloatArray
+    y: FloatArray
+    heading: FloatArray
+    deviation: FloatArray
+    can_move: BoolArray
+    present: BoolArray
+    length: float | FloatArray
+    width: float | FloatArray
+
+    @classmethod
+    def of(cls, sampled: SampledVehicle, rows: IntArray) -> Frame:
+        """Of one vehicle at some rows of its motion, shape (n,)."""
+        motion = sampled.motion
+        box = motion.entity.bounding_box
+        heading = motion.heading[rows]
+        present = ((motion.activity[rows] & Activity.ACTIVE) != 0) & motion.entity.is_vehicle
+        return cls(
+            motion.x[rows] + box.center_x * np.cos(heading),
+            motion.y[rows] + box.center_x * np.sin(heading),
+            heading,
+            sampled.deviation,
+            sampled.can_move,
+            present,
+            box.length,
+            box.width,
+        )
+
+
+def widened(
+    own: Frame, other: Frame, responds_left: bool | BoolArray, responds_right: bool | BoolArray
+) -> tuple[FloatArray, BoolArray, BoolArray] | None:
+    """By how much the gap to the other is widened, whether it is to the left, and whether the profile responds to it.
+
+    None if the other never is near.
+    """
+    ahead_x, ahead_y = other.x - own.x, other.y - own.y
+    reach = FADES + 0.5 * (own.length + other.length)
+    near = own.present & other.present & (ahead_x**2 + ahead_y**2 < (reach + MARGIN) ** 2)
+    if not near.any():
+        return None
+    cos, sin = np.cos(own.heading), np.sin(own.heading)
+    along, aside = ahead_x * cos + ahead_y * sin, ahead_y * cos - ahead_x * sin
+    same_way = np.cos(other.heading - own.heading) > 0.9
+    half = 0.5 * (own.width + other.width)
+    is_left = aside > 0
+    nominal = np.abs(aside) - half
+    gap = nominal + np.where(is_left, 1.0, -1.0) * (other.deviation - own.deviation)
+    free = np.maximum(np.abs(along) - 0.5 * (own.length + other.length), 0.0)
+    responding = np.where(is_left, responds_left, responds_right)
+    weight = 1.0 - smooth_step(free / np.where(responding, RESPONDING_FADES, FADES))
+    weight *= smooth_step(nominal / ENTERING) * (near & same_way)
+    return weight * np.where(responding, wider(gap, responding=True), wider(gap, responding=False)), is_left, responding
+
+
+class Response(NamedTuple):
+    """What is known of drivers, shape (n,) each; see `SampledVehicle`."""
+
+    responds_left: BoolArray
+    responds_right: BoolArray
+    alone_left: BoolArray
+    alone_right: BoolArray
+
+
+def moved_aside(own: Frame, other: Frame, response: Response, left_hand: bool | BoolArray) -> FloatArray:
+    """By how much each moves aside for another, positive left, shape (n,). [m]"""
+    widening = widened(own, other, response.responds_left, response.responds_right)
+    if widening is None:
+        return np.zeros(len(own.deviation))
+    aside, is_left, responding = widening
+    alone = np.where(is_left, response.alone_left, response.alone_right)
+    aside = aside * own_share(is_left == left_hand, responding, other.can_move, alone) * own.can_move
+    return np.where(is_left, 0.0 - aside, aside)  # no negative zeros
+
+
+def own_share(overtakes: BoolArray, responding: BoolArray, other_moves: BoolArray, alone: BoolArray) -> FloatArray:
+    """Share that a vehicle has of a widening, shape (n,). [-]
+
+    By whether it is the overtaking one, responds to the other by its profile, the other can move, and its answer is
+    known of the driver alone, who then has no share. By itself `motorway` moves 0.209 m from whom it overtakes and
+    0.083 m from who overtakes it, where real vehicles move 0.239 and 0.045 m: the second has done more than its part
+    already.
+    """
+    share = np.where(responding, 1.0, OVERTAKING_SHARE)
+    return np.where(other_moves, np.where(overtakes, share, 1.0 - share), 1.0) * ~alone
+
+
+def wider(gap: FloatArray, *, responding: bool) -> FloatArray:
+    """What gaps to somebody are widened by, to whom the profile responds by itself or not, shape (n,). [m]"""
+    free, side_by_side = GAPS
+    free = RESPONDING if responding else free
+    wanted = np.interp(gap, free, side_by_side)
+    wanted = np.where(gap < free[0], side_by_side[0], wanted)
+    return np.asarray(np.maximum(wanted - gap, 0.0) * (gap < free[-1]))
+
+
+def _smoothed(values: FloatArray, width: float) -> FloatArray:
+    half = min(int(np.ceil(4.0 * width)), max(len(values) - 1, 0))
+    kernel = np.exp(-0.5 * (np.arange(-half, half + 1) / width) ** 2)
+    return np.asarray(np.convolve(np.pad(values, half, mode="edge"), kernel / kernel.sum(), "valid"))
+
+
+def _left_hand(network: RoadNetwork, sampled: Sequence[SampledVehicle], rows: IntArray) -> list[bool]:
+    """Whether each vehicle drives where one keeps left: the first road that it is on says so."""
+    found = []
+    for one in sampled:
+        road = one.motion.road[rows]
+        on = np.flatnonzero(road >= 0)
+        found.append(bool(len(on)) and network.roads[int(road[on[0]])].rule == "LHT")
+    return found

@@ -1,0 +1,142 @@
+"""What every driver sees at one moment: the road, and the vehicles around from where they are.
+
+Gaps and sides are those of `around`, as in `context`, there for one vehicle at many moments, here for many at one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.world.road.network import RoadNetwork
+from xosc_lateral.world.surroundings.around import IN_SIGHT, Around, Extent, Reach, free_space, lane_path, see_along
+from xosc_lateral.world.surroundings.context import lanes_beside, road_columns, spread_out
+from xosc_lateral.world.surroundings.nearby import pairs_now
+
+
+class Roads(Protocol):
+    """The roads of a simulation: as an OpenDRIVE file or the simulation itself has them."""
+
+    def columns(self, road: IntArray, lane: IntArray, s: FloatArray) -> dict[str, FloatArray]:
+        """Context columns of places on lanes, shape (n,) each, as `surroundings.context.road_columns` has them."""
+        ...
+
+    def section(self, road: int, lane: int, s: float) -> float:
+        """Where the lane section begins that a place is in: places of one section share a path. [m]"""
+        ...
+
+    def path(self, road: int, lane: int, s: float) -> list[Reach]:
+        """Lane sections within reach along the lane, both ways."""
+        ...
+
+    def directions(self, road: IntArray, lane: IntArray) -> IntArray:
+        """+1 where a lane is driven along s, -1 against it, shape (n,). [-]"""
+        ...
+
+    def across(self, road: IntArray, lane: IntArray, s: FloatArray, offset: FloatArray) -> FloatArray:
+        """Lateral coordinate t on the road of places so far from their lanes' centres, shape (n,). [m]"""
+        ...
+
+    def centre(self, road: int, lane: int, s: FloatArray) -> FloatArray:
+        """The same of one lane's centre, shape (n,). [m]"""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class OpenDriveRoads:
+    """Those of an OpenDRIVE file; roads by their index in the network."""
+
+    network: RoadNetwork
+
+    def columns(self, road: IntArray, lane: IntArray, s: FloatArray) -> dict[str, FloatArray]:
+        """See `Roads`."""
+        return road_columns(self.network, road, lane, s, np.zeros(len(s)), np.ones(len(s)))
+
+    def section(self, road: int, lane: int, s: float) -> float:
+        """See `Roads`."""
+        return self.network.section_at(road, s)[0]
+
+    def path(self, road: int, lane: int, s: float) -> list[Reach]:
+        """See `Roads`."""
+        return lane_path(self.network, road, lane, s, self.network.travel_direction(road, lane))
+
+    def directions(self, road: IntArray, lane: IntArray) -> IntArray:
+        """See `Roads`."""
+        return np.asarray(self.network.travel_directions(road, lane), dtype=np.int64)
+
+    def across(self, road: IntArray, lane: IntArray, s: FloatArray, offset: FloatArray) -> FloatArray:
+        """See `Roads`."""
+        return self.network.offset_to_t(road, lane, s, offset)
+
+    def centre(self, road: int, lane: int, s: FloatArray) -> FloatArray:
+        """See `Roads`."""
+        return self.network.lane_centre_t(road, lane, s)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Places:
+    """Where vehicles are at one moment, shape (n,) each."""
+
+    x: FloatArray
+    y: FloatArray
+    heading: FloatArray
+    """Reference point [m] and the lane's direction of travel there. [rad]"""
+    road: IntArray
+    lane: IntArray
+    """Index of the road, -1 for none; lane id."""
+    s: FloatArray
+    """Along the road. [m]"""
+    length: FloatArray
+    width: FloatArray
+    center_x: FloatArray
+    """Of the bounding box, and how far its middle is ahead of the reference point. [m]"""
+
+
+def look_around(roads: Roads, places: Places, offset: FloatArray, is_truck: BoolArray) -> dict[str, FloatArray]:
+    """Context columns of the road and of the vehicles around, shape (n,) each; NaN off the road.
+
+    A conversion knows what comes, and has the road's columns as means over the way around; here they are as they are.
+    """
+    n = len(places.x)
+    there = (places.road >= 0) & (places.lane != 0)
+    on = np.flatnonzero(there)
+    where = (places.road[on], places.lane[on], places.s[on])
+    road = {name: spread_out(values, there) for name, values in roads.columns(*where).items()}
+    direction, t = np.ones(n, dtype=np.int64), spread_out(roads.across(*where, offset[on]), there)
+    direction[on] = roads.directions(*where[:2])
+    width = np.maximum(np.fmax(road["lane_width"], places.width), 0.1)
+    around = Around.with_no_one(n)
+    for path, u, i, j in _along_paths(roads, places, on):
+        seen = see_along(path, u[i], offset[i], places.road[j], places.s[j], t[j], direction[j], roads.centre)
+        extents = (Extent(places.length[k], places.center_x[k]) for k in (i, j))
+        around.add(i, seen, free_space(seen, *extents), width[i], places.width[j], is_truck[j])
+    lanes = {side: is_there.astype(np.float64) for side, is_there in lanes_beside(road).items()}
+    return road | around.columns(lanes, always_fade=True)
+
+
+def _along_paths(
+    roads: Roads, places: Places, on: IntArray
+) -> Iterator[tuple[list[Reach], FloatArray, IntArray, IntArray]]:
+    """For every lane path: the path, where everybody on it is along it [m], and pairs of one on it and one in sight."""
+    u, group = np.zeros(len(places.x)), np.full(len(places.x), -1)
+    origins: dict[tuple[int, int, float], tuple[int, float, list[Reach]]] = {}
+    for k in on.tolist():
+        road, lane, s = int(places.road[k]), int(places.lane[k]), float(places.s[k])
+        key = (road, lane, roads.section(road, lane, s))
+        if key not in origins:
+            origins[key] = (len(origins), s, roads.path(road, lane, s))
+        group[k], start, path = origins[key]
+        u[k] = path[0].sign * (s - start)
+    a, b = pairs_now(np.where(group >= 0, places.x, np.nan), places.y, IN_SIGHT)
+    who, whom = np.concatenate([a, b]), np.concatenate([b, a])
+    order = np.argsort(group[who], kind="stable")
+    who, whom = who[order], whom[order]
+    ends = np.searchsorted(group[who], np.arange(len(origins) + 1))
+    for number, (_, _, path) in enumerate(origins.values()):
+        pairs = slice(ends[number], ends[number + 1])
+        if pairs.start < pairs.stop:
+            yield path, u, who[pairs], whom[pairs]
