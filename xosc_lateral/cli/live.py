@@ -24,8 +24,7 @@ app.add_typer(group, name="live", short_help=VERBS["live"])
 export = typer.Typer(help="Drivers as parts for other tools.", no_args_is_help=True)
 app.add_typer(export, name="export", short_help=VERBS["export"])
 
-FCD = "x,y,angle,type,speed,pos,posLat,lane"
-"""What `import fcd` reads; SUMO leaves `posLat` out unless told."""
+FCD = "x,y,angle,type,speed,pos,posLat,lane"  # What `import fcd` reads; SUMO leaves `posLat` out unless told.
 
 
 @dataclass(frozen=True, slots=True)

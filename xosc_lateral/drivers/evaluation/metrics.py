@@ -28,21 +28,10 @@ DIFFERENCE_SCALE = 10.0  # First differences count ten times, as in the paper. [
 
 
 def snippet_metrics(snippets: FloatArray) -> FloatArray:
-    """The ten metrics of each snippet.
+    """The ten metrics of each snippet, shape (n, 10), columns as in `METRICS`, in the snippets' unit.
 
-    Raises `ValueError` if a snippet has fewer than two values, or one is not finite.
-
-    Parameters
-    ----------
-    snippets : array, shape (n, m)
-        One snippet a row: offset [m] or relative offset [-] at an even step; 51 values for 10 s at 5 Hz.
-
-    Returns
-    -------
-    array, shape (n, 10)
-        Columns as in `METRICS`, in the unit of the snippets: largest and smallest value, mean, standard deviation
-        (of the population, ddof 0), median, 25 % and 75 % quantile (linear between order statistics), range, and mean
-        and standard deviation of the first difference times 10.
+    The standard deviation is the population's, quantiles are linear between order statistics, first differences times
+    10. Raises `ValueError` if a snippet has fewer than two values, or one is not finite.
     """
     snippets = np.asarray(snippets, dtype=np.float64)
     if snippets.ndim != 2 or snippets.shape[1] < 2:
@@ -114,7 +103,7 @@ class Distances:
 def wasserstein(a: FloatArray, b: FloatArray) -> float:
     """Earth mover's distance of two samples on a line: the area between their distribution functions.
 
-    Same value as `scipy.stats.wasserstein_distance` without weights, without its 0.3 s of import.
+    Same value as `scipy.stats.wasserstein_distance`, without its 0.3 s of import.
     """
     a, b = np.sort(a), np.sort(b)
     values = np.sort(np.concatenate([a, b]))
@@ -133,12 +122,7 @@ def column_distances(real: FloatArray, other: FloatArray) -> list[float]:
 
 
 def metric_distances(real: FloatArray, other: FloatArray) -> Distances:
-    """Distance of two sets of metrics.
-
-    Raises `NotEnoughDataError` if `real` has fewer than two snippets, so no standard deviation.
-
-    `real` and `other`, shape (n, 10) and (m, 10): results of `snippet_metrics`; `real` sets the scale.
-    """
+    """Distance of two sets of metrics, shape (n, 10) and (m, 10); `real`, two at least, sets the scale."""
     if len(real) < 2 or len(other) < 1:
         raise NotEnoughDataError(f"{len(real)} real and {len(other)} other snippets; two and one are needed")
     return Distances(dict(zip(METRICS, column_distances(real, other), strict=True)))
@@ -157,10 +141,8 @@ def mean_distances(several: list[Distances]) -> Distances:
 def split_groups(groups: NDArray[np.generic], rng: np.random.Generator) -> NDArray[np.bool_]:
     """Half of the groups at random: True for the rows of the first half.
 
-    Groups (drives, or blocks of one drive) go to one side as a whole: neighbouring snippets of one driver are alike,
-    and split apart they would make real data look closer to itself than it is.
-
-    Raises `NotEnoughDataError` if there are fewer than two groups.
+    Groups (drives, or blocks of one drive) go to one side as a whole: neighbouring snippets of one driver are alike.
+    Raises `NotEnoughDataError` if there are fewer than two.
     """
     names = np.unique(groups)
     if len(names) < 2:
@@ -174,16 +156,13 @@ ORDER = 0.5  # Of the variogram score: the power that its authors found most sen
 
 
 def energy_score(real: FloatArray, ensemble: FloatArray) -> FloatArray:
-    """Energy score of each window: a proper score, lowest on average for the truth.
+    """Energy score of each window, shape (n,): a proper score, lowest on average for the truth. [m]
 
-    `real`, shape (n, m): what was driven; `ensemble`, shape (n, k, m): k sampled windows for each, k >= 2. [m] Returns
-    shape (n,): mean distance to the real window minus half the mean distance among the sampled ones; unbiased for small
-    ensembles. [m]
+    `real`, shape (n, m): what was driven; `ensemble`, shape (n, k, m), k >= 2: sampled for each. [m]
 
     References
     ----------
-    .. [1] T. Gneiting, A. E. Raftery, "Strictly Proper Scoring Rules, Prediction, and Estimation", JASA 102, 2007,
-       section 4.3.
+    .. [1] T. Gneiting, A. E. Raftery, "Strictly Proper Scoring Rules, Prediction, and Estimation", JASA 102, 2007, 4.3.
     """
     import scoringrules
 
@@ -192,10 +171,9 @@ def energy_score(real: FloatArray, ensemble: FloatArray) -> FloatArray:
 
 
 def variogram_score(real: FloatArray, ensemble: FloatArray, *, every: int = 5) -> FloatArray:
-    """Variogram score of each window: sees how values depend on one another, where the energy score is dull.
+    """Variogram score of each window, as `energy_score`: sees how values depend on one another. [m]
 
-    `real` and `ensemble`, shape (n, m) and (n, k, m): as in `energy_score`. [m]; `every`: steps between the values that
-    are paired: all pairs of a window of 51 values would be 2601. Returns shape (n,): mean over the pairs. [m]
+    `every`: steps between the values that are paired: all pairs of a window of 51 values would be 2601.
 
     References
     ----------
@@ -211,10 +189,7 @@ def variogram_score(real: FloatArray, ensemble: FloatArray, *, every: int = 5) -
 
 
 def proper_scores(real: FloatArray, ensemble: FloatArray) -> dict[str, float]:
-    """Mean of each score in `SCORE_UNITS` over the windows; empty without the extra `board`. [m]
-
-    `real` of shape (n, m), `ensemble` of shape (n, members, m).
-    """
+    """Mean of each score in `SCORE_UNITS` over the windows; empty without the extra `board`. [m]"""
     try:
         scores = energy_score(real, ensemble), variogram_score(real, ensemble)
     except ImportError:

@@ -107,10 +107,7 @@ def sample_snippets(profile: DriverProfile, snippets: Snippets, seed: int, *, wi
 def sample_recorded(
     profile: DriverProfile, segments: Sequence[Segment], starts: FloatArray, seed: int, *, with_sensor: bool = True
 ) -> list[FloatArray]:
-    """For each segment one path of a new driver, as the profile's sensor would have recorded it. [m]
-
-    `starts` of the sums, shape (segments,) [m].
-    """
+    """For each segment one path [m] of a new driver from `starts` [m], as the profile's sensor would record it."""
     root, sensor = np.random.SeedSequence(seed), profile.sensor if with_sensor else None
     return [
         recorded_offsets(profile, segment, child(root, k), sensor, start)

@@ -30,24 +30,10 @@ MANY_SEGMENTS = 8  # With so many segments without a gap, spectra are taken from
 def gapped_spectrum(
     series: FloatArray, valid: BoolArray, seams: NDArray[np.intp], step: float, segment: int
 ) -> tuple[FloatArray, FloatArray, int]:
-    """Power density by Welch's method of series with gaps, over segments that are mostly valid and lie in one part.
+    """Frequency [Hz] and power density [m2/Hz] by Welch's method of series with gaps, and the number of segments.
 
-    Parameters
-    ----------
-    series : array, shape (runs, n)
-        Gaps are filled with the mean. [m]
-    valid : bool array, shape (n,)
-    seams : int array, shape (n,)
-        Number of the part that a row belongs to: runs are put together from parts, with a jump between them.
-    step : float
-        [s]
-    segment : int
-        Samples.
-
-    Returns
-    -------
-    frequency : array [Hz], density : array [m^2/Hz], number of segments : int
-        Without frequency 0; the density is NaN if no segment is long enough.
+    Segments of so many samples are mostly `valid` and lie in one part: runs, shape (runs, n) [m], are put together from
+    parts with a jump between them, whose numbers are `seams`. NaN if no segment is long enough.
     """
     centred = np.where(valid, series - series[:, valid].mean(axis=1, keepdims=True), 0.0)
     window = np.hanning(segment)
@@ -118,11 +104,9 @@ def _periodogram(runs: Sequence[FloatArray], length: int, step: float) -> tuple[
 
 
 def autocorrelation(runs: Sequence[FloatArray], lags: Sequence[int]) -> FloatArray:
-    """Correlation of the offset with itself some steps later, about the mean of all runs.
+    """Correlation of the offset with itself some steps later, about the mean of all runs; 0 where no run reaches.
 
     Differences between drivers count: they don't decay.
-
-    Returns shape (len(lags),): lags that no run reaches get 0.
     """
     everything = np.concatenate(list(runs))
     mean, variance = everything.mean(), everything.var()
@@ -149,10 +133,10 @@ def comparison_band(runs: Sequence[Run]) -> float:
 
 
 def slow_movement(path: FloatArray, step: float, stop: float = STOP_FREQUENCY) -> FloatArray:
-    """A path without its movement above a frequency [Hz].
+    """A path, shape (n,) [m], without its movement above a frequency [Hz].
 
-    `path`, shape (n,) [m], is evenly in time, and continued beyond its ends by its mirror image through the end point.
-    With a `step` [s] that shows nothing above the frequency it stays as it is.
+    It is continued beyond its ends by its mirror image through the end point; where its `step` [s] shows nothing above
+    the frequency it stays as it is.
     """
     if len(path) < 2 or 0.5 / step <= stop:
         return np.array(path)
@@ -160,10 +144,7 @@ def slow_movement(path: FloatArray, step: float, stop: float = STOP_FREQUENCY) -
 
 
 def thinned(paths: FloatArray, step: float, stop: float = STOP_FREQUENCY) -> FloatArray:
-    """Filtered paths, shape (n, m), without the rows that would show leftovers of the stop band alone. [m]
-
-    Half their rate is the beginning of the stop band.
-    """
+    """Filtered paths, shape (n, m) [m], at the rate whose half is the beginning of the stop band."""
     return paths[:, :: max(1, round(0.5 / stop / step))]
 
 

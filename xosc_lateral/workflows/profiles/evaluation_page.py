@@ -266,10 +266,7 @@ def _key_figures(realism: Realism) -> list[KeyFigure]:
 
 
 def blocks_of(scores: ProfileScores) -> dict[str, float]:
-    """Every block of the fair measure as a ratio to what other real drivers get: 1 is as good as it gets. [-]
-
-    Families of differences by condition; the classifiers: 1 at AUC 0.5, 2 at AUC 1.
-    """
+    """Every block of the fair measure over what other real drivers get; classifiers: 1 at AUC 0.5, 2 at 1. [-]"""
     blocks = {}
     for one in scores.realism.conditions:
         for family, beside in one.families.items():
