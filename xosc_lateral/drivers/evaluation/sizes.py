@@ -25,7 +25,7 @@ QUANTITIES = ("mean offset", "slow movement", "fast movement")  # Of the movemen
 FAST_S, SLOW_S = 1.0, 4.0
 FAST_HZ = 0.5 / FAST_S  # Frequency up to which a recording has to be valid for its fast movement to count. [Hz]
 BLOCK_S = 300.0  # Stretches that count as independent: three times as long as drivers wander. [s]
-SMALLEST = 1e-12  # Of a mean square: of a car that does not move. [m2]
+LEAST_MEAN_SQUARE = 1e-12  # Of a mean square: of a car that does not move. [m2]
 # Share of pairs of one driver that are told apart, by whichever quantity, and the chance of finding the least
 # difference that is named. [-]
 LEVEL, POWER = 0.05, 0.8
@@ -90,7 +90,7 @@ def _measured(parts: Sequence[tuple[str, FloatArray]], step: float) -> tuple[Flo
     means = weights @ values
     scores = weights[:, None] * (values - means)
     errors = [_error(scores, cluster) for cluster in (np.arange(len(table)), table[:, 0].astype(np.intp))]
-    squares = np.maximum(means[1:], SMALLEST)
+    squares = np.maximum(means[1:], LEAST_MEAN_SQUARE)
     for error in errors:
         error[1:] /= 2.0 * squares
     return np.array([means[0], *(0.5 * np.log(squares))]), errors[0], errors[1]
