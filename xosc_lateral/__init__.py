@@ -10,7 +10,7 @@ from xosc_lateral.base.version import __version__
 TYPE_CHECKING = False  # importing `typing` for it would take longer than all the rest
 
 _HOME = {
-    "convert": "workflows.conversion.call",
+    "convert": "workflows.conversion.convert",
     "convert_many": "workflows.batch.call",
     "reconstruct": "workflows.recordings.call",
     "verify": "workflows.batch.verify",
@@ -42,7 +42,7 @@ _HOME = {
     "OffsetStream": "drivers.model.stream",
     "DriverProfile": "drivers.model.profile",
     "Drive": "drivers.drives.drive",
-    "Conversion": "workflows.conversion.call",
+    "Conversion": "workflows.conversion.conversion",
     "Reconstruction": "workflows.recordings.call",
     "ConvertSettings": "workflows.conversion.settings",
     "BatchResult": "workflows.batch.call",
@@ -131,7 +131,8 @@ if TYPE_CHECKING:
     from xosc_lateral.drivers.model.stream import OffsetStream
     from xosc_lateral.workflows.batch.call import BatchResult, convert_many
     from xosc_lateral.workflows.batch.verify import Verification, reproduce, verify
-    from xosc_lateral.workflows.conversion.call import Conversion, convert
+    from xosc_lateral.workflows.conversion.conversion import Conversion
+    from xosc_lateral.workflows.conversion.convert import convert
     from xosc_lateral.workflows.conversion.settings import ConvertSettings
     from xosc_lateral.workflows.detection.call import detect
     from xosc_lateral.workflows.detection.detection import Detection

@@ -7,9 +7,8 @@ from typing import Annotated
 
 import typer
 
-from xosc_lateral.base.errors import XoscLateralError
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Allow, Library, Mapped, RoadPath, Seed, TimeLimit, Written, command
+from xosc_lateral.cli.words import Allow, Library, Mapped, RoadPath, Seed, TimeLimit, Written, command, naming_option
 
 app = group_of_verbs()
 
@@ -67,30 +66,29 @@ def detect(
     allow: Allow = None,
     road_path: RoadPath = None,
     time_limit: TimeLimit = None,
-    said: Written,
+    reply: Written,
 ) -> None:
     """Count false alarms in lane keeping, cut-ins seen and the time before the marking, source by source."""
     from xosc_lateral import detect
     from xosc_lateral.files.output_paths import claim, output_file
     from xosc_lateral.files.output_tables import output_suffixes
+    from xosc_lateral.workflows.detection.observation import read_sensor
     from xosc_lateral.workflows.result import PAGE_SUFFIXES
 
     table = None if output is None else output_file(output, "detection.csv", output_suffixes())
     page = None if report is None else output_file(report, "detection.html", PAGE_SUFFIXES)
-    claim([table, page], [source for source in sources if source.is_file()], force=said.force)
-    try:
+    claim([table, page], [source for source in sources if source.is_file()], force=reply.force)
+    with naming_option("--sensor"):
+        read_sensor(sensor)
+    with naming_option("--detector"):
         result = detect(
             sources, detectors=detector or ("all",), ego=ego, variants=variants, profiles=profile or ("motorway",),
             train=train or (), sensor=sensor, threshold=threshold, answer_time=answer_time, seed=seed, road=road,
             columns=mapped.mapping(), library=library or (), allow=allow or (), road_path=road_path or (),
             time_limit=time_limit,
         )  # fmt: skip
-    except ValueError as error:
-        if isinstance(error, XoscLateralError):
-            raise
-        raise typer.BadParameter(str(error)) from error
     if table is not None:
-        result.write(table, force=said.force)
+        result.write(table, force=reply.force)
     if page is not None:
-        result.write_report(page, force=said.force)
-    said.say(result)
+        result.write_report(page, force=reply.force)
+    reply.say(result)

@@ -46,7 +46,7 @@ class Driven:
     osi: Osi = None
     library: Library = None
 
-    def run(self, live: Callable[..., LiveRun], source: Path, said: Written, **settings: Any) -> None:
+    def run(self, live: Callable[..., LiveRun], source: Path, reply: Written, **settings: Any) -> None:
         """Run a simulation of that source, and write and say what came out."""
         from xosc_lateral.files.osi import SUFFIXES, osi_wanted
         from xosc_lateral.files.output_paths import claim, output_file
@@ -54,17 +54,17 @@ class Driven:
 
         table = None if self.states is None else output_file(self.states, "states.csv", TABLE_SUFFIXES)
         trace = None if self.osi is None else output_file(self.osi, f"{source.stem}_gt.mcap", SUFFIXES)
-        claim([table, trace], [source], force=said.force)
+        claim([table, trace], [source], force=reply.force)
         osi_wanted(trace)
         others = pairs(self.vehicle, "--vehicle")
-        who = {"profile": self.profile, "profiles": others, "ego": self.ego or (), "folders": self.library or ()}
-        run = live(source, seed=self.seed, **who, **settings)
+        drivers = {"profile": self.profile, "profiles": others, "ego": self.ego or (), "folders": self.library or ()}
+        run = live(source, seed=self.seed, **drivers, **settings)
         if table is not None:
-            run.write(table, force=said.force)
+            run.write(table, force=reply.force)
         if trace is not None:
-            run.write_osi(trace, force=said.force)
+            run.write_osi(trace, force=reply.force)
         warn(run.warnings)
-        said.say(run)
+        reply.say(run)
 
 
 @command(
@@ -81,13 +81,13 @@ def esmini(
     window: Annotated[bool, typer.Option("--window", help="Open esmini's window.")] = False,
     *,
     driven: Driven,
-    said: Written,
+    reply: Written,
 ) -> None:
     """Play a scenario in esmini with drivers in its vehicles; its triggers and maneuvers stay as written."""
     from xosc_lateral.workflows.live.call import live_esmini
 
     settings = {"duration": duration, "step": step, "window": window}
-    driven.run(live_esmini, scenario, said, library=player_library, **settings)
+    driven.run(live_esmini, scenario, reply, library=player_library, **settings)
 
 
 @command(
@@ -108,14 +108,14 @@ def sumo(
     ] = None,
     *,
     driven: Driven,
-    said: Written,
+    reply: Written,
 ) -> None:
     """Run a SUMO simulation with the sublane model and drivers in its vehicles; lane changes stay SUMO's."""
     from xosc_lateral.workflows.live.call import live_sumo
 
     options = () if fcd_output is None else ("--fcd-output", str(fcd_output), "--fcd-output.attributes", FCD)
     settings = {"duration": duration, "lateral_resolution": lateral_resolution, "options": options}
-    driven.run(live_sumo, config, said, **settings)
+    driven.run(live_sumo, config, reply, **settings)
 
 
 @command(

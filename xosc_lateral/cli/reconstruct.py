@@ -36,11 +36,10 @@ def reconstruct(
     ] = None,
     mapped: Mapped,
     settings: Annotated[dict[str, Any], ReconstructSettings],
-    said: Written,
+    reply: Written,
 ) -> None:
     """Turn a recording into maneuvers, its road, and the drivers who drove."""
     from xosc_lateral import reconstruct as make
 
     columns = mapped.mapping()
-    made = make(recording, output, format=format_, road=road, columns=columns, force=said.force, **settings)
-    said.say(made)
+    reply.say(make(recording, output, format=format_, road=road, columns=columns, force=reply.force, **settings))

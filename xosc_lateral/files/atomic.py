@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import IO
 
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.source import refuse_guarded
+from xosc_lateral.files.source import LOG, refuse_guarded
 
 _RUN: ContextVar[str] = ContextVar("run", default="")
 
@@ -69,6 +69,7 @@ def replace_atomically(path: Path | str, write: Callable[[Path], object]) -> Pat
             temporary.replace(path)
     except OSError as error:  # of a full disk, say: libraries name no file, or one that nobody knows
         raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
+    LOG.info("wrote %s", path)
     return path
 
 

@@ -20,11 +20,14 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import lru_cache
+from logging import getLogger
 from pathlib import Path
 from typing import IO, Any
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.limits import FILE_SIZE, PACKING_RATIO, UNPACKED_SIZE, UNPACKED_UNASKED, Limit
+
+LOG = getLogger(__name__)
 
 IN_MEMORY = 64_000_000  # files up to this are read once and parsed from memory [byte]
 
@@ -179,6 +182,7 @@ def refuse_guarded(target: Path) -> None:
 
 
 def _remember(path: Path, digest: str) -> None:
+    LOG.info("read %s, sha256 %s", path, digest)
     _LAST_READ.pop(str(path), None)
     _LAST_READ[str(path)] = digest
     if len(_LAST_READ) > REMEMBERED:

@@ -87,6 +87,7 @@ def foreign_errors(path: Path, what: str) -> Iterator[None]:
 
 _FIELDS = re.compile(r"Expected (\d+) fields in line (\d+), saw (\d+)")
 _OPEN_QUOTE = re.compile(r"EOF inside string starting at row (\d+)")
+_READERS = {"pandas", "pyarrow", "gzip", "zlib"}  # whose own texts say nothing to a reader of ours
 
 
 def _plain_reason(error: Exception) -> str:
@@ -96,6 +97,8 @@ def _plain_reason(error: Exception) -> str:
         return f"line {match[2]} has {match[3]} cells, the head has {match[1]}"
     if match := _OPEN_QUOTE.search(reason):
         return f"a quotation mark in line {int(match[1]) + 1} is not closed"
+    if type(error).__module__.partition(".")[0] in _READERS or isinstance(error, EOFError):
+        return "it is empty, damaged, or laid out otherwise"
     if isinstance(error, LookupError | TypeError | AttributeError | ArithmeticError) and not isinstance(
         error, UnicodeError
     ):

@@ -92,7 +92,7 @@ def test_a_vehicle_under_test_is_left_byte_for_byte_and_each_other_written_by_wh
     assert "<TimeHeadwayCondition" in text and "<LaneChangeAction>" not in text
     again = {one.name: one for one in play_scenario(tmp_path / "out.xosc").motion.entities}
     for name in ("B", "C"):
-        path = made._made.enriched.entity(name).trajectory
+        path = made.movement.entity(name).trajectory
         n = min(len(path.time), len(again[name].time))
         assert np.hypot(again[name].x[:n] - path.x[:n], again[name].y[:n] - path.y[:n]).max() < 0.05
 

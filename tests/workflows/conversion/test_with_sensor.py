@@ -17,7 +17,7 @@ from xosc_lateral.drivers.model.sampled_offsets import known_sensor, sensor_erro
 from xosc_lateral.drivers.model.sensor.model import SensorModel
 from xosc_lateral.files.openscenario.provenance import MARK
 from xosc_lateral.files.profiles import read_profile, write_profile
-from xosc_lateral.workflows.conversion.call import convert
+from xosc_lateral.workflows.conversion.convert import convert
 
 NOISE = SensorModel(white=0.01)
 """0.12 m rms below 1.5 Hz."""
@@ -36,7 +36,7 @@ def profile() -> DriverProfile:
 
 
 def _offsets(made: object) -> dict[str, np.ndarray]:
-    entities = made._made.enriched.entities  # type: ignore[attr-defined]
+    entities = made.movement.entities  # type: ignore[attr-defined]
     return {one.name: np.concatenate([segment.offset for segment in one.segments]) for one in entities}
 
 

@@ -13,8 +13,10 @@ from math import inf
 
 from msgspec import structs
 
+from xosc_lateral.workflows.conversion.consequences import CHANGES
 from xosc_lateral.workflows.conversion.load import Played
-from xosc_lateral.workflows.conversion.shifts import Change, Comparison, compare_runs
+from xosc_lateral.workflows.conversion.result import EventShift
+from xosc_lateral.workflows.conversion.shifts import Change, Comparison, compare_runs, largest_of
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_chain import OffsetChain, scaled
 from xosc_lateral.world.player.player import play
@@ -56,6 +58,8 @@ LEAST_DURATION = 20.0
 SIZES = (1.0, 0.5, 0.25, 0.0)
 """Times what was sampled: sizes that are tried for the moves before a conflict, all of them without a path, which makes
 a car's way a millimetre longer in 400 m. [-]"""
+LARGE_SHIFT = 0.3
+"""Of its duration, by which an action lasts longer or shorter without a word. [-]"""
 MOST_TRIALS = 40
 """Of a conversion: beyond, what is left is told. [-]"""
 
@@ -187,6 +191,30 @@ class KeptChains:
     comparisons: tuple[Comparison, ...]
     changes: tuple[Change, ...]
     smaller: dict[str, tuple[float, bool]]
+
+    @property
+    def shifts(self) -> tuple[EventShift, ...]:
+        """The largest of each event."""
+        return largest_of(self.comparisons)
+
+    def warnings(self, left: Collection[str]) -> Iterator[str]:
+        """A line each: who stays as it is, whose moves are smaller, what takes much longer, what happens otherwise."""
+        for name in sorted(left):
+            yield f"'{name}' stays as it is: {CHANGES}"
+        for name, (factor, everywhere) in sorted(self.smaller.items()):
+            if name not in left:
+                size = "none" if factor == 0.0 else f"{factor:g} times what was sampled"
+                where = "" if everywhere else " before a maneuver"
+                yield f"lane offsets of '{name}' are {size}{where}: {CHANGES}"
+        for shift in self.shifts:
+            longer = shift.end - shift.start
+            if shift.duration > 0.0 and abs(longer) > LARGE_SHIFT * shift.duration:
+                yield (
+                    f"event '{shift.event}' of '{shift.entity}' at {shift.time:.2f} s lasts "
+                    f"{shift.duration + longer:.2f} instead of {shift.duration:.2f} s: its way from beside the middle "
+                    "is another one"
+                )
+        yield from map(str, self.changes)
 
 
 def keep_meaning(

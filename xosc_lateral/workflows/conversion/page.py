@@ -41,7 +41,7 @@ GAP_TIMES = ("at [s]", "at [s] ")
 
 def conversion_page(conversion: ConvertedScenario) -> str:
     """HTML page on one converted scenario, self-contained; same input, same bytes."""
-    enriched = conversion.enriched
+    enriched = conversion.movement
     done = [entity for entity in enriched.entities if entity.is_enriched]
     page = Page(f"{conversion.source.name}: lateral movement added")
     page.lead(
@@ -52,7 +52,7 @@ def conversion_page(conversion: ConvertedScenario) -> str:
             else "No entity was enriched; the reasons are listed below."
         )
         + f" The scenario runs for {enriched.motion.end_time:.1f} s (ended by the {enriched.motion.ended_by}). "
-        f"The result is in `{conversion.output.name}`."
+        f"The result is in `{(conversion.output or conversion.source).name}`."
     )
     page.key_figures(_key_figures(enriched, done))
     page.lead(under_test(conversion))
@@ -93,12 +93,12 @@ def _provenance(conversion: ConvertedScenario) -> dict[str, object]:
     made = conversion.provenance
     return {
         "scenario": conversion.source.name,
-        "output": conversion.output.name,
+        "output": (conversion.output or conversion.source).name,
         "under test": list(made.ego) or "none",
         "written as": [f"{name}: {WRITTEN_AS[mode]}" for name, mode in made.modes.items()],
         "neighbours": [
             f"{one.name}: {beside_text(one.profile, made.options['neighbours'])}"
-            for one in conversion.enriched.entities
+            for one in conversion.movement.entities
             if one.is_enriched and one.profile is not None
         ],
         "seed": made.options["seed"],
@@ -108,12 +108,12 @@ def _provenance(conversion: ConvertedScenario) -> dict[str, object]:
         "profiles are valid for": sorted(
             {
                 f"{one.profile.name}: {one.profile.validity.in_words() or 'not stated'}"
-                for one in conversion.enriched.entities
+                for one in conversion.movement.entities
                 if one.is_enriched and one.profile is not None
             }
         ),
         "inputs": [f"{name} ({sha[:12]})" for name, sha in made.inputs.items()],
-        "output hash": conversion.output_sha256,
+        "output hash": conversion.sha256,
     }
 
 

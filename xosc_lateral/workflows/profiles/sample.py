@@ -170,9 +170,17 @@ class Offsets(Result):
 
     def plot(self, *, most: int = 6) -> Figure:
         """Offset over time of the first runs; measured ones beside them where there are any."""
-        from xosc_lateral.workflows.conversion.frames import offsets_figure
+        from xosc_lateral.files.pages.chart import MEASURED, SAMPLED
+        from xosc_lateral.files.pages.figure import Figure
 
-        return offsets_figure(self._made[:most])
+        sampled = self._made[:most]
+        figure = Figure(max(1, len(sampled)), height=75.0, legend=True)
+        for panel, drive in zip(figure.panels, sampled, strict=False):
+            if drive.offset_real is not None:
+                panel.line(drive.time, drive.offset_real, MEASURED, label="measured")
+            panel.line(drive.time, drive.offset, SAMPLED, label="sampled")
+            panel.title, panel.x.label, panel.y.label = drive.drive, "time [s]", "offset [m]"
+        return figure
 
     def csv(self) -> str:
         """The table as text."""
