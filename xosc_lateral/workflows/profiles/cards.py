@@ -36,7 +36,7 @@ SINGLE_DRIVER_DRIVES = 10
 SHOWN_DRIVERS, SHOWN_S = 4, 120.0
 """Sample paths that are drawn, and their length. [s]"""
 
-WRAPPED_ROWS = ("", "lane", "+-", "source", "licence")
+WRAPPED_ROWS = ("", "valid", "lane", "+-", "source", "licence")
 """Rows of a card that are wrapped in the terminal."""
 
 
