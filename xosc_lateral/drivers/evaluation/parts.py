@@ -11,7 +11,7 @@ from xosc_lateral.drivers.evaluation.distances import Distances, metric_distance
 from xosc_lateral.drivers.evaluation.filters import STOP_FREQUENCY
 from xosc_lateral.drivers.evaluation.metrics import snippet_metrics
 from xosc_lateral.drivers.evaluation.snippets import Snippets, sample_parts
-from xosc_lateral.drivers.fitting.models.two_level.fit import split_levels
+from xosc_lateral.drivers.fitting.models.two_level import split_levels
 from xosc_lateral.drivers.model.core.two_level.model import PAPER_SETTINGS
 from xosc_lateral.drivers.model.profile import DriverProfile
 

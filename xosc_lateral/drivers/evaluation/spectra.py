@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
-from xosc_lateral.drivers.drives.periodogram import tapered_powers
+from xosc_lateral.drivers.drives.filters import tapered_powers
 
 MANY_SEGMENTS = 8  # With so many segments without a gap, spectra are taken from these only.
 
