@@ -91,6 +91,12 @@ def scale_frequencies(values: FloatArray, gain: FloatArray) -> FloatArray:
 
 
 # ---- power spectra by Welch's method, window by window ----
+# (`scipy.signal.welch` averages them; medians and geometric means over windows are wanted here, over many runs, and
+# half a second of import is not.)
+# P. D. Welch, "The use of fast Fourier transform for the estimation of power spectra", IEEE Trans. Audio and
+# Electroacoustics 15 (1967), pp. 70-73.
+
+
 class Detrend(Enum):
     """What is taken out of a window before it is transformed."""
 

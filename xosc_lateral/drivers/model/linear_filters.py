@@ -32,6 +32,10 @@ def prepare(steps: int) -> None:
 class JitKernel:
     """A function over arrays with a plain Python body; call it with the count of its steps first.
 
+    Importing numba costs 0.4 s, more than a scenario of a minute needs; a sample of hours needs it. Both ways
+    run the same operations in the same order: the numbers are the same to the last bit (no fast-math, no fused
+    multiply-add).
+
     The body indexes its arguments with whole numbers only. It gets lists in plain Python (three times as fast as arrays
     there) and arrays when compiled, and writes its results into its array arguments.
     """
@@ -165,6 +169,12 @@ def convolve(values: FloatArray, kernel: FloatArray) -> FloatArray:
 
 
 # ---- a curve through samples with continuous lateral speed and acceleration ----
+# Each piece is the quintic that meets value, slope and second derivative at both of its samples, where slope and second
+# derivative are the central differences there. It needs one sample before and one behind the piece, no more, so that a
+# stream can follow it; a spline through all samples would need them all.
+# Derived here: six conditions (value, slope and second derivative at u = 0 and 1) fix the six coefficients; solved by
+# hand.
+
 Number = TypeVar("Number", float, FloatArray)
 
 

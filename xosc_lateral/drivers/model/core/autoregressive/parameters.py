@@ -133,6 +133,10 @@ def _factor(variance: float, normal: FloatArray) -> FloatArray:
 
 
 # ---- volatility: a factor on movement that differs between drivers and varies ----
+# The logarithm of the factor is the sum of three normal parts: one that a driver keeps, one that varies within minutes,
+# and one that varies within seconds (both first-order autoregressions). Factors have a mean square of 1.
+# S. J. Taylor, "Modelling Financial Time Series", Wiley 1986: stochastic volatility.
+
 SLOW_CORRELATION_TIME = 300.0
 """Of the part that varies within minutes. [s]"""
 
