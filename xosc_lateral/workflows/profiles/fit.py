@@ -39,7 +39,7 @@ def read_drives(drives: DrivesLike, columns: MappingLike | None = None) -> list[
 def fit(
     drives: DrivesLike,
     *,
-    name: str,
+    name: str = "",
     model: str = "autoregressive",
     corrected: bool = False,
     columns: MappingLike | None = None,
@@ -59,7 +59,7 @@ def fit(
     drives, columns
         See `read_drives`.
     name : str
-        Of the profile.
+        Of the profile; else the first table's, without its suffix, or "profile".
     model : str
         "two-level": the paper's model to the letter; "autoregressive" (or "best"): ours.
     corrected : bool
@@ -93,10 +93,10 @@ def fit(
     from msgspec.structs import replace
 
     from xosc_lateral.base.errors import DriverProfileError
-    from xosc_lateral.drivers.drives.frozen import summary_of
+    from xosc_lateral.drivers.drives.cleaning import summary_of
     from xosc_lateral.drivers.fitting.bands import KEEPING_BAND, split_by_band
     from xosc_lateral.drivers.fitting.fitting import fit_profile
-    from xosc_lateral.drivers.fitting.models.two_level.correction import correct_two_level
+    from xosc_lateral.drivers.fitting.models.two_level import correct_two_level
     from xosc_lateral.drivers.model.core.base import ModelKind
     from xosc_lateral.drivers.model.core.registry import model_named
     from xosc_lateral.drivers.model.core.two_level.model import TwoLevelModel
@@ -120,7 +120,7 @@ def fit(
     with naming(given):
         profile = fit_profile(
             given.drives,
-            name=name,
+            name=name or (given.files[0].name.split(".")[0] if given.files else "profile"),
             model=model,
             provenance=known,
             sensor_noise=sensor_noise,
