@@ -173,13 +173,13 @@ def _add_dynamics(page: Page, enriched: Enriched, done: Sequence[EntityResult]) 
 
 def _add_lane_changes(page: Page, enriched: Enriched, done: Sequence[EntityResult]) -> None:
     """Those of vehicles on trajectories: the player draws the others."""
-    found = [(entity, one) for entity in done for one in entity.crossings if one.is_lane_change]
-    if not found:
+    changes = [(entity, one) for entity in done for one in entity.crossings if one.is_lane_change]
+    if not changes:
         return
     page.section("Lane changes")
-    more = f" The first {MOST_LANE_CHANGES} of {len(found)}." if len(found) > MOST_LANE_CHANGES else ""
+    more = f" The first {MOST_LANE_CHANGES} of {len(changes)}." if len(changes) > MOST_LANE_CHANGES else ""
     page.figure(
-        figures.lane_changes_over_time(enriched, found[:MOST_LANE_CHANGES]),
+        figures.lane_changes_over_time(enriched, changes[:MOST_LANE_CHANGES]),
         "Speed towards the new lane. Coloured: enriched, with the movement in the lane. Dashed: as written. Band: the "
         f"largest speed of 90 % of 323 lane changes of 6 to 13 s on one motorway.{more}",
         "Lateral speed over time of each lane change",
