@@ -91,8 +91,8 @@ def verdict_of(runs: Sequence[Run], sampled: Sequence[FloatArray], groups: Seque
     real, made = (_powers(paths, groups, edges, step) for paths in (measured, sampled))
     bands = []
     for k, (low, high) in enumerate(edges if len(real[0]) else []):
-        (own, own_error), (other, other_error) = (_mean(power[:, k], whose) for power, whose in (real, made))
-        bands.append(BandPower(low, high, own, other, float(np.hypot(own_error, other_error))))
+        (density, density_error), (other, other_error) = (_mean(power[:, k], whose) for power, whose in (real, made))
+        bands.append(BandPower(low, high, density, other, float(np.hypot(density_error, other_error))))
     alarms = {
         speed: (alarms_per_hour(measured, step, speed), alarms_per_hour(sampled, step, speed)) for speed in ALARM_SPEEDS
     }
@@ -108,9 +108,9 @@ def _powers(
     power, whose = [], []
     for path, group in zip(paths, groups, strict=True):
         if len(path) >= size:
-            own = 2.0 * step * periodograms(path, size, detrend=Detrend.ENDS)
-            power += [[row[(frequency >= low) & (frequency < high)].mean() for low, high in edges] for row in own]
-            whose += [group] * len(own)
+            density = 2.0 * step * periodograms(path, size, detrend=Detrend.ENDS)
+            power += [[row[(frequency >= low) & (frequency < high)].mean() for low, high in edges] for row in density]
+            whose += [group] * len(density)
     return np.array(power).reshape(len(power), len(edges)) + 1e-12, np.array(whose, dtype=np.str_)
 
 

@@ -205,8 +205,8 @@ def _outcome(known: Provenance) -> list[tuple[str, str]]:
 
 def _outcome_items(loop: Mapping[str, Any] | None, evaluation: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     if loop:
-        found = ", ".join(loop["found"]) or "nothing"
-        yield "loop", f"started from a {loop['base']} model, seed {loop['seed']}; found: {found}"
+        names = ", ".join(loop["found"]) or "nothing"
+        yield "loop", f"started from a {loop['base']} model, seed {loop['seed']}; found: {names}"
     if short := evaluation.get("snippets"):
         scores = (
             f"distance {short['mean_distance']:.3f}, between real drivers {short['mean_floor']:.3f}, "
