@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.drives.periodogram import tapered_powers, without_line
+from xosc_lateral.drivers.drives.filters import tapered_powers, without_line
 from xosc_lateral.drivers.evaluation.metrics import DIFFERENCE_SCALE, snippet_metrics
 from xosc_lateral.drivers.evaluation.shape import shape_features, turns
 from xosc_lateral.drivers.evaluation.snippets import Snippets

@@ -11,7 +11,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.drives.cuts import HALF_WIDTH
-from xosc_lateral.drivers.model.jit_kernel import prepare
+from xosc_lateral.drivers.model.linear_filters import prepare
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import sample_offsets
 from xosc_lateral.drivers.model.seeds import child

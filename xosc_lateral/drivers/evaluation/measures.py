@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.drivers.drives.periodogram import tapered_powers, without_line
+from xosc_lateral.drivers.drives.filters import tapered_powers, without_line
 from xosc_lateral.drivers.evaluation.lane_keeping import INDICATORS, lane_keeping_indicators
 from xosc_lateral.drivers.evaluation.metrics import METRICS, column_distances, snippet_metrics
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.drives.drive import Run
-from xosc_lateral.drivers.drives.periodogram import Detrend, periodograms
+from xosc_lateral.drivers.drives.filters import Detrend, periodograms
 from xosc_lateral.drivers.drives.resampling import PASS_BAND_EDGES
 
 BAND_EDGES = (0.04, 0.08, 0.12, 0.16, 0.20, 0.25, 0.32, 0.40, 0.50, 0.70, 1.0, PASS_BAND_EDGES)

@@ -19,7 +19,7 @@ from xosc_lateral.drivers.model.core.base import CoreModel, ModelKind
 from xosc_lateral.drivers.model.core.registry import model_named
 from xosc_lateral.drivers.model.effects import ColumnEffect
 from xosc_lateral.drivers.model.profile import DriverProfile, Provenance
-from xosc_lateral.drivers.model.sensor.model import SensorModel
+from xosc_lateral.drivers.model.sensor import SensorModel
 
 
 def fit_profile(

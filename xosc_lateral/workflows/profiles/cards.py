@@ -32,7 +32,7 @@ CHANGED: Mapping[Acts, str] = {
 
 SINGLE_DRIVER_DRIVES = 10  # Drives below which a profile is taken to be of one driver.
 SHOWN_DRIVERS, SHOWN_S = 4, 120.0  # Sample paths that are drawn, and their length. [s]
-WRAPPED_ROWS = ("", "lane", "+-", "source", "licence")  # Rows of a card that are wrapped in the terminal.
+WRAPPED_ROWS = ("", "valid", "lane", "+-", "source", "licence")  # Rows of a card that are wrapped in the terminal.
 
 
 # ---- the list --------------------------------------------------------------------------------------------------------

@@ -93,10 +93,10 @@ def fit(
     from msgspec.structs import replace
 
     from xosc_lateral.base.errors import DriverProfileError
-    from xosc_lateral.drivers.drives.frozen import summary_of
+    from xosc_lateral.drivers.drives.cleaning import summary_of
     from xosc_lateral.drivers.fitting.bands import KEEPING_BAND, split_by_band
     from xosc_lateral.drivers.fitting.fitting import fit_profile
-    from xosc_lateral.drivers.fitting.models.two_level.correction import correct_two_level
+    from xosc_lateral.drivers.fitting.models.two_level import correct_two_level
     from xosc_lateral.drivers.model.core.base import ModelKind
     from xosc_lateral.drivers.model.core.registry import model_named
     from xosc_lateral.drivers.model.core.two_level.model import TwoLevelModel

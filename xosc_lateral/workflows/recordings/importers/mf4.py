@@ -133,13 +133,7 @@ def import_mf4(
         ]
     every_unit = {name: " | ".join(sorted(words)) for name, words in units.items()}
     settings = {"step": step, "channels": list(channels), "units": every_unit}
-    about = {
-        "format": "mf4",
-        "licence": LICENCE,
-        "settings": settings,
-        "step": step,
-        "notes": tuple(dict.fromkeys(notes)),
-    }
+    about = {"format": "mf4", "licence": LICENCE, "settings": settings, "notes": tuple(dict.fromkeys(notes))}
     return finished(pd.concat(tables, ignore_index=True), keep_cut=False, sources=files, step=step, **about)
 
 
