@@ -181,9 +181,11 @@ def summarise(drives: FloatArray, step: float) -> MovementSummary:
     )
 
 
-def figures_of(profile: DriverProfile, seed: int = 0) -> tuple[MovementSummary, LaneKeeping]:
+def figures_of(
+    profile: DriverProfile, seed: int = 0, drives: FloatArray | None = None
+) -> tuple[MovementSummary, LaneKeeping]:
     """The figures by which a profile is known everywhere, of one set of sampled drives in even traffic."""
-    drives, step = highway_drives(profile, seed), profile.model.step
+    drives, step = highway_drives(profile, seed) if drives is None else drives, profile.model.step
     known = profile.provenance
     recorded = None
     if known.hours > 0.0 and known.drives and "derived_from" not in known.fit:
