@@ -22,9 +22,7 @@ from xosc_lateral.files.templates.plots import TEMPLATES
 from xosc_lateral.files.templates.template import Template
 
 __all__ = ["TEMPLATES", "AnyTemplate", "PlainTemplate", "Template", "all_templates", "find_template"]
-
 GROUP = "xosc_lateral.templates"  # entry points of further templates
-
 SCENARIO, ROAD = ".xosc", ".xodr"
 
 # A comment (to be left alone), or a declaration; a value may hold ">", which ends no tag there.

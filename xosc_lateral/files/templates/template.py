@@ -76,7 +76,6 @@ class Template:
 
 
 def _filled(root: ET.Element, plot: Plot, settings: Settings) -> str:
-    """The scenario with what the settings say."""
     _set(root, "FileHeader", revMinor=settings.text("version").split(".")[1])
     for declared in root.iterfind("ParameterDeclarations/ParameterDeclaration"):
         declared.set("value", f"{settings.number(declared.get('name', '')):g}")
@@ -101,7 +100,6 @@ def _filled(root: ET.Element, plot: Plot, settings: Settings) -> str:
 
 
 def _set(root: ET.Element, path: str, **values: float | str) -> None:
-    """Attributes of the first element at a path."""
     element = root.find(path)
     assert element is not None, f"the shipped scenario has {path}"
     for name, value in values.items():
@@ -141,11 +139,8 @@ def document(root: ET.Element) -> str:
 
 
 ROAD = 1  # id of the only road
-
 SHOULDER = 3.0  # hard shoulder [m]; RAA 2008 (guidelines for motorways), cross-section RQ 31
-
 MEDIAN = 2.0  # paved margin beside the fast lane, and the grass beyond the shoulder [m]
-
 CROSSFALL = 0.025  # least crossfall for drainage, towards the outer edge [-]; RAA 2008
 
 

@@ -18,7 +18,6 @@ from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.enums import Priority
 
 DATE = "2024-01-01T00:00:00"  # the format asks for a date: the same recording gives the same bytes
-
 MODELS = {"car": "car", "van": "van", "truck": "truck", "bus": "bus", "trailer": "trailer"}
 MODELS |= {"motorcycle": "motorbike", "motorbike": "motorbike", "bicycle": "bicycle"}
 """Recorded class -> vehicle category, the same in all versions; others are cars."""
@@ -113,7 +112,6 @@ class _Vehicle:
         self._maneuver = build.maneuver(act, f"{plan.name}_maneuver", plan.name)
 
     def _value(self, name: str, value: float, digits: int) -> str:
-        """A number of its own."""
         self._values[name] = decimal(value, digits)
         return f"${name}"
 
@@ -126,7 +124,6 @@ class _Vehicle:
         return f"${{{decimal(to, digits)} + ${name}}}"
 
     def _event(self, what: str) -> etree._Element:
-        """Its trigger comes after its actions."""
         return build.event(self._maneuver, f"{self._plan.name}_{what}", Priority.PARALLEL, self._version)
 
     def _begin(self, event: etree._Element, moment: float) -> etree._Element:
@@ -232,7 +229,6 @@ class _Vehicle:
                 self._begin(piece, float(time[k - 1]))
 
     def _begin_by_distance(self, event: etree._Element, trigger: RelativeTrigger) -> None:
-        """Once a distance along the road passes a declared value, and not before a time."""
         group = self._begin(event, trigger.not_before)[0]
         system = {"coordinateSystem": "road"} if self._version >= (1, 1) else {}
         sub(

@@ -57,8 +57,7 @@ COLUMNS = (
     *("acceleration_signed", "dimension_length", "dimension_height", "interpolated"),
     *(f"classifications_{name}" for name in CLASSES),
 )
-PIECES = (0.5, 0.6)
-"""Frequencies below which movement across the road is kept, and above which none is: half a jump a period. [Hz]"""
+PIECES = (0.5, 0.6)  # movement across is kept below, and none of it above: half a jump of the cubics a period [Hz]
 ATTENUATION = 40.0  # of what is faster; a third of a millimetre of its 3 cm is left [dB]
 HIGHEST_FREQUENCY = 0.1  # of what these tracks show of driving [Hz]
 POSITION_RESOLUTION = 0.01  # that positions are given in [m]
@@ -108,7 +107,6 @@ def read_tracks(source: Path) -> pd.DataFrame:
 
 
 def _trajectory_files(source: Path) -> list[io.BytesIO]:
-    """The trajectory CSV files in a CSV, a zip, or a zip in a wheel."""
     with open_source(source) as opened:
         if not zipfile.is_zipfile(opened.file):
             opened.file.seek(0)
@@ -238,7 +236,6 @@ def _place(
 
 
 def _lane_width(lanes: list[LaneCentreLine]) -> float:
-    """Median distance of neighbouring lane centres, where both are known."""
     s = np.arange(max(lane.start for lane in lanes), min(lane.end for lane in lanes), 10.0)
     return float(np.median(np.diff([lane.at(s, np.full(len(s), lane.height)) for lane in lanes], axis=0)))
 
@@ -271,7 +268,6 @@ def _each(passage: IntArray, every: int) -> BoolArray:
 
 
 def _context(tracks: pd.DataFrame, placed: _Placed, s: FloatArray, forward: BoolArray) -> pd.DataFrame:
-    """The drive table's columns, for every row of the tracks."""
     kind = vehicle_classes(tracks)
     frame = np.round(tracks["time"].to_numpy() / STEP).astype(np.int64) * 2 + forward
     near = find_neighbours(
@@ -318,7 +314,6 @@ def _describe(carriageway: str, index: int, lane: LaneCentreLine) -> dict[str, o
 
 
 def _version(source: Path) -> str:
-    """Version of the data set, as the name of the folder or zip gives it."""
     names = [str(source)]
     if zipfile.is_zipfile(source):
         names += zipfile.ZipFile(source).namelist()

@@ -41,25 +41,15 @@ LICENCE = (
     "No tracks are passed on with a profile, only fitted parameters."
 )
 LANE_WIDTH = 3.5  # assumed: usual on rural roads; the campaign gives none [m]
-
-HIGHEST_FREQUENCY = 1.5
-"""Runs at 5 Hz keep what is slower; the noise there (2e-8 m2/Hz at most) is a tenth of the movement. [Hz]"""
-
+HIGHEST_FREQUENCY = 1.5  # runs at 5 Hz keep what is slower; noise there (2e-8 m2/Hz) is a tenth of the movement [Hz]
 POSITION_RESOLUTION = 1e-3  # noise of the positions [m]
 GRID_STEP = 1.0  # points of the centre line are so far apart [m]
-
-SMOOTHING, ROUNDS = 12.0, 5
-"""Standard deviation of the Gaussian by which the centre line follows the mean path [m], and how often."""
-
+SMOOTHING, ROUNDS = 12.0, 5  # Gaussian by which the centre line follows the mean path [m], and how often
 RETURN_DISTANCE = 5.0  # a lap is over where a car is as near to where it began [m] ...
-
-MINIMUM_LAP = 500.0
-"""... and has come so far since. [m]"""
-
+MINIMUM_LAP = 500.0  # ... and has come so far since [m]
 MINIMUM_SPEED = 5.0  # slower rows (standing start, end of a test) say nothing about the lane's centre [m/s]
 LANE_SHARE = 0.5  # of the lane's width: rows further from its centre are elsewhere [-]
 MAXIMUM_STEP = 0.25  # rows further apart in time are no longer one run [s]
-
 FROZEN_TIME = 10.0
 """A speed of a moving car that stands to the last digit for so long is none that was measured: in some recordings of
 the campaigns it does for minutes, the engine's too; measured ones here repeat for 1.6 s at most. [s]"""
@@ -214,12 +204,10 @@ class _Loop:
         return found
 
 
-PLACING_STEPS = 4
-"""Steps of the search for the point of a line that lies abreast: each leaves less than a tenth of the last. [-]"""
+PLACING_STEPS = 4  # of the search for the point of a line abreast: each leaves less than a tenth of the last [-]
 
 
 def _centre_line(cars: Sequence[_Car]) -> _Loop:
-    """The mean path of all passes."""
     loop = _even(_smooth(_first_lap(cars)))
     x, y = (np.concatenate([getattr(car, name)[_moves(car)] for car in cars]) for name in ("x", "y"))
     for _ in range(ROUNDS):

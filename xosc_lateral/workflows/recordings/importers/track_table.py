@@ -72,9 +72,7 @@ class Tracks:
     """How far x and y lie behind the vehicle's middle; None: they are the middle. [m]"""
 
 
-MAX_SPEED_RATIO = 1.39
-"""A speed off by more is in another unit: the nearest, knots, are 1.94 times as many, and this is its root. [-]"""
-
+MAX_SPEED_RATIO = 1.39  # a speed off by more is in another unit: root of the nearest, knots, 1.94 times as many [-]
 SPEED_WINDOW = 0.4  # positions are differenced over this where no speed was recorded [s]
 
 
@@ -158,7 +156,6 @@ def tracks_of(
 
 
 def _require_speed(speed: FloatArray, driven: FloatArray, path: Path) -> None:
-    """Refuse speeds as recorded that are not those of x and y. [m/s]"""
     moving = (driven > MOVING_SPEED) & (speed > 0.0)
     ratio = float(np.median(speed[moving] / driven[moving])) if moving.any() else 1.0
     if 1.0 / MAX_SPEED_RATIO <= ratio <= MAX_SPEED_RATIO:
@@ -178,7 +175,6 @@ def _given_columns(table: pd.DataFrame, name: str, otherwise: FloatArray) -> Flo
 
 
 def _columns(table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequence[str]) -> pd.DataFrame:
-    """The columns that are needed, under their own names, in our units."""
     mapping = {**saved.columns, **parse_map(words)}
     if unknown := mapping.keys() - HEADERS.keys():
         raise FormatError(f"--map {min(unknown)}: tracks have {', '.join(HEADERS)}", path=path)
@@ -210,9 +206,7 @@ def _columns(table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequen
 
 
 FIRST = b"esmini "  # begins the lines before the table, which name the player's version
-
 HEAD = "Index [-]"
-
 MOST_LINES = 50  # before the table's head; a player writes seven
 
 _LOGGED = {
