@@ -152,8 +152,7 @@ class Fmi(StrEnum):
 
 @command(
     export, "fmu", "A functional mock-up unit, C source and binaries.",
-    "export fmu -p motorway --fmi 3.0 -o driver.fmu", "export fmu -p motorway --compiler gcc -o driver.fmu",
-    "export fmu -p motorway --python -o driver.fmu",
+    "export fmu -p motorway --fmi 3.0 -o driver.fmu", "export fmu -p motorway --python -o driver.fmu",
 )  # fmt: skip
 def fmu(
     output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.fmu", help="The unit.")],
