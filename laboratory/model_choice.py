@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from xosc_lateral.drivers.drives.cuts import all_runs
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.evaluation.classifier import classifier_two_sample_test
-from xosc_lateral.drivers.evaluation.distances import snippet_distances, split_groups
-from xosc_lateral.drivers.evaluation.metrics import METRICS
+from xosc_lateral.drivers.evaluation.metrics import METRICS, snippet_distances, split_groups
 from xosc_lateral.drivers.fitting.models.autoregressive.fit import fit_autoregressive
 from xosc_lateral.drivers.fitting.models.autoregressive.fit_matching import matched, simulate
 from xosc_lateral.drivers.fitting.models.autoregressive.settings import DEFAULT_SETTINGS

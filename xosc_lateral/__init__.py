@@ -43,7 +43,7 @@ _HOME = {
     "DriverProfile": "drivers.model.profile",
     "Drive": "drivers.drives.drive",
     "Conversion": "workflows.conversion.conversion",
-    "Reconstruction": "workflows.recordings.call",
+    "Reconstruction": "workflows.recordings.reconstruction",
     "ConvertSettings": "workflows.conversion.settings",
     "BatchResult": "workflows.batch.call",
     "Verification": "workflows.batch.verify",
@@ -149,7 +149,8 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.profiles.loop import ClosedLoop, close_loop
     from xosc_lateral.workflows.profiles.profiles import compare_profiles, list_profiles, read_profile, write_profile
     from xosc_lateral.workflows.profiles.sample import Offsets, sample
-    from xosc_lateral.workflows.recordings.call import ImportedDrives, Reconstruction, import_drives, reconstruct
+    from xosc_lateral.workflows.recordings.call import ImportedDrives, import_drives, reconstruct
+    from xosc_lateral.workflows.recordings.reconstruction import Reconstruction
 
 
 def __getattr__(name: str) -> object:

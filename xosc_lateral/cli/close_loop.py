@@ -15,6 +15,8 @@ from xosc_lateral.base.signals import Interrupted
 from xosc_lateral.cli import VERBS, group_of_verbs
 from xosc_lateral.cli.words import Library, Mapped, Seed, Tables, Written, command, pairs
 
+# What is said of one option stays together.
+# fmt: off
 app = group_of_verbs()
 
 
@@ -54,27 +56,19 @@ def shown_progress(title: str, quiet: bool) -> Iterator[Callable[[float, str], N
     app, "close-loop", VERBS["close-loop"],
     "close-loop drives.csv.gz -o refined.json --report loop/",
     "close-loop drives.csv.gz -p motorway -o refined.json --report loop/",
-)  # fmt: skip
+)
 def close_loop(
     tables: Tables,
     *,
     output: Annotated[str, typer.Option("--output", "-o", metavar="REFINED.json", help="Profile to write.")],
     report: Annotated[Path, typer.Option(metavar="DIR", help="Folder for report.json and report.html.")],
-    profile: Annotated[
-        str | None,
-        typer.Option("--profile", "-p", metavar="NAME|PATH", help="Profile to start from; default: one is fitted."),
-    ] = None,
+    profile: Annotated[str | None, typer.Option("--profile", "-p", metavar="NAME|PATH",
+        help="Profile to start from; default: one is fitted.")] = None,
     seed: Seed = 0,
-    leave_out: Annotated[
-        list[str] | None, typer.Option(metavar="COLUMN", help="Context column to ignore; may be repeated.")
-    ] = None,
-    role: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="COLUMN=ROLE",
-            help="What a column is: road, weather, traffic, time, own, driver or unknown; may be repeated.",
-        ),
-    ] = None,
+    leave_out: Annotated[list[str] | None, typer.Option(metavar="COLUMN",
+        help="Context column to ignore; may be repeated.")] = None,
+    role: Annotated[list[str] | None, typer.Option(metavar="COLUMN=ROLE",
+        help="What a column is: road, weather, traffic, time, own, driver or unknown; may be repeated.")] = None,
     mapped: Mapped,
     library: Library = None,
     reply: Written,
@@ -89,15 +83,8 @@ def close_loop(
     claim([written, *ClosedLoop.report_files(output_folder(report))], tables, force=reply.force)
     with shown_progress("closing the loop", reply.quiet) as progress:
         result = close_loop(
-            tables,
-            profile,
-            seed=seed,
-            name=written.stem,
-            leave_out=leave_out or (),
-            roles=pairs(role, "--role"),
-            columns=mapped.mapping(),
-            library=library or (),
-            progress=progress,
+            tables, profile, seed=seed, name=written.stem, leave_out=leave_out or (), roles=pairs(role, "--role"),
+            columns=mapped.mapping(), library=library or (), progress=progress,
         )
     write_profile(result.profile, written, force=reply.force)
     result.write_report(report, force=reply.force)

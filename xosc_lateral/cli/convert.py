@@ -30,6 +30,8 @@ from xosc_lateral.workflows.conversion.settings import ConvertSettings, OutputMo
 if TYPE_CHECKING:
     from xosc_lateral.workflows.conversion.conversion import Conversion
 
+# What is said of one option stays together.
+# fmt: off
 app = group_of_verbs()
 
 BATCH = "Batches"
@@ -56,45 +58,30 @@ class _WithPanels(TyperCommand):
     "convert scenarios/ -o enriched/ --variants 3 --jobs 2",
     "convert cut-in.xosc -o - --entity Truck=motorway-vehicle-3 | grep Vertex",
     cls=_WithPanels,
-)  # fmt: skip
+)
 def convert(
-    scenario: Annotated[
-        list[str],
-        typer.Argument(
-            help="Maneuver-based scenario (.xosc); several files, a folder, a glob or a table: a batch.",
-            show_default=False,
-        ),
-    ],
+    scenario: Annotated[list[str],
+        typer.Argument(help="Maneuver-based scenario (.xosc); several files, a folder, a glob or a table: a batch.",
+        show_default=False)],
     *,
-    output: Annotated[
-        str | None,
-        typer.Option(
-            "-o", "--output", help="File, folder/, or - for stdout; default NAME_lifelike.xosc. Batch: a folder."
-        ),
-    ] = None,
+    output: Annotated[str | None, typer.Option("-o", "--output",
+        help="File, folder/, or - for stdout; default NAME_lifelike.xosc. Batch: a folder.")] = None,
     settings: Annotated[dict[str, Any], ConvertSettings],
     variants: Annotated[int, typer.Option(help="Number of outputs, each with different offsets.", min=1)] = 1,
-    report: Annotated[
-        str | None,
-        typer.Option(metavar="PAGE.html", help="Page that shows what was added; for a batch, a folder of pages."),
-    ] = None,
+    report: Annotated[str | None, typer.Option(metavar="PAGE.html",
+        help="Page that shows what was added; for a batch, a folder of pages.")] = None,
     osi: Osi = None,
     jobs: Annotated[int, typer.Option(help="Number of processes; -1: one per core.", rich_help_panel=BATCH)] = 1,
-    job_timeout: Annotated[
-        float, typer.Option(help="Time limit per scenario [s].", min=1, max=86_400, rich_help_panel=BATCH)
-    ] = JOB_TIMEOUT.value,
-    job_memory: Annotated[
-        float, typer.Option(help="Memory limit per scenario [MB].", min=100, max=1e6, rich_help_panel=BATCH)
-    ] = JOB_MEMORY.value,
-    cluster: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Address of a dask scheduler.", rich_help_panel=BATCH)
-    ] = None,
-    keep_old: Annotated[
-        bool, typer.Option("--keep-old", help="Leave outputs of older inputs or versions alone.", rich_help_panel=BATCH)
-    ] = False,
-    log_json: Annotated[
-        bool, typer.Option("--log-json", help="Progress as JSON lines on stderr.", rich_help_panel=BATCH)
-    ] = False,
+    job_timeout: Annotated[float, typer.Option(help="Time limit per scenario [s].", min=1, max=86_400,
+        rich_help_panel=BATCH)] = JOB_TIMEOUT.value,
+    job_memory: Annotated[float, typer.Option(help="Memory limit per scenario [MB].", min=100, max=1e6,
+        rich_help_panel=BATCH)] = JOB_MEMORY.value,
+    cluster: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Address of a dask scheduler.",
+        rich_help_panel=BATCH)] = None,
+    keep_old: Annotated[bool, typer.Option("--keep-old", help="Leave outputs of older inputs or versions alone.",
+        rich_help_panel=BATCH)] = False,
+    log_json: Annotated[bool, typer.Option("--log-json", help="Progress as JSON lines on stderr.",
+        rich_help_panel=BATCH)] = False,
     reply: Written,
 ) -> None:
     """Give every car in a scenario the lateral movement of a real driver."""
@@ -211,12 +198,8 @@ def _convert_batch(inputs: Sequence[str], output: str | None, options: Mapping[s
 
 @command(app, "verify", VERBS["verify"], "verify enriched/", "verify lifelike.xosc --json")
 def verify(
-    outputs: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="OUTPUT...", help="Converted scenarios, or folders with a manifest.", show_default=False
-        ),
-    ],
+    outputs: Annotated[list[Path], typer.Argument(metavar="OUTPUT...",
+        help="Converted scenarios, or folders with a manifest.", show_default=False)],
     *,
     library: Library = None,
     allow: Allow = None,
@@ -240,12 +223,10 @@ def verify(
 @command(
     app, "reproduce", VERBS["reproduce"],
     "reproduce lifelike.xosc -o again.xosc", "reproduce enriched/ -o again/ --jobs 2",
-)  # fmt: skip
+)
 def reproduce(
-    output: Annotated[
-        Path,
-        typer.Argument(metavar="OUTPUT", help="Converted scenario, or a folder with a manifest.", show_default=False),
-    ],
+    output: Annotated[Path, typer.Argument(metavar="OUTPUT", help="Converted scenario, or a folder with a manifest.",
+        show_default=False)],
     new: Annotated[str, typer.Option("--output", "-o", help="File or folder to write to.", show_default=False)],
     *,
     library: Library = None,

@@ -21,6 +21,8 @@ from xosc_lateral.cli.words import (
     write_stdout,
 )
 
+# What is said of one option stays together.
+# fmt: off
 app = group_of_verbs()
 
 
@@ -38,51 +40,28 @@ def _known_model(text: str) -> str:
     app, "fit", VERBS["fit"],
     "fit drives.csv.gz -o mine.json", "fit monday.csv tuesday.csv -o profiles/ --name anna --map speed=v_kmh:km/h",
     "fit smoothed.csv -o mine.json --valid-below 0.3",
-)  # fmt: skip
+)
 def fit(
     tables: Tables,
     *,
-    output: Annotated[
-        str, typer.Option("--output", "-o", metavar="PROFILE.json", help="Profile to write: file, folder/, or -.")
-    ],
-    model: Annotated[
-        str,
-        typer.Option(
-            parser=_known_model,
-            metavar="[two-level|autoregressive|PLUG-IN]",
-            help="two-level: Neis and Beyerer; autoregressive: the default; best: the same.",
-        ),
-    ] = "autoregressive",
-    corrected: Annotated[
-        bool, typer.Option("--corrected", help="Two-level model: freed of its fit's bias, by simulation.")
-    ] = False,
+    output: Annotated[str, typer.Option("--output", "-o", metavar="PROFILE.json",
+        help="Profile to write: file, folder/, or -.")],
+    model: Annotated[str, typer.Option(parser=_known_model, metavar="[two-level|autoregressive|PLUG-IN]",
+        help="two-level: Neis and Beyerer; autoregressive: the default; best: the same.")] = "autoregressive",
+    corrected: Annotated[bool, typer.Option("--corrected",
+        help="Two-level model: freed of its fit's bias, by simulation.")] = False,
     mapped: Mapped,
     name: Annotated[str, typer.Option(help="Name of the profile; default: the file's name.")] = "",
     source: Annotated[str, typer.Option(help="Description of the drives, for the provenance.")] = "",
     licence: Annotated[str, typer.Option(help="Licence of the drives, for the provenance.")] = "",
-    sensor_noise: Annotated[
-        float | None,
-        typer.Option(
-            help="Standard deviation of the sensor's error, rounding included [m]; default: estimated.", min=1e-4, max=2
-        ),
-    ] = None,
+    sensor_noise: Annotated[float | None,
+        typer.Option(help="Standard deviation of the sensor's error, rounding included [m]; default: estimated.",
+        min=1e-4, max=2)] = None,
     left_hand: Annotated[bool, typer.Option("--left-hand", help="Drives of left-hand traffic.")] = False,
-    neighbours: Annotated[
-        bool | None,
-        typer.Option(
-            "--neighbours/--no-neighbours",
-            help="Whether to fit how drivers keep away from vehicles beside them; default: where they are known.",
-        ),
-    ] = None,
-    valid_below: Annotated[
-        float | None,
-        typer.Option(
-            metavar="HZ",
-            min=0.02,
-            max=2.5,
-            help="Frequency up to which tables show driving that do not state it: smoothed tracks. [Hz]",
-        ),
-    ] = None,
+    neighbours: Annotated[bool | None, typer.Option("--neighbours/--no-neighbours",
+        help="Whether to fit how drivers keep away from vehicles beside them; default: where they are known.")] = None,
+    valid_below: Annotated[float | None, typer.Option(metavar="HZ", min=0.02, max=2.5,
+        help="Frequency up to which tables show driving that do not state it: smoothed tracks. [Hz]")] = None,
     prior: Annotated[
         str,
         typer.Option(
@@ -105,19 +84,9 @@ def fit(
     written = None if output == STDOUT else output_file(output, f"{usual}.json", PROFILE_SUFFIXES)
     claim([written], tables, force=reply.force)
     profile = fit(
-        tables,
-        name=name or (usual if written is None else written.stem),
-        model=model,
-        corrected=corrected,
-        columns=mapped.mapping(),
-        source=source,
-        licence=licence,
-        sensor_noise=sensor_noise,
-        left_hand=left_hand,
-        neighbours=neighbours,
-        valid_below=valid_below,
-        prior=None if prior == "none" else prior,
-        library=library or (),
+        tables, name=name or (usual if written is None else written.stem), model=model, corrected=corrected,
+        columns=mapped.mapping(), source=source, licence=licence, sensor_noise=sensor_noise, left_hand=left_hand,
+        neighbours=neighbours, valid_below=valid_below, prior=None if prior == "none" else prior, library=library or (),
     )
     if written is None:
         write_stdout(profile_bytes(profile))
@@ -135,26 +104,22 @@ Table = list[Path] | None
     app, "sample", VERBS["sample"],
     "sample -p motorway --duration 600 --speed 33 --seed 1 -o offsets.csv",
     "sample -p mine.json --like drives.parquet --snippet 10 -o snippets.parquet",
-)  # fmt: skip
+)
 def sample(
     *,
     profile: Profile,
-    output: Annotated[
-        str, typer.Option("--output", "-o", metavar="OUT", help="Table: .csv, .csv.gz, .parquet, folder/, - .")
-    ],
+    output: Annotated[str, typer.Option("--output", "-o", metavar="OUT",
+        help="Table: .csv, .csv.gz, .parquet, folder/, - .")],
     seed: Seed = 0,
-    like: Annotated[
-        Table, typer.Option(metavar="TABLE", help="For each measured snippet, one with the same start and context.")
-    ] = None,
+    like: Annotated[Table, typer.Option(metavar="TABLE",
+        help="For each measured snippet, one with the same start and context.")] = None,
     snippet: Annotated[float, typer.Option(help="Length of a snippet with --like. [s]", min=0.2, max=1e6)] = 10.0,
-    context: Annotated[
-        Table, typer.Option(metavar="TABLE", help="One free run per drive of the table, under its context.")
-    ] = None,
+    context: Annotated[Table, typer.Option(metavar="TABLE",
+        help="One free run per drive of the table, under its context.")] = None,
     duration: Annotated[float | None, typer.Option(help="One free run of this length. [s]", min=0.2, max=9e6)] = None,
     speed: Annotated[float, typer.Option(help="Speed of the free run. [m/s]", min=0, max=150)] = 30.0,
-    lane_width: Annotated[
-        float | None, typer.Option(help="Lane width of the free run [m]; default: the profile's.", min=1, max=10)
-    ] = None,
+    lane_width: Annotated[float | None, typer.Option(help="Lane width of the free run [m]; default: the profile's.",
+        min=1, max=10)] = None,
     with_: With = None,
     mapped: Mapped,
     library: Library = None,

@@ -87,6 +87,8 @@ def _plain_command(name: str) -> Any:
     return typer.main.get_command(formats)
 
 
+# What is said of one option stays together.
+# fmt: off
 app = group_of_verbs()
 group = typer.Typer(cls=_WithPlugins, help="Convert recordings in other formats into the standard drive table.")
 app.add_typer(group, name="import", short_help=VERBS["import"], no_args_is_help=True)
@@ -96,9 +98,8 @@ app.add_typer(group, name="import", short_help=VERBS["import"], no_args_is_help=
 def dlr_ht(
     source: Source,
     *,
-    max_gap: Annotated[
-        float, typer.Option(help="Longest gap between two cameras that is kept [s].", min=0, max=60)
-    ] = 1.0,
+    max_gap: Annotated[float, typer.Option(help="Longest gap between two cameras that is kept [s].", min=0,
+        max=60)] = 1.0,
     table: _CutTable,
 ) -> None:
     """DLR Highway Traffic: the wheel of tasi 0.15.4, the data set's zip, or its trajectory CSV."""
@@ -116,24 +117,16 @@ def levelx(source: Source, *, table: _CutTable) -> None:
 @command(
     group, "mf4", "ASAM MDF bus logs.",
     "import mf4 log.mf4 -o drive.parquet --map offset=Lane_Lat --map lane_width=Lane_Width",
-)  # fmt: skip
+)
 def mf4(
-    sources: Annotated[
-        list[Path], typer.Argument(metavar="SOURCE...", help="Logs; each is a drive of its own.", show_default=False)
-    ],
+    sources: Annotated[list[Path], typer.Argument(metavar="SOURCE...", help="Logs; each is a drive of its own.",
+        show_default=False)],
     *,
-    channels: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--map",
-            metavar="NAME=CHANNEL[:UNIT]",
-            help="Channel of a column, e.g. speed=v_veh:km/h; default unit: the file's.",
-        ),
-    ] = None,
+    channels: Annotated[list[str] | None, typer.Option("--map", metavar="NAME=CHANNEL[:UNIT]",
+        help="Channel of a column, e.g. speed=v_veh:km/h; default unit: the file's.")] = None,
     mapping_file: MappingFile = None,
-    step: Annotated[
-        float, typer.Option(help="Time step of the table, to which channels are interpolated [s].", min=0.001, max=1)
-    ] = 0.04,
+    step: Annotated[float, typer.Option(help="Time step of the table, to which channels are interpolated [s].",
+        min=0.001, max=1)] = 0.04,
     table: _Table,
 ) -> None:
     """ASAM MDF bus logs (extra `mdf`). They need a channel map, since signal names differ from car to car."""
@@ -147,19 +140,13 @@ def mf4(
 @command(
     group, "tracks", "Tracks on an OpenDRIVE road.",
     "import tracks tracks.csv --road road.xodr -o drives.parquet --map vehicle=obj",
-)  # fmt: skip
+)
 def tracks(
     source: Source,
     *,
     road: Annotated[Path, typer.Option("--road", metavar="FILE.xodr", help="Road on which the tracks lie.")],
-    columns: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--map",
-            metavar="NAME=COLUMN[:UNIT]",
-            help="vehicle, time, x, y, heading, speed, length, vehicle_class, e.g. heading=psi:deg.",
-        ),
-    ] = None,
+    columns: Annotated[list[str] | None, typer.Option("--map", metavar="NAME=COLUMN[:UNIT]",
+        help="vehicle, time, x, y, heading, speed, length, vehicle_class, e.g. heading=psi:deg.")] = None,
     mapping_file: MappingFile = None,
     table: _CutTable,
 ) -> None:
@@ -171,9 +158,8 @@ def tracks(
 def fcd(
     source: Annotated[Path, typer.Argument(help="What --fcd-output wrote (.xml).", show_default=False)],
     *,
-    net: Annotated[
-        Path | None, typer.Option(help="Road network (.net.xml): lanes, side of the road, who is on the next edge.")
-    ] = None,
+    net: Annotated[Path | None,
+        typer.Option(help="Road network (.net.xml): lanes, side of the road, who is on the next edge.")] = None,
     types: Annotated[Path | None, typer.Option(help="File with the vehicle types (.rou.xml): lengths.")] = None,
     lane_width: Annotated[float, typer.Option(help="Without a network. [m]", min=1, max=10)] = 3.2,
     table: _Table,
@@ -185,11 +171,10 @@ def fcd(
 @command(
     group, "openacc", "OpenACC, AstaZero campaign.",
     "import openacc ASta_040719_platoon3.csv ASta_050719_platoon1.csv -o drives.parquet",
-)  # fmt: skip
+)
 def openacc(
-    sources: Annotated[
-        list[Path], typer.Argument(metavar="FILE...", help="Files of one track (.csv, .csv.gz).", show_default=False)
-    ],
+    sources: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Files of one track (.csv, .csv.gz).",
+        show_default=False)],
     *,
     lane_width: Annotated[float, typer.Option(help="Of the road, which the files don't give. [m]", min=2, max=6)] = 3.5,
     table: _CutTable,
@@ -211,19 +196,15 @@ def commonroad(
 @command(
     group, "osi", "ASAM OSI traces.",
     "import osi cut-in_gt.mcap -o drives.parquet", "import osi a.mcap b.mcap --host host -o ego.csv",
-)  # fmt: skip
+)
 def osi(
-    sources: Annotated[
-        list[Path], typer.Argument(metavar="TRACE...", help="Traces (.mcap, .osi).", show_default=False)
-    ],
+    sources: Annotated[list[Path], typer.Argument(metavar="TRACE...", help="Traces (.mcap, .osi).",
+        show_default=False)],
     *,
-    host: Annotated[
-        str | None,
-        typer.Option("--host", metavar="ID", help="Keep this vehicle alone: its id or name; host: the host vehicle."),
-    ] = None,
-    road: Annotated[
-        Path | None, typer.Option("--road", metavar="FILE.xodr", help="Take lanes from here, not from the trace.")
-    ] = None,
+    host: Annotated[str | None, typer.Option("--host", metavar="ID",
+        help="Keep this vehicle alone: its id or name; host: the host vehicle.")] = None,
+    road: Annotated[Path | None, typer.Option("--road", metavar="FILE.xodr",
+        help="Take lanes from here, not from the trace.")] = None,
     channel: Annotated[str | None, typer.Option("--channel", metavar="TOPIC", help="Of an MCAP file.")] = None,
     table: _CutTable,
 ) -> None:
@@ -234,15 +215,14 @@ def osi(
 @command(
     group, "table", "Tables of drives under other names.",
     "import table --propose monday.csv > company.toml", "import table *.csv --mapping company.toml -o drives.parquet",
-)  # fmt: skip
+)
 def table_(
     sources: Annotated[list[Path], typer.Argument(metavar="TABLE...", help="Tables of drives.", show_default=False)],
     *,
     output: Annotated[str, typer.Option("--output", "-o", metavar="TABLE", help="Drive table, or - .")] = "-",
     mapped: Mapped,
-    propose: Annotated[
-        bool, typer.Option("--propose", help="Write the first version of a mapping of these tables, with comments.")
-    ] = False,
+    propose: Annotated[bool, typer.Option("--propose",
+        help="Write the first version of a mapping of these tables, with comments.")] = False,
     reply: Written,
 ) -> None:
     """Tables of drives under a company's own names, units and words, by a saved mapping."""

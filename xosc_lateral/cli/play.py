@@ -27,6 +27,8 @@ from xosc_lateral.cli.words import (
     write_stdout,
 )
 
+# What is said of one option stays together.
+# fmt: off
 app = group_of_verbs()
 
 Scenario = Annotated[Path, typer.Argument(help="Maneuver-based scenario (.xosc).", show_default=False)]
@@ -36,14 +38,12 @@ Scenario = Annotated[Path, typer.Argument(help="Maneuver-based scenario (.xosc).
     app, "play", VERBS["play"],
     "play cut-in.xosc -o states.csv", "play cut-in.xosc --osi cut-in_gt.mcap", "play cut-in.xosc -o states.parquet",
     "play cut-in.xosc -o - | head",
-)  # fmt: skip
+)
 def play(
     scenario: Scenario,
     *,
-    output: Annotated[
-        str | None,
-        typer.Option("--output", "-o", help="Table: .csv, .csv.gz, .parquet, folder/, - .", show_default=False),
-    ] = None,
+    output: Annotated[str | None, typer.Option("--output", "-o", help="Table: .csv, .csv.gz, .parquet, folder/, - .",
+        show_default=False)] = None,
     osi: Osi = None,
     step: Annotated[float, typer.Option(help="Length of a frame [s].", min=0.001, max=1.0)] = 0.02,
     time_limit: TimeLimit = None,
@@ -51,9 +51,8 @@ def play(
     allow: Allow = None,
     road: Road = None,
     road_path: RoadPath = None,
-    strict: Annotated[
-        bool, typer.Option("--strict", help="A missing vehicle catalog, or a run cut off, is an error.")
-    ] = False,
+    strict: Annotated[bool, typer.Option("--strict",
+        help="A missing vehicle catalog, or a run cut off, is an error.")] = False,
     reply: Written,
 ) -> None:
     """Play a scenario without offsets and write every entity's position at every step."""
@@ -70,14 +69,8 @@ def play(
     claim([table, trace], [scenario], force=reply.force)
     osi_wanted(trace)
     played = play(
-        scenario,
-        step=step,
-        time_limit=time_limit,
-        parameters=pairs(parameter, "--set"),
-        allow=allow or (),
-        road=road,
-        road_path=road_path or (),
-        strict=strict,
+        scenario, step=step, time_limit=time_limit, parameters=pairs(parameter, "--set"), allow=allow or (), road=road,
+        road_path=road_path or (), strict=strict,
     )
     written = None
     if output == STDOUT:
@@ -118,19 +111,16 @@ def segments(
 @command(
     app, "view", VERBS["view"],
     "view cut-in.xosc", "view cut-in_lifelike.xosc -o pages/",
-)  # fmt: skip
+)
 def view(
     scenario: Annotated[Path, typer.Argument(help="Any scenario (.xosc), converted or not.", show_default=False)],
-    output: Annotated[
-        str | None,
-        typer.Option("--output", "-o", help="Page to write; default: NAME_view.html beside it."),
-    ] = None,
+    output: Annotated[str | None, typer.Option("--output", "-o",
+        help="Page to write; default: NAME_view.html beside it.")] = None,
     parameter: Parameters = None,
     allow: Allow = None,
     time_limit: TimeLimit = None,
-    open_page: Annotated[
-        bool | None, typer.Option("--open/--no-open", help="Open the page in the browser. Default: from a terminal.")
-    ] = None,
+    open_page: Annotated[bool | None, typer.Option("--open/--no-open",
+        help="Open the page in the browser. Default: from a terminal.")] = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
@@ -167,9 +157,8 @@ def write(
     name: Annotated[str, typer.Argument(help="Template; `template list` names them.", show_default=False)],
     *,
     output: Annotated[str, typer.Option("--output", "--out", "-o", help="Folder to write to.", show_default=False)],
-    settings: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a setting; may be repeated.")
-    ] = None,
+    settings: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE",
+        help="Change a setting; may be repeated.")] = None,
     reply: Written,
 ) -> None:
     """Write a template's scenario and its road."""

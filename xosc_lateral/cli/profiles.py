@@ -21,6 +21,8 @@ Fields = Annotated[
     ),
 ]
 
+# What is said of one option stays together.
+# fmt: off
 app = group_of_verbs()
 group = typer.Typer(help="Driver profiles: those shipped, and your own.", no_args_is_help=True)
 app.add_typer(group, name="profiles", short_help=VERBS["profiles"])
@@ -30,13 +32,10 @@ app.add_typer(group, name="profiles", short_help=VERBS["profiles"])
 def list_(
     *,
     library: Library = None,
-    tags: Annotated[
-        list[str] | None, typer.Option("--tag", metavar="TAG", help="Only profiles with this tag; may be repeated.")
-    ] = None,
-    where: Annotated[
-        list[str] | None,
-        typer.Option(metavar="FIELD=VALUE", help="Only profiles with this value, e.g. country=DE; may be repeated."),
-    ] = None,
+    tags: Annotated[list[str] | None, typer.Option("--tag", metavar="TAG",
+        help="Only profiles with this tag; may be repeated.")] = None,
+    where: Annotated[list[str] | None, typer.Option(metavar="FIELD=VALUE",
+        help="Only profiles with this value, e.g. country=DE; may be repeated.")] = None,
     reply: Printing,
 ) -> None:
     """List all profiles with model and source, and name files that cannot be read."""
@@ -94,9 +93,7 @@ def compare(
 
 
 @command(
-    group,
-    "derive",
-    "Make a driver from stated figures.",
+    group, "derive", "Make a driver from stated figures.",
     "profiles derive --preset drowsy -o drowsy.json",
     "profiles derive motorway --sdlp 0.25 --mean 0.1 -o calm.json",
 )
@@ -104,20 +101,17 @@ def derive(
     *,
     base: Annotated[str, typer.Argument(metavar="[BASE]", help="Profile that gives what is not stated.")] = "motorway",
     output: Annotated[str, typer.Option("--output", "-o", help="File, folder/ or -.")] = "-",
-    preset: Annotated[
-        str | None, typer.Option(help="alcohol-0.5, drowsy or truck: figures with a source, as changes of the base's.")
-    ] = None,
+    preset: Annotated[str | None,
+        typer.Option(help="alcohol-0.5, drowsy or truck: figures with a source, as changes of the base's.")] = None,
     sdlp: Annotated[float | None, typer.Option(help="Standard deviation of lateral position. [m]")] = None,
     mean: Annotated[float | None, typer.Option(help="Mean offset, positive left. [m]")] = None,
     restlessness: Annotated[float | None, typer.Option(help="Standard deviation of lateral speed. [m/s]")] = None,
     memory: Annotated[float | None, typer.Option(help="After which the autocorrelation is 1/e. [s]")] = None,
-    near_line: Annotated[
-        float | None, typer.Option(help="Share of time with a side within 0.2 m of a marking. [0 to 1]")
-    ] = None,
+    near_line: Annotated[float | None,
+        typer.Option(help="Share of time with a side within 0.2 m of a marking. [0 to 1]")] = None,
     speed: Annotated[float | None, typer.Option(help="At which the figures hold; default 26.4. [m/s]")] = None,
-    vehicle: Annotated[
-        str | None, typer.Option("--class", metavar="truck", help="What the base knows of trucks.")
-    ] = None,
+    vehicle: Annotated[str | None, typer.Option("--class", metavar="truck",
+        help="What the base knows of trucks.")] = None,
     called: Annotated[str, typer.Option("--name", help="Id of the new profile.")] = "",
     library: Library = None,
     reply: Written,
@@ -224,9 +218,8 @@ def uses(
 def export(
     names: Names,
     *,
-    output: Annotated[
-        str, typer.Option("--output", "-o", help="One profile: file or -; several: folder/.", show_default=False)
-    ],
+    output: Annotated[str, typer.Option("--output", "-o", help="One profile: file or -; several: folder/.",
+        show_default=False)],
     library: Library = None,
     reply: Written,
 ) -> None:

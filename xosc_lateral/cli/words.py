@@ -52,48 +52,32 @@ def _begin_log(context: typer.Context, wanted: bool) -> bool:
     return wanted
 
 
-Verbose = Annotated[
-    bool,
-    typer.Option("--verbose", "-v", callback=_begin_log, help="Log files and steps, with times, on standard error."),
-]
+# What is said of one option stays together.
+# fmt: off
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", callback=_begin_log,
+    help="Log files and steps, with times, on standard error.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Machine-readable: JSON on standard output, errors included.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
-Osi = Annotated[
-    str | None,
-    typer.Option("--osi", metavar="TRACE", help="ASAM OSI trace too (.mcap, .osi): lanes, boxes, motion; extra osi."),
-]
+Osi = Annotated[str | None, typer.Option("--osi", metavar="TRACE",
+    help="ASAM OSI trace too (.mcap, .osi): lanes, boxes, motion; extra osi.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace files that xosc-lateral did not write itself.")]
 Seed = Annotated[int, typer.Option(help="Random seed; the same inputs and seed give the same bytes.", min=0)]
-Library = Annotated[
-    list[Path] | None, typer.Option(metavar="FOLDER", help="Folder with more profiles; may be repeated.")
-]
+Library = Annotated[list[Path] | None, typer.Option(metavar="FOLDER",
+    help="Folder with more profiles; may be repeated.")]
 Profile = Annotated[str, typer.Option("--profile", "-p", metavar="NAME|PATH", help="Driver profile.")]
 Tables = Annotated[list[Path], typer.Argument(metavar="TABLE...", help="Drive tables: .csv, .csv.gz, .parquet.")]
-Columns = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--map",
-        metavar="NAME=COLUMN[:UNIT]",
-        help="Column under another name or unit, e.g. speed=v_kmh:km/h; may be repeated.",
-    ),
-]
-MappingFile = Annotated[
-    Path | None,
-    typer.Option("--mapping", metavar="FILE.toml", help="Saved mapping of columns (import table --propose FILE...)."),
-]
-Parameters = Annotated[
-    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Set a scenario parameter; may be repeated.")
-]
-Allow = Annotated[
-    list[Path] | None, typer.Option(help="Folder that roads and catalogs may be read from; may be repeated.")
-]
-Road = Annotated[
-    Path | None, typer.Option("--road", help="OpenDRIVE file, whatever the scenario says.", show_default=False)
-]
-RoadPath = Annotated[
-    list[Path] | None,
-    typer.Option("--road-path", metavar="DIR", help='Folder with roads known by name ("Town04"); may be repeated.'),
-]
+Columns = Annotated[list[str] | None, typer.Option("--map", metavar="NAME=COLUMN[:UNIT]",
+    help="Column under another name or unit, e.g. speed=v_kmh:km/h; may be repeated.")]
+MappingFile = Annotated[Path | None, typer.Option("--mapping", metavar="FILE.toml",
+    help="Saved mapping of columns (import table --propose FILE...).")]
+Parameters = Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE",
+    help="Set a scenario parameter; may be repeated.")]
+Allow = Annotated[list[Path] | None,
+    typer.Option(help="Folder that roads and catalogs may be read from; may be repeated.")]
+Road = Annotated[Path | None, typer.Option("--road", help="OpenDRIVE file, whatever the scenario says.",
+    show_default=False)]
+RoadPath = Annotated[list[Path] | None, typer.Option("--road-path", metavar="DIR",
+    help='Folder with roads known by name ("Town04"); may be repeated.')]
 
 
 def _number(value: float | None) -> float | None:
@@ -103,16 +87,9 @@ def _number(value: float | None) -> float | None:
     return value
 
 
-TimeLimit = Annotated[
-    float | None,
-    typer.Option(
-        help="Cut runs off here [s]; default: 60 without a stop trigger, 3600 with one.",
-        callback=_number,
-        min=0.1,
-        max=86_400,
-        show_default=False,
-    ),
-]
+TimeLimit = Annotated[float | None,
+    typer.Option(help="Cut runs off here [s]; default: 60 without a stop trigger, 3600 with one.", callback=_number,
+    min=0.1, max=86_400, show_default=False)]
 
 
 class Part(StrEnum):
@@ -121,9 +98,10 @@ class Part(StrEnum):
     SENSOR = "sensor"
 
 
-With = Annotated[
-    list[Part] | None, typer.Option("--with", help="sensor: add the error of the sensor that measured the drives.")
-]
+With = Annotated[list[Part] | None, typer.Option("--with",
+    help="sensor: add the error of the sensor that measured the drives.")]
+
+# fmt: on
 
 
 SHARED = {

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.evaluation.distances import wasserstein
 from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, MovementSummary, figures_of
 from xosc_lateral.drivers.evaluation.metrics import (
     DRIVERS,
@@ -17,6 +16,7 @@ from xosc_lateral.drivers.evaluation.metrics import (
     cut_snippets,
     free_runs,
     snippet_metrics,
+    wasserstein,
 )
 from xosc_lateral.drivers.evaluation.scores import SNIPPET
 from xosc_lateral.drivers.evaluation.spectra import Spectrum, spectrum
@@ -31,8 +31,7 @@ class ComparedProfile:
     """A profile and its free runs in even traffic."""
 
     profile: DriverProfile
-    runs: FloatArray
-    """Shape (drivers, n). [m]"""
+    runs: FloatArray  # Shape (drivers, n). [m]
     summary: MovementSummary
     keeping: LaneKeeping
     spectrum: Spectrum
@@ -71,11 +70,7 @@ class Compared:
 
     @property
     def floors(self) -> FloatArray:
-        """Up to which distance two profiles are alike, shape (k, k): root mean square of both from themselves. [-]
-
-        From itself is one piece of its free runs from another, each as long as the drives that it was fitted on, at
-        most half of them: so far apart are two profiles of one driver by the chance of what was recorded.
-        """
+        """Up to which distance two profiles are alike, shape (k, k): root mean square of both from themselves. [-]"""
         itself = np.diag(self.distance)
         return np.sqrt(0.5 * (itself[:, None] ** 2 + itself[None, :] ** 2))
 

@@ -1,9 +1,9 @@
 """How near sampled driving is to real driving, beside how near other real drivers are: the fair measure.
 
 Snippets of 10, 30 and 60 s are compared under three conditions: sampled from where the real ones start; cut from free
-runs that know no start; and free runs again, movement below 0.5 Hz alone. Every number stands beside that of real
-snippets of other drivers that know as much about the start. What was recorded is the driver and the sensor, so a
-profile that knows its sensor is compared with it; below 0.5 Hz the driver is compared alone, as `convert` writes him.
+runs; and free runs again, movement below 0.5 Hz alone. Every number stands beside that of real snippets of other
+drivers that know as much about the start. Recordings hold driver and sensor, so a profile that knows its sensor is
+compared with it; below 0.5 Hz the driver is compared alone, as `convert` writes him.
 """
 
 from __future__ import annotations
@@ -17,16 +17,6 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.evaluation.classifier import TwoSampleResult, classifier_two_sample_test, context_features
-from xosc_lateral.drivers.evaluation.distances import SCORE_UNITS, proper_scores, split_groups
-from xosc_lateral.drivers.evaluation.filters import (
-    PASS_FREQUENCY,
-    STOP_FREQUENCY,
-    comparison_band,
-    dithered,
-    resolution_of,
-    slow_movement,
-    thinned,
-)
 from xosc_lateral.drivers.evaluation.measures import (
     FLOOR_DRAWS,
     UNITS,
@@ -38,8 +28,25 @@ from xosc_lateral.drivers.evaluation.measures import (
     real_against_real,
     windows_with_the_same_start,
 )
-from xosc_lateral.drivers.evaluation.parts import LENGTHS, SnippetCondition
-from xosc_lateral.drivers.evaluation.snippets import Snippets, sample_runs, sample_snippets, sensor_noise, snippets_of
+from xosc_lateral.drivers.evaluation.metrics import SCORE_UNITS, proper_scores, split_groups
+from xosc_lateral.drivers.evaluation.snippets import (
+    LENGTHS,
+    SnippetCondition,
+    Snippets,
+    sample_runs,
+    sample_snippets,
+    sensor_noise,
+    snippets_of,
+)
+from xosc_lateral.drivers.evaluation.spectra import (
+    PASS_FREQUENCY,
+    STOP_FREQUENCY,
+    comparison_band,
+    dithered,
+    resolution_of,
+    slow_movement,
+    thinned,
+)
 from xosc_lateral.drivers.model.profile import DriverProfile
 
 
@@ -53,16 +60,10 @@ class VarianceParts:
 
 
 def variance_parts(windows: FloatArray, drivers: NDArray[np.generic]) -> VarianceParts:
-    """Variance between drivers, within drivers, and inside windows.
+    """Variance of windows, shape (n, m) [m], between drivers, within drivers, and inside windows.
 
-    One-way random effects on the windows' means, by the method of moments for unequal counts [1]_. Neighbouring
-    windows of a driver are alike, so `between` holds what changes more slowly than a drive is long.
-
-    `windows`, shape (n, m) [m]; `drivers`, shape (n,).
-
-    References
-    ----------
-    .. [1] S. R. Searle, G. Casella, C. E. McCulloch, "Variance Components", Wiley 1992, section 3.6.
+    One-way random effects on the windows' means, by the method of moments for unequal counts (Searle, Casella and
+    McCulloch, "Variance Components", 1992, 3.6). `between` holds what changes more slowly than a drive is long.
     """
     means = windows.mean(axis=1)
     names, member, counts = np.unique(drivers, return_inverse=True, return_counts=True)
@@ -167,8 +168,7 @@ def score_realism(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
     return Realism(tuple(found), variance_parts(short.offset, whose), variance_parts(short.cut_from(recorded), whose))
 
 
-MINIMUM_ROWS = 6
-"""Of a snippet that a classifier is shown. [-]"""
+MINIMUM_ROWS = 6  # Of a snippet that a classifier is shown. [-]
 
 
 def _under(

@@ -1,10 +1,4 @@
-"""Up to which frequency sampled movement is like that of other real drivers, and what a detector makes of it.
-
-References
-----------
-.. [1] P. D. Welch, "The use of fast Fourier transform for the estimation of power spectra", IEEE Trans. Audio
-   Electroacoustics 15, 1967.
-"""
+"""Up to which frequency sampled movement is like that of other real drivers, and what a detector makes of it."""
 
 from __future__ import annotations
 
@@ -23,14 +17,12 @@ from xosc_lateral.drivers.drives.resampling import PASS_BAND_EDGES
 BAND_EDGES = (0.04, 0.08, 0.12, 0.16, 0.20, 0.25, 0.32, 0.40, 0.50, 0.70, 1.0, PASS_BAND_EDGES)
 """In which power is compared: as wide as windows of 25.6 s resolve, or a quarter of their frequency. [Hz]"""
 
-WINDOW = 25.6
-"""[s]"""
+WINDOW = 25.6  # [s]
 
 TOLERANCE = 1.5
 """Factor by which the power of real drivers differs from run to run (six runs with differential GNSS). [-]"""
 
-ERROR_FACTOR = 2.0
-"""Standard errors within which a difference may be chance. [-]"""
+ERROR_FACTOR = 2.0  # Standard errors within which a difference may be chance. [-]
 
 ALARM_SPEEDS, ALARM_HOLD = (0.10, 0.15, 0.20), 0.4
 """A plain detector's lateral speeds [m/s], and how long they have to last. [s]"""

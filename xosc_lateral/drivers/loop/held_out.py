@@ -15,8 +15,13 @@ from xosc_lateral.drivers.drives.cuts import MIN_RUN
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.filters import filtered
 from xosc_lateral.drivers.drives.resampling import STEP
-from xosc_lateral.drivers.evaluation.distances import Distances, mean_distances, metric_distances
-from xosc_lateral.drivers.evaluation.metrics import METRICS, snippet_metrics
+from xosc_lateral.drivers.evaluation.metrics import (
+    METRICS,
+    Distances,
+    mean_distances,
+    metric_distances,
+    snippet_metrics,
+)
 from xosc_lateral.drivers.fitting.fitting import fit_population, fit_runs
 from xosc_lateral.drivers.fitting.place import COLUMNS as KNOWN_TO_THE_BASE
 from xosc_lateral.drivers.loop.columns import Column

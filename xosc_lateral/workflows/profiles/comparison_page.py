@@ -19,14 +19,9 @@ from xosc_lateral.files.profiles import profile_hash
 from xosc_lateral.workflows.profiles.cards import figures_record
 from xosc_lateral.workflows.profiles.violins import LABELS
 
-SHOWN_S = 120.0
-"""Length of the sample paths in the figure. [s]"""
-
-SPACING = 0.8
-"""Between the zero lines of two sample paths. [m]"""
-
-MAXIMUM_DRAWN = 12
-"""So many profiles are drawn at most; the distances are of all."""
+SHOWN_S = 120.0  # Length of the sample paths in the figure. [s]
+SPACING = 0.8  # Between the zero lines of two sample paths. [m]
+MAXIMUM_DRAWN = 12  # So many profiles are drawn at most; the distances are of all.
 
 
 def comparison_text(compared: Compared) -> str:

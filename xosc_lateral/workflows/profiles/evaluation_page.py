@@ -11,10 +11,10 @@ import numpy as np
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.evaluation.lane_keeping import NEAR_MARKING
 from xosc_lateral.drivers.evaluation.metrics import METRICS
-from xosc_lateral.drivers.evaluation.parts import PartEvaluation
 from xosc_lateral.drivers.evaluation.realism import Realism
 from xosc_lateral.drivers.evaluation.record import scores_to_dict
 from xosc_lateral.drivers.evaluation.scores import SNIPPET, ProfileScores, SnippetScores
+from xosc_lateral.drivers.evaluation.snippets import PartEvaluation
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.pages.chart import MEASURED, SAMPLED
 from xosc_lateral.files.pages.figure import Figure
@@ -266,10 +266,7 @@ def _key_figures(realism: Realism) -> list[KeyFigure]:
 
 
 def blocks_of(scores: ProfileScores) -> dict[str, float]:
-    """Every block of the fair measure as a ratio to what other real drivers get: 1 is as good as it gets. [-]
-
-    Families of differences by condition; the classifiers: 1 at AUC 0.5, 2 at AUC 1.
-    """
+    """Every block of the fair measure over what other real drivers get; classifiers: 1 at AUC 0.5, 2 at 1. [-]"""
     blocks = {}
     for one in scores.realism.conditions:
         for family, beside in one.families.items():

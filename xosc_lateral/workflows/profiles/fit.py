@@ -39,7 +39,7 @@ def read_drives(drives: DrivesLike, columns: MappingLike | None = None) -> list[
 def fit(
     drives: DrivesLike,
     *,
-    name: str,
+    name: str = "",
     model: str = "autoregressive",
     corrected: bool = False,
     columns: MappingLike | None = None,
@@ -59,7 +59,7 @@ def fit(
     drives, columns
         See `read_drives`.
     name : str
-        Of the profile.
+        Of the profile; else the first table's, without its suffix, or "profile".
     model : str
         "two-level": the paper's model to the letter; "autoregressive" (or "best"): ours.
     corrected : bool
@@ -120,7 +120,7 @@ def fit(
     with naming(given):
         profile = fit_profile(
             given.drives,
-            name=name,
+            name=name or (given.files[0].name.split(".")[0] if given.files else "profile"),
             model=model,
             provenance=known,
             sensor_noise=sensor_noise,

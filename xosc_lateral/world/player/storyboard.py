@@ -91,7 +91,10 @@ class StoryboardElement:
             self.start()
         if self.state is _RUNNING:
             for child in self.children:
-                if child.state is _STANDBY or (child.state is _RUNNING and (child.children or child.stop_trigger)):
+                if child.state is _STANDBY:
+                    if child.start_trigger is None or not child.start_trigger.rests:
+                        child.evaluate_triggers(time)
+                elif child.state is _RUNNING and (child.children or child.stop_trigger):
                     child.evaluate_triggers(time)
 
     def step(self, time: float, step: float) -> None:

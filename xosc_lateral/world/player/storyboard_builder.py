@@ -180,8 +180,8 @@ def prepare_trigger(trigger: Trigger, simulation: Simulation, *, when_empty: boo
 
 def _prepare(condition: Condition, simulation: Simulation) -> RunningCondition:
     check = _check(condition, simulation)
-    forget = check.forget if isinstance(check, StateWatch) else None
-    return RunningCondition(check, condition.edge, condition.delay, forget)
+    watch = check if isinstance(check, StateWatch) else None
+    return RunningCondition(check, condition.edge, condition.delay, watch)
 
 
 def _check(condition: Condition, simulation: Simulation) -> Check:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from xosc_lateral.world.player.conditions.base import ValueCheck, ValueChecks
 from xosc_lateral.world.player.simulation import Simulation
 from xosc_lateral.world.player.storyboard import StoryboardElement
+from xosc_lateral.world.player.trigger import Watch
 from xosc_lateral.world.player.values import Values, holds
 from xosc_lateral.world.scenario.conditions import (
     ParameterCondition,
@@ -79,7 +80,7 @@ def prepare_user_defined(content: UserDefinedValueCondition, simulation: Simulat
 
 
 # ---- StoryboardElementStateCondition ----
-class StateWatch:
+class StateWatch(Watch):
     """Changes of one element since the last look.
 
     Any change since then that matches counts, also one that was passed through; without changes the last state goes on
@@ -101,10 +102,16 @@ class StateWatch:
                 and len(reference) >= len(element.name)
                 and "::".join(element.path).endswith(reference)
             ):
-                element.watchers.append(lambda state, transition: self._changes.append((state, transition)))
+                element.watchers.append(self._note)
                 return
         what = f"no {kind.value} '{reference}' in the storyboard: the condition stays false"
         self._simulation.note(what, self._content.place)
+
+    def _note(self, state: State, transition: State | None) -> None:
+        self._changes.append((state, transition))
+        self.is_settled = False
+        if self.wake is not None:
+            self.wake()
 
     def forget(self) -> None:
         """Leave changes that nobody has looked at aside."""
@@ -113,6 +120,7 @@ class StateWatch:
     def __call__(self) -> bool:
         """Whether the element is, or was since the last look, in the wanted state."""
         wanted = self._content.state
+        self.is_settled = not self._changes
         if not self._changes:
             return self._last is wanted
         changes, self._changes = self._changes, []
