@@ -12,8 +12,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.drivers.evaluation.distances import Distances, metric_distances, wasserstein
-from xosc_lateral.drivers.evaluation.metrics import METRICS, cut_snippets, free_runs, snippet_metrics
+from xosc_lateral.drivers.evaluation.metrics import (
+    METRICS,
+    Distances,
+    cut_snippets,
+    free_runs,
+    metric_distances,
+    snippet_metrics,
+    wasserstein,
+)
 from xosc_lateral.drivers.model.profile import DriverProfile
 
 FloatArray = NDArray[np.float64]

@@ -24,7 +24,7 @@ from tests.kit.profiles import as_drive
 from xosc_lateral.drivers.drives.cuts import PAPER_RULES, all_runs
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.drives.resampling import STEP
-from xosc_lateral.drivers.evaluation.distances import snippet_distances
+from xosc_lateral.drivers.evaluation.metrics import snippet_distances
 from xosc_lateral.drivers.fitting.models.autoregressive import fit as fitting
 from xosc_lateral.drivers.fitting.models.autoregressive import fit_coarse
 from xosc_lateral.drivers.fitting.models.autoregressive.fit_coarse import fit_autoregression

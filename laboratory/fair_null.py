@@ -23,8 +23,8 @@ from laboratory.markers import show
 from xosc_lateral.drivers.drives.cuts import all_runs
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.evaluation.classifier import TwoSampleResult, classifier_two_sample_test, context_features
-from xosc_lateral.drivers.evaluation.filters import slow_movement, thinned
 from xosc_lateral.drivers.evaluation.snippets import Snippets, sample_runs, snippets_of
+from xosc_lateral.drivers.evaluation.spectra import slow_movement, thinned
 from xosc_lateral.drivers.fitting.fitting import fit_population, fit_profile
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.drives import read_drives

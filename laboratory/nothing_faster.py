@@ -18,8 +18,8 @@ from laboratory.markers import show
 from xosc_lateral.drivers.drives.cuts import all_runs
 from xosc_lateral.drivers.drives.filters import filtered, low_pass_between
 from xosc_lateral.drivers.drives.resampling import STEP
-from xosc_lateral.drivers.evaluation.filters import STOP_FREQUENCY, slow_movement
 from xosc_lateral.drivers.evaluation.snippets import snippets_of
+from xosc_lateral.drivers.evaluation.spectra import STOP_FREQUENCY, slow_movement
 from xosc_lateral.files.drives import read_drives
 
 LENGTHS = (10.0, 30.0, 60.0)

@@ -26,13 +26,10 @@ import xosc_lateral as xl
 from laboratory import agreement
 from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.workflows.recordings.importers import dlr_ht
-from xosc_lateral.workflows.recordings.reconstruct import (
-    Reconstructed,
-    ReconstructSettings,
-    drivers_table,
-    reconstruct_recording,
-)
+from xosc_lateral.workflows.recordings.reconstruct import reconstruct_recording
+from xosc_lateral.workflows.recordings.reconstruction import Reconstruction, drivers_table
 from xosc_lateral.workflows.recordings.recordings import RecordedTraffic, read_recording
+from xosc_lateral.workflows.recordings.settings import ReconstructSettings
 from xosc_lateral.world.motion.nominal import Activity, NominalMotion
 
 FloatArray = NDArray[np.float64]
@@ -92,7 +89,7 @@ class OtherReading:
         return found
 
 
-def lane_changes(made: Reconstructed, other: OtherReading) -> tuple[int, int, int, FloatArray]:
+def lane_changes(made: Reconstruction, other: OtherReading) -> tuple[int, int, int, FloatArray]:
     """Found by both, by the other reading alone, by the reconstruction alone; differences of begin and end [s]."""
     both, missed, extra, ends = 0, 0, 0, list[tuple[float, float]]()
     start = made.recording.start
@@ -136,7 +133,7 @@ def window_lines(traffic: RecordedTraffic, other: OtherReading, begins: Sequence
     return lines
 
 
-def write(made: Reconstructed, folder: Path) -> Path:
+def write(made: Reconstruction, folder: Path) -> Path:
     """Scenario, road and table of drivers."""
     (folder / made.traffic.road_name).write_bytes(made.traffic.road)
     path = folder / f"{made.traffic.name}.xosc"

@@ -23,17 +23,18 @@ from laboratory.fair_null import slow_test
 from laboratory.markers import show
 from laboratory.reconstruction import WINDOW, write
 from xosc_lateral.drivers.drives.drive import Run
-from xosc_lateral.drivers.evaluation.filters import slow_movement
 from xosc_lateral.drivers.evaluation.snippets import Snippets, snippets_of
+from xosc_lateral.drivers.evaluation.spectra import slow_movement
 from xosc_lateral.files.profiles import read_profile
 from xosc_lateral.workflows.conversion.consequences import Gap, gaps_of
 from xosc_lateral.workflows.conversion.enrich import enrich
 from xosc_lateral.workflows.conversion.load import Played, play_scenario
 from xosc_lateral.workflows.conversion.result import Enriched
-from xosc_lateral.workflows.recordings.drivers import STEP, in_lane_offsets
 from xosc_lateral.workflows.recordings.page import recorded_path
-from xosc_lateral.workflows.recordings.reconstruct import Reconstructed, ReconstructSettings, reconstruct_recording
+from xosc_lateral.workflows.recordings.reconstruct import STEP, in_lane_offsets, reconstruct_recording
+from xosc_lateral.workflows.recordings.reconstruction import Reconstruction
 from xosc_lateral.workflows.recordings.recordings import read_recording
+from xosc_lateral.workflows.recordings.settings import ReconstructSettings
 
 FloatArray = NDArray[np.float64]
 
@@ -46,7 +47,7 @@ EVERY = 0.1  # [s], the step of the published models
 class Twins:
     """A window, its maneuvers as played, and every variant of them."""
 
-    made: Reconstructed
+    made: Reconstruction
     played: Played
     variants: list[Enriched]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import gc
 import os
+import time
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +47,20 @@ def test_rows_in_a_file_give_the_same_bytes(scenario: Path, monkeypatch: pytest.
     assert sizes, "nothing lay in the file"
     assert in_file.data == in_memory.data
     assert {path.suffix for path in scenario.parent.iterdir()} == {".xosc", ".xodr"}, "the file has no name"
+
+
+@pytest.mark.skipif(rows.status_bytes(2) == 0, reason="the system does not say what is in memory")
+def test_pages_of_the_file_leave_memory_by_themselves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rows, "IN_MEMORY", 0.0)
+    before = rows.status_bytes(2)
+    with rows.beside(tmp_path):
+        column = rows.empty(20_000_000)
+        column[:] = np.arange(20_000_000)
+    deadline = time.monotonic() + 20.0
+    while rows.status_bytes(2) - before > rows.MAPPED and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert rows.status_bytes(2) - before <= rows.MAPPED
+    assert column[-1] == 19_999_999 and (np.diff(column[:1000]) == 1.0).all()
 
 
 def test_what_drivers_see_is_gone_before_paths_are_made(scenario: Path, monkeypatch: pytest.MonkeyPatch) -> None:

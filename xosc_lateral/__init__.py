@@ -10,7 +10,7 @@ from xosc_lateral.base.version import __version__
 TYPE_CHECKING = False  # importing `typing` for it would take longer than all the rest
 
 _HOME = {
-    "convert": "workflows.conversion.call",
+    "convert": "workflows.conversion.convert",
     "convert_many": "workflows.batch.call",
     "reconstruct": "workflows.recordings.call",
     "verify": "workflows.batch.verify",
@@ -42,8 +42,8 @@ _HOME = {
     "OffsetStream": "drivers.model.stream",
     "DriverProfile": "drivers.model.profile",
     "Drive": "drivers.drives.drive",
-    "Conversion": "workflows.conversion.call",
-    "Reconstruction": "workflows.recordings.call",
+    "Conversion": "workflows.conversion.conversion",
+    "Reconstruction": "workflows.recordings.reconstruction",
     "ConvertSettings": "workflows.conversion.settings",
     "BatchResult": "workflows.batch.call",
     "Verification": "workflows.batch.verify",
@@ -131,7 +131,8 @@ if TYPE_CHECKING:
     from xosc_lateral.drivers.model.stream import OffsetStream
     from xosc_lateral.workflows.batch.call import BatchResult, convert_many
     from xosc_lateral.workflows.batch.verify import Verification, reproduce, verify
-    from xosc_lateral.workflows.conversion.call import Conversion, convert
+    from xosc_lateral.workflows.conversion.conversion import Conversion
+    from xosc_lateral.workflows.conversion.convert import convert
     from xosc_lateral.workflows.conversion.settings import ConvertSettings
     from xosc_lateral.workflows.detection.call import detect
     from xosc_lateral.workflows.detection.detection import Detection
@@ -148,7 +149,8 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.profiles.loop import ClosedLoop, close_loop
     from xosc_lateral.workflows.profiles.profiles import compare_profiles, list_profiles, read_profile, write_profile
     from xosc_lateral.workflows.profiles.sample import Offsets, sample
-    from xosc_lateral.workflows.recordings.call import ImportedDrives, Reconstruction, import_drives, reconstruct
+    from xosc_lateral.workflows.recordings.call import ImportedDrives, import_drives, reconstruct
+    from xosc_lateral.workflows.recordings.reconstruction import Reconstruction
 
 
 def __getattr__(name: str) -> object:

@@ -17,8 +17,7 @@ from xosc_lateral.drivers.evaluation.measures import (
     real_against_real,
     windows_with_the_same_start,
 )
-from xosc_lateral.drivers.evaluation.parts import LENGTHS, SnippetCondition
-from xosc_lateral.drivers.evaluation.snippets import Snippets, snippets_of
+from xosc_lateral.drivers.evaluation.snippets import LENGTHS, SnippetCondition, Snippets, snippets_of
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

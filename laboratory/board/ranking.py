@@ -19,7 +19,7 @@ from laboratory.board.half import DRAWS, Half, floors
 from laboratory.board.ranked import SHORT, ranked_numbers
 from laboratory.board.sampled_half import SampledHalf
 from xosc_lateral.drivers.evaluation.measures import differences
-from xosc_lateral.drivers.evaluation.parts import SnippetCondition
+from xosc_lateral.drivers.evaluation.snippets import SnippetCondition
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -12,9 +12,8 @@ from laboratory.board.half import DRAWS, ENSEMBLE, Half
 from laboratory.board.models.base import LateralModel
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.evaluation.measures import Features, features_of
-from xosc_lateral.drivers.evaluation.parts import SnippetCondition
 from xosc_lateral.drivers.evaluation.realism import VarianceParts, variance_parts
-from xosc_lateral.drivers.evaluation.snippets import Snippets
+from xosc_lateral.drivers.evaluation.snippets import SnippetCondition, Snippets
 from xosc_lateral.drivers.model.sampled_offsets import segment_of
 
 FloatArray = NDArray[np.float64]

@@ -247,3 +247,40 @@ def test_a_profiles_id_stays_inside_its_library(
     assert "without a folder" in capsys.readouterr().err
     assert main(["profiles", "export", "hostile.json", "-o", "inner/"]) == (name != "..")  # a file "...json" is one
     assert {path.parent.name for path in tmp_path.rglob("*.json")} <= {tmp_path.name, "inner"}
+
+
+def test_a_log_names_files_and_ends_with_its_command(tmp_path, capsys):
+    target = tmp_path / "cut-in"
+    assert main(["template", "write", "cut-in", "-o", str(target), "--verbose"]) == 0
+    err = capsys.readouterr().err
+    assert re.search(rf"^\d\d:\d\d:\d\d\.\d+ wrote {re.escape(str(target / 'cut-in.xosc'))}$", err, flags=re.MULTILINE)
+    assert main(["segments", str(target / "cut-in.xosc"), "-v", "--quiet"]) == 0
+    assert re.search(r"read \S+cut-in.xodr, sha256 [0-9a-f]{64}$", capsys.readouterr().err, flags=re.MULTILINE)
+    assert main(["segments", str(target / "cut-in.xosc"), "--quiet"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_every_verb_names_a_page_that_exists():
+    from xosc_lateral.cli.words import PAGES
+
+    root = Path(__file__).resolve().parents[2]
+    assert {page for pages in PAGES.values() for page in pages.split(", ") if not (root / page).exists()} == set()
+    assert set(PAGES) | {"__init__", "words"} == {path.stem for path in (root / "xosc_lateral" / "cli").glob("*.py")}
+
+
+def test_a_closed_loop_that_is_interrupted_says_what_it_was_at(capsys):
+    from xosc_lateral.cli.close_loop import shown_progress
+
+    with pytest.raises(KeyboardInterrupt), shown_progress("closing the loop", False) as progress:
+        progress(0.3, "looking at the mean")
+        raise KeyboardInterrupt
+    assert capsys.readouterr().err == "xosc-lateral: stopped while looking at the mean; nothing is written yet\n"
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.csv.gz", "a.parquet"])
+@pytest.mark.parametrize("data", [b"", b"PAR1xxxxPAR1", b"\x1f\x8bgarbage"], ids=["empty", "no Parquet", "cut gzip"])
+def test_a_damaged_table_is_refused_in_words_of_our_own(tmp_path, capsys, name, data):
+    (tmp_path / name).write_bytes(data)
+    assert main(["fit", str(tmp_path / name), "-o", str(tmp_path / "x.json")]) == 1
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1 and not re.search("footer|parse|end-of-stream|C error|codec", err), err

@@ -7,13 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from tests.kit.motion import drive, entity, together, two_roads
-from xosc_lateral.workflows.conversion.result import (
-    ConversionProvenance,
-    ConvertedScenario,
-    Enriched,
-    EntityResult,
-    SampledSegment,
-)
+from xosc_lateral.workflows.conversion.conversion import Conversion
+from xosc_lateral.workflows.conversion.result import ConversionProvenance, Enriched, EntityResult, SampledSegment
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
 from xosc_lateral.world.motion.gaps import BoxPath, Gap, smallest_gaps
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, Note
@@ -115,10 +110,10 @@ def _gaps(paths: list[tuple[EntityMotion, WorldTrajectory]]) -> tuple[Gap, ...]:
     return smallest_gaps(paths[0][0].time[::5], boxes)
 
 
-def converted(enriched: Enriched, *warnings: str) -> ConvertedScenario:
+def converted(enriched: Enriched, *warnings: str) -> Conversion:
     """The same as a conversion of in.xosc into out.xosc."""
     options = ConvertSettings(seed=7, parameters={"speed": "30"}).record(Path())
     made = ConversionProvenance(
         "0.1", 1, "in.xosc", {"in.xosc": "a" * 64}, {"Ego": ("calm", "b" * 64)}, options, 2, "1.2", (), {}, "d" * 64
     )
-    return ConvertedScenario(Path("in.xosc"), Path("out.xosc"), "c" * 64, enriched, made, warnings)
+    return Conversion(Path("in.xosc"), Path("out.xosc"), "c" * 64, enriched, made, warnings)

@@ -3,8 +3,8 @@
 A run of a day has millions of rows, one of an hour with hundreds of cars a hundred million. Whoever works on all of
 them does so with `blocks`, and makes columns that last with `columns`, `stored` and `empty`. Within `beside`, columns
 beyond `IN_MEMORY` are mapped from a file without a name, which is gone with the last of them, however the process ends.
-Pages of it that are in memory are given back after a block as soon as they are more than `MAPPED`; nothing is lost by
-that, since the mapping is shared with the file (madvise(2), MADV_DONTNEED). Where the system can't, all is in memory.
+A thread gives its pages in memory back as soon as they are more than `MAPPED`; nothing is lost by that, since the
+mapping is shared with the file (madvise(2), MADV_DONTNEED). Where the system can't, all is in memory.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ import mmap
 import os
 import sys
 import tempfile
+import threading
+import time
 import weakref
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -31,7 +33,10 @@ IN_MEMORY = 64e6
 """Columns of one run that are in memory before others go to the file: 2 h of one car, as of 100 for 70 s. [byte]"""
 
 MAPPED = 50e6
-"""Pages of the file that may be in memory after a block: what two or three passes over a block touch. [byte]"""
+"""Pages of the file that may be in memory: what two or three passes over a block touch. [byte]"""
+
+LOOK_EVERY = 0.01
+"""How often they are counted: a pass over a file at 5 GB/s brings as many again meanwhile. [s]"""
 
 CHUNK = 64 << 20
 """Least that the file grows by; a long one grows by an eighth, since each piece takes one of the open files. [byte]"""
@@ -85,14 +90,18 @@ class _Store:
                 raise OSError(error.errno, what, str(self.folder)) from error
             weakref.finalize(chunk, opened.pop_all().close)
         self._size += size
-        _chunks[chunk] = np.frombuffer(chunk, np.uint8).ctypes.data, file.fileno()
+        global _is_giving_back
+        with _changing_chunks:
+            _chunks[chunk] = np.frombuffer(chunk, np.uint8).ctypes.data, file.fileno()
+            if not _is_giving_back:
+                _is_giving_back = True
+                threading.Thread(target=_give_back, daemon=True, name="give back pages").start()
         return chunk
 
 
 # Of all runs whose columns somebody still has: where they are in memory, and the numbers of their files.
 _chunks = weakref.WeakKeyDictionary[mmap.mmap, tuple[int, int]]()
-_other_pages = 0  # pages of other files: libraries [byte]
-_rows = 0  # since they were looked at
+_changing_chunks, _is_giving_back = threading.Lock(), False
 _store: ContextVar[_Store | None] = ContextVar("store", default=None)
 
 
@@ -110,17 +119,22 @@ def beside(folder: Path | None) -> Iterator[None]:
         _store.reset(token)
 
 
-def give_back(rows: int = BLOCK) -> None:
-    """After work on so many rows: pages of the file leave memory if they are too many; looked at once a block."""
-    global _other_pages, _rows
-    _rows += rows
-    if _rows < BLOCK:
-        return
-    _rows = 0
-    if _chunks and status_bytes(2) - _other_pages > MAPPED:
-        for chunk in tuple(_chunks):
-            chunk.madvise(mmap.MADV_DONTNEED)
-        _other_pages = status_bytes(2)
+def _give_back() -> None:
+    """As long as there is a file: pages of it leave memory when they are too many."""
+    global _is_giving_back
+    other_pages = status_bytes(2)  # of libraries [byte]
+    while True:
+        time.sleep(LOOK_EVERY)
+        with _changing_chunks:
+            chunks = tuple(_chunks)
+            if not chunks:
+                _is_giving_back = False
+                return
+        if status_bytes(2) - other_pages > MAPPED:
+            for chunk in chunks:
+                chunk.madvise(mmap.MADV_DONTNEED)
+            other_pages = status_bytes(2)
+        del chunks
 
 
 def empty(shape: int | tuple[int, ...], kind: DTypeLike = np.float64) -> NDArray[Any]:
@@ -187,7 +201,6 @@ def columns(n: int, parts: Iterable[Sequence[NDArray[Any]]]) -> list[NDArray[Any
                 found[k] = column
             if len(found[k]) == n:
                 put(found[k], slice(begin, end), values)
-        give_back(end - begin)
         begin = end
     return [values if len(values) == n else np.broadcast_to(values, n) for values in found]
 
@@ -202,9 +215,7 @@ def _is_all(values: NDArray[Any], first: NDArray[Any]) -> bool:
 def blocks(n: int, begin: int = 0) -> Iterator[slice]:
     """Rows from `begin` to n, at most `BLOCK` at a time."""
     for first in range(begin, n, BLOCK):
-        rows = slice(first, min(first + BLOCK, n))
-        give_back(rows.stop - first)  # at the beginning, since not everybody goes on to the end
-        yield rows
+        yield slice(first, min(first + BLOCK, n))
 
 
 def rows_where(n: int, holds: Callable[[slice], NDArray[np.bool_]], begin: int = 0) -> NDArray[np.intp]:

@@ -41,7 +41,8 @@ VERBS = {
 """Name -> what it does."""
 
 MODULES = {
-    "import": "import_", "export": "live", "reproduce": "verify", "view": "play", "segments": "play",
+    "sample": "fit", "evaluate": "fit", "verify": "convert", "reproduce": "convert", "view": "play", "segments": "play",
+    "template": "play", "import": "import_", "export": "live",
 }  # fmt: skip
 """Verbs whose module, which is loaded when they are used, is not called like them."""
 
@@ -69,9 +70,9 @@ def _root(
 
 def group_of_verbs() -> typer.Typer:
     """What a module adds its verbs to: a group, though of one."""
-    found = typer.Typer(**TYPER_STYLE)
-    found.callback()(_root)
-    return found
+    group = typer.Typer(**TYPER_STYLE)
+    group.callback()(_root)
+    return group
 
 
 @cache

@@ -5,60 +5,73 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from logging import getLogger
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from xosc_lateral.base.signals import Interrupted
 from xosc_lateral.cli import VERBS, group_of_verbs
 from xosc_lateral.cli.words import Library, Mapped, Seed, Tables, Written, command, pairs
 
+# What is said of one option stays together.
+# fmt: off
 app = group_of_verbs()
 
 
 @contextmanager
 def shown_progress(title: str, quiet: bool) -> Iterator[Callable[[float, str], None]]:
-    """Give a function that takes the share done (0..1) and what is being done; silent when stderr is no terminal."""
-    if quiet or not sys.stderr.isatty():
-        yield lambda share, what: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    """Give a function that takes the share done (0..1) and what is being done, for the log and a bar on a terminal."""
+    log, phase = getLogger(__name__), title
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[what]}"), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(title, total=1.0, what="")
-        yield lambda share, what: bar.update(task, completed=share, what=what)
+    def note(share: float, what: str) -> None:
+        nonlocal phase
+        phase = what
+        log.info("%s: %s (%.0f %%)", title, what, 100.0 * share)
+
+    try:
+        if quiet or not sys.stderr.isatty():
+            yield note
+            return
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+        times = TextColumn("so far"), TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn()
+        columns = TextColumn("{task.description}:"), TextColumn("{task.fields[what]}"), BarColumn(), *times
+        with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+            task = bar.add_task(title, total=1.0, what="")
+
+            def show(share: float, what: str) -> None:
+                note(share, what)
+                bar.update(task, completed=share, what=what)
+
+            yield show
+    except (KeyboardInterrupt, Interrupted):
+        typer.echo(f"xosc-lateral: stopped while {phase}; nothing is written yet", err=True)
+        raise
 
 
 @command(
     app, "close-loop", VERBS["close-loop"],
     "close-loop drives.csv.gz -o refined.json --report loop/",
     "close-loop drives.csv.gz -p motorway -o refined.json --report loop/",
-)  # fmt: skip
+)
 def close_loop(
     tables: Tables,
     *,
     output: Annotated[str, typer.Option("--output", "-o", metavar="REFINED.json", help="Profile to write.")],
     report: Annotated[Path, typer.Option(metavar="DIR", help="Folder for report.json and report.html.")],
-    profile: Annotated[
-        str | None,
-        typer.Option("--profile", "-p", metavar="NAME|PATH", help="Profile to start from; default: one is fitted."),
-    ] = None,
+    profile: Annotated[str | None, typer.Option("--profile", "-p", metavar="NAME|PATH",
+        help="Profile to start from; default: one is fitted.")] = None,
     seed: Seed = 0,
-    leave_out: Annotated[
-        list[str] | None, typer.Option(metavar="COLUMN", help="Context column to ignore; may be repeated.")
-    ] = None,
-    role: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="COLUMN=ROLE",
-            help="What a column is: road, weather, traffic, time, own, driver or unknown; may be repeated.",
-        ),
-    ] = None,
+    leave_out: Annotated[list[str] | None, typer.Option(metavar="COLUMN",
+        help="Context column to ignore; may be repeated.")] = None,
+    role: Annotated[list[str] | None, typer.Option(metavar="COLUMN=ROLE",
+        help="What a column is: road, weather, traffic, time, own, driver or unknown; may be repeated.")] = None,
     mapped: Mapped,
     library: Library = None,
-    said: Written,
+    reply: Written,
 ) -> None:
     """Find what a profile fails to reproduce, trace it to effects, add them, and score the result on held-out data."""
     from xosc_lateral import close_loop, write_profile
@@ -67,19 +80,12 @@ def close_loop(
     from xosc_lateral.workflows.profiles.profiles import PROFILE_SUFFIXES
 
     written = output_file(output, "refined.json", PROFILE_SUFFIXES)
-    claim([written, *ClosedLoop.report_files(output_folder(report))], tables, force=said.force)
-    with shown_progress("closing the loop", said.quiet) as progress:
+    claim([written, *ClosedLoop.report_files(output_folder(report))], tables, force=reply.force)
+    with shown_progress("closing the loop", reply.quiet) as progress:
         result = close_loop(
-            tables,
-            profile,
-            seed=seed,
-            name=written.stem,
-            leave_out=leave_out or (),
-            roles=pairs(role, "--role"),
-            columns=mapped.mapping(),
-            library=library or (),
-            progress=progress,
+            tables, profile, seed=seed, name=written.stem, leave_out=leave_out or (), roles=pairs(role, "--role"),
+            columns=mapped.mapping(), library=library or (), progress=progress,
         )
-    write_profile(result.profile, written, force=said.force)
-    result.write_report(report, force=said.force)
-    said.say(result)
+    write_profile(result.profile, written, force=reply.force)
+    result.write_report(report, force=reply.force)
+    reply.say(result)

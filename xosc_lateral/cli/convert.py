@@ -1,4 +1,4 @@
-"""`xosc-lateral convert`: the main job."""
+"""`xosc-lateral convert`: the main job; `verify`: whether outputs are what it makes today; `reproduce`: once more."""
 
 from __future__ import annotations
 
@@ -12,13 +12,26 @@ from typer.core import TyperCommand
 from xosc_lateral.base.limits import JOB_MEMORY, JOB_TIMEOUT
 from xosc_lateral.base.signals import Interrupted
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Osi, Written, command, say_json, warn, write_stdout
+from xosc_lateral.cli.words import (
+    Allow,
+    Library,
+    Osi,
+    Printing,
+    RoadPath,
+    Written,
+    command,
+    say_json,
+    warn,
+    write_stdout,
+)
 from xosc_lateral.files.openscenario.write.target import Player
 from xosc_lateral.workflows.conversion.settings import ConvertSettings, OutputMode
 
 if TYPE_CHECKING:
-    from xosc_lateral.workflows.conversion.call import Conversion
+    from xosc_lateral.workflows.conversion.conversion import Conversion
 
+# What is said of one option stays together.
+# fmt: off
 app = group_of_verbs()
 
 BATCH = "Batches"
@@ -45,54 +58,39 @@ class _WithPanels(TyperCommand):
     "convert scenarios/ -o enriched/ --variants 3 --jobs 2",
     "convert cut-in.xosc -o - --entity Truck=motorway-vehicle-3 | grep Vertex",
     cls=_WithPanels,
-)  # fmt: skip
+)
 def convert(
-    scenario: Annotated[
-        list[str],
-        typer.Argument(
-            help="Maneuver-based scenario (.xosc); several files, a folder, a glob or a table: a batch.",
-            show_default=False,
-        ),
-    ],
+    scenario: Annotated[list[str],
+        typer.Argument(help="Maneuver-based scenario (.xosc); several files, a folder, a glob or a table: a batch.",
+        show_default=False)],
     *,
-    output: Annotated[
-        str | None,
-        typer.Option(
-            "-o", "--output", help="File, folder/, or - for stdout; default NAME_lifelike.xosc. Batch: a folder."
-        ),
-    ] = None,
+    output: Annotated[str | None, typer.Option("-o", "--output",
+        help="File, folder/, or - for stdout; default NAME_lifelike.xosc. Batch: a folder.")] = None,
     settings: Annotated[dict[str, Any], ConvertSettings],
     variants: Annotated[int, typer.Option(help="Number of outputs, each with different offsets.", min=1)] = 1,
-    report: Annotated[
-        str | None,
-        typer.Option(metavar="PAGE.html", help="Page that shows what was added; for a batch, a folder of pages."),
-    ] = None,
+    report: Annotated[str | None, typer.Option(metavar="PAGE.html",
+        help="Page that shows what was added; for a batch, a folder of pages.")] = None,
     osi: Osi = None,
     jobs: Annotated[int, typer.Option(help="Number of processes; -1: one per core.", rich_help_panel=BATCH)] = 1,
-    job_timeout: Annotated[
-        float, typer.Option(help="Time limit per scenario [s].", min=1, max=86_400, rich_help_panel=BATCH)
-    ] = JOB_TIMEOUT.value,
-    job_memory: Annotated[
-        float, typer.Option(help="Memory limit per scenario [MB].", min=100, max=1e6, rich_help_panel=BATCH)
-    ] = JOB_MEMORY.value,
-    cluster: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Address of a dask scheduler.", rich_help_panel=BATCH)
-    ] = None,
-    keep_old: Annotated[
-        bool, typer.Option("--keep-old", help="Leave outputs of older inputs or versions alone.", rich_help_panel=BATCH)
-    ] = False,
-    log_json: Annotated[
-        bool, typer.Option("--log-json", help="Progress as JSON lines on stderr.", rich_help_panel=BATCH)
-    ] = False,
-    said: Written,
+    job_timeout: Annotated[float, typer.Option(help="Time limit per scenario [s].", min=1, max=86_400,
+        rich_help_panel=BATCH)] = JOB_TIMEOUT.value,
+    job_memory: Annotated[float, typer.Option(help="Memory limit per scenario [MB].", min=100, max=1e6,
+        rich_help_panel=BATCH)] = JOB_MEMORY.value,
+    cluster: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Address of a dask scheduler.",
+        rich_help_panel=BATCH)] = None,
+    keep_old: Annotated[bool, typer.Option("--keep-old", help="Leave outputs of older inputs or versions alone.",
+        rich_help_panel=BATCH)] = False,
+    log_json: Annotated[bool, typer.Option("--log-json", help="Progress as JSON lines on stderr.",
+        rich_help_panel=BATCH)] = False,
+    reply: Written,
 ) -> None:
     """Give every car in a scenario the lateral movement of a real driver."""
     from xosc_lateral.workflows.batch.request import is_single
 
     _refuse_together(settings)
-    options = {**settings, "force": said.force}
+    options = {**settings, "force": reply.force}
     if len(scenario) == 1 and is_single(scenario[0]):
-        _convert_one(Path(scenario[0]), output, options, variants, report, osi, said)
+        _convert_one(Path(scenario[0]), output, options, variants, report, osi, reply)
         return
     if osi is not None:
         raise typer.BadParameter("traces are written for a single scenario", param_hint="--osi")
@@ -102,8 +100,8 @@ def convert(
         raise typer.BadParameter("of a batch: a folder, not a file", param_hint="--report")
     options |= {"variants": variants, "report": report, "workers": jobs, "cluster": cluster, "keep_old": keep_old}
     options |= {"job_timeout": job_timeout, "job_memory": job_memory}
-    options["show"] = "json" if log_json else "quiet" if said.quiet else "auto"
-    _convert_batch(scenario, output, options, said)
+    options["show"] = "json" if log_json else "quiet" if reply.quiet else "auto"
+    _convert_batch(scenario, output, options, reply)
 
 
 def _warn_if_cut_off(result: Conversion, unsaid: bool) -> None:
@@ -112,13 +110,13 @@ def _warn_if_cut_off(result: Conversion, unsaid: bool) -> None:
         warn([result.cut_off])
 
 
-def _refuse_together(given: Mapping[str, Any]) -> None:
+def _refuse_together(settings: Mapping[str, Any]) -> None:
     """Settings that can be had alone, but not with each other."""
     try:
-        ConvertSettings(player=given["player"], version=given.get("version"))
+        ConvertSettings(player=settings["player"], version=settings.get("version"))
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--version") from error
-    if given["player"] is Player.CARLA and given["mode"] is OutputMode.LANE_OFFSET:
+    if settings["player"] is Player.CARLA and settings["mode"] is OutputMode.LANE_OFFSET:
         raise typer.BadParameter("CARLA's lane offsets have no shape; use --mode trajectory", param_hint="--for")
 
 
@@ -129,21 +127,21 @@ def _convert_one(
     variants: int,
     report: str | None,
     osi: str | None,
-    said: Written,
+    reply: Written,
 ) -> None:
     from xosc_lateral.files.osi import osi_wanted
     from xosc_lateral.files.output_paths import STDOUT, claim, output_file
-    from xosc_lateral.workflows.conversion.call import convert, lifelike, osi_files, output_scenario
-    from xosc_lateral.workflows.conversion.convert import numbered
+    from xosc_lateral.workflows.conversion.conversion import osi_files
+    from xosc_lateral.workflows.conversion.convert import convert, lifelike, numbered, output_scenario
     from xosc_lateral.workflows.result import PAGE_SUFFIXES
 
     if output == STDOUT:
-        if variants > 1 or said.as_json or osi is not None:
+        if variants > 1 or reply.as_json or osi is not None:
             raise typer.BadParameter("standard output takes a single scenario and no other output", param_hint="-o -")
         result = convert(source, None, report=report, **options)
         write_stdout(result.data)
-        said.say(result, err=True)
-        _warn_if_cut_off(result, said.quiet)
+        reply.say(result, err=True)
+        _warn_if_cut_off(result, reply.quiet)
         unclean = bool(result.warnings) or not result.enriched
     else:
         written = lifelike(source) if output is None else output_scenario(output, source)
@@ -156,20 +154,20 @@ def _convert_one(
         osi_wanted(trace)
         outputs, pages, traces = zip(*files, strict=True)
         both = [path for one in traces if one is not None for path in osi_files(one, source)]
-        claim([*outputs, *pages, *both], [source], force=said.force)
+        claim([*outputs, *pages, *both], [source], force=reply.force)
         unclean = False
         for variant, (path, its_page, its_trace) in enumerate(files, start=1):
             result = convert(source, path, variant=variant, report=its_page, **options)
             if its_trace is not None:
                 result.write_osi(its_trace, force=True)
-            said.say(result)
-            _warn_if_cut_off(result, said.quiet or said.as_json)
+            reply.say(result)
+            _warn_if_cut_off(result, reply.quiet or reply.as_json)
             unclean |= bool(result.warnings) or not result.enriched
     if options["strict"] and unclean:
         raise typer.Exit(1)
 
 
-def _convert_batch(inputs: Sequence[str], output: str | None, options: Mapping[str, Any], said: Written) -> None:
+def _convert_batch(inputs: Sequence[str], output: str | None, options: Mapping[str, Any], reply: Written) -> None:
     """Convert all of them; exit code 1 if any failed, or with `--strict` if anything is to be said of any."""
     from xosc_lateral.workflows.batch.call import convert_many
 
@@ -180,7 +178,7 @@ def _convert_batch(inputs: Sequence[str], output: str | None, options: Mapping[s
     def show(row: Mapping[str, Any]) -> None:
         nonlocal finished
         finished += row["state"] != "failed"
-        if said.as_json:
+        if reply.as_json:
             say_json({"kind": "output", **row})
 
     try:
@@ -191,8 +189,59 @@ def _convert_batch(inputs: Sequence[str], output: str | None, options: Mapping[s
             err=True,
         )
         raise typer.Exit(128 + signal.number) from None
-    said.say_words(str(result), {"kind": "summary", **result.totals()}, err=False)
-    if result.cut_off and (said.quiet or said.as_json):
+    reply.say_words(str(result), {"kind": "summary", **result.totals()}, err=False)
+    if result.cut_off and (reply.quiet or reply.as_json):
         warn([f"{len(result.cut_off)} runs end at the time limit, not by themselves: {result.cut_off[0]} is one"])
     if result.failed or (options["strict"] and (result.with_warnings or result.nobody_enriched)):
+        raise typer.Exit(1)
+
+
+@command(app, "verify", VERBS["verify"], "verify enriched/", "verify lifelike.xosc --json")
+def verify(
+    outputs: Annotated[list[Path], typer.Argument(metavar="OUTPUT...",
+        help="Converted scenarios, or folders with a manifest.", show_default=False)],
+    *,
+    library: Library = None,
+    allow: Allow = None,
+    road_path: RoadPath = None,
+    fast: Annotated[bool, typer.Option("--fast", help="Compare hashes alone; make nothing again.")] = False,
+    jobs: Annotated[int, typer.Option(help="Number of processes; -1: one per core.")] = 1,
+    reply: Printing,
+) -> None:
+    """Make outputs again in memory and name those that differ, and why: edited, other inputs, another version."""
+    from xosc_lateral import verify as check
+
+    if jobs == 0 or jobs < -1:
+        raise typer.BadParameter("at least 1, or -1 for one per core", param_hint="--jobs")
+    places = {"library": library or (), "allow": allow or (), "road_path": road_path or ()}
+    result = check(outputs, **places, fast=fast, workers=0 if jobs == 1 else jobs)
+    reply.say(result, even=bool(result.failing))
+    if result.failing:
+        raise typer.Exit(1)
+
+
+@command(
+    app, "reproduce", VERBS["reproduce"],
+    "reproduce lifelike.xosc -o again.xosc", "reproduce enriched/ -o again/ --jobs 2",
+)
+def reproduce(
+    output: Annotated[Path, typer.Argument(metavar="OUTPUT", help="Converted scenario, or a folder with a manifest.",
+        show_default=False)],
+    new: Annotated[str, typer.Option("--output", "-o", help="File or folder to write to.", show_default=False)],
+    *,
+    library: Library = None,
+    allow: Allow = None,
+    road_path: RoadPath = None,
+    jobs: Annotated[int, typer.Option(help="Of a folder: number of processes; -1: one per core.")] = 1,
+    reply: Written,
+) -> None:
+    """Make an output, or a folder of them, again and compare the content; exit code 1 if it differs."""
+    from xosc_lateral import reproduce as again
+
+    if jobs == 0 or jobs < -1:
+        raise typer.BadParameter("at least 1, or -1 for one per core", param_hint="--jobs")
+    places = {"library": library or (), "allow": allow or (), "road_path": road_path or ()}
+    result = again(output, new, **places, workers=jobs, force=reply.force)
+    reply.say(result, even=bool(result.failing))
+    if result.failing:
         raise typer.Exit(1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,41 +10,52 @@ import typer
 from typer.core import TyperGroup
 
 from xosc_lateral.cli import TYPER_STYLE, VERBS, group_of_verbs
-from xosc_lateral.cli.words import Columns, Mapped, MappingFile, Written, command, pairs, spelled_out, write_stdout
+from xosc_lateral.cli.words import Mapped, MappingFile, Written, command, pairs, with_options, write_stdout
 
-Output = Annotated[
-    str, typer.Option("--output", "-o", metavar="TABLE", help="Drive table: .parquet, .csv, .csv.gz, folder/, - .")
-]
-KeepCut = Annotated[
-    bool, typer.Option("--keep-cut", help="Keep rows that would be cut; the column `state` gives the reason.")
-]
 Source = Annotated[Path, typer.Argument(metavar="SOURCE", help="File or folder to read.", show_default=False)]
 
 
-def _import(name: str, sources: Sequence[Path], output: str, said: Written, /, **options: Any) -> None:
-    """Read recordings of a format, write them as a table, and say what they are."""
-    from xosc_lateral import import_drives
-    from xosc_lateral.files.output_paths import STDOUT, claim, output_file
-    from xosc_lateral.files.output_tables import harmless_frame, output_suffixes
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Table(Written):
+    """Options of all formats: the table to write."""
 
-    if output != STDOUT:
-        files = [source for source in sources if source.is_file()]
-        claim([output_file(output, "drives.parquet", output_suffixes())], files, force=said.force)
-    imported = import_drives(name, sources[0] if len(sources) == 1 else sources, **options)
-    if output == STDOUT:
-        write_stdout(harmless_frame(imported.to_frame()).to_csv(index=False, lineterminator="\n"))
-        said.say_words(str(imported), None)
-    else:
-        written = imported.write(output, force=said.force)
-        said.say_words(str(imported), {"output": str(written), **imported.to_dict()})
+    output: Annotated[
+        str, typer.Option("--output", "-o", metavar="TABLE", help="Drive table: .parquet, .csv, .csv.gz, folder/, - .")
+    ]
+
+    def fill(self, name: str, *sources: Path, **options: Any) -> None:
+        """Read recordings of a format, write them as a table, and say what they are."""
+        from xosc_lateral import import_drives
+        from xosc_lateral.files.output_paths import STDOUT, claim, output_file
+        from xosc_lateral.files.output_tables import harmless_frame, output_suffixes
+
+        if self.output != STDOUT:
+            files = [source for source in sources if source.is_file()]
+            claim([output_file(self.output, "drives.parquet", output_suffixes())], files, force=self.force)
+        imported = import_drives(name, sources[0] if len(sources) == 1 else sources, **options)
+        if self.output == STDOUT:
+            write_stdout(harmless_frame(imported.to_frame()).to_csv(index=False, lineterminator="\n"))
+            self.say_words(str(imported), None)
+        else:
+            written = imported.write(self.output, force=self.force)
+            self.say_words(str(imported), {"output": str(written), **imported.to_dict()})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _CutTable(_Table):
+    """The same of formats from which lane changes and the like are cut."""
+
+    keep_cut: Annotated[
+        bool, typer.Option("--keep-cut", help="Keep rows that would be cut; the column `state` gives the reason.")
+    ] = False
 
 
 class _WithPlugins(TyperGroup):
     """Formats with options of their own, then others, of the package or of plug-ins, with ``--set KEY=VALUE``."""
 
     def list_commands(self, ctx: Any) -> list[str]:
-        own = super().list_commands(ctx)
-        return [*own, *(name for name in _formats() if name not in own)]
+        names = super().list_commands(ctx)
+        return [*names, *(name for name in _formats() if name not in names)]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         known = super().get_command(ctx, cmd_name)
@@ -61,22 +72,23 @@ def _formats() -> list[str]:
 def _plain_command(name: str) -> Any:
     from xosc_lateral.workflows.recordings.importers import find_importer
 
-    one = typer.Typer(context_settings=TYPER_STYLE["context_settings"], rich_markup_mode=None)
+    formats = typer.Typer(context_settings=TYPER_STYLE["context_settings"], rich_markup_mode=None)
 
     def run(
         sources: Annotated[list[Path], typer.Argument(metavar="SOURCE...", show_default=False)],
         *,
-        output: Output,
         settings: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE")] = None,
-        said: Written,
+        table: _Table,
     ) -> None:
-        _import(name, sources, output, said, **pairs(settings, "--set"))
+        table.fill(name, *sources, **pairs(settings, "--set"))
 
     help_text = (find_importer(name).__doc__ or "Another format.").strip()
-    one.command(name, help=help_text, short_help=help_text.splitlines()[0])(spelled_out(run))
-    return typer.main.get_command(one)
+    formats.command(name, help=help_text, short_help=help_text.splitlines()[0])(with_options(run))
+    return typer.main.get_command(formats)
 
 
+# What is said of one option stays together.
+# fmt: off
 app = group_of_verbs()
 group = typer.Typer(cls=_WithPlugins, help="Convert recordings in other formats into the standard drive table.")
 app.add_typer(group, name="import", short_help=VERBS["import"], no_args_is_help=True)
@@ -86,179 +98,137 @@ app.add_typer(group, name="import", short_help=VERBS["import"], no_args_is_help=
 def dlr_ht(
     source: Source,
     *,
-    output: Output,
-    max_gap: Annotated[
-        float, typer.Option(help="Longest gap between two cameras that is kept [s].", min=0, max=60)
-    ] = 1.0,
-    keep_cut: KeepCut = False,
-    said: Written,
+    max_gap: Annotated[float, typer.Option(help="Longest gap between two cameras that is kept [s].", min=0,
+        max=60)] = 1.0,
+    table: _CutTable,
 ) -> None:
     """DLR Highway Traffic: the wheel of tasi 0.15.4, the data set's zip, or its trajectory CSV."""
     from xosc_lateral.workflows.recordings.cuts import CutSettings
 
-    _import("dlr-ht", [source], output, said, settings=CutSettings(max_gap=max_gap), keep_cut=keep_cut)
+    table.fill("dlr-ht", source, settings=CutSettings(max_gap=max_gap), keep_cut=table.keep_cut)
 
 
 @command(group, "levelx", "highD and exiD.", "import levelx highD/ -o highd.parquet")
-def levelx(
-    source: Source,
-    *,
-    output: Output,
-    keep_cut: KeepCut = False,
-    said: Written,
-) -> None:
+def levelx(source: Source, *, table: _CutTable) -> None:
     """Recordings of highD or exiD: a folder, or one XX_tracks.csv with its two meta files beside it."""
-    _import("levelx", [source], output, said, keep_cut=keep_cut)
+    table.fill("levelx", source, keep_cut=table.keep_cut)
 
 
 @command(
-    group,
-    "mf4",
-    "ASAM MDF bus logs.",
+    group, "mf4", "ASAM MDF bus logs.",
     "import mf4 log.mf4 -o drive.parquet --map offset=Lane_Lat --map lane_width=Lane_Width",
 )
 def mf4(
-    sources: Annotated[
-        list[Path], typer.Argument(metavar="SOURCE...", help="Logs; each is a drive of its own.", show_default=False)
-    ],
+    sources: Annotated[list[Path], typer.Argument(metavar="SOURCE...", help="Logs; each is a drive of its own.",
+        show_default=False)],
     *,
-    output: Output,
-    channels: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--map",
-            metavar="NAME=CHANNEL[:UNIT]",
-            help="Channel of a column, e.g. speed=v_veh:km/h; default unit: the file's.",
-        ),
-    ] = None,
+    channels: Annotated[list[str] | None, typer.Option("--map", metavar="NAME=CHANNEL[:UNIT]",
+        help="Channel of a column, e.g. speed=v_veh:km/h; default unit: the file's.")] = None,
     mapping_file: MappingFile = None,
-    step: Annotated[
-        float, typer.Option(help="Time step of the table, to which channels are interpolated [s].", min=0.001, max=1)
-    ] = 0.04,
-    said: Written,
+    step: Annotated[float, typer.Option(help="Time step of the table, to which channels are interpolated [s].",
+        min=0.001, max=1)] = 0.04,
+    table: _Table,
 ) -> None:
     """ASAM MDF bus logs (extra `mdf`). They need a channel map, since signal names differ from car to car."""
     from xosc_lateral.workflows.recordings.importers.mf4 import channels_wanted
 
     if not channels and mapping_file is None:
         raise typer.BadParameter(channels_wanted(sources[0]), param_hint="--map")
-    _import("mf4", sources, output, said, channels=channels or (), step=step, mapping=mapping_file)
+    table.fill("mf4", *sources, channels=channels or (), step=step, mapping=mapping_file)
 
 
 @command(
     group, "tracks", "Tracks on an OpenDRIVE road.",
     "import tracks tracks.csv --road road.xodr -o drives.parquet --map vehicle=obj",
-)  # fmt: skip
+)
 def tracks(
     source: Source,
     *,
-    output: Output,
     road: Annotated[Path, typer.Option("--road", metavar="FILE.xodr", help="Road on which the tracks lie.")],
-    columns: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--map",
-            metavar="NAME=COLUMN[:UNIT]",
-            help="vehicle, time, x, y, heading, speed, length, vehicle_class, e.g. heading=psi:deg.",
-        ),
-    ] = None,
+    columns: Annotated[list[str] | None, typer.Option("--map", metavar="NAME=COLUMN[:UNIT]",
+        help="vehicle, time, x, y, heading, speed, length, vehicle_class, e.g. heading=psi:deg.")] = None,
     mapping_file: MappingFile = None,
-    keep_cut: KeepCut = False,
-    said: Written,
+    table: _CutTable,
 ) -> None:
     """A table of tracks (x, y and heading of any recording) on a known road: lanes, offsets, neighbours."""
-    _import("tracks", [source], output, said, road=road, columns=columns or (), mapping=mapping_file, keep_cut=keep_cut)
+    table.fill("tracks", source, road=road, columns=columns or (), mapping=mapping_file, keep_cut=table.keep_cut)
 
 
 @command(group, "fcd", "SUMO's FCD output.", "import fcd fcd.xml --net run.net.xml -o drives.parquet")
 def fcd(
     source: Annotated[Path, typer.Argument(help="What --fcd-output wrote (.xml).", show_default=False)],
     *,
-    output: Output,
-    net: Annotated[
-        Path | None, typer.Option(help="Road network (.net.xml): lanes, side of the road, who is on the next edge.")
-    ] = None,
+    net: Annotated[Path | None,
+        typer.Option(help="Road network (.net.xml): lanes, side of the road, who is on the next edge.")] = None,
     types: Annotated[Path | None, typer.Option(help="File with the vehicle types (.rou.xml): lengths.")] = None,
     lane_width: Annotated[float, typer.Option(help="Without a network. [m]", min=1, max=10)] = 3.2,
-    said: Written,
+    table: _Table,
 ) -> None:
     """SUMO's FCD output of a run with the sublane model: a drive for every vehicle."""
-    _import("fcd", [source], output, said, net=net, types=types, lane_width=lane_width)
+    table.fill("fcd", source, net=net, types=types, lane_width=lane_width)
 
 
 @command(
     group, "openacc", "OpenACC, AstaZero campaign.",
     "import openacc ASta_040719_platoon3.csv ASta_050719_platoon1.csv -o drives.parquet",
-)  # fmt: skip
+)
 def openacc(
-    sources: Annotated[
-        list[Path], typer.Argument(metavar="FILE...", help="Files of one track (.csv, .csv.gz).", show_default=False)
-    ],
+    sources: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Files of one track (.csv, .csv.gz).",
+        show_default=False)],
     *,
-    output: Output,
     lane_width: Annotated[float, typer.Option(help="Of the road, which the files don't give. [m]", min=2, max=6)] = 3.5,
-    keep_cut: KeepCut = False,
-    said: Written,
+    table: _CutTable,
 ) -> None:
     """OpenACC's platoons on the closed loop of AstaZero: lane centre from all passes of all files."""
-    _import("openacc", sources, output, said, lane_width=lane_width, keep_cut=keep_cut)
+    table.fill("openacc", *sources, lane_width=lane_width, keep_cut=table.keep_cut)
 
 
 @command(group, "commonroad", "CommonRoad scenarios.", "import commonroad DEU_A9-1_1_T-1.xml -o drives.parquet")
 def commonroad(
     sources: Annotated[list[Path], typer.Argument(metavar="SOURCE...", help="Scenarios (.xml).", show_default=False)],
     *,
-    output: Output,
-    keep_cut: KeepCut = False,
-    said: Written,
+    table: _CutTable,
 ) -> None:
     """CommonRoad scenarios (extra `commonroad`): recorded obstacles between the bounds of their lanelets."""
-    _import("commonroad", sources, output, said, keep_cut=keep_cut)
+    table.fill("commonroad", *sources, keep_cut=table.keep_cut)
 
 
 @command(
     group, "osi", "ASAM OSI traces.",
     "import osi cut-in_gt.mcap -o drives.parquet", "import osi a.mcap b.mcap --host host -o ego.csv",
-)  # fmt: skip
+)
 def osi(
-    sources: Annotated[
-        list[Path], typer.Argument(metavar="TRACE...", help="Traces (.mcap, .osi).", show_default=False)
-    ],
+    sources: Annotated[list[Path], typer.Argument(metavar="TRACE...", help="Traces (.mcap, .osi).",
+        show_default=False)],
     *,
-    output: Output,
-    host: Annotated[
-        str | None,
-        typer.Option("--host", metavar="ID", help="Keep this vehicle alone: its id or name; host: the host vehicle."),
-    ] = None,
-    road: Annotated[
-        Path | None, typer.Option("--road", metavar="FILE.xodr", help="Take lanes from here, not from the trace.")
-    ] = None,
+    host: Annotated[str | None, typer.Option("--host", metavar="ID",
+        help="Keep this vehicle alone: its id or name; host: the host vehicle.")] = None,
+    road: Annotated[Path | None, typer.Option("--road", metavar="FILE.xodr",
+        help="Take lanes from here, not from the trace.")] = None,
     channel: Annotated[str | None, typer.Option("--channel", metavar="TOPIC", help="Of an MCAP file.")] = None,
-    keep_cut: KeepCut = False,
-    said: Written,
+    table: _CutTable,
 ) -> None:
     """ASAM OSI traces of ground truth or sensor views (extra `osi`): vehicles between the boundaries of their lanes."""
-    _import("osi", sources, output, said, host=host, road=road, channel=channel, keep_cut=keep_cut)
+    table.fill("osi", *sources, host=host, road=road, channel=channel, keep_cut=table.keep_cut)
 
 
 @command(
     group, "table", "Tables of drives under other names.",
     "import table --propose monday.csv > company.toml", "import table *.csv --mapping company.toml -o drives.parquet",
-)  # fmt: skip
-def table(
+)
+def table_(
     sources: Annotated[list[Path], typer.Argument(metavar="TABLE...", help="Tables of drives.", show_default=False)],
     *,
     output: Annotated[str, typer.Option("--output", "-o", metavar="TABLE", help="Drive table, or - .")] = "-",
-    mapping_file: MappingFile = None,
-    columns: Columns = None,
-    propose: Annotated[
-        bool, typer.Option("--propose", help="Write the first version of a mapping of these tables, with comments.")
-    ] = False,
-    said: Written,
+    mapped: Mapped,
+    propose: Annotated[bool, typer.Option("--propose",
+        help="Write the first version of a mapping of these tables, with comments.")] = False,
+    reply: Written,
 ) -> None:
     """Tables of drives under a company's own names, units and words, by a saved mapping."""
     if not propose:
-        _import("table", sources, output, said, mapping=Mapped(columns, mapping_file).mapping())
+        table = _Table(output=output, quiet=reply.quiet, as_json=reply.as_json, force=reply.force)
+        table.fill("table", *sources, mapping=mapped.mapping())
         return
     from xosc_lateral.files.atomic import write_atomically
     from xosc_lateral.files.output_paths import STDOUT, claim, output_file
@@ -269,5 +239,5 @@ def table(
         write_stdout(text)
         return
     path = output_file(output, "mapping.toml", (".toml",))
-    claim([path], sources, force=said.force)
+    claim([path], sources, force=reply.force)
     write_atomically(path, text)

@@ -16,14 +16,15 @@ from xosc_lateral.cli.words import Force, Library, Osi, Profile, Quiet, Seed, Wr
 if TYPE_CHECKING:
     from xosc_lateral.workflows.live.call import LiveRun
 
+# What is said of one option stays together.
+# fmt: off
 app = group_of_verbs()
 group = typer.Typer(help="Drivers in a simulation that runs.", no_args_is_help=True)
 app.add_typer(group, name="live", short_help=VERBS["live"])
 export = typer.Typer(help="Drivers as parts for other tools.", no_args_is_help=True)
 app.add_typer(export, name="export", short_help=VERBS["export"])
 
-FCD = "x,y,angle,type,speed,pos,posLat,lane"
-"""What `import fcd` reads; SUMO leaves `posLat` out unless told."""
+FCD = "x,y,angle,type,speed,pos,posLat,lane"  # What `import fcd` reads; SUMO leaves `posLat` out unless told.
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,22 +32,17 @@ class Driven:
     """Options of both simulators: who drives, and what is written of the run."""
 
     profile: Profile = "motorway"
-    vehicle: Annotated[
-        list[str] | None,
-        typer.Option("--vehicle", metavar="NAME=PROFILE", help="Another profile for one vehicle; may be repeated."),
-    ] = None
-    ego: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="Vehicle under test: not driven; may be repeated.")
-    ] = None
+    vehicle: Annotated[list[str] | None, typer.Option("--vehicle", metavar="NAME=PROFILE",
+        help="Another profile for one vehicle; may be repeated.")] = None
+    ego: Annotated[list[str] | None, typer.Option(metavar="NAME",
+        help="Vehicle under test: not driven; may be repeated.")] = None
     seed: Seed = 0
-    states: Annotated[
-        str | None,
-        typer.Option("--states", metavar="OUT", help="Table of where everybody was: .csv, .csv.gz, .parquet."),
-    ] = None
+    states: Annotated[str | None, typer.Option("--states", metavar="OUT",
+        help="Table of where everybody was: .csv, .csv.gz, .parquet.")] = None
     osi: Osi = None
     library: Library = None
 
-    def run(self, live: Callable[..., LiveRun], source: Path, said: Written, **settings: Any) -> None:
+    def run(self, live: Callable[..., LiveRun], source: Path, reply: Written, **settings: Any) -> None:
         """Run a simulation of that source, and write and say what came out."""
         from xosc_lateral.files.osi import SUFFIXES, osi_wanted
         from xosc_lateral.files.output_paths import claim, output_file
@@ -54,74 +50,69 @@ class Driven:
 
         table = None if self.states is None else output_file(self.states, "states.csv", TABLE_SUFFIXES)
         trace = None if self.osi is None else output_file(self.osi, f"{source.stem}_gt.mcap", SUFFIXES)
-        claim([table, trace], [source], force=said.force)
+        claim([table, trace], [source], force=reply.force)
         osi_wanted(trace)
         others = pairs(self.vehicle, "--vehicle")
-        who = {"profile": self.profile, "profiles": others, "ego": self.ego or (), "folders": self.library or ()}
-        run = live(source, seed=self.seed, **who, **settings)
+        drivers = {"profile": self.profile, "profiles": others, "ego": self.ego or (), "folders": self.library or ()}
+        run = live(source, seed=self.seed, **drivers, **settings)
         if table is not None:
-            run.write(table, force=said.force)
+            run.write(table, force=reply.force)
         if trace is not None:
-            run.write_osi(trace, force=said.force)
+            run.write_osi(trace, force=reply.force)
         warn(run.warnings)
-        said.say(run)
+        reply.say(run)
 
 
 @command(
     group, "esmini", "Play a scenario in esmini, through your library of it.",
     "live esmini cut-in.xosc --player-library libesminiLib.so --ego Ego --states states.csv",
-)  # fmt: skip
+)
 def esmini(
     scenario: Annotated[Path, typer.Argument(help="Scenario (.xosc).", show_default=False)],
-    player_library: Annotated[
-        Path, typer.Option(help="libesminiLib.so or esminiLib.dll of esmini 3.", show_default=False)
-    ],
+    player_library: Annotated[Path, typer.Option(help="libesminiLib.so or esminiLib.dll of esmini 3.",
+        show_default=False)],
     duration: Annotated[float, typer.Option(help="Ends here, if not before. [s]", min=0.01, max=86_400)] = 3600.0,
     step: Annotated[float, typer.Option(help="Length of a step. [s]", min=0.001, max=0.2)] = 0.01,
     window: Annotated[bool, typer.Option("--window", help="Open esmini's window.")] = False,
     *,
     driven: Driven,
-    said: Written,
+    reply: Written,
 ) -> None:
     """Play a scenario in esmini with drivers in its vehicles; its triggers and maneuvers stay as written."""
     from xosc_lateral.workflows.live.call import live_esmini
 
     settings = {"duration": duration, "step": step, "window": window}
-    driven.run(live_esmini, scenario, said, library=player_library, **settings)
+    driven.run(live_esmini, scenario, reply, library=player_library, **settings)
 
 
 @command(
     group, "sumo", "Run a SUMO simulation (extra sumo).",
     "live sumo run.sumocfg -p motorway --seed 1 --lateral-resolution 4 --states states.parquet",
-)  # fmt: skip
+)
 def sumo(
     config: Annotated[Path, typer.Argument(help="Configuration (.sumocfg).", show_default=False)],
-    duration: Annotated[
-        float, typer.Option(help="Ends here, if not before or as configured. [s]", min=0.01, max=1e7)
-    ] = 86_400.0,
-    lateral_resolution: Annotated[
-        float | None,
-        typer.Option(help="Switch the sublane model on [m]; default: as configured.", min=0.01, max=5.0),
-    ] = None,
-    fcd_output: Annotated[
-        Path | None, typer.Option(metavar="FCD.xml", help="SUMO's own output of where everybody was.")
-    ] = None,
+    duration: Annotated[float, typer.Option(help="Ends here, if not before or as configured. [s]", min=0.01,
+        max=1e7)] = 86_400.0,
+    lateral_resolution: Annotated[float | None,
+        typer.Option(help="Switch the sublane model on [m]; default: as configured.", min=0.01, max=5.0)] = None,
+    fcd_output: Annotated[Path | None, typer.Option(metavar="FCD.xml",
+        help="SUMO's own output of where everybody was.")] = None,
     *,
     driven: Driven,
-    said: Written,
+    reply: Written,
 ) -> None:
     """Run a SUMO simulation with the sublane model and drivers in its vehicles; lane changes stay SUMO's."""
     from xosc_lateral.workflows.live.call import live_sumo
 
     options = () if fcd_output is None else ("--fcd-output", str(fcd_output), "--fcd-output.attributes", FCD)
     settings = {"duration": duration, "lateral_resolution": lateral_resolution, "options": options}
-    driven.run(live_sumo, config, said, **settings)
+    driven.run(live_sumo, config, reply, **settings)
 
 
 @command(
     group, "stdio", "Answer over a pipe: one line of JSON in, one out.",
     "live stdio -p motorway --seed 1 --road motorway.xodr",
-)  # fmt: skip
+)
 def stdio(
     profile: Profile = "motorway",
     seed: Seed = 0,
@@ -153,7 +144,7 @@ class Fmi(StrEnum):
 @command(
     export, "fmu", "A functional mock-up unit, C source and binaries.",
     "export fmu -p motorway --fmi 3.0 -o driver.fmu", "export fmu -p motorway --python -o driver.fmu",
-)  # fmt: skip
+)
 def fmu(
     output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.fmu", help="The unit.")],
     profile: Profile = "motorway",

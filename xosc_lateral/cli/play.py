@@ -1,4 +1,4 @@
-"""`xosc-lateral play`: the nominal motion of a scenario as a table; `segments` of it; `view`: as a page that plays."""
+"""`xosc-lateral play`: the nominal motion as a table; `segments` of it; `view`: as a page; `template`: to start."""
 
 from __future__ import annotations
 
@@ -27,6 +27,8 @@ from xosc_lateral.cli.words import (
     write_stdout,
 )
 
+# What is said of one option stays together.
+# fmt: off
 app = group_of_verbs()
 
 Scenario = Annotated[Path, typer.Argument(help="Maneuver-based scenario (.xosc).", show_default=False)]
@@ -36,14 +38,12 @@ Scenario = Annotated[Path, typer.Argument(help="Maneuver-based scenario (.xosc).
     app, "play", VERBS["play"],
     "play cut-in.xosc -o states.csv", "play cut-in.xosc --osi cut-in_gt.mcap", "play cut-in.xosc -o states.parquet",
     "play cut-in.xosc -o - | head",
-)  # fmt: skip
+)
 def play(
     scenario: Scenario,
     *,
-    output: Annotated[
-        str | None,
-        typer.Option("--output", "-o", help="Table: .csv, .csv.gz, .parquet, folder/, - .", show_default=False),
-    ] = None,
+    output: Annotated[str | None, typer.Option("--output", "-o", help="Table: .csv, .csv.gz, .parquet, folder/, - .",
+        show_default=False)] = None,
     osi: Osi = None,
     step: Annotated[float, typer.Option(help="Length of a frame [s].", min=0.001, max=1.0)] = 0.02,
     time_limit: TimeLimit = None,
@@ -51,10 +51,9 @@ def play(
     allow: Allow = None,
     road: Road = None,
     road_path: RoadPath = None,
-    strict: Annotated[
-        bool, typer.Option("--strict", help="A missing vehicle catalog, or a run cut off, is an error.")
-    ] = False,
-    said: Written,
+    strict: Annotated[bool, typer.Option("--strict",
+        help="A missing vehicle catalog, or a run cut off, is an error.")] = False,
+    reply: Written,
 ) -> None:
     """Play a scenario without offsets and write every entity's position at every step."""
     from xosc_lateral import play
@@ -67,29 +66,23 @@ def play(
     is_file = output is not None and output != STDOUT
     table = output_file(output, f"{scenario.stem}.csv", output_suffixes()) if output is not None and is_file else None
     trace = None if osi is None else output_file(osi, f"{scenario.stem}_gt.mcap", SUFFIXES)
-    claim([table, trace], [scenario], force=said.force)
+    claim([table, trace], [scenario], force=reply.force)
     osi_wanted(trace)
     played = play(
-        scenario,
-        step=step,
-        time_limit=time_limit,
-        parameters=pairs(parameter, "--set"),
-        allow=allow or (),
-        road=road,
-        road_path=road_path or (),
-        strict=strict,
+        scenario, step=step, time_limit=time_limit, parameters=pairs(parameter, "--set"), allow=allow or (), road=road,
+        road_path=road_path or (), strict=strict,
     )
     written = None
     if output == STDOUT:
         write_stdout(played.csv())
     elif output is not None:
-        written = played.write(output, force=said.force)
+        written = played.write(output, force=reply.force)
     if trace is not None:
-        played.write_osi(trace, force=said.force)
-    if said.as_json:
+        played.write_osi(trace, force=reply.force)
+    if reply.as_json:
         traces = {} if trace is None else {"osi": str(trace)}
         say_json({"output": None if written is None else str(written), **traces, **played.to_dict()})
-    elif not said.quiet:
+    elif not reply.quiet:
         for note in played.notes:
             typer.echo(note, err=True)
     warn(played.warnings)
@@ -104,33 +97,30 @@ def segments(
     time_limit: TimeLimit = None,
     parameter: Parameters = None,
     allow: Allow = None,
-    said: Printing,
+    reply: Printing,
 ) -> None:
     """List each entity's road-following segments, and the reason for everything else."""
     from xosc_lateral import play, segments
 
     played = play(scenario, time_limit=time_limit, parameters=pairs(parameter, "--set"), allow=allow or ())
-    found = segments(played)
+    listed = segments(played)
     warn(played.warnings)
-    said.say(found)
+    reply.say(listed)
 
 
 @command(
     app, "view", VERBS["view"],
     "view cut-in.xosc", "view cut-in_lifelike.xosc -o pages/",
-)  # fmt: skip
+)
 def view(
     scenario: Annotated[Path, typer.Argument(help="Any scenario (.xosc), converted or not.", show_default=False)],
-    output: Annotated[
-        str | None,
-        typer.Option("--output", "-o", help="Page to write; default: NAME_view.html beside it."),
-    ] = None,
+    output: Annotated[str | None, typer.Option("--output", "-o",
+        help="Page to write; default: NAME_view.html beside it.")] = None,
     parameter: Parameters = None,
     allow: Allow = None,
     time_limit: TimeLimit = None,
-    open_page: Annotated[
-        bool | None, typer.Option("--open/--no-open", help="Open the page in the browser. Default: from a terminal.")
-    ] = None,
+    open_page: Annotated[bool | None, typer.Option("--open/--no-open",
+        help="Open the page in the browser. Default: from a terminal.")] = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
@@ -144,3 +134,36 @@ def view(
         typer.echo(str(page))
     if open_page or (open_page is None and sys.stdout.isatty()):
         typer.launch(page.absolute().as_uri())
+
+
+group = typer.Typer(help="Maneuver-based motorway scenarios to start from.", no_args_is_help=True)
+app.add_typer(group, name="template", short_help=VERBS["template"])
+
+
+@command(group, "list", "Templates, or one template's settings.", "template list cut-in")
+def list_(
+    name: Annotated[str | None, typer.Argument(help="Show this template's settings.", show_default=False)] = None,
+    *,
+    reply: Printing,
+) -> None:
+    """List the templates, or one template's settings with units, defaults and ranges."""
+    from xosc_lateral import list_templates
+
+    reply.say(list_templates(name))
+
+
+@command(group, "write", "Write a scenario and its road.", "template write cut-in -o out/ --set ego_speed=28")
+def write(
+    name: Annotated[str, typer.Argument(help="Template; `template list` names them.", show_default=False)],
+    *,
+    output: Annotated[str, typer.Option("--output", "--out", "-o", help="Folder to write to.", show_default=False)],
+    settings: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE",
+        help="Change a setting; may be repeated.")] = None,
+    reply: Written,
+) -> None:
+    """Write a template's scenario and its road."""
+    from xosc_lateral import write_template
+
+    chosen: dict[str, str] = pairs(settings, "--set")
+    written = write_template(name, output, force=reply.force, **chosen)
+    reply.say_written(written, template=name, settings=chosen)

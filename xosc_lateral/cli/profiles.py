@@ -21,6 +21,8 @@ Fields = Annotated[
     ),
 ]
 
+# What is said of one option stays together.
+# fmt: off
 app = group_of_verbs()
 group = typer.Typer(help="Driver profiles: those shipped, and your own.", no_args_is_help=True)
 app.add_typer(group, name="profiles", short_help=VERBS["profiles"])
@@ -30,20 +32,17 @@ app.add_typer(group, name="profiles", short_help=VERBS["profiles"])
 def list_(
     *,
     library: Library = None,
-    tags: Annotated[
-        list[str] | None, typer.Option("--tag", metavar="TAG", help="Only profiles with this tag; may be repeated.")
-    ] = None,
-    where: Annotated[
-        list[str] | None,
-        typer.Option(metavar="FIELD=VALUE", help="Only profiles with this value, e.g. country=DE; may be repeated."),
-    ] = None,
-    said: Printing,
+    tags: Annotated[list[str] | None, typer.Option("--tag", metavar="TAG",
+        help="Only profiles with this tag; may be repeated.")] = None,
+    where: Annotated[list[str] | None, typer.Option(metavar="FIELD=VALUE",
+        help="Only profiles with this value, e.g. country=DE; may be repeated.")] = None,
+    reply: Printing,
 ) -> None:
     """List all profiles with model and source, and name files that cannot be read."""
     from xosc_lateral import list_profiles
 
-    found = list_profiles(library or (), tags=tags or (), where=pairs(where, "--where"))
-    said.say(found)
+    entries = list_profiles(library or (), tags=tags or (), where=pairs(where, "--where"))
+    reply.say(entries)
 
 
 @command(group, "show", "Show one profile's card.", "profiles show motorway --report card.html")
@@ -52,7 +51,7 @@ def show(
     *,
     library: Library = None,
     report: Page = None,
-    said: Written,
+    reply: Written,
 ) -> None:
     """A profile's card: what it does, where it comes from, how realistic it is."""
     from xosc_lateral import read_profile
@@ -63,10 +62,10 @@ def show(
 
     profile = read_profile(name, library or ())
     if report is not None:
-        write_card(profile, report, force=said.force)
-    if said.as_json:
+        write_card(profile, report, force=reply.force)
+    if reply.as_json:
         say_json(card(profile))
-    elif not said.quiet:
+    elif not reply.quiet:
         beside = [effect for effect in profile.effects if NEIGHBOURS.intersection(effect.columns)]
         typer.echo("\n".join([card_text(profile), *(f"  converted  {one}" for one in proofs_of(profile, beside))]))
 
@@ -80,7 +79,7 @@ def compare(
     library: Library = None,
     seed: Seed = 0,
     report: Page = None,
-    said: Written,
+    reply: Written,
 ) -> None:
     """Compare profiles, and show which are not distinguishable."""
     from xosc_lateral import compare_profiles
@@ -89,14 +88,12 @@ def compare(
         raise typer.BadParameter("at least two profiles are needed", param_hint="NAME|PATH...")
     compared = compare_profiles(*names, seed=seed, library=library or ())
     if report is not None:
-        compared.write_report(report, force=said.force)
-    said.say(compared)
+        compared.write_report(report, force=reply.force)
+    reply.say(compared)
 
 
 @command(
-    group,
-    "derive",
-    "Make a driver from stated figures.",
+    group, "derive", "Make a driver from stated figures.",
     "profiles derive --preset drowsy -o drowsy.json",
     "profiles derive motorway --sdlp 0.25 --mean 0.1 -o calm.json",
 )
@@ -104,23 +101,20 @@ def derive(
     *,
     base: Annotated[str, typer.Argument(metavar="[BASE]", help="Profile that gives what is not stated.")] = "motorway",
     output: Annotated[str, typer.Option("--output", "-o", help="File, folder/ or -.")] = "-",
-    preset: Annotated[
-        str | None, typer.Option(help="alcohol-0.5, drowsy or truck: figures with a source, as changes of the base's.")
-    ] = None,
+    preset: Annotated[str | None,
+        typer.Option(help="alcohol-0.5, drowsy or truck: figures with a source, as changes of the base's.")] = None,
     sdlp: Annotated[float | None, typer.Option(help="Standard deviation of lateral position. [m]")] = None,
     mean: Annotated[float | None, typer.Option(help="Mean offset, positive left. [m]")] = None,
     restlessness: Annotated[float | None, typer.Option(help="Standard deviation of lateral speed. [m/s]")] = None,
     memory: Annotated[float | None, typer.Option(help="After which the autocorrelation is 1/e. [s]")] = None,
-    near_line: Annotated[
-        float | None, typer.Option(help="Share of time with a side within 0.2 m of a marking. [0 to 1]")
-    ] = None,
+    near_line: Annotated[float | None,
+        typer.Option(help="Share of time with a side within 0.2 m of a marking. [0 to 1]")] = None,
     speed: Annotated[float | None, typer.Option(help="At which the figures hold; default 26.4. [m/s]")] = None,
-    vehicle: Annotated[
-        str | None, typer.Option("--class", metavar="truck", help="What the base knows of trucks.")
-    ] = None,
+    vehicle: Annotated[str | None, typer.Option("--class", metavar="truck",
+        help="What the base knows of trucks.")] = None,
     called: Annotated[str, typer.Option("--name", help="Id of the new profile.")] = "",
     library: Library = None,
-    said: Written,
+    reply: Written,
 ) -> None:
     """A driver from stated figures, sampled until he has them within 2 %; what can't be had together is refused.
 
@@ -138,8 +132,8 @@ def derive(
     if output == STDOUT:
         write_stdout(profile_bytes(made.profile))
         return
-    path = write_profile(made.profile, output, force=said.force)
-    said.say_words(str(made), {"output": str(path), **made.profile.provenance.fit}, err=False)
+    path = write_profile(made.profile, output, force=reply.force)
+    reply.say_words(str(made), {"output": str(path), **made.profile.provenance.fit}, err=False)
 
 
 @command(
@@ -152,13 +146,13 @@ def add(
     called: Annotated[str | None, typer.Option("--name", help="Id in the library; default: its own.")] = None,
     tags: Tags = None,
     fields: Fields = None,
-    said: Written,
+    reply: Written,
 ) -> None:
     """Put a profile into a library's folder, with tags and metadata."""
     from xosc_lateral.workflows.profiles.profiles import add_profile
 
-    path = add_profile(name, library, name=called, tags=tags or (), metadata=pairs(fields, "--set"), force=said.force)
-    said.say_written(path, id=path.stem)
+    path = add_profile(name, library, name=called, tags=tags or (), metadata=pairs(fields, "--set"), force=reply.force)
+    reply.say_written(path, id=path.stem)
 
 
 @command(group, "tag", "Change tags and metadata.", "profiles tag mine --library team/ --tag night --remove day")
@@ -169,7 +163,7 @@ def tag(
     tags: Tags = None,
     remove: Annotated[list[str] | None, typer.Option(metavar="TAG", help="Tag to remove; may be repeated.")] = None,
     fields: Fields = None,
-    said: Printing,
+    reply: Printing,
 ) -> None:
     """Change tags and metadata of a profile of your own, in its file."""
     from xosc_lateral.files.profiles import facts_of
@@ -178,15 +172,15 @@ def tag(
     metadata = pairs(fields, "--set")
     changed = tag_profile(name, library or (), add=tags or (), remove=remove or (), metadata=metadata)
     facts = {**facts_of(changed), "tags": list(changed.metadata.tags)}
-    said.say_words(", ".join(f"{key} {value}" for key, value in facts.items() if value), facts, err=False)
+    reply.say_words(", ".join(f"{key} {value}" for key, value in facts.items() if value), facts, err=False)
 
 
 @command(group, "remove", "Delete profiles from a library.", "profiles remove mine --library team/")
-def remove(names: Names, *, library: Library = None, said: Printing) -> None:
+def remove(names: Names, *, library: Library = None, reply: Printing) -> None:
     """Delete the files of profiles of your own, all or none; `profiles uses` says which outputs used them."""
     from xosc_lateral.workflows.profiles.keeping import remove_profiles
 
-    said.say_written(remove_profiles(names, library or ()))
+    reply.say_written(remove_profiles(names, library or ()))
 
 
 @command(group, "rename", "Give a profile another id.", "profiles rename mine night-driver --library team/")
@@ -195,13 +189,13 @@ def rename(
     new: Annotated[str, typer.Argument(metavar="NEW", help="Its new id.", show_default=False)],
     *,
     library: Library = None,
-    said: Written,
+    reply: Written,
 ) -> None:
     """Change a profile's id, in its file and as the file's name. Its hash changes with it."""
     from xosc_lateral.workflows.profiles.keeping import rename_profile
 
-    path = rename_profile(name, new, library or (), force=said.force)
-    said.say_written(path, id=path.stem)
+    path = rename_profile(name, new, library or (), force=reply.force)
+    reply.say_written(path, id=path.stem)
 
 
 @command(group, "uses", "Find outputs that used a profile.", "profiles uses mine out/ --library team/")
@@ -210,12 +204,12 @@ def uses(
     outputs: Annotated[list[Path], typer.Argument(metavar="FOLDER...", help="Of batches, or their manifests.")],
     *,
     library: Library = None,
-    said: Printing,
+    reply: Printing,
 ) -> None:
     """Which outputs of batches have offsets of a profile, of which vehicles, and whether it is the same now."""
     from xosc_lateral.workflows.profiles.keeping import find_uses
 
-    said.say(find_uses(name, outputs, library or ()))
+    reply.say(find_uses(name, outputs, library or ()))
 
 
 @command(
@@ -224,11 +218,10 @@ def uses(
 def export(
     names: Names,
     *,
-    output: Annotated[
-        str, typer.Option("--output", "-o", help="One profile: file or -; several: folder/.", show_default=False)
-    ],
+    output: Annotated[str, typer.Option("--output", "-o", help="One profile: file or -; several: folder/.",
+        show_default=False)],
     library: Library = None,
-    said: Written,
+    reply: Written,
 ) -> None:
     """Write profiles to a file or a folder, to pass them on."""
     from xosc_lateral import read_profile, write_profile
@@ -241,24 +234,24 @@ def export(
     if output == STDOUT:
         write_stdout(profile_bytes(chosen[0]))
         return
-    written = [write_profile(profile, output, force=said.force) for profile in chosen]
-    said.say_written(written)
+    written = [write_profile(profile, output, force=reply.force) for profile in chosen]
+    reply.say_written(written)
 
 
 @command(group, "check", "Check a library for broken files.", "profiles check --library team/")
-def check(*, library: Library = None, said: Printing) -> None:
+def check(*, library: Library = None, reply: Printing) -> None:
     """Read every profile of the library; exit with 1 if one cannot be read or its id is not its file's name."""
     from xosc_lateral import list_profiles
 
-    found = list_profiles(library or ())
-    wrong = [entry.problem for entry in found if entry.problem]
-    if said.as_json:
-        problems = [{"path": str(entry.path), "problem": entry.problem} for entry in found if entry.problem]
-        say_json({"checked": len(found), "problems": problems})
+    entries = list_profiles(library or ())
+    wrong = [entry.problem for entry in entries if entry.problem]
+    if reply.as_json:
+        problems = [{"path": str(entry.path), "problem": entry.problem} for entry in entries if entry.problem]
+        say_json({"checked": len(entries), "problems": problems})
     else:
         for problem in wrong:
             typer.echo(problem)
-        if not said.quiet:
-            typer.echo(f"{len(found)} files, {len(wrong)} with problems")
+        if not reply.quiet:
+            typer.echo(f"{len(entries)} files, {len(wrong)} with problems")
     if wrong:
         raise typer.Exit(1)

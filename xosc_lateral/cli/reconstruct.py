@@ -9,8 +9,10 @@ import typer
 
 from xosc_lateral.cli import VERBS, group_of_verbs
 from xosc_lateral.cli.words import Mapped, Written, command
-from xosc_lateral.workflows.recordings.reconstruct import ReconstructSettings
+from xosc_lateral.workflows.recordings.settings import ReconstructSettings
 
+# What is said of one option stays together.
+# fmt: off
 app = group_of_verbs()
 
 
@@ -19,28 +21,21 @@ app = group_of_verbs()
     "reconstruct tasi-0.15.4-py3-none-any.whl -o a39/ --from 60 --to 120",
     "reconstruct tracks.csv --road road.xodr -o out/ --around 17 --host 17 --relative",
     "convert out/drivers.csv -o twins/ --variants 20",
-)  # fmt: skip
+)
 def reconstruct(
     recording: Annotated[Path, typer.Argument(help="Tracks of several vehicles.", show_default=False)],
     *,
     output: Annotated[str, typer.Option("--output", "-o", help="Folder to write to.", show_default=False)],
-    format_: Annotated[
-        str | None,
-        typer.Option(
-            "--format", help="dlr-ht, levelx, osi, commonroad, fcd, tracks; default: by the file.", show_default=False
-        ),
-    ] = None,
-    road: Annotated[
-        Path | None,
-        typer.Option("--road", help="OpenDRIVE file, or SUMO network, that it was recorded on.", show_default=False),
-    ] = None,
+    format_: Annotated[str | None, typer.Option("--format",
+        help="dlr-ht, levelx, osi, commonroad, fcd, tracks; default: by the file.", show_default=False)] = None,
+    road: Annotated[Path | None, typer.Option("--road",
+        help="OpenDRIVE file, or SUMO network, that it was recorded on.", show_default=False)] = None,
     mapped: Mapped,
     settings: Annotated[dict[str, Any], ReconstructSettings],
-    said: Written,
+    reply: Written,
 ) -> None:
     """Turn a recording into maneuvers, its road, and the drivers who drove."""
     from xosc_lateral import reconstruct as make
 
     columns = mapped.mapping()
-    made = make(recording, output, format=format_, road=road, columns=columns, force=said.force, **settings)
-    said.say(made)
+    reply.say(make(recording, output, format=format_, road=road, columns=columns, force=reply.force, **settings))

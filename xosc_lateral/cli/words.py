@@ -5,15 +5,18 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, is_dataclass
 from enum import StrEnum
-from functools import partial, wraps
+from functools import wraps
 from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args, get_type_hints
 
 import typer
+
+from xosc_lateral.base.errors import XoscLateralError
 
 if TYPE_CHECKING:
     from xosc_lateral.files.mapping import TableMapping
@@ -22,44 +25,59 @@ if TYPE_CHECKING:
 
 Verb = TypeVar("Verb", bound=Callable[..., Any])
 
+PAGES = {
+    "close_loop": "docs/closing_the_loop.md",
+    "convert": "docs/scenarios.md, docs/pipeline.md",
+    "detect": "docs/how_to/detect.md",
+    "fit": "docs/model.md, docs/formats.md",
+    "import_": "docs/real_data.md, docs/formats.md",
+    "live": "docs/live.md",
+    "play": "docs/playing.md",
+    "profiles": "docs/library.md",
+    "reconstruct": "docs/how_to/from_a_recording.md",
+}
+"""Module of verbs -> pages that say more."""
+
+
+def _begin_log(context: typer.Context, wanted: bool) -> bool:
+    """Send the package's log (`logging`, "xosc_lateral") to standard error, until the command ends."""
+    if wanted:
+        import logging
+
+        log, handler = logging.getLogger("xosc_lateral"), logging.StreamHandler()
+        handler.setFormatter(logging.Formatter("%(asctime)s.%(msecs)03d %(message)s", "%H:%M:%S"))
+        log.addHandler(handler)
+        log.setLevel(logging.INFO)
+        context.call_on_close(lambda: log.removeHandler(handler))
+    return wanted
+
+
+# What is said of one option stays together.
+# fmt: off
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", callback=_begin_log,
+    help="Log files and steps, with times, on standard error.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Machine-readable: JSON on standard output, errors included.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
-Osi = Annotated[
-    str | None,
-    typer.Option("--osi", metavar="TRACE", help="ASAM OSI trace too (.mcap, .osi): lanes, boxes, motion; extra osi."),
-]
+Osi = Annotated[str | None, typer.Option("--osi", metavar="TRACE",
+    help="ASAM OSI trace too (.mcap, .osi): lanes, boxes, motion; extra osi.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace files that xosc-lateral did not write itself.")]
 Seed = Annotated[int, typer.Option(help="Random seed; the same inputs and seed give the same bytes.", min=0)]
-Library = Annotated[
-    list[Path] | None, typer.Option(metavar="FOLDER", help="Folder with more profiles; may be repeated.")
-]
+Library = Annotated[list[Path] | None, typer.Option(metavar="FOLDER",
+    help="Folder with more profiles; may be repeated.")]
 Profile = Annotated[str, typer.Option("--profile", "-p", metavar="NAME|PATH", help="Driver profile.")]
 Tables = Annotated[list[Path], typer.Argument(metavar="TABLE...", help="Drive tables: .csv, .csv.gz, .parquet.")]
-Columns = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--map",
-        metavar="NAME=COLUMN[:UNIT]",
-        help="Column under another name or unit, e.g. speed=v_kmh:km/h; may be repeated.",
-    ),
-]
-MappingFile = Annotated[
-    Path | None,
-    typer.Option("--mapping", metavar="FILE.toml", help="Saved mapping of columns (import table --propose FILE...)."),
-]
-Parameters = Annotated[
-    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Set a scenario parameter; may be repeated.")
-]
-Allow = Annotated[
-    list[Path] | None, typer.Option(help="Folder that roads and catalogs may be read from; may be repeated.")
-]
-Road = Annotated[
-    Path | None, typer.Option("--road", help="OpenDRIVE file, whatever the scenario says.", show_default=False)
-]
-RoadPath = Annotated[
-    list[Path] | None,
-    typer.Option("--road-path", metavar="DIR", help='Folder with roads known by name ("Town04"); may be repeated.'),
-]
+Columns = Annotated[list[str] | None, typer.Option("--map", metavar="NAME=COLUMN[:UNIT]",
+    help="Column under another name or unit, e.g. speed=v_kmh:km/h; may be repeated.")]
+MappingFile = Annotated[Path | None, typer.Option("--mapping", metavar="FILE.toml",
+    help="Saved mapping of columns (import table --propose FILE...).")]
+Parameters = Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE",
+    help="Set a scenario parameter; may be repeated.")]
+Allow = Annotated[list[Path] | None,
+    typer.Option(help="Folder that roads and catalogs may be read from; may be repeated.")]
+Road = Annotated[Path | None, typer.Option("--road", help="OpenDRIVE file, whatever the scenario says.",
+    show_default=False)]
+RoadPath = Annotated[list[Path] | None, typer.Option("--road-path", metavar="DIR",
+    help='Folder with roads known by name ("Town04"); may be repeated.')]
 
 
 def _number(value: float | None) -> float | None:
@@ -69,16 +87,9 @@ def _number(value: float | None) -> float | None:
     return value
 
 
-TimeLimit = Annotated[
-    float | None,
-    typer.Option(
-        help="Cut runs off here [s]; default: 60 without a stop trigger, 3600 with one.",
-        callback=_number,
-        min=0.1,
-        max=86_400,
-        show_default=False,
-    ),
-]
+TimeLimit = Annotated[float | None,
+    typer.Option(help="Cut runs off here [s]; default: 60 without a stop trigger, 3600 with one.", callback=_number,
+    min=0.1, max=86_400, show_default=False)]
 
 
 class Part(StrEnum):
@@ -87,9 +98,10 @@ class Part(StrEnum):
     SENSOR = "sensor"
 
 
-With = Annotated[
-    list[Part] | None, typer.Option("--with", help="sensor: add the error of the sensor that measured the drives.")
-]
+With = Annotated[list[Part] | None, typer.Option("--with",
+    help="sensor: add the error of the sensor that measured the drives.")]
+
+# fmt: on
 
 
 SHARED = {
@@ -107,15 +119,21 @@ SHARED = {
 
 def pairs(words: Iterable[str] | None, option: str) -> dict[str, str]:
     """Read ``NAME=VALUE`` words; wrong usage when there is no ``=`` or a name comes twice."""
-    found: dict[str, str] = {}
-    for word in words or ():
-        name, equals, value = word.partition("=")
-        if not equals or not name:
-            raise typer.BadParameter(f"{word!r}: expected NAME=VALUE", param_hint=option)
-        if name in found:
-            raise typer.BadParameter(f"{name!r} is given twice", param_hint=option)
-        found[name] = value
-    return found
+    from xosc_lateral.workflows.conversion.options import texts
+
+    with naming_option(option):
+        return texts(list(words or ()))
+
+
+@contextmanager
+def naming_option(option: str) -> Iterator[None]:
+    """A value that can't be read is wrong usage of that option."""
+    try:
+        yield
+    except ValueError as error:
+        if isinstance(error, XoscLateralError):
+            raise
+        raise typer.BadParameter(str(error), param_hint=option) from error
 
 
 def warn(lines: Iterable[str]) -> None:
@@ -155,6 +173,7 @@ class Printing:
     """Options of verbs that say what came out, and how it is said."""
 
     quiet: Quiet = False
+    verbose: Verbose = False
     as_json: AsJson = False
 
     def say(self, result: Result, *, even: bool = False, err: bool = False) -> None:
@@ -194,70 +213,71 @@ def flags_of(name: str, option: Option) -> tuple[str, ...]:
 
 
 def _parameters(settings: type) -> list[Parameter]:
-    """An option for each setting."""
+    """An option for each setting, or for each field of a group such as `Printing`, `force` first."""
     from xosc_lateral.workflows.conversion.options import settable
 
-    found = []
-    for item in settable(settings):
+    items = settable(settings)
+    if not items:
+        kinds = get_type_hints(settings, include_extras=True)  # of each base in its own module
+        group = [each.replace(annotation=kinds[name]) for name, each in signature(settings).parameters.items()]
+        return sorted(group, key=lambda parameter: parameter.name != "force")
+    parameters = []
+    for item in items:
         option: Option = item.metadata["option"]
-        words = typer.Option(*flags_of(item.name, option), **option.words)
-        kind = SHARED.get(item.name) or Annotated[option.kind, words]
+        kind = (
+            SHARED.get(item.name) or Annotated[option.kind, typer.Option(*flags_of(item.name, option), **option.words)]
+        )
         default = None if type(None) in get_args(get_args(kind)[0]) else item.default
-        found.append(Parameter(item.name, Parameter.KEYWORD_ONLY, default=default, annotation=kind))
-    return found
+        parameters.append(Parameter(item.name, Parameter.KEYWORD_ONLY, default=default, annotation=kind))
+    return parameters
 
 
-def _read(settings: type, /, **said: Any) -> dict[str, Any]:
-    """What was said of the settings; wrong usage, with the option's name, if it can't be."""
+def _read(settings: type, /, **words: Any) -> Any:
+    """A group; or what was said of settings, wrong usage if it can't be."""
     from xosc_lateral.workflows.conversion.options import options_of
 
     options = options_of(settings)
-    given = {name: value for name, value in said.items() if value not in (None, [])}
-    for name, value in given.items():
-        try:
+    if not options:
+        return settings(**words)
+    values = {name: value for name, value in words.items() if value not in (None, [])}
+    for name, value in values.items():
+        with naming_option(flags_of(name, options[name])[0]):
             options[name].read(value)
-        except ValueError as error:
-            raise typer.BadParameter(str(error), param_hint=flags_of(name, options[name])[0]) from error
-    return given
+    return values
 
 
-def _is_settings(kind: Any) -> bool:
-    return isinstance(kind, type) and is_dataclass(kind)
-
-
-def spelled_out(verb: Callable[..., Any]) -> Callable[..., None]:
+def with_options(verb: Callable[..., Any]) -> Callable[..., None]:
     """The verb with options of its own for those that it has together in one parameter.
 
     Such a parameter is a dataclass as `Printing`, or a mapping that is annotated with a class of settings.
     """
-    own = list[Parameter]()
-    groups = dict[str, tuple[Callable[..., Any], list[Parameter]]]()
-    for one in signature(verb, eval_str=True).parameters.values():
-        settings = next(filter(_is_settings, getattr(one.annotation, "__metadata__", ())), None)
+    options, groups = list[Parameter](), dict[str, tuple[type, list[str]]]()
+    for parameter in signature(verb, eval_str=True).parameters.values():
+        kinds = [parameter.annotation, *getattr(parameter.annotation, "__metadata__", ())]
+        settings = next((kind for kind in kinds if isinstance(kind, type) and is_dataclass(kind)), None)
+        added = [parameter] if settings is None else _parameters(settings)
         if settings is not None:
-            groups[one.name] = partial(_read, settings), _parameters(settings)
-        elif _is_settings(one.annotation):
-            options = list(signature(one.annotation, eval_str=True).parameters.values())
-            groups[one.name] = one.annotation, sorted(options, key=lambda option: option.name != "force")
-        own += groups[one.name][1] if one.name in groups else [one]
+            groups[parameter.name] = settings, [option.name for option in added]
+        options += [option.replace(kind=Parameter.KEYWORD_ONLY) for option in added]
 
     @wraps(verb)
-    def run(**given: Any) -> None:
-        for name, (made_of, options) in groups.items():
-            given[name] = made_of(**{option.name: given.pop(option.name) for option in options})
-        verb(**given)
+    def run(**values: Any) -> None:
+        for name, (settings, names) in groups.items():
+            values[name] = _read(settings, **{option: values.pop(option) for option in names})
+        verb(**values)
 
-    parameters = [one.replace(kind=one.KEYWORD_ONLY) for one in own]
-    run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+    run.__signature__ = Signature(options)  # type: ignore[attr-defined]
     return run
 
 
 def command(group: typer.Typer, name: str, short: str, *examples: str, cls: Any = None) -> Callable[[Verb], Verb]:
-    """Add a verb to a group, with examples at the end of its help."""
-    epilog = "\b\nExamples:\n" + "\n".join(f"  xosc-lateral {line}" for line in examples)
+    """Add a verb to a group, with examples and its page at the end of its help."""
 
     def add(verb: Verb) -> Verb:
-        group.command(name, cls=cls, short_help=short, epilog=epilog)(spelled_out(verb))
+        page = PAGES[verb.__module__.rpartition(".")[2]]
+        lines = "".join(f"\n  xosc-lateral {line}" for line in examples)
+        epilog = f"\b\nExamples:{lines}\n\n\b\nMore: {page}"
+        group.command(name, cls=cls, short_help=short, epilog=epilog)(with_options(verb))
         return verb
 
     return add

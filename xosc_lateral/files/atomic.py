@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import IO
 
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.source import refuse_guarded
+from xosc_lateral.files.source import LOG, refuse_guarded
 
 _RUN: ContextVar[str] = ContextVar("run", default="")
 
@@ -38,10 +38,8 @@ def temporary_files(runs: Iterable[str]) -> re.Pattern[str]:
 def write_atomically(path: Path | str, data: bytes | str, *, durable: bool = False) -> Path:
     """Write bytes or UTF-8 text to a temporary file beside the output, then move it there; missing folders are made.
 
-    Raises `OSError`: Disk full, no permission: the output is as it was, and no temporary file stays behind.
-
-    `durable`: return only when the disk has it, so that not even a power cut takes it back. On a busy disk that is a
-    tenth of a second: for what ten thousand others depend on, not for each of the ten thousand.
+    A full disk (`OSError`) leaves the output as it was. `durable`: return only when the disk has it, so that not even a
+    power cut takes it back: a tenth of a second on a busy disk, for what ten thousand others depend on.
     """
     content = data.encode() if isinstance(data, str) else data
 
@@ -56,11 +54,7 @@ def write_atomically(path: Path | str, data: bytes | str, *, durable: bool = Fal
 
 
 def replace_atomically(path: Path | str, write: Callable[[Path], object]) -> Path:
-    """Let `write` fill a temporary file beside the output, then move it there: for writers that want a path.
-
-    Raises `FormatError`: The output is a file that was opened as an input (`source.guarding_inputs`); `OSError`: As for
-    `write_atomically`.
-    """
+    """Let `write` fill a temporary file beside the output, then move it there; an input (`guarding_inputs`) stays."""
     path = Path(path)
     refuse_guarded(path)
     try:
@@ -69,6 +63,7 @@ def replace_atomically(path: Path | str, write: Callable[[Path], object]) -> Pat
             temporary.replace(path)
     except OSError as error:  # of a full disk, say: libraries name no file, or one that nobody knows
         raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
+    LOG.info("wrote %s", path)
     return path
 
 
@@ -96,11 +91,7 @@ _LINK = "is a link, which is not followed here: remove it"
 
 
 def open_own(path: Path) -> IO[bytes]:
-    """Open a file for reading and writing; made if it is not there.
-
-    Raises `FormatError`: it or its folder is a link, it is no file, has another name elsewhere or another owner;
-    `OSError`: it can't be opened.
-    """
+    """Open a file for reading and writing, made if it is not there; links and files of others are refused."""
     if not hasattr(os, "O_DIRECTORY"):  # Windows: links need a privilege there
         return os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT | _PLAIN), "r+b")
     here = path.parent
@@ -137,10 +128,7 @@ def _owner_of_new_files(folder: Path) -> int:
 
 
 def make_own_folder(folder: Path, depth: int) -> None:
-    """Make a folder that is so many levels below the one that the user named.
-
-    Raises `FormatError`: it, or one in between, is a link, which an output would follow; `OSError`: it can't be made.
-    """
+    """Make a folder that is so many levels below the one that the user named; links on the way are refused."""
     for place in (folder, *folder.parents)[:depth]:
         if place.is_symlink():
             raise FormatError(_LINK, path=place)

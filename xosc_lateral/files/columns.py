@@ -68,11 +68,7 @@ def parse_condition(text: str, path: Path) -> tuple[str, str, float | str]:
 def chosen_rows(
     table: pd.DataFrame, missing: Sequence[float | str] | None, conditions: Sequence[str], path: Path
 ) -> pd.DataFrame:
-    """The rows that fulfil all conditions, without what stands for no value.
-
-    Raises `FormatError`: a condition's column is not there; no row is left; nothing is said about what stands for no
-    value, and a column has one of the usual markers.
-    """
+    """The rows that fulfil all conditions, without what stands for no value; usual markers have to be named."""
     marked = {name: _without_markers(table[name], missing, path) for name in table.columns}
     marked = {name: column for name, column in marked.items() if column is not None}
     table = table.assign(**marked) if marked else table
@@ -137,10 +133,7 @@ def comma_numbers(column: pd.Series) -> pd.Series | None:
 
 
 def numbers_of(column: pd.Series, path: Path, name: str) -> FloatArray:
-    """Numbers, also with decimal commas, and of `time` seconds, shape (n,); NaN where a cell is empty.
-
-    Raises `FormatError` for a cell that is no number.
-    """
+    """Numbers, also with decimal commas, and of `time` seconds, shape (n,); NaN where a cell is empty."""
     is_text = not pd.api.types.is_numeric_dtype(column)
     if is_text and name == "time" and (seconds := seconds_of_stamps(column, path)) is not None:
         return seconds
@@ -159,10 +152,7 @@ def numbers_of(column: pd.Series, path: Path, name: str) -> FloatArray:
 
 
 def indicators(name: str, column: pd.Series, drives: pd.Series | None, most: int) -> dict[str, FloatArray]:
-    """A text column as one column ``name=value`` of 0 and 1 per value.
-
-    Empty if it has more than `most` values, or changes in no drive: then it is a label, not a context.
-    """
+    """A text column as ``name=value`` of 0 and 1 per value; nothing of more than `most` values, or fixed in drives."""
     codes, values = column.factorize()
     if not 2 <= len(values) <= most:
         return {}
@@ -187,9 +177,8 @@ def seconds_of_stamps(
 ) -> FloatArray | None:
     """Dates with times (ISO 8601, ``21.11.2026 14:03:05,12``, ``11/21/2026 2:03 PM``) or clock times, as seconds.
 
-    Counted from the earliest, or from midnight for clock times, which may run past it; NaN where there is none.
-    None if a value is neither. `zone`: of dates that name none, ``Europe/Berlin``. `drives`: whose rows they are.
-    Raises `FormatError`: local time goes back, as at the end of summer time, and no zone says where; no such zone.
+    Counted from the earliest, or from midnight for clock times, which may run past it; NaN where there is none, None if
+    a value is neither. `zone`: of local dates. Local time that goes back, as at the end of summer time, needs one.
     """
     is_date = pd.api.types.is_datetime64_any_dtype(column)
     known = column.dropna() if is_date else column.dropna().astype(str).str.strip()

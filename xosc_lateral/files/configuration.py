@@ -27,10 +27,7 @@ def configuration_file() -> Path | None:
 
 
 def configuration() -> tuple[Path | None, Mapping[str, list[str]]]:
-    """The file, None where there is none, and what it says, each key's value as a list.
-
-    Raises `FormatError` if it is no TOML, or says something else.
-    """
+    """The file, None where there is none, and what it says, each key's value as a list. Raises `FormatError`."""
     path = configuration_file()
     try:
         if path is None or not path.is_file():

@@ -40,15 +40,10 @@ MAX_LEVELS = 12  # a column of whole numbers with at most so many values holds l
 
 
 def read_drives(paths: str | Path | Sequence[str | Path], mapping: MappingLike | None = None) -> list[Drive]:
-    """Read the drives of one or several tables.
+    """Read the drives of one or several tables, in the order of the files and of first appearance.
 
-    Raises `FormatError` when a file can't be read, a column is missing, or its values can't be in the unit meant;
-    `NotEnoughDataError` when a file holds no drive with two rows of time, offset and lane width.
-
-    `paths`: tables; the suffix gives the format. `mapping`: what columns are called, and how tables are written; see
-    `files.mapping`. Returns list of Drive: in the order of the files and of first appearance; a drive without a name
-    is called after its file. Rows are sorted by time, repeated times dropped, rows with a missing value left out (a
-    gap).
+    `mapping`: what columns are called, and how tables are written, see `files.mapping`. A drive without a name is
+    called after its file. Rows are sorted by time, repeated times dropped, rows with a missing value left out (a gap).
     """
     known = as_mapping(mapping)
     files = [Path(path) for path in ([paths] if isinstance(paths, str | Path) else paths)]
@@ -125,10 +120,7 @@ def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.Dat
 
 
 def from_middle(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.DataFrame:
-    """The table with distances to the markings from the vehicle's middle: those from its wheels make lanes narrow.
-
-    Raises `FormatError`: they do, and the mapping does not say how far apart the wheels are.
-    """
+    """Distances to the markings; those of wheels (`wheel_track`) as offset and width: narrow lanes ask for it."""
     if not {"distance_left", "distance_right"} <= set(table.columns):
         return table
     left, right = (numbers_of(table[name], path, name) for name in ("distance_left", "distance_right"))
@@ -151,8 +143,8 @@ def from_middle(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.Da
 def _numeric_columns(name: str, table: pd.DataFrame, path: Path) -> dict[str, FloatArray]:
     """A column as float64, or as one column per category; nothing where it holds labels.
 
-    Infinite values count as missing, but for those of distances to others: nobody is within reach. So do glitches of a
-    context column; one that is full of them is another quantity, which is refused.
+    Infinite values are missing, but where nobody is within reach; so are glitches of a context column, unless it is
+    full.
     """
     column = table[name]
     is_needed = name in (*DRIVE_COLUMNS, "speed")
@@ -220,10 +212,7 @@ def file_label(path: Path) -> str:
 
 
 def file_labels(paths: Sequence[Path]) -> list[str]:
-    """Different labels for several files: with folders where names are equal, whole where these are.
-
-    Raises `FormatError`: a file is named twice.
-    """
+    """Different labels for several files: with folders where names are equal, whole where these are."""
     if twice := [path for path in paths if paths.count(path) > 1]:
         raise FormatError("the file is named twice", path=twice[0])
     short = [file_label(path) for path in paths]

@@ -18,10 +18,7 @@ _BRACKETS = re.compile(r"[\[\]{}]")
 
 
 def parse_json(data: bytes, path: Path) -> Any:
-    """JSON of an input file.
-
-    Raises `FormatError`: Not UTF-8, no JSON, NaN or infinity in it, or nested deeper than `limits.JSON_DEPTH`.
-    """
+    """JSON of an input file. Raises `FormatError`."""
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -56,10 +53,7 @@ def _finite(text: str) -> float:
 
 
 def canonical_json(value: Any, indent: int = 0) -> str:
-    """JSON text of plain values: keys as they come, one item a line, lists of numbers on one line.
-
-    Raises `ValueError` for a number that is not finite: JSON has none.
-    """
+    """JSON text of plain values: keys as they come, one item a line, lists of numbers on one line."""
     pad = " " * (indent + 1)
     if isinstance(value, Mapping):
         items = [f"{pad}{json.dumps(str(key))}: {canonical_json(item, indent + 1)}" for key, item in value.items()]

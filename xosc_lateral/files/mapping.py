@@ -11,7 +11,7 @@ count, ``missing = [-9999]``: what stands for no value, ``time_zone = "Europe/Be
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from math import pi
 from pathlib import Path
@@ -84,9 +84,7 @@ def is_measured(unit: str) -> bool:
 
 
 def factor(column: str, unit: str) -> float:
-    """Factor from `unit` to the unit that the standard table has `column` in (SI where it names none).
-
-    A unit with a leading minus turns the sign: ``-m`` for offsets counted to the right.
+    """Factor from `unit` (``-m`` turns the sign) to that of the standard table's `column`, SI where it names none.
 
     Raises `ValueError` for an unknown unit, or one that measures something else.
     """
@@ -145,10 +143,7 @@ class TableMapping:
     recorded: Mapping[str, float] = field(default_factory=dict)  # by the names in `RECORDED`
 
     def class_names(self, column: pd.Series, path: Path) -> pd.Series:
-        """Vehicle classes in words.
-
-        Raises `FormatError`: they are numbers, and the mapping does not say of what.
-        """
+        """Vehicle classes in words; numbers need the mapping's [values.vehicle_class]."""
         words = column.map(as_word)
         if self.classes:
             return words.map(lambda word: self.classes.get(word, word))
@@ -163,10 +158,7 @@ class TableMapping:
         return replace(self, columns={**self.columns, **more}) if more else self
 
     def numbers(self, name: str, column: pd.Series, path: Path) -> pd.Series:
-        """The column `name`, its texts as the numbers that they stand for.
-
-        Raises `FormatError`: for a text that stands for none.
-        """
+        """The column `name`, its texts as the numbers that they stand for. Raises `FormatError`."""
         if name not in self.values:
             return column
         known = {text.strip().lower(): number for text, number in self.values[name].items()}
@@ -196,10 +188,7 @@ def as_mapping(given: MappingLike | None) -> TableMapping:
 
 
 def parse_map(words: Iterable[str]) -> dict[str, ColumnSource]:
-    """Read ``NAME=COLUMN`` or ``NAME=COLUMN:UNIT`` (``speed=v_kmh:km/h``, ``offset=lat:-cm``).
-
-    Raises `FormatError`: when a word has no ``=`` or its unit does not fit the column.
-    """
+    """Read ``NAME=COLUMN`` or ``NAME=COLUMN:UNIT`` (``speed=v_kmh:km/h``, ``offset=lat:-cm``). Raises `FormatError`."""
     mapping: dict[str, ColumnSource] = {}
     for word in map(composed, words):
         name, equals, rest = word.partition("=")
@@ -223,62 +212,55 @@ def read_mapping(path: Path) -> TableMapping:
     if unknown := values.keys() - set(KEYS):
         raise FormatError(f"unknown entry {min(unknown)!r}; there are {', '.join(KEYS)}", path=path)
     for key in ("columns", "values", "roles"):
-        if not isinstance(values.get(key, {}), dict):
+        if not isinstance(values.setdefault(key, {}), dict):
             raise FormatError("expected a table of names", path=path, element=f"[{key}]")
+    for key, (expected, is_one) in ENTRIES.items():
+        if key in values and not is_one(values[key]):
+            raise FormatError(f"{key} {values[key]!r}, expected {expected}", path=path)
     decimal = values.get("decimal", ".")
-    if decimal not in (".", ","):
-        raise FormatError(f"decimal {decimal!r}, expected . or ,", path=path)
     if decimal == values.get("separator"):
         raise FormatError(f"separator and decimal are both {decimal!r}", path=path)
-    for key in ("encoding", "separator"):
-        if not isinstance(values.get(key, ""), str) or values.get(key) == "":
-            raise FormatError(f"{key} {values[key]!r}, expected a text", path=path)
-    for key in ("rows", "missing"):
-        if not isinstance(values.get(key, []), list):
-            raise FormatError(f"{key} {values[key]!r}, expected a list", path=path)
-    rows = [_text(entry, path, "rows") for entry in values.get("rows", [])]
-    for condition in rows:
-        parse_condition(condition, path)
+    for condition in values.get("rows", []):
+        parse_condition(_text(condition, path, "rows"), path)
+    for entry in values.get("missing", []):
+        if isinstance(entry, bool) or not isinstance(entry, int | float | str):
+            raise FormatError(f"{entry!r}, expected a number or a text", path=path, element="missing")
+    markers = [entry if isinstance(entry, str) else float(entry) for entry in values.get("missing", [])]
+    classes = values["values"].pop("vehicle_class", {})
     track = values.get("wheel_track")
-    if track is not None and (isinstance(track, bool) or not isinstance(track, int | float) or not 0.0 <= track <= 3.0):
-        raise FormatError(f"wheel_track {track!r}, expected 0 to 3 m", path=path)
-    reference = values.get("reference", "centre")
-    if reference not in REFERENCES:
-        raise FormatError(f"reference {reference!r}, expected {', '.join(REFERENCES)}", path=path)
     return TableMapping(
-        {name: _column(name, entry, path) for name, entry in values.get("columns", {}).items()},
-        {
-            name: _numbers(name, entry, path)
-            for name, entry in values.get("values", {}).items()
-            if name != "vehicle_class"
-        },
-        {name: _role(entry, path, f"[roles] {name}") for name, entry in values.get("roles", {}).items()},
-        values.get("encoding"),
-        values.get("separator"),
-        decimal,
-        {
+        columns={name: _column(name, entry, path) for name, entry in values["columns"].items()},
+        values={name: _numbers(name, entry, path) for name, entry in values["values"].items()},
+        roles={name: _role(entry, path, f"[roles] {name}") for name, entry in values["roles"].items()},
+        encoding=values.get("encoding"),
+        separator=values.get("separator"),
+        decimal=decimal,
+        classes={
             str(number).strip().lower(): _text(entry, path, f"[values.vehicle_class] {number}")
-            for number, entry in values.get("values", {}).get("vehicle_class", {}).items()
+            for number, entry in classes.items()
         },
-        tuple(rows),
-        None if "missing" not in values else tuple(_marker(entry, path) for entry in values["missing"]),
-        _text(values.get("time_zone", "-"), path, "time_zone").removeprefix("-"),
-        None if track is None else float(track),
-        reference,
-        {key: _above_zero(values[key], path, key) for key in RECORDED if key in values},
+        rows=tuple(values.get("rows", [])),
+        missing=tuple(markers) if "missing" in values else None,
+        time_zone=_text(values["time_zone"], path, "time_zone") if "time_zone" in values else "",
+        wheel_track=None if track is None else float(track),
+        reference=values.get("reference", "centre"),
+        recorded={key: float(values[key]) for key in RECORDED if key in values},
     )
 
 
-def _marker(entry: Any, path: Path) -> float | str:
-    if isinstance(entry, bool) or not isinstance(entry, int | float | str):
-        raise FormatError(f"{entry!r}, expected a number or a text", path=path, element="missing")
-    return entry if isinstance(entry, str) else float(entry)
+def _is_number(entry: Any) -> bool:
+    return isinstance(entry, int | float) and not isinstance(entry, bool)
 
 
-def _above_zero(entry: Any, path: Path, key: str) -> float:
-    if isinstance(entry, bool) or not isinstance(entry, int | float) or not 0.0 < entry < np.inf:
-        raise FormatError(f"{key} {entry!r}, expected a number above 0", path=path)
-    return float(entry)
+ENTRIES: Mapping[str, tuple[str, Callable[[Any], bool]]] = {
+    **dict.fromkeys(("encoding", "separator"), ("a text", lambda entry: isinstance(entry, str) and entry != "")),
+    "decimal": (". or ,", lambda entry: entry in (".", ",")),
+    **dict.fromkeys(("rows", "missing"), ("a list", lambda entry: isinstance(entry, list))),
+    "wheel_track": ("0 to 3 m", lambda entry: _is_number(entry) and 0.0 <= entry <= 3.0),
+    "reference": (", ".join(REFERENCES), lambda entry: entry in REFERENCES),
+    **dict.fromkeys(RECORDED, ("a number above 0", lambda entry: _is_number(entry) and 0.0 < entry < np.inf)),
+}
+"""Entries that are no tables -> what is expected of them, in words and as a check."""
 
 
 def _role(entry: Any, path: Path, where: str) -> str:
@@ -297,20 +279,19 @@ def _text(entry: Any, path: Path, where: str) -> str:
 
 def _column(name: str, entry: Any, path: Path) -> ColumnSource:
     where = f"[columns] {name}"
-    if isinstance(entry, dict):  # a header with a colon, or a sign by itself
+    try:
+        if not isinstance(entry, dict):
+            return _source(name, _text(entry, path, where))
+        # a header with a colon, or a sign by itself
         if unknown := entry.keys() - {"column", "unit", "sign"}:
             raise FormatError(f"unknown {min(unknown)!r}; there are column, unit, sign", path=path, element=where)
         if entry.get("sign", 1) not in (1, -1):
             raise FormatError(f"sign {entry['sign']!r}, expected 1 or -1", path=path, element=where)
-        source = ColumnSource(_text(entry.get("column"), path, where))
-        unit, sign = entry.get("unit", ""), float(entry.get("sign", 1))
-        try:
-            return replace(source, factor=sign * (factor(name, unit) if unit else 1.0), unit=unit)
-        except (ValueError, AttributeError) as error:
-            raise FormatError(str(error), path=path, element=where) from error
-    try:
-        return _source(name, _text(entry, path, where))
-    except ValueError as error:
+        column, unit = _text(entry.get("column"), path, where), entry.get("unit", "")
+        return ColumnSource(column, float(entry.get("sign", 1)) * (factor(name, unit) if unit else 1.0), unit)
+    except FormatError:
+        raise
+    except (ValueError, AttributeError) as error:
         raise FormatError(str(error), path=path, element=where) from error
 
 

@@ -22,11 +22,7 @@ LONGEST_NAME = 255  # of a file, on all common systems [byte]
 
 
 def file_name(name: str, what: str) -> str:
-    """A name that others gave, as the name of a file: the one gate to paths.
-
-    `what`: whose name it is, for the message. Raises `FormatError`: it could lead to another folder, or no file can
-    have it.
-    """
+    """A name that others gave, as the name of a file: the one gate to paths. `what`: whose it is, for the message."""
     wrong = name in ("", ".", "..") or any(sign in "/\\" or sign < " " for sign in name)
     if wrong or len(name.encode(errors="replace")) > LONGEST_NAME:
         raise FormatError(f"{what} {name[:60]!r}: expected the name of a file, without a folder")
@@ -39,10 +35,7 @@ def path_below(folder: Path, name: str, what: str) -> Path:
 
 
 def output_file(output: str | Path, usual_name: str, suffixes: Sequence[str]) -> Path:
-    """Path of an output file, which in a folder has its usual name. Raises `FormatError` for another suffix.
-
-    `output`: as the user gave it. `suffixes`: formats that can be written, lower case with their dot.
-    """
+    """Path of an output file, which in a folder has its usual name. Raises `FormatError` for another suffix."""
     path = output_folder(output) / file_name(usual_name, "name") if is_folder(output) else Path(output)
     if not path.name.lower().endswith(tuple(suffixes)):
         kind = path.suffix or "a file without suffix"
@@ -65,11 +58,7 @@ def output_folder(output: str | Path) -> Path:
 
 
 def claim(outputs: Iterable[Path | None], inputs: Iterable[Path] = (), *, force: bool = False) -> None:
-    """Refuse outputs that can't be meant, or that would replace somebody else's file, before any work is done.
-
-    Raises `FormatError`: see `refuse_outputs`; or a file is there that this package did not write, unless `force` is
-    given.
-    """
+    """Refuse outputs as `refuse_outputs` does, and, without `force`, files that this package did not write."""
     wanted = [output for output in outputs if output is not None]
     refuse_outputs(wanted, inputs)
     for output in wanted:
@@ -78,11 +67,7 @@ def claim(outputs: Iterable[Path | None], inputs: Iterable[Path] = (), *, force:
 
 
 def refuse_outputs(outputs: Iterable[Path | None], inputs: Iterable[Path] = ()) -> None:
-    """Refuse outputs that can't be meant, before any work is done and anything is written.
-
-    Raises `FormatError` if an output (None: not wanted) is a folder, an input (links resolved), or named twice, or its
-    folder can't be made or written to.
-    """
+    """Refuse outputs before any work: folders, inputs (links resolved), what is named twice or can't be written."""
     folders: dict[Path, str] = {}
     taken = {real_path(path, folders): "is an input; choose another output" for path in inputs}
     writable: set[Path] = set()

@@ -24,10 +24,7 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 def harmless(text: str) -> str:
-    """Text that no spreadsheet takes for a formula: what begins like one gets an apostrophe before it.
-
-    Reference: OWASP, "CSV Injection".
-    """
+    """Text that no spreadsheet takes for a formula, by an apostrophe before it (OWASP, "CSV Injection")."""
     return f"'{text}" if text.startswith(_FORMULA) else text
 
 
@@ -51,21 +48,14 @@ def output_suffixes() -> tuple[str, ...]:
 
 
 def write_frame(frame: pd.DataFrame, path: Path, provenance: Mapping[str, Any]) -> None:
-    """Write a table; the same frame and provenance give the same bytes.
-
-    `path`: its suffix, one of `output_suffixes`, decides the format. `provenance`: JSON values; the package's version
-    is added. A CSV has six decimals, Parquet every bit.
-    """
+    """Write a table in the format of the suffix, six decimals in CSV, every bit in Parquet; same frame, same bytes."""
     write_table(path, provenance, frame=lambda: frame, text=lambda: csv_text(frame))
 
 
 def write_table(
     path: Path, provenance: Mapping[str, Any], *, frame: Callable[[], pd.DataFrame], text: Callable[[], str]
 ) -> None:
-    """As `write_frame`, for tables that have a CSV of their own; whole or not at all.
-
-    `frame`, `text`: give the table, and its CSV, when they are wanted.
-    """
+    """As `write_frame`, for tables that have a CSV of their own; whole or not at all."""
     name = path.name.lower()
     if name.endswith(PARQUET):
         write_atomically(path, _parquet(frame(), stamped(provenance)))
@@ -115,10 +105,7 @@ _NUMBERS = "%.3f,%s,%.4f,%.4f,%.4f,%.6f,%.4f,%s,%d,%.4f,%.4f"
 
 
 def states_csv(motion: NominalMotion, network: RoadNetwork) -> str:
-    """Rows of all entities that exist at a time, ordered by time and then as in the scenario, as CSV.
-
-    Poses are inertial: the offset of the road's header counts. `network`: that it was played on.
-    """
+    """Inertial states of all entities that exist at a time, ordered by time and then as in the scenario, as CSV."""
     lines = [",".join(COLUMNS)]
     for rows in zip(*(_lines(entity, network) for entity in motion.entities), strict=True):
         lines += [row for row in rows if row]

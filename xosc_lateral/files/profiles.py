@@ -77,8 +77,6 @@ def library_folders(folders: Iterable[str | Path] = ()) -> tuple[Path, ...]:
 
     ``XOSC_LATERAL_LIBRARY`` holds folders, separated as in PATH. The configuration is ``xosc-lateral/config.toml`` in
     ``XDG_CONFIG_HOME`` (else ``~/.config``; on Windows ``APPDATA``) with ``library = ["FOLDER", ...]``.
-
-    Raises `FormatError` if one of them isn't there.
     """
     from_environment = [Path(name) for name in os.environ.get(LIBRARY_VARIABLE, "").split(os.pathsep) if name]
     found = [*map(Path, folders), *from_environment, *configured_libraries()]
@@ -112,12 +110,8 @@ SCHEMA = Path(__file__).resolve().parents[1] / "resources" / "driver_profile.sch
 def read_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -> DriverProfile:
     """Read a profile by its path or name, once per process for as long as its file stays the same.
 
-    A name is looked for in the folders, then among those shipped.
-
-    Raises `DriverProfileError` if no profile of that name is known; lists those that are; `FormatError` if the file is
-    not there or no valid profile, or a folder isn't one.
-
-    `name_or_path`: ``motorway`` or ``somewhere/mine.json``. `folders`: looked through first, in this order.
+    A name is looked for in the folders, in their order, then among those shipped. Raises `DriverProfileError`: no
+    profile of that name is known; `FormatError`: the file is not there or no valid profile, or a folder isn't one.
     """
     path = find_profile(name_or_path, folders)
     state = check_regular(path)
@@ -138,10 +132,7 @@ def _read_profile(path: Path, _state: tuple[int, ...]) -> DriverProfile:
 
 
 def write_profile(profile: DriverProfile, path: str | Path) -> None:
-    """Write a profile file, whole or not at all; the same profile gives the same bytes.
-
-    Raises `OSError` when it can't be written.
-    """
+    """Write a profile file, whole or not at all; the same profile gives the same bytes. Raises `OSError`."""
     write_atomically(Path(path), profile_bytes(profile))
 
 
@@ -245,10 +236,7 @@ class Entry:
 
 
 def read_library(folders: Iterable[Path] = ()) -> list[Entry]:
-    """Every file of the library; a broken or foreign one costs one entry, not the listing.
-
-    Raises `FormatError` if a folder isn't there.
-    """
+    """Every file of the library; a broken or foreign one costs one entry, not the listing. Raises `FormatError`."""
     first: dict[str, Path] = {}
     entries = []
     for path in list_profiles(folders):
@@ -266,10 +254,7 @@ def read_library(folders: Iterable[Path] = ()) -> list[Entry]:
 
 
 def matching(entries: Iterable[Entry], tags: Collection[str], where: Mapping[str, str]) -> list[Entry]:
-    """Entries that carry all the tags and whose metadata (or `id`, or `model`) are as given, letters big or small.
-
-    Raises `XoscLateralError` if `where` names something that profiles don't have.
-    """
+    """Entries that carry all the tags and whose metadata (or `id`, or `model`) are as given, letters big or small."""
     for field in where:
         if field not in (*FIELDS, "id", "model"):
             raise XoscLateralError(f"profiles have no field {field!r}; there are id, model, {', '.join(FIELDS)}")
@@ -296,10 +281,7 @@ def described(
     remove_tags: Collection[str] = (),
     fields: Mapping[str, str] | None = None,
 ) -> DriverProfile:
-    """The profile under another id, with other tags and metadata; what is not mentioned stays.
-
-    Raises `XoscLateralError` for a field that there is not (`FIELDS` are known) and for an id that is no file name.
-    """
+    """The profile under another id, with other tags and metadata; what is not mentioned stays."""
     for field in fields or {}:
         if field not in FIELDS:
             raise XoscLateralError(f"profiles have no field {field!r} to set; there are {', '.join(FIELDS)}")

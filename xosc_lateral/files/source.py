@@ -20,11 +20,14 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import lru_cache
+from logging import getLogger
 from pathlib import Path
 from typing import IO, Any
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.limits import FILE_SIZE, PACKING_RATIO, UNPACKED_SIZE, UNPACKED_UNASKED, Limit
+
+LOG = getLogger(__name__)
 
 IN_MEMORY = 64_000_000  # files up to this are read once and parsed from memory [byte]
 
@@ -51,10 +54,7 @@ class Source:
     size: int  # [byte]
 
     def unpacked(self, size: int) -> None:
-        """Refuse a packed file that would take all memory; `size`: unpacked so far. [byte]
-
-        Raises `FormatError`: above `limits.UNPACKED_SIZE`, or above `UNPACKED_UNASKED` and `PACKING_RATIO`.
-        """
+        """Refuse a packed file that would take all memory, see `limits`; `size`: unpacked so far. [byte]"""
         if size > UNPACKED_SIZE.bytes:
             raise FormatError(UNPACKED_SIZE.refusal(size / 1e6), path=self.path)
         ratio = size / max(self.size, 1)
@@ -94,11 +94,7 @@ def read_toml(path: Path, otherwise: str) -> dict[str, Any]:
 
 @contextmanager
 def open_source(path: Path | str, limit: Limit = FILE_SIZE) -> Iterator[Source]:
-    """Open an input file for reading.
-
-    Raises `FormatError`: It is not there, can't be read, is no regular file or larger than the limit, or changed while
-    it was being read.
-    """
+    """Open an input file for reading. Raises `FormatError`."""
     path = Path(path)
     with _opened(path) as file:
         before = os.fstat(file.fileno())
@@ -167,10 +163,7 @@ def edit_in_place(path: Path) -> None:
 
 
 def refuse_guarded(target: Path) -> None:
-    """Refuse to replace an input; links of both kinds are seen through.
-
-    Raises `FormatError`: The target is a file that was opened as an input.
-    """
+    """Refuse to replace an input; links of both kinds are seen through. Raises `FormatError`."""
     guarded = _GUARDED.get()
     if guarded and target.exists():
         state = target.stat()
@@ -179,6 +172,7 @@ def refuse_guarded(target: Path) -> None:
 
 
 def _remember(path: Path, digest: str) -> None:
+    LOG.info("read %s, sha256 %s", path, digest)
     _LAST_READ.pop(str(path), None)
     _LAST_READ[str(path)] = digest
     if len(_LAST_READ) > REMEMBERED:
@@ -216,10 +210,7 @@ def _unreadable(error: OSError | ValueError, path: Path) -> FormatError:
 
 
 def file_hash(path: Path) -> str:
-    """Hexadecimal SHA-256 of a file's bytes as they are now; read once per process for as long as it stays the same.
-
-    Raises `OSError` when it can't be read; `FormatError` when it is not there, or no regular file.
-    """
+    """SHA-256 of a file's bytes as they are now; read once per process for as long as it stays the same."""
     return _file_hash(path, state_key(check_regular(path)))
 
 
@@ -232,10 +223,7 @@ def file_state(path: Path) -> str:
 
 
 def parsed_hash(path: Path) -> str:
-    """Hexadecimal SHA-256 of the bytes that this process parsed, whatever has become of the file since.
-
-    What an output states about its inputs. A file that was not parsed is hashed now.
-    """
+    """SHA-256 of the bytes that this process parsed, whatever the file is since; a file not parsed is hashed now."""
     try:
         return last_read(path)
     except KeyError:

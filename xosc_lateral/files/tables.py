@@ -37,10 +37,7 @@ _DOUBLE = 8
 
 
 def read_table(path: Path, mapping: TableMapping | None = None) -> pd.DataFrame:
-    """Read a CSV, CSV.gz or Parquet file as it is; a mapping may say how text is written.
-
-    Raises `FormatError` when it isn't one, or is beyond the limits.
-    """
+    """Read a CSV, CSV.gz or Parquet file as it is; a mapping may say how text is written. Raises `FormatError`."""
     if not path.name.lower().endswith(TABLE_SUFFIXES):
         raise FormatError(f"not a drive table: expected a name ending in {', '.join(TABLE_SUFFIXES)}", path=path)
     if mapping is None:
@@ -71,10 +68,7 @@ def as_text(table: pd.DataFrame) -> pd.DataFrame:
 
 @contextmanager
 def foreign_errors(path: Path, what: str) -> Iterator[None]:
-    """Whatever a library raises about a file becomes one line that names the file.
-
-    Raises `FormatError` in place of anything that is no error of ours.
-    """
+    """Whatever a library raises about a file becomes one line that names the file."""
     try:
         yield
     except XoscLateralError:
@@ -87,6 +81,7 @@ def foreign_errors(path: Path, what: str) -> Iterator[None]:
 
 _FIELDS = re.compile(r"Expected (\d+) fields in line (\d+), saw (\d+)")
 _OPEN_QUOTE = re.compile(r"EOF inside string starting at row (\d+)")
+_READERS = {"pandas", "pyarrow", "gzip", "zlib"}  # whose own texts say nothing to a reader of ours
 
 
 def _plain_reason(error: Exception) -> str:
@@ -96,6 +91,8 @@ def _plain_reason(error: Exception) -> str:
         return f"line {match[2]} has {match[3]} cells, the head has {match[1]}"
     if match := _OPEN_QUOTE.search(reason):
         return f"a quotation mark in line {int(match[1]) + 1} is not closed"
+    if type(error).__module__.partition(".")[0] in _READERS or isinstance(error, EOFError):
+        return "it is empty, damaged, or laid out otherwise"
     if isinstance(error, LookupError | TypeError | AttributeError | ArithmeticError) and not isinstance(
         error, UnicodeError
     ):
@@ -104,10 +101,7 @@ def _plain_reason(error: Exception) -> str:
 
 
 def unpacked_text(source: Source) -> IO[bytes]:
-    """The file, unpacked if it is gzip (by its first bytes, whatever its name).
-
-    Raises `FormatError`: It unpacks to more than `limits` allow.
-    """
+    """The file, unpacked within `limits` if it is gzip (by its first bytes, whatever its name)."""
     packed = source.file.read(2) == b"\x1f\x8b"
     source.file.seek(0)
     if not packed:
@@ -202,10 +196,7 @@ class ContextTable(dict[str, tuple[FloatArray, FloatArray]]):
 
 
 def read_context(path: Path) -> ContextTable:
-    """Read a table with a `time` column [s from scenario start] and any context columns, all of them numbers.
-
-    Raises `FormatError`: No `time` column, time that does not increase, a value that is infinite, no number or none
-    that a road has (`limits`), or no context column.
+    """Read a table with a `time` column [s from scenario start], increasing, and context columns, all of them numbers.
 
     NaN values are left out row by row: between what is stated, values are interpolated.
     """

@@ -70,10 +70,7 @@ def parse_xml(data: bytes, path: object) -> etree._Element:
 
 
 def _declared_late(data: bytes) -> bytes:
-    """Blanks in place of an XML declaration that comments or blanks stand before: the encoding is UTF-8 then.
-
-    Not allowed, yet in the field; places in the file stay the same.
-    """
+    """Blanks in place of an XML declaration after comments or blanks: not allowed, yet in the field; places stay."""
     begin = at = 3 if data.startswith(b"\xef\xbb\xbf") else 0
     while True:
         at = _BLANKS.match(data, at).end()  # type: ignore[union-attr]  # matches nothing, too
@@ -112,10 +109,7 @@ def root_tag(path: Path) -> str:
 
 
 def read_document(path: Path) -> XmlDocument:
-    """Read a file. The tree is shared between callers: never change it.
-
-    Raises `FormatError`: Missing, no regular file, too large, or see `parse_xml`.
-    """
+    """Read a file. The tree is shared between callers: never change it. Raises `FormatError`."""
     state = check_regular(path)
     guard_input(path)
     if state.st_size > MAX_CACHED_BYTES:

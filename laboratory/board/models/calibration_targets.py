@@ -15,8 +15,7 @@ from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.evaluation.measures import Features, differences, features_of
-from xosc_lateral.drivers.evaluation.parts import SnippetCondition
-from xosc_lateral.drivers.evaluation.snippets import Snippets, snippets_of
+from xosc_lateral.drivers.evaluation.snippets import SnippetCondition, Snippets, snippets_of
 
 FloatArray = NDArray[np.float64]
 

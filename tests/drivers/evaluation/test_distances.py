@@ -7,15 +7,16 @@ import pytest
 from scipy.stats import wasserstein_distance
 
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.drivers.evaluation.distances import (
+from xosc_lateral.drivers.evaluation.metrics import (
+    METRICS,
     Distances,
     mean_distances,
     metric_distances,
     snippet_distances,
+    snippet_metrics,
     split_groups,
     wasserstein,
 )
-from xosc_lateral.drivers.evaluation.metrics import METRICS, snippet_metrics
 
 RNG = np.random.default_rng(1)
 ROWS = 0.1 * RNG.normal(size=(60, 51)).cumsum(axis=1)

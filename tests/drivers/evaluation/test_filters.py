@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from xosc_lateral.drivers.evaluation.classifier import classifier_two_sample_test
-from xosc_lateral.drivers.evaluation.filters import PASS_FREQUENCY, STOP_FREQUENCY, slow_movement, thinned
+from xosc_lateral.drivers.evaluation.spectra import PASS_FREQUENCY, STOP_FREQUENCY, slow_movement, thinned
 
 STEP = 0.2
 

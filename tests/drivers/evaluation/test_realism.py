@@ -9,12 +9,11 @@ from msgspec.structs import replace
 from tests.kit.runs import smooth_runs
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.resampling import STEP
-from xosc_lateral.drivers.evaluation.parts import SnippetCondition
 from xosc_lateral.drivers.evaluation.realism import Beside, Realism, score_realism
-from xosc_lateral.drivers.evaluation.snippets import sample_runs, sensor_noise, snippets_of
+from xosc_lateral.drivers.evaluation.snippets import SnippetCondition, sample_runs, sensor_noise, snippets_of
 from xosc_lateral.drivers.fitting.fitting import fit_runs
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.drivers.model.sensor.model import SensorModel
+from xosc_lateral.drivers.model.sensor import SensorModel
 from xosc_lateral.workflows.profiles.realism_text import realism_lines, start_fade_note
 
 SHORT = SnippetCondition(10.0, False)

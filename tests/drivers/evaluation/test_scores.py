@@ -12,20 +12,23 @@ from laboratory.comparison import compare_profiles, driver_distances
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.resampling import STEP
-from xosc_lateral.drivers.evaluation.distances import (
+from xosc_lateral.drivers.evaluation.lane_keeping import figures_of, margins
+from xosc_lateral.drivers.evaluation.metrics import (
+    METRICS,
+    cut_snippets,
+    free_runs,
     metric_distances,
     snippet_distances,
+    snippet_metrics,
     split_groups,
     wasserstein,
 )
-from xosc_lateral.drivers.evaluation.lane_keeping import figures_of, margins
-from xosc_lateral.drivers.evaluation.metrics import METRICS, cut_snippets, free_runs, snippet_metrics
 from xosc_lateral.drivers.evaluation.record import scores_to_dict
 from xosc_lateral.drivers.evaluation.scores import score_profile, score_snippets
 from xosc_lateral.drivers.evaluation.snippets import snippets_of
 from xosc_lateral.drivers.evaluation.spectra import autocorrelation, spectrum
 from xosc_lateral.drivers.fitting.fitting import fit_runs
-from xosc_lateral.drivers.fitting.models.two_level.fit import split_levels
+from xosc_lateral.drivers.fitting.models.two_level import split_levels
 from xosc_lateral.drivers.model.profile import DriverProfile
 
 # ---- metrics and distances -------------------------------------------------------------------------------------------

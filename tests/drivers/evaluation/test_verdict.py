@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from xosc_lateral.drivers.drives.drive import Run
-from xosc_lateral.drivers.evaluation.filters import comparison_band, dithered, slow_movement
+from xosc_lateral.drivers.evaluation.spectra import comparison_band, dithered, slow_movement
 from xosc_lateral.drivers.evaluation.verdict import Verdict, alarms_per_hour, verdict_of
 
 STEP = 0.2

@@ -14,7 +14,6 @@ from tests.kit.enriched import converted, made_enriched
 from tests.kit.places import hand_written
 from xosc_lateral.files.pages.chart import BLUE
 from xosc_lateral.files.pages.figure import Figure
-from xosc_lateral.workflows.conversion.frames import conversion_frame
 from xosc_lateral.workflows.conversion.text import as_text, facts
 from xosc_lateral.workflows.playing.figures import thumbnail
 from xosc_lateral.workflows.playing.scene import lane_surfaces, markings
@@ -171,7 +170,7 @@ def test_nothing_is_drawn_of_a_road_beyond_its_ends():
 
 # ---- results as tables and text --------------------------------------------------------------------------------------
 def test_rows_of_a_conversion_hold_the_world_and_the_lane_of_the_same_place(enriched):
-    frame = conversion_frame(enriched)
+    frame = converted(enriched).to_frame()
     assert frame["time"].is_monotonic_increasing
     assert len(frame) == sum(int(((one.motion.activity & Activity.ACTIVE) != 0).sum()) for one in enriched.entities)
     ego = frame[frame["name"] == "Ego"]
@@ -182,7 +181,7 @@ def test_rows_of_a_conversion_hold_the_world_and_the_lane_of_the_same_place(enri
 
 
 def test_rows_of_one_moment_come_in_the_order_of_the_scenario(enriched):
-    frame = conversion_frame(enriched)
+    frame = converted(enriched).to_frame()
     assert frame[frame["time"] == 0.0]["name"].tolist() == [one.name for one in enriched.entities]
 
 
@@ -198,7 +197,9 @@ def test_facts_are_json_and_add_up_to_the_scenario(enriched):
 
 
 def test_a_conversion_says_of_every_entity_what_was_done_or_why_not(enriched):
-    lines = as_text(converted(enriched, "mind this"), Path("page.html")).splitlines()
+    conversion = converted(enriched, "mind this")
+    conversion.report = Path("page.html")
+    lines = as_text(conversion).splitlines()
     assert lines[0] == "out.xosc" and lines[-1] == "report: page.html"
     assert "  Slow: as in the scenario (below 40 km/h throughout)" in lines
     assert "  warning: mind this" in lines

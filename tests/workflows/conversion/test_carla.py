@@ -127,7 +127,7 @@ def test_a_conversion_is_left_handed_too_and_keeps_the_town(tmp_path: Path, maps
     assert len(vertices) > 10
     assert min(vertices) > 10.0
     again = play_scenario(out / "carla.xosc", roads=maps).motion.entities[0]
-    wanted = conversion.enriched.entities[0].trajectory
+    wanted = conversion.movement.entities[0].trajectory
     n = min(len(again.y), len(wanted.y))
     assert abs(again.y[:n] - wanted.y[:n]).max() < 0.05
     assert again.y[:n].max() < -10.0

@@ -52,19 +52,19 @@ def test_who_leaves_the_lane_is_told_with_the_worst_moment_and_how_far(
 
 def test_who_stays_within_the_marking_has_left_nothing(network: RoadNetwork) -> None:
     motion = drive(network, entity())
-    assert lane_departures(result(network, motion, (HALF - 1e-6) * BUMP), network) == []
+    assert not list(lane_departures(result(network, motion, (HALF - 1e-6) * BUMP), network))
 
 
 def test_nominal_and_added_offset_count_together(network: RoadNetwork) -> None:
     motion = drive(network, entity(), offset=1.0)
-    assert len(lane_departures(result(network, motion, (HALF - 0.9) * BUMP), network)) == 1
-    assert lane_departures(result(network, motion, -(HALF + 0.9) * BUMP), network) == []
+    assert len(list(lane_departures(result(network, motion, (HALF - 0.9) * BUMP), network))) == 1
+    assert not list(lane_departures(result(network, motion, -(HALF + 0.9) * BUMP), network))
 
 
 def test_what_the_scenario_does_itself_is_no_departure(network: RoadNetwork) -> None:
     """The nominal reference point is outside already."""
     motion = drive(network, entity(), offset=HALF + 0.2)
-    assert lane_departures(result(network, motion, 0.4 * BUMP), network) == []
+    assert not list(lane_departures(result(network, motion, 0.4 * BUMP), network))
 
 
 def lateral(rows: slice) -> np.ndarray:
@@ -84,7 +84,7 @@ def test_lane_changes_cross_markings_anyway(network: RoadNetwork) -> None:
     lanes = motion.lane.copy()
     lanes[300:] = -1
     changing = replace(motion, lane=lanes)
-    assert lane_departures(result(network, changing, (HALF + 0.3) * BUMP), network) == []
+    assert not list(lane_departures(result(network, changing, (HALF + 0.3) * BUMP), network))
 
 
 # ---- gaps ------------------------------------------------------------------------------------------------------------

@@ -14,9 +14,9 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main
 from xosc_lateral.files.profiles import write_profile
 from xosc_lateral.files.templates import TEMPLATES, find_template
+from xosc_lateral.workflows.conversion.conversion import Conversion
 from xosc_lateral.workflows.conversion.convert import convert_scenario
 from xosc_lateral.workflows.conversion.load import play_scenario
-from xosc_lateral.workflows.conversion.result import ConvertedScenario
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
 from xosc_lateral.world.motion.nominal import Activity
 
@@ -34,7 +34,7 @@ def _template(folder: Path, name: str, **settings: str) -> Path:
     return folder / f"{name}.xosc"
 
 
-def _convert(folder: Path, name: str, profile: str, **settings: str) -> ConvertedScenario:
+def _convert(folder: Path, name: str, profile: str, **settings: str) -> Conversion:
     source = _template(folder, name, **settings)
     return convert_scenario(source, folder / "out.xosc", ConvertSettings(profile=profile, seed=7, ego=frozenset()))
 
@@ -46,8 +46,8 @@ def test_the_output_played_again_is_where_it_was_written_to_5_cm(
 ) -> None:
     conversion = _convert(tmp_path, name, profile, traffic=traffic)
     again = {entity.name: entity for entity in play_scenario(conversion.output).motion.entities}
-    assert any(entity.is_enriched for entity in conversion.enriched.entities)
-    for entity in conversion.enriched.entities:
+    assert any(entity.is_enriched for entity in conversion.movement.entities)
+    for entity in conversion.movement.entities:
         path, replay = entity.trajectory, again[entity.name]
         assert replay.time[-1] == pytest.approx(path.time[-1], abs=0.03)
         n = min(len(path.time), len(replay.time))
@@ -58,13 +58,13 @@ def test_the_output_played_again_is_where_it_was_written_to_5_cm(
 
 def test_same_inputs_and_seed_give_the_same_bytes_and_another_seed_does_not(tmp_path: Path, profile: str) -> None:
     source = _template(tmp_path, "cut-in")
-    first = convert_scenario(source, tmp_path / "out.xosc", ConvertSettings(profile=profile, seed=1)).output_sha256
-    again = convert_scenario(source, tmp_path / "out.xosc", ConvertSettings(profile=profile, seed=1)).output_sha256
-    other = convert_scenario(source, tmp_path / "out.xosc", ConvertSettings(profile=profile, seed=2)).output_sha256
+    first = convert_scenario(source, tmp_path / "out.xosc", ConvertSettings(profile=profile, seed=1)).sha256
+    again = convert_scenario(source, tmp_path / "out.xosc", ConvertSettings(profile=profile, seed=1)).sha256
+    other = convert_scenario(source, tmp_path / "out.xosc", ConvertSettings(profile=profile, seed=2)).sha256
     variant = convert_scenario(source, tmp_path / "out.xosc", ConvertSettings(profile=profile, seed=1), variant=1)
     assert first == again
-    assert len({first, other, variant.output_sha256}) == 3
-    assert variant.output_sha256 == hashlib.sha256((tmp_path / "out.xosc").read_bytes()).hexdigest()
+    assert len({first, other, variant.sha256}) == 3
+    assert variant.sha256 == hashlib.sha256((tmp_path / "out.xosc").read_bytes()).hexdigest()
 
 
 def test_a_converted_file_is_not_converted_again(tmp_path: Path, profile: str) -> None:
@@ -79,7 +79,7 @@ def test_entities_are_chosen_and_driven_as_the_user_says(tmp_path: Path, profile
     names = [entity.name for entity in play_scenario(source).scenario.entities]
     settings = ConvertSettings(entity={names[0]: profile}, only=frozenset({names[0]}), ego=frozenset())
     conversion = convert_scenario(source, tmp_path / "out.xosc", settings)
-    enriched = {entity.name: entity.is_enriched for entity in conversion.enriched.entities}
+    enriched = {entity.name: entity.is_enriched for entity in conversion.movement.entities}
     assert enriched == {name: name == names[0] for name in names}
     with pytest.raises(FormatError, match="no such entity"):
         convert_scenario(source, tmp_path / "out.xosc", ConvertSettings(profile=profile, only=frozenset({"nobody"})))

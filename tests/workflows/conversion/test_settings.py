@@ -17,7 +17,7 @@ from xosc_lateral.files.openscenario.write.target import Player
 from xosc_lateral.workflows.conversion.options import options_of
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.conversion.settings import OPTIONS, ConvertKeywords, ConvertSettings, OutputMode
-from xosc_lateral.workflows.recordings.reconstruct import ReconstructKeywords, ReconstructSettings
+from xosc_lateral.workflows.recordings.settings import ReconstructKeywords, ReconstructSettings
 
 
 def test_python_the_command_line_and_the_configuration_have_the_same_options() -> None:

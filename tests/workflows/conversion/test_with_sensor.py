@@ -14,10 +14,10 @@ from xosc_lateral.base.shipped import shipped_folder
 from xosc_lateral.cli import main
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampled_offsets import known_sensor, sensor_error
-from xosc_lateral.drivers.model.sensor.model import SensorModel
+from xosc_lateral.drivers.model.sensor import SensorModel
 from xosc_lateral.files.openscenario.provenance import MARK
 from xosc_lateral.files.profiles import read_profile, write_profile
-from xosc_lateral.workflows.conversion.call import convert
+from xosc_lateral.workflows.conversion.convert import convert
 
 NOISE = SensorModel(white=0.01)
 """0.12 m rms below 1.5 Hz."""
@@ -36,7 +36,7 @@ def profile() -> DriverProfile:
 
 
 def _offsets(made: object) -> dict[str, np.ndarray]:
-    entities = made._made.enriched.entities  # type: ignore[attr-defined]
+    entities = made.movement.entities  # type: ignore[attr-defined]
     return {one.name: np.concatenate([segment.offset for segment in one.segments]) for one in entities}
 
 

@@ -51,7 +51,7 @@ def at_end() -> str:
 def converted(path: Path, **options: str) -> tuple[EntityResult, EntityResult]:
     """Of A, with the way as written and lifelike."""
     pair = [xl.convert(path, seed=2, lane_changes=name, **options) for name in ("written", "lifelike")]
-    written, lifelike = (made._made.enriched.entity("A") for made in pair)
+    written, lifelike = (made.movement.entity("A") for made in pair)
     return written, lifelike
 
 
@@ -126,10 +126,10 @@ def test_the_choice_is_recorded_and_made_again(tmp_path: Path) -> None:
 
 def test_the_report_draws_lane_changes_before_and_after(tmp_path: Path) -> None:
     made = xl.convert(scenario(tmp_path), seed=2, lane_changes="lifelike")
-    page = conversion_page(made._made)
+    page = conversion_page(made)
     assert "Speed towards the new lane" in page
-    entity_result = made._made.enriched.entity("A")
-    figure = lane_changes_over_time(made._made.enriched, [(entity_result, entity_result.crossings[0])])
+    entity_result = made.movement.entity("A")
+    figure = lane_changes_over_time(made.movement, [(entity_result, entity_result.crossings[0])])
     written, enriched = (np.asarray(mark.y) for mark in figure.panels[0].curves())
     assert written.max() == pytest.approx(0.5 * np.pi * WIDTH / 5.0, abs=0.02) and written.min() > -0.01
     assert 0.7 * written.max() < enriched.max() < 1.5 * written.max()

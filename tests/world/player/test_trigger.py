@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+import numpy as np
 import pytest
 
-from xosc_lateral.world.player.trigger import RunningCondition, RunningTrigger
+from xosc_lateral.world.player.trigger import RunningCondition, RunningTrigger, Watch
 from xosc_lateral.world.scenario.enums import ConditionEdge
 
 NONE, RISING, FALLING, EITHER = (
@@ -115,3 +116,46 @@ def test_a_reset_forgets_what_was_delayed() -> None:
     trigger.evaluate(0.0)
     trigger.reset()
     assert [trigger.evaluate(t) for t in (1.0, 2.0, 3.0)] == [False, False, False]
+
+
+class Told(Watch):
+    """A watch that is told of changes, and counts how often it is looked at."""
+
+    def __init__(self) -> None:
+        self.value, self.looks = False, 0
+
+    def tell(self, value: bool) -> None:
+        self.value, self.is_settled = value, False
+        if self.wake is not None:
+            self.wake()
+
+    def __call__(self) -> bool:
+        self.looks += 1
+        self.is_settled = True
+        return self.value
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_trigger_that_rests_fires_when_one_that_is_always_looked_at_does(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    delays = rng.choice([0.0, 0.3, 1.0], size=(2, 2))
+    pairs = [[[Told() for _ in range(2)] for _ in range(2)] for _ in range(2)]
+    resting, looking = (
+        RunningTrigger(
+            tuple(
+                tuple(RunningCondition(w, NONE, d, w) for w, d in zip(group, row, strict=True))
+                for group, row in zip(watches, delays.tolist(), strict=True)
+            ),
+            when_empty=True,
+        )
+        for watches in pairs
+    )
+    looking._may_rest = False
+    for frame in range(400):
+        for row, column in np.argwhere(rng.random((2, 2)) < 0.03).tolist():
+            value = bool(rng.random() < 0.2)
+            for watches in pairs:
+                watches[row][column].tell(value)
+        assert resting.evaluate(0.1 * frame) == looking.evaluate(0.1 * frame)
+    counts = [sum(watch.looks for group in watches for watch in group) for watches in pairs]
+    assert counts[0] < 0.9 * counts[1]

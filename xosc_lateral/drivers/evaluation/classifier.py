@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.drives.periodogram import tapered_powers, without_line
+from xosc_lateral.drivers.drives.filters import tapered_powers, without_line
 from xosc_lateral.drivers.evaluation.metrics import DIFFERENCE_SCALE, snippet_metrics
 from xosc_lateral.drivers.evaluation.shape import shape_features, turns
 from xosc_lateral.drivers.evaluation.snippets import Snippets
@@ -43,11 +43,7 @@ class TwoSampleResult:
 
 
 def snippet_features(snippets: FloatArray, *, fast: bool = False) -> FloatArray:
-    """Everything that gives a model away: values, differences, log spectrum, ten metrics, roughness, memory, shape.
-
-    `snippets`, shape (n, m) [m]; `fast`: also what second and third differences and an even spectrum show: fast
-    movement, with its sensor, as recorded. Returns shape (n, k).
-    """
+    """Everything that gives a model away, shape (n, k); `fast`: also what second and third differences show."""
     difference = np.diff(snippets, axis=1)
     every = max(1, snippets.shape[1] // VALUES)
     thin = snippets[:, ::every]
@@ -72,14 +68,14 @@ def snippet_features(snippets: FloatArray, *, fast: bool = False) -> FloatArray:
 
 def _fast_features(difference: FloatArray) -> FloatArray:
     """Size, largest, tails and turns of second and third differences. [log m], [log m], [-], [-] Shape (n, 8)."""
-    found = []
+    columns = []
     for order in (1, 2):
         values = np.diff(difference, order, axis=1)
         square = (values**2).mean(axis=1)
         tails = (values**4).mean(axis=1) / np.maximum(square**2, 1e-36)
         largest = np.abs(values).max(axis=1)
-        found += [np.log(np.sqrt(square) + 1e-9), np.log(largest + 1e-9), tails, turns(values)]
-    return np.column_stack(found)
+        columns += [np.log(np.sqrt(square) + 1e-9), np.log(largest + 1e-9), tails, turns(values)]
+    return np.column_stack(columns)
 
 
 def _log_power(power: FloatArray, edges: FloatArray) -> FloatArray:
@@ -89,30 +85,20 @@ def _log_power(power: FloatArray, edges: FloatArray) -> FloatArray:
 
 
 def context_features(snippets: Snippets, paths: FloatArray) -> FloatArray:
-    """What was around each snippet, and how a path moves with it.
+    """What was around each snippet, and how a path, shape (n, m) [m], moves with it, shape (n, 3 * columns).
 
-    Parameters
-    ----------
-    snippets : Snippets
-        Of measured driving.
-    paths : array, shape (n, m)
-        Measured or sampled under that context. [m]
-
-    Returns
-    -------
-    array, shape (n, 3 * columns)
-        Mean and standard deviation of every context column, and its correlation with the path. Where there is none: -2
-        for a correlation, one less than the least for the others, so that a tree can part it from the rest.
+    Mean and standard deviation of every context column, and its correlation with the path; where there is none -2 for a
+    correlation, one less than the least for the others, so that a tree can part it from the rest.
     """
     names = sorted({name for one in snippets.items for name in one.run.context})
     empty = np.full(paths.shape[1], np.nan)
-    found = []
+    columns = []
     for name in names:
         values = np.array(
             [one.run.context[name][one.rows] if name in one.run.context else empty for one in snippets.items]
         )
-        found += _beside(values, paths)
-    return np.column_stack(found) if found else np.empty((len(paths), 0))
+        columns += _beside(values, paths)
+    return np.column_stack(columns) if columns else np.empty((len(paths), 0))
 
 
 def _beside(values: FloatArray, paths: FloatArray) -> list[FloatArray]:
@@ -144,20 +130,9 @@ def classifier_two_sample_test(
 ) -> TwoSampleResult | None:
     """Train a gradient-boosted classifier to separate two sets of snippets, and judge it on drives it has not seen.
 
-    Parameters
-    ----------
-    real, other : array, shape (n, m) and (k, m)
-    groups_real, groups_other : array, shape (n,) and (k,)
-        Drives: no drive is both learnt from and judged.
-    context : two arrays, shape (n, c) and (k, c), optional
-        Features of the context of either: then context and movement are judged jointly.
-    fast : bool
-        Look at fast movement closely, see `snippet_features`.
-
-    Returns
-    -------
-    Separation or None
-        None without scikit-learn (extra `classifier`) or with fewer than five drives.
+    `real` and `other` of shape (n, m) and (k, m), `groups_...` of shape (n,) and (k,): their drives; `context`:
+    features of the context of either, then context and movement are judged jointly. None without scikit-learn (extra
+    `classifier`) or with fewer than five drives.
     """
     try:
         from sklearn.ensemble import HistGradientBoostingClassifier
@@ -200,10 +175,7 @@ def _judged(score: FloatArray, label: NDArray[np.bool_], groups: NDArray[np.gene
 
 
 def area_under_roc(score: FloatArray, label: NDArray[np.bool_], weight: FloatArray) -> float:
-    """Probability that a weighted draw of the labelled scores above one of the others; equal scores count half. [-]
-
-    All of shape (n,).
-    """
+    """Probability that a weighted draw of the labelled scores above one of the others; equal ones count half."""
     values, place = np.unique(score, return_inverse=True)
     yes = np.bincount(place, weight * label, minlength=len(values))
     no = np.bincount(place, weight * ~label, minlength=len(values))

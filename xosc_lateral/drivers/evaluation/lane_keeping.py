@@ -11,7 +11,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.drives.cuts import HALF_WIDTH
-from xosc_lateral.drivers.model.jit_kernel import prepare
+from xosc_lateral.drivers.model.linear_filters import prepare
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import sample_offsets
 from xosc_lateral.drivers.model.seeds import child
@@ -29,10 +29,7 @@ class Margins:
 
 
 def margins(offsets: Sequence[FloatArray], lane_widths: Sequence[FloatArray], step: float) -> Margins:
-    """Time near a marking and rate of excursions over several runs (offset and lane width [m] at an even step [s]).
-
-    Shape (n_i,) each.
-    """
+    """Time near a marking and rate of excursions over runs, shape (n_i,) each [m], at an even step [s]."""
     near = [np.abs(x) > 0.5 * w - NEAR_MARKING for x, w in zip(offsets, lane_widths, strict=True)]
     rows = sum(len(one) for one in near)
     entries = sum(int((one[1:] & ~one[:-1]).sum()) for one in near)
@@ -51,8 +48,8 @@ def time_to_line_crossing(
 ) -> FloatArray:
     """Time until the side that the vehicle moves towards reaches its marking, at constant lateral speed.
 
-    `offset` and `lane_width`, shape (..., m). [m] Returns shape (..., m - 1): 0 where the side is beyond the marking
-    already, at most `LONGEST_TLC`. [s]
+    0 where the side is beyond the marking already, at most `LONGEST_TLC`, shape (..., m - 1); from `offset` and
+    `lane_width`, shape (..., m).
     """
     speed = np.diff(offset, axis=-1) / step
     towards = np.sign(speed) * offset[..., 1:]
@@ -81,23 +78,11 @@ WANDERING_ZONE = 0.375
 def lane_keeping_indicators(
     offset: FloatArray, lane_width: FloatArray, step: float, *, half_width: float = HALF_WIDTH
 ) -> FloatArray:
-    """Indicators of each window.
+    """Indicators of each window, shape (n, 7), from `offset` and `lane_width`, shape (n, m >= 4) [m].
 
-    Parameters
-    ----------
-    offset, lane_width : array, shape (n, m)
-        One window a row, m >= 4. [m]
-    step : float
-        [s]
-    half_width : float
-        Of the vehicles. [m]
-
-    Returns
-    -------
-    array, shape (n, 7)
-        Columns as in `INDICATORS`, units as in `UNITS`: standard deviation of lateral position [1]_; smallest and
-        median time to line crossing [2]_; shares of time beyond the wandering zone of UN R157 [3]_ and near a marking;
-        root mean square of lateral acceleration and jerk, from differences of the offset (no steering in them).
+    Columns as in `INDICATORS`, units as in `UNITS`: standard deviation of lateral position [1]_; smallest and median
+    time to line crossing [2]_; shares of time beyond the wandering zone of UN R157 [3]_ and near a marking; root mean
+    square of lateral acceleration and jerk, from differences of the offset.
 
     References
     ----------
@@ -138,9 +123,8 @@ class LaneKeeping:
 
     References
     ----------
-    .. [4] J. C. Verster, T. Roth, "Standard operation procedures for conducting the on-the-road driving test, and
-       measurement of the standard deviation of lateral position (SDLP)", International J. of General Medicine 4, 2011,
-       pp. 359-371, doi:10.2147/IJGM.S19639.
+    .. [4] J. C. Verster, T. Roth, "Standard operation procedures for conducting the on-the-road driving test",
+       International J. of General Medicine 4, 2011, doi:10.2147/IJGM.S19639.
     .. [5] "Validating lane drifts as a predictive measure of drug or sleepiness induced driving impairment",
        Psychopharmacology, 2020: deviations of more than 100 cm from the mean for 8 s.
     """
@@ -197,9 +181,11 @@ def summarise(drives: FloatArray, step: float) -> MovementSummary:
     )
 
 
-def figures_of(profile: DriverProfile, seed: int = 0) -> tuple[MovementSummary, LaneKeeping]:
+def figures_of(
+    profile: DriverProfile, seed: int = 0, drives: FloatArray | None = None
+) -> tuple[MovementSummary, LaneKeeping]:
     """The figures by which a profile is known everywhere, of one set of sampled drives in even traffic."""
-    drives, step = highway_drives(profile, seed), profile.model.step
+    drives, step = highway_drives(profile, seed) if drives is None else drives, profile.model.step
     known = profile.provenance
     recorded = None
     if known.hours > 0.0 and known.drives and "derived_from" not in known.fit:
@@ -227,9 +213,8 @@ def lane_keeping(
 ) -> LaneKeeping:
     """Measure drives, shape (drives, n) [m], in a lane of a width [m], with rows `step` seconds apart.
 
-    The errors say how far the figures of as much recorded driving would differ if it were driven again: so many seconds
-    of so many drives. They come from how stretches of that length differ from drive to drive; without `recorded`
-    there are none.
+    The errors say how far the figures of as much recorded driving (seconds, drives) would differ if it were driven
+    again: as far as stretches of that length differ from drive to drive. Without `recorded` there are none.
     """
     half_width = HALF_WIDTH if half_width is None else half_width
     within = drives - drives.mean(axis=1, keepdims=True)

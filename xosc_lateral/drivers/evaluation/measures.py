@@ -1,14 +1,8 @@
 """What is compared in a set of windows, computed once and then for any choice of rows.
 
-A sampled window that starts where its real one starts knows something that a random real window does not: comparing
-both with the real windows would let every model with a good start look better than real driving. So such windows stand
+A sampled window that starts where its real one starts knows something that a random real window does not. So it stands
 beside real windows of *other* drivers whose start is the same, and windows that know no start beside any windows of
-other drivers.
-
-References
-----------
-.. [1] A. Ramdas, N. García Trillos, M. Cuturi, "On Wasserstein two-sample testing and related families of
-       nonparametric tests", Entropy 19, 2017.
+other drivers (A. Ramdas, N. García Trillos, M. Cuturi, "On Wasserstein two-sample testing", Entropy 19, 2017).
 """
 
 from __future__ import annotations
@@ -22,10 +16,9 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.drivers.drives.periodogram import tapered_powers, without_line
-from xosc_lateral.drivers.evaluation.distances import column_distances
+from xosc_lateral.drivers.drives.filters import tapered_powers, without_line
 from xosc_lateral.drivers.evaluation.lane_keeping import INDICATORS, lane_keeping_indicators
-from xosc_lateral.drivers.evaluation.metrics import METRICS, snippet_metrics
+from xosc_lateral.drivers.evaluation.metrics import METRICS, column_distances, snippet_metrics
 
 LAGS = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0)  # Of the autocorrelation; those that fit into half a window are used. [s]
 BANDS = np.geomspace(0.03, 1.0, 13)  # Edges of the spectrum's bands, eight a decade. [Hz]
@@ -92,30 +85,25 @@ UNITS = {"metrics": "sd", "lane_keeping": "sd", "spectrum": "dB", "memory": "-"}
 
 
 def differences(real: Features, other: Features, rows: IntArray, other_rows: IntArray) -> dict[str, float]:
-    """How far apart two sets of windows are, by family.
+    """How far apart two sets of windows are, by family; `rows`: windows that count, and how often.
 
-    `rows` and `other_rows`: windows that count, and how often (a bootstrap repeats them).
-
-    Returns
-    -------
-    dict
-        `metrics`, `lane_keeping`: mean Wasserstein distance in standard deviations of the real ones [sd]; `spectrum`:
-        rms difference over the bands [dB]; `memory`: rms difference of the autocorrelation [-].
+    `metrics`, `lane_keeping`: mean Wasserstein distance in standard deviations of the real ones [sd]; `spectrum`: rms
+    difference over the bands [dB]; `memory`: rms difference of the autocorrelation [-].
     """
-    found = {
+    families = {
         "metrics": float(np.mean(column_distances(real.metrics[rows], other.metrics[other_rows]))),
         "lane_keeping": float(np.mean(column_distances(real.indicators[rows], other.indicators[other_rows]))),
     }
     if not real.power.shape[1]:  # too short for any band
-        return found | _memory_difference(real, other, rows, other_rows)
+        return families | _memory_difference(real, other, rows, other_rows)
     level, beside = real.power[rows].mean(axis=0) + MINIMUM_POWER, other.power[other_rows].mean(axis=0) + MINIMUM_POWER
-    found["spectrum"] = float(np.sqrt(np.mean((10.0 * np.log10(beside / level)) ** 2)))
-    return found | _memory_difference(real, other, rows, other_rows)
+    families["spectrum"] = float(np.sqrt(np.mean((10.0 * np.log10(beside / level)) ** 2)))
+    return families | _memory_difference(real, other, rows, other_rows)
 
 
 def _memory_difference(real: Features, other: Features, rows: IntArray, other_rows: IntArray) -> dict[str, float]:
-    own, others = autocorrelation_of(real, rows), autocorrelation_of(other, other_rows)
-    return {"memory": float(np.sqrt(np.mean((own - others) ** 2)))}
+    reference, others = autocorrelation_of(real, rows), autocorrelation_of(other, other_rows)
+    return {"memory": float(np.sqrt(np.mean((reference - others) ** 2)))}
 
 
 def autocorrelation_of(features: Features, rows: IntArray) -> FloatArray:
@@ -154,27 +142,10 @@ def windows_with_the_same_start(
     count: int = 1,
     nearest: int = NEIGHBOUR_COUNT,
 ) -> IntArray:
-    """For each window `count` others by other drivers that start at nearly the same offset.
+    """For each window `count` others by other drivers that start at nearly the same offset: rows, shape (n, count).
 
-    Raises `NotEnoughDataError` when other drivers have fewer than `count` windows.
-
-    Parameters
-    ----------
-    starts : array, shape (n,)
-        First offset of each real window. [m]
-    drivers : array, shape (n,)
-        Whose it is: a driver's own windows are never taken.
-    donor_starts, donor_drivers : array, shape (k,)
-        Of the windows to choose from. [m]
-    count : int
-        Different windows for each, at most `nearest`.
-    nearest : int
-        Pool to draw from.
-
-    Returns
-    -------
-    array of int, shape (n, count)
-        Rows of the donors. The donor should then be shifted by the few millimetres that its start differs, or not.
+    Drawn among the `nearest`; a driver's own windows are never taken. Raises `NotEnoughDataError` when other drivers
+    have fewer than `count` windows.
     """
     chosen = np.empty((len(starts), count), dtype=np.int64)
     for row, (start, driver) in enumerate(zip(starts.tolist(), drivers.tolist(), strict=True)):
@@ -190,11 +161,7 @@ def windows_with_the_same_start(
 def real_against_real(
     real: Features, donors: Features, rows: IntArray, donor_rows: IntArray, stand_ins: IntArray | None
 ) -> dict[str, float]:
-    """`differences` of real windows of other drivers.
-
-    `rows` and `donor_rows`, shape (n,) and (k,): windows that count; `stand_ins`, shape (n, draws), optional: rows of
-    the donors with the same starts, averaged over the draws; without, all of `donor_rows` at once.
-    """
+    """`differences` of real windows of other drivers; `stand_ins`, shape (n, draws): donors with the same starts."""
     if stand_ins is None:
         return differences(real, donors, rows, donor_rows)
     draws = [differences(real, donors, rows, stand_ins[:, draw]) for draw in range(stand_ins.shape[1])]

@@ -1,8 +1,7 @@
 """How true a profile is to measured drives: distances, the paper's four evaluations, and beyond.
 
-The paper (arXiv:2405.17080, section IV) compares ten metrics of 10 s snippets in four evaluations. Before them comes
-the fair measure (`realism`), and beside them what the paper does not look at: spectrum, autocorrelation, the lane's
-margins.
+The paper (arXiv:2405.17080, section IV) compares ten metrics of 10 s snippets in four evaluations; before them comes
+the fair measure (`realism`), beside them spectrum, autocorrelation and the lane's margins.
 """
 
 from __future__ import annotations
@@ -16,26 +15,36 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.drives.drive import Run
-from xosc_lateral.drivers.evaluation.distances import Distances, mean_distances, metric_distances, split_groups
-from xosc_lateral.drivers.evaluation.filters import (
-    STOP_FREQUENCY,
-    comparison_band,
-    dithered,
-    resolution_of,
-    slow_movement,
-)
 from xosc_lateral.drivers.evaluation.lane_keeping import Margins, margins
-from xosc_lateral.drivers.evaluation.metrics import METRICS, snippet_metrics
-from xosc_lateral.drivers.evaluation.parts import PartEvaluation, SnippetCondition, evaluate_parts
+from xosc_lateral.drivers.evaluation.metrics import (
+    METRICS,
+    Distances,
+    mean_distances,
+    metric_distances,
+    snippet_metrics,
+    split_groups,
+)
 from xosc_lateral.drivers.evaluation.realism import Realism, score_realism
 from xosc_lateral.drivers.evaluation.snippets import (
+    PartEvaluation,
+    SnippetCondition,
     Snippets,
+    evaluate_parts,
     sample_runs,
     sample_snippets,
     sensor_noise,
     snippets_of,
 )
-from xosc_lateral.drivers.evaluation.spectra import Spectrum, autocorrelation, spectrum
+from xosc_lateral.drivers.evaluation.spectra import (
+    STOP_FREQUENCY,
+    Spectrum,
+    autocorrelation,
+    comparison_band,
+    dithered,
+    resolution_of,
+    slow_movement,
+    spectrum,
+)
 from xosc_lateral.drivers.evaluation.verdict import Verdict, verdict_of
 from xosc_lateral.drivers.model.profile import DriverProfile
 
@@ -68,13 +77,10 @@ class SnippetScores:
 def score_snippets(
     real: FloatArray, sampled: FloatArray, group: NDArray[np.str_], *, seed: int, seconds: float = SNIPPET
 ) -> SnippetScores:
-    """Distances of sampled snippets, and between measured ones, over random halves of the groups.
+    """Distances of sampled snippets, and between measured ones, shape (n, m) each, over random halves of the groups.
 
     A half of real snippets is compared with its own sampled ones, and with the other real half: both distances rest on
-    as many snippets, so that their ratio is fair.
-
-    `real` and `sampled`, shape (n, m): row k of both starts at the same offset under the same context. [m]; `group`,
-    shape (n,): never split between halves.
+    as many snippets. Row k of both starts at the same offset under the same context.
     """
     rng = np.random.default_rng(seed)
     metrics, artificial = snippet_metrics(real), snippet_metrics(sampled)
@@ -134,10 +140,7 @@ class ProfileScores:
 
     @property
     def classifier_auc(self) -> float | None:
-        """Area under the ROC curve between real and sampled snippets of 10 s with the same start; None: not trained.
-
-        [-]
-        """
+        """Area under the ROC curve of snippets of 10 s with the same start; None: not trained. [-]"""
         shared = self.realism.of(SnippetCondition(SNIPPET, True))
         return None if shared is None or shared.alone is None else shared.alone.auc
 
@@ -151,12 +154,9 @@ class ProfileScores:
 
 
 def score_profile(profile: DriverProfile, runs: Sequence[Run], *, seed: int, classify: bool = True) -> ProfileScores:
-    """Evaluate a profile on measured runs.
+    """Evaluate a profile on measured runs at its step.
 
-    Raises `NotEnoughDataError` with fewer than `MIN_SNIPPETS` snippets of 10 s.
-
-    `runs`: at the profile's step; `classify`: whether to train the classifiers (a minute or two for some hours of
-    driving).
+    Raises `NotEnoughDataError` with fewer than `MIN_SNIPPETS` snippets of 10 s. `classify`: train the classifiers too.
     """
     step, below = profile.model.step, comparison_band(runs)
     short = _has_enough_snippets(snippets_of(runs, SNIPPET, step))

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.drives.periodogram import tapered_powers
+from xosc_lateral.drivers.drives.filters import tapered_powers
 
 # Columns of `shape_features`; most are features of catch22.
 SHAPES = (
@@ -34,26 +34,14 @@ EXTREME_QUANTILE = 1.0  # Beyond it a value counts as extreme, in standard devia
 
 
 def shape_features(snippets: FloatArray) -> FloatArray:
-    """Shape of each snippet, mean and standard deviation taken out.
+    """Shape of each snippet, shape (n, m >= 8), mean and standard deviation taken out; columns as in `SHAPES`. [-]
 
-    Parameters
-    ----------
-    snippets : array, shape (n, m)
-        One a row, evenly in time, m >= 8. [any unit]
-
-    Returns
-    -------
-    array, shape (n, 17)
-        Columns as in `SHAPES`: centre of the fullest of 5 and of 10 bins; longest stretch above the mean, and of
-        falling values; lag at which the autocorrelation falls below 1/e, and of its first minimum; mean cube of
-        changes; share of changes beyond 0.04; centre of the power over frequency, and share in the lowest fifth;
-        median place of values above 1 and below -1; entropy of three-letter words; error of the mean of the last
-        three as a forecast; kurtosis of values and of changes; share of changes that turn round. [-]
-
-    References
-    ----------
-    .. [1] C. H. Lubba et al., "catch22: CAnonical Time-series CHaracteristics", Data Mining and Knowledge Discovery 33,
-       2019. Written from the descriptions there, for all rows at once; numbers differ from the reference code's.
+    Centre of the fullest of 5 and of 10 bins; longest stretch above the mean, and of falling values; lag at which the
+    autocorrelation falls below 1/e, and of its first minimum; mean cube of changes; share of changes beyond 0.04;
+    centre of the power over frequency, and share in the lowest fifth; median place of values above 1 and below -1;
+    entropy of three-letter words; error of the mean of the last three as a forecast; kurtosis of values and of changes;
+    share of changes that turn round. After C. H. Lubba et al., "catch22: CAnonical Time-series CHaracteristics", Data
+    Mining and Knowledge Discovery 33, 2019, for all rows at once; numbers differ from the reference code's.
     """
     x = np.asarray(snippets, dtype=np.float64)
     spread = x.std(axis=1, keepdims=True)

@@ -1,9 +1,13 @@
-"""What the ten metrics don't see: spectrum, autocorrelation, time near a marking, excursions.
+"""What the ten metrics don't see: spectrum, autocorrelation, and movement below a frequency alone.
+
+Below 0.5 Hz, or what a recording is valid to, nothing faster is left to see. A logarithm of power sees a tenth of a
+millimetre as well as a metre, so that a filter which is still closing there shows a classifier what lies above.
 
 References
 ----------
 P. D. Welch, "The use of fast Fourier transform for the estimation of power spectra", IEEE Trans. Audio and
-Electroacoustics 15, 1967, pp. 70-73.
+Electroacoustics 15, 1967, pp. 70-73. J. F. Kaiser, "Nonrecursive digital filter design using the I0-sinh window
+function", Proc. IEEE ISCAS 1974.
 """
 
 from __future__ import annotations
@@ -16,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
-from xosc_lateral.drivers.drives.periodogram import tapered_powers
+from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.drives.filters import filtered, low_pass_between, tapered_powers
 
 MANY_SEGMENTS = 8  # With so many segments without a gap, spectra are taken from these only.
 
@@ -24,24 +29,10 @@ MANY_SEGMENTS = 8  # With so many segments without a gap, spectra are taken from
 def gapped_spectrum(
     series: FloatArray, valid: BoolArray, seams: NDArray[np.intp], step: float, segment: int
 ) -> tuple[FloatArray, FloatArray, int]:
-    """Power density by Welch's method of series with gaps, over segments that are mostly valid and lie in one part.
+    """Frequency [Hz] and power density [m2/Hz] by Welch's method of series with gaps, and the number of segments.
 
-    Parameters
-    ----------
-    series : array, shape (runs, n)
-        Gaps are filled with the mean. [m]
-    valid : bool array, shape (n,)
-    seams : int array, shape (n,)
-        Number of the part that a row belongs to: runs are put together from parts, with a jump between them.
-    step : float
-        [s]
-    segment : int
-        Samples.
-
-    Returns
-    -------
-    frequency : array [Hz], density : array [m^2/Hz], number of segments : int
-        Without frequency 0; the density is NaN if no segment is long enough.
+    Segments of so many samples are mostly `valid` and lie in one part: runs, shape (runs, n) [m], are put together from
+    parts with a jump between them, whose numbers are `seams`. NaN if no segment is long enough.
     """
     centred = np.where(valid, series - series[:, valid].mean(axis=1, keepdims=True), 0.0)
     window = np.hanning(segment)
@@ -112,11 +103,9 @@ def _periodogram(runs: Sequence[FloatArray], length: int, step: float) -> tuple[
 
 
 def autocorrelation(runs: Sequence[FloatArray], lags: Sequence[int]) -> FloatArray:
-    """Correlation of the offset with itself some steps later, about the mean of all runs.
+    """Correlation of the offset with itself some steps later, about the mean of all runs; 0 where no run reaches.
 
     Differences between drivers count: they don't decay.
-
-    Returns shape (len(lags),): lags that no run reaches get 0.
     """
     everything = np.concatenate(list(runs))
     mean, variance = everything.mean(), everything.var()
@@ -127,3 +116,48 @@ def autocorrelation(runs: Sequence[FloatArray], lags: Sequence[int]) -> FloatArr
         if count and variance > 0.0:
             result[k] = sum(products) / count / variance
     return result
+
+
+STOP_FREQUENCY = (
+    0.5  # Where the stop band begins. Drivers steer against what they see below it; beyond it cameras show. [Hz]
+)
+PASS_FREQUENCY = 0.4  # Where the pass band ends: the filter sees 11 s to each side, a quarter of most runs. [Hz]
+# Of the stop band: noise of 1 cm becomes 0.1 mm, far less than a difference between two models. [dB]
+ATTENUATION = 40.0
+
+
+def comparison_band(runs: Sequence[Run]) -> float:
+    """Frequency below which movement is compared: half a hertz, or what the recording is valid to. [Hz]"""
+    return min([STOP_FREQUENCY, *(run.valid_below for run in runs if run.valid_below is not None)])
+
+
+def slow_movement(path: FloatArray, step: float, stop: float = STOP_FREQUENCY) -> FloatArray:
+    """A path, shape (n,) [m], without its movement above a frequency [Hz].
+
+    It is continued beyond its ends by its mirror image through the end point; where its `step` [s] shows nothing above
+    the frequency it stays as it is.
+    """
+    if len(path) < 2 or 0.5 / step <= stop:
+        return np.array(path)
+    return filtered(path, low_pass_between(PASS_FREQUENCY / STOP_FREQUENCY * stop, stop, step, ATTENUATION))
+
+
+def thinned(paths: FloatArray, step: float, stop: float = STOP_FREQUENCY) -> FloatArray:
+    """Filtered paths, shape (n, m) [m], at the rate whose half is the beginning of the stop band."""
+    return paths[:, :: max(1, round(0.5 / stop / step))]
+
+
+def dithered(paths: Sequence[FloatArray], resolution: float, seed: int) -> list[FloatArray]:
+    """Paths with even noise as wide as a recording's resolution [m]: what is finer can't be told from rounding."""
+    if resolution <= 0.0:
+        return list(paths)
+    root = np.random.SeedSequence(seed).spawn(len(paths))
+    return [
+        path + resolution * (np.random.default_rng(own).random(len(path)) - 0.5)
+        for path, own in zip(paths, root, strict=True)
+    ]
+
+
+def resolution_of(runs: Sequence[Run]) -> float:
+    """The coarsest that runs state; 0 where none does. [m]"""
+    return max((run.resolution for run in runs if run.resolution is not None), default=0.0)

@@ -62,11 +62,9 @@ def write_osi(
 ) -> Path:
     """Write a trace, ``.mcap``, or ``.osi`` (messages alone); same motion, same bytes.
 
-    Raises `FormatError`: another suffix; `XoscLateralError`: the extra `osi` is not installed; `OSError`: the file
-    can't be written; it is as it was then.
-
-    `trajectories`: one per entity, in its order, where they are not the nominal ones. `host`: entity that is the host
-    vehicle; without it the trace has none. `description`: for the metadata of the file.
+    `trajectories`: one per entity, where they are not the nominal ones. `host`: entity that is the host vehicle;
+    without it the trace has none. `description`: for the file's metadata. Raises `FormatError`, `XoscLateralError`,
+    `OSError`.
     """
     if path.suffix.lower() not in SUFFIXES:
         raise FormatError(f"an OSI trace ends in {' or '.join(SUFFIXES)}", path=path)

@@ -29,11 +29,8 @@ INK, MUTED, GRID, SHADE, PAPER = "#1b2126", "#6a737b", "#dde1e4", "#eef1f3", "#f
 MEASURED, SAMPLED = BLUE, VERMILLION
 NOMINAL, ENRICHED = MUTED, BLUE
 
-TICK_SPACING = {"x": 62.0, "y": 20.0}
-"""Between two ticks, at least. [pt]"""
-
-DASHED = "3 2"
-"""Strokes and gaps of a dashed line. [pt]"""
+TICK_SPACING = {"x": 62.0, "y": 20.0}  # Between two ticks, at least. [pt]
+DASHED = "3 2"  # Strokes and gaps of a dashed line. [pt]
 
 LONGEST_NAME = 40
 """Longer names are cut in figures, which they would leave no room for; the page's tables have them whole."""
@@ -55,12 +52,9 @@ class Axis:
 
     label: str = ""
     log: bool = False
-    limits: tuple[float, float] | None = None
-    """From the data if None; may run from high to low."""
-    holds: tuple[float, ...] = ()
-    """Values that limits from the data include at least."""
-    ticks: Sequence[tuple[float, str]] | None = None
-    """Places and names; numbers if None."""
+    limits: tuple[float, float] | None = None  # From the data if None; may run from high to low.
+    holds: tuple[float, ...] = ()  # Values that limits from the data include at least.
+    ticks: Sequence[tuple[float, str]] | None = None  # Places and names; numbers if None.
     grid: bool = True
 
     @property
@@ -85,12 +79,10 @@ class Mark:
     x: FloatArray
     y: FloatArray
     color: str
-    width: float = 1.5
-    """Of a line, diameter of a dot. [pt]"""
+    width: float = 1.5  # Of a line, diameter of a dot. [pt]
     dashes: str = ""
     opacity: float = 1.0
-    label: str = ""
-    """Shown in the legend, and when somebody points at it."""
+    label: str = ""  # Shown in the legend, and when somebody points at it.
 
 
 @dataclass(slots=True)
@@ -148,14 +140,14 @@ def ticks_of(panel: Panel, name: str, length: float) -> Ticks:
     """Where ticks stand, 0 to 1, and what is written there."""
     axis: Axis = getattr(panel, name)
     if axis.ticks is not None:
-        found = [(float(axis.share(value)), text) for value, text in axis.ticks]
+        ticks = [(float(axis.share(value)), text) for value, text in axis.ticks]
     else:
         values = (
             _log_places(*axis.ends) if axis.log else _linear_places(*axis.ends, max(2.0, length / TICK_SPACING[name]))
         )
         texts = [_power(value) for value in values.tolist()] if axis.log else _numbers(values)
-        found = list(zip(axis.share(values).tolist(), texts, strict=True))
-    return [(at, text) for at, text in found if -1e-6 <= at <= 1.0 + 1e-6]
+        ticks = list(zip(axis.share(values).tolist(), texts, strict=True))
+    return [(at, text) for at, text in ticks if -1e-6 <= at <= 1.0 + 1e-6]
 
 
 def _linear_places(first: float, last: float, count: float) -> FloatArray:

@@ -1,8 +1,6 @@
-"""Figures: panels in rows and columns, laid out and written as SVG. Same figure, same bytes.
+"""Figures: panels in rows and columns, written as SVG without a plotting package. Same figure, same bytes.
 
-Seven figures of a report take 30 ms, and no plotting package is loaded: matplotlib takes 0.3 s to import, and 0.4 s to
-lay them out and to write them. Texts are laid out by an estimate of their width, which is what a browser's own font
-leaves open anyway.
+Texts are laid out by an estimate of their width, which is what a browser's own font leaves open anyway.
 """
 
 from __future__ import annotations
@@ -48,14 +46,9 @@ FONT = "system-ui, sans-serif"
 TEXT, TITLE, LABEL, LEGEND, NUMBERS = 9.0, 17.0, 14.0, 17.0, 12.0
 """Size of texts; heights of a title, an axis' label, a row of the legend, the numbers below a panel. [pt]"""
 
-PANEL_SPACING = 9.0
-"""Free space between panels, and around them. [pt]"""
-
-PADDING = 0.04
-"""Share of an axis that is left free on either side of the data. [-]"""
-
-WIDTH = 660.0
-"""Width of a figure that fills the text column. [pt]"""
+PANEL_SPACING = 9.0  # Free space between panels, and around them. [pt]
+PADDING = 0.04  # Share of an axis that is left free on either side of the data. [-]
+WIDTH = 660.0  # Width of a figure that fills the text column. [pt]
 
 
 def text_width(text: str) -> float:
@@ -63,23 +56,19 @@ def text_width(text: str) -> float:
     return TEXT * sum(1.0 if unicodedata.east_asian_width(letter) in "WF" else 0.56 for letter in text)
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, repr=False)
 class Figure:
     """Panels in rows and columns."""
 
     rows: int = 1
     columns: int = 1
-    height: float = 150.0
-    """Of one panel without its title and labels. [pt]"""
-    width: float = WIDTH
-    """Of the whole figure. [pt]"""
+    height: float = 150.0  # Of one panel without its title and labels. [pt]
+    width: float = WIDTH  # Of the whole figure. [pt]
     share_x: Literal["", "all"] = ""
     share_y: Literal["", "all"] = ""
     """Whether all panels have the same limits; tick labels stand once then, below each column or beside each row."""
-    legend: bool = False
-    """Whether labels are explained above the panels."""
-    axes: bool = True
-    """Whether there are ticks, labels and a frame."""
+    legend: bool = False  # Whether labels are explained above the panels.
+    axes: bool = True  # Whether there are ticks, labels and a frame.
     panels: list[Panel] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -92,6 +81,9 @@ class Figure:
     def svg(self) -> str:
         """The figure as SVG document, on white."""
         return svg_of(self)
+
+    def __repr__(self) -> str:
+        return f"<Figure {'; '.join(panel.title or panel.y.label for panel in self.panels)}>"
 
     def _repr_svg_(self) -> str:
         return self.svg()
@@ -109,8 +101,8 @@ class Figure:
                 axes: list[Axis] = [getattr(panel, name) for panel in group]
                 drawn = [getattr(mark, name) for panel in group for mark in panel.marks]
                 held = [value for axis in axes for value in axis.holds]
-                given = next((axis.limits for axis in axes if axis.limits is not None), None)
-                limits = given or _limits(np.concatenate([*drawn, held]), axes[0].log)
+                fixed = next((axis.limits for axis in axes if axis.limits is not None), None)
+                limits = fixed or _limits(np.concatenate([*drawn, held]), axes[0].log)
                 for axis in axes:
                     axis.limits = axis.limits or limits
 
@@ -130,16 +122,7 @@ def _limits(values: FloatArray, log: bool) -> tuple[float, float]:
 
 # ---- layout ----
 def svg_of(figure: Figure, alt: str = "", *, themed: bool = False) -> str:
-    """The SVG element.
-
-    Parameters
-    ----------
-    figure : Figure
-    alt : str
-        What it shows, for those who can't see it.
-    themed : bool
-        Take colours and font from the page; else those of the light theme, on white.
-    """
+    """The SVG element, with words for those who can't see it; `themed`: colours and font are the page's."""
     figure.settle()
     left, right = _margins(figure)
     inner = (figure.width - sum(left) - right - (figure.columns - 1) * PANEL_SPACING) / figure.columns

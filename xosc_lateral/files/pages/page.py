@@ -20,8 +20,7 @@ from typing import Any, Literal, NamedTuple
 from xosc_lateral.base.version import __version__
 from xosc_lateral.files.pages.figure import Figure, svg_of
 
-MISSING_TEXT = "–"
-"""Shown for a value that is not there (None or NaN)."""
+MISSING_TEXT = "–"  # Shown for a value that is not there (None or NaN).
 
 
 def format_number(value: float, digits: int = 3) -> str:
@@ -60,11 +59,9 @@ Tone = Literal["", "good", "bad"]
 class KeyFigure(NamedTuple):
     """One number that a reader takes home."""
 
-    value: object
-    """Shown large, with its unit; a number alone is formatted like in tables."""
+    value: object  # Shown large, with its unit; a number alone is formatted like in tables.
     label: str
-    note: str = ""
-    """A small line below, such as what to compare the number with."""
+    note: str = ""  # A small line below, such as what to compare the number with.
     tone: Tone = ""
 
 
@@ -75,13 +72,7 @@ class Html(str):
 
 
 class Page:
-    """A page in the making.
-
-    Parameters
-    ----------
-    title : str
-        Heading and window title.
-    """
+    """A page in the making."""
 
     def __init__(self, title: str) -> None:
         self._title = title
@@ -125,18 +116,7 @@ class Page:
         self._main += [f"<ul>{points}</ul>"] if points else []
 
     def figure(self, figure: Figure, caption: str, alt: str = "", *, over_time: bool = False) -> None:
-        """Add a figure.
-
-        Parameters
-        ----------
-        figure : Figure
-        caption : str
-            What to see in it, shown below.
-        alt : str
-            The same for those who can't see it; the caption if empty.
-        over_time : bool
-            Its x axis is the scenario's time: it has a cursor at the player's time, and a click sets that.
-        """
+        """Add a figure with a caption; `alt`: for those who can't see it; `over_time`: x is the player's time."""
         self._need("plots.js")
         time = ' class="time"' if over_time else ""
         picture = svg_of(figure, alt or caption.replace("`", ""), themed=True)
@@ -151,18 +131,10 @@ class Page:
         formats: Mapping[str, str] | None = None,
         tones: Mapping[int, Tone] | None = None,
     ) -> None:
-        """Add a table, or say that there are no rows.
+        """Add a table, headed by the keys of the first row, or say that there are no rows.
 
-        Parameters
-        ----------
-        rows : sequence of mappings
-            Column headings are the keys of the first row; put units there.
-        caption : str
-            Shown above the table.
-        formats : mapping, optional
-            Format specification by column, such as ``{"p": ".1e"}``; the others get `format_number`.
-        tones : mapping, optional
-            Row number, from 0, to its background: ``good`` or ``bad``.
+        `formats`: format specification by column, such as ``{"p": ".1e"}``; `tones`: row number, from 0, to its
+        background.
         """
         if not rows:
             self._main.append(f"<p>{inline(f'{caption}: none.' if caption else 'None.')}</p>")

@@ -61,10 +61,7 @@ class PlainTemplate:
         )
 
     def files(self, chosen: Mapping[str, str] | None = None) -> dict[str, str]:
-        """File name -> text of the scenario, with the chosen values as declared ones, and of its road.
-
-        Raises `XoscLateralError` for an unknown parameter, or a value that is not of its type.
-        """
+        """File name -> text of the scenario, with the chosen values as declared ones, and of its road."""
         by_name = {parameter.name: parameter for parameter in self.parameters}
         text = self._text
         for name, value in (chosen or {}).items():

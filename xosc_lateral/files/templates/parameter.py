@@ -130,12 +130,7 @@ _TYPES: dict[str, re.Pattern[str]] = {
 
 
 class Settings:
-    """Values of a template's parameters: the defaults, and what the user set.
-
-    Raises `XoscLateralError` for an unknown name or a value out of range.
-
-    `chosen`: what the user set, as text.
-    """
+    """Values of a template's parameters: the defaults, and what the user chose, as text. Raises `XoscLateralError`."""
 
     __slots__ = ("_values",)
 

@@ -65,12 +65,7 @@ class Template:
         return self.own_parameters + COMMON_SETTINGS
 
     def files(self, chosen: Mapping[str, str] | None = None) -> dict[str, str]:
-        """File name -> text of the scenario and its road; same settings, same bytes.
-
-        Raises `XoscLateralError` for an unknown parameter or a value out of range.
-
-        `chosen`: parameters that differ from their defaults, as text.
-        """
+        """File name -> text of the scenario and its road by the `chosen` parameters; same settings, same bytes."""
         settings = Settings(self.parameters, chosen or {})
         plot = self.plot(settings)
         scenario = (shipped_folder("templates") / f"{self.name}.xosc").read_text(encoding="utf-8")
@@ -240,10 +235,7 @@ class Motorway:
             section.add_right_lane(lane)
 
     def _crossfall(self) -> list[tuple[float, float, float]]:
-        """Superelevation as (s, angle there, change per metre): down to the outer edge, in bends down to the inside.
-
-        A positive angle lowers the right side (OpenDRIVE 1.7, section 10.2).
-        """
+        """Superelevation as (s, angle, change per metre), positive to lower the right side: in bends to the inside."""
         outwards = -CROSSFALL if self.left_hand else CROSSFALL
         profile, s = {0.0: (outwards, 0.0)}, 0.0
         for part in self.alignment:

@@ -49,16 +49,12 @@ class JobState(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class JobOutcome:
-    """What became of a job.
-
-    `row`: as in the manifest; `seconds`: the conversion took. [s]; `why`: why an output that was there is made anew, or
-    would be; empty: there was none.
-    """
+    """What became of a job."""
 
     state: JobState
     row: ManifestRow
-    seconds: float
-    why: str = ""
+    seconds: float  # the conversion took
+    why: str = ""  # why an output that was there is made anew, or would be
 
 
 PROGRAM, SETTINGS, INPUTS = "another version made it", "settings differ", "inputs changed"

@@ -16,9 +16,8 @@ from xosc_lateral.files.atomic import make_own_folder, write_atomically
 from xosc_lateral.files.pages.page import Html, KeyFigure, Page, Tone
 from xosc_lateral.workflows.batch.jobs import Batch, Job, fingerprint
 from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, read_manifest
+from xosc_lateral.workflows.conversion.conversion import Conversion
 from xosc_lateral.workflows.conversion.convert import convert_scenario
-from xosc_lateral.workflows.conversion.result import ConvertedScenario
-from xosc_lateral.world.motion.gaps import Gap
 
 
 def convert_job(job: Job) -> ManifestRow:
@@ -42,9 +41,10 @@ def _refuse_changes(job: Job) -> None:
         raise FormatError("profile or context table changed during the run; run it again", path=job.source)
 
 
-def describe(job: Job, conversion: ConvertedScenario) -> ManifestRow:
+def describe(job: Job, conversion: Conversion) -> ManifestRow:
     """A conversion as a row: numbers and hashes, nothing that keeps its arrays alive."""
-    enriched, provenance = conversion.enriched, conversion.provenance
+    enriched, provenance = conversion.movement, conversion.provenance
+    before, after = (None if gap is None else _rounded(gap) for gap in conversion.smallest_gap)
     inputs = {
         Path(os.path.relpath(os.path.normpath(job.source.parent / name), job.base)).as_posix(): sha256
         for name, sha256 in sorted(provenance.inputs.items())
@@ -54,7 +54,7 @@ def describe(job: Job, conversion: ConvertedScenario) -> ManifestRow:
     return replace(
         job.row(),
         scenario_sha256=provenance.inputs.get(job.source.name, ""),
-        output_sha256=conversion.output_sha256,
+        output_sha256=conversion.sha256,
         road=road,
         road_sha256=inputs.get(road, ""),
         inputs=inputs,
@@ -65,8 +65,8 @@ def describe(job: Job, conversion: ConvertedScenario) -> ManifestRow:
         why_not={entity.name: entity.why for entity in enriched.entities if not entity.is_enriched},
         segment_seconds=_rounded(sum(entity.segment_seconds for entity in enriched.entities)),
         offset_spread=_rounded(np.std(np.concatenate(offsets))) if offsets else 0.0,
-        gap_before=_smallest_gap(enriched.gaps_before),
-        gap_after=_smallest_gap(enriched.gaps_after),
+        gap_before=before,
+        gap_after=after,
         warnings=conversion.warnings,
         version=provenance.version,
         mode=provenance.mode,
@@ -75,10 +75,6 @@ def describe(job: Job, conversion: ConvertedScenario) -> ManifestRow:
         content_sha256=provenance.content_sha256,
         cut_off=enriched.motion.cut_off is not None,
     )
-
-
-def _smallest_gap(gaps: tuple[Gap, ...]) -> float | None:
-    return _rounded(min(gap.distance for gap in gaps)) if gaps else None
 
 
 def _rounded(value: float | np.floating) -> float:
@@ -92,12 +88,12 @@ INDEX = "index.html"
 GAPS = ("smallest gap, nominal [m]", "smallest gap, enriched [m]")
 
 
-def write_page_and_thumbnail(conversion: ConvertedScenario, page: Path) -> None:
+def write_page_and_thumbnail(conversion: Conversion, page: Path) -> None:
     """Write the page of one conversion of a batch, and the small picture that stands for it in the index."""
     from xosc_lateral.workflows.conversion.page import conversion_page
     from xosc_lateral.workflows.playing.figures import thumbnail
 
-    write_atomically(page.with_suffix(".svg"), thumbnail(conversion.enriched))
+    write_atomically(page.with_suffix(".svg"), thumbnail(conversion.movement))
     write_atomically(page, conversion_page(conversion))
 
 

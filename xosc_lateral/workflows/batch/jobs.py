@@ -26,29 +26,19 @@ from xosc_lateral.workflows.conversion.settings import AUTO, ConvertSettings
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """One output to make; plain values, so that it can be sent to another process.
+    """One output to make; plain values, so that it can be sent to another process. Paths are absolute."""
 
-    - `name`: path of the output below the output folder, with forward slashes: names its row in the manifest
-    - `scenario`: path of the input below `base`, with forward slashes
-    - `source`, `output`: absolute
-    - `base`: folder that the output tree mirrors. Absolute
-    - `fingerprint`: SHA-256 over everything but the input files and the program that decides on the output's bytes
-    - `error`: why it can't even be tried (a distribution that can't be read); empty normally
-    - `page`: where a report page about it is written, and its thumbnail beside that. Absolute
-    - `package_version`: of the process that planned it: a worker with another one refuses
-    """
-
-    name: str
-    scenario: str
+    name: str  # path of the output below the output folder, with forward slashes: names its row in the manifest
+    scenario: str  # path of the input below `base`, with forward slashes
     source: Path
     output: Path
-    base: Path
+    base: Path  # folder that the output tree mirrors
     settings: ConvertSettings
     variant: int
-    fingerprint: str
-    error: str = ""
-    page: Path | None = None
-    package_version: str = __version__
+    fingerprint: str  # SHA-256 over all but the input files and the program that decides on the output's bytes
+    error: str = ""  # why it can't even be tried (a distribution that can't be read)
+    page: Path | None = None  # where a report page about it is written, and its thumbnail beside that
+    package_version: str = __version__  # of the process that planned it: a worker with another one refuses
 
     def row(self, error: str = "") -> ManifestRow:
         """Its row as far as it is known before the conversion; no hash of a scenario that can't be read."""
@@ -74,20 +64,13 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """What `convert_many` does.
-
-    - `folder`: output tree. Absolute
-    - `base`: folder that it mirrors. Absolute
-    - `jobs`: by name
-    - `left_out`: files found in folders that are not to be converted: catalogs, outputs of former conversions
-    - `notes`: what a user has to know before it begins, a line each
-    """
+    """What `convert_many` does. Paths are absolute."""
 
     folder: Path
-    base: Path
-    jobs: tuple[Job, ...]
-    left_out: tuple[tuple[Path, DocumentKind], ...] = ()
-    notes: tuple[str, ...] = ()
+    base: Path  # folder that the output tree mirrors
+    jobs: tuple[Job, ...]  # by name
+    left_out: tuple[tuple[Path, DocumentKind], ...] = ()  # found, but catalogs, or outputs of former conversions
+    notes: tuple[str, ...] = ()  # what a user has to know before it begins, a line each
 
     def __len__(self) -> int:
         return len(self.jobs)

@@ -45,40 +45,10 @@ _OLD_NAMES = {
 
 @dataclass(frozen=True, slots=True)
 class ManifestRow:
-    """One output, or why there is none.
+    """One output, or why there is none; `output` names it. The page of pipelines describes the columns.
 
-    - `output`: path of the output below the output folder, with forward slashes; names the row
-    - `scenario`, `scenario_sha256`: path of the input below the inputs' common folder, and SHA-256 of the file
-    - `variant`, `seed`: the variant from 1, as in file names
-    - `profile`: as asked for (a name, a path, "auto")
-    - `parameters`: scenario parameters that were replaced
-    - `settings`: SHA-256 over settings, variant, profile files and context table
-    - `with_sensor`: offsets hold the sensor error of the drives that profiles were fitted on; else the driver alone
-    - `output_sha256`: SHA-256 of the output
-    - `road`, `road_sha256`: as for the scenario; empty if it has none
-    - `inputs`: every file that was read -> SHA-256
-    - `profiles`: enriched entity -> name of its profile
-    - `profile_sha256`: profile name -> SHA-256
-    - `entities`: in the scenario
-    - `enriched`: names of the entities that got offsets
-    - `why_not`: entity that got none -> why
-    - `segment_seconds`: road-following time of all enriched entities together. [s]
-    - `offset_spread`: standard deviation of all sampled offsets. [m]
-    - `gap_before`, `gap_after`: smallest gap between any two vehicles, nominal and enriched; None: no two come near
-      each other. [m]
-    - `player`, `version`: what it was written for; version of the standard
-    - `mode`: how offsets are written: "trajectory", "lane-offset", "mixed"; empty: nobody got any
-    - `modes`: the same by vehicle
-    - `only`: who alone was to be enriched; None: everybody
-    - `ego`: vehicles under test: left as they are; empty: there is none
-    - `behaviour`: `version.BEHAVIOUR` of the program that wrote it
-    - `options`: what was asked for: `ConvertSettings.record`, files as seen from the scenario
-    - `content_sha256`: SHA-256 of the output without its provenance
-    - `cut_off`: the run ends at the time limit, though its scenario goes on
-    - `error`: one line; empty if the output is what the inputs and settings give
-    - `stale`: the output is that of a former run, which the other columns describe: it could not be made anew, or was
-      to be kept
-    - `schema`: version of these columns. Rows without it are of version 1, whose variants count from 0
+    Paths are with forward slashes, below the folder of outputs or the common one of inputs; distances in [m], times in
+    [s]. Rows without a `schema` are of version 1, whose variants count from 0.
     """
 
     output: str

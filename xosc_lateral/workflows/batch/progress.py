@@ -33,33 +33,21 @@ class Display(StrEnum):
 
 @dataclass(slots=True)
 class Summary:
-    """How a batch went.
-
-    - `total`, `written`, `up_to_date`, `failed`: jobs
-    - `anew`, `kept`: why outputs that were there were made anew, or are no longer what a conversion would write but
-      were to be kept -> how many
-    - `seconds`: from start to end. [s]
-    - `stale`: of the failed ones: those whose output of a former run is kept
-    - `failures`: output and error
-    - `with_warnings`: outputs with at least one
-    - `cut_off`: outputs of runs that the time limit cut off
-    - `nobody_enriched`: why no entity of an output got offsets -> how many outputs
-    - `became`: state of each output, and what it took [s]
-    """
+    """How a batch went, in jobs."""
 
     total: int
     written: int = 0
     up_to_date: int = 0
     failed: int = 0
-    stale: int = 0
-    seconds: float = 0.0
-    failures: list[tuple[str, str]] = field(default_factory=list)
+    stale: int = 0  # of the failed ones: those whose output of a former run is kept
+    seconds: float = 0.0  # from start to end
+    failures: list[tuple[str, str]] = field(default_factory=list)  # output and error
     with_warnings: int = 0
-    anew: dict[str, int] = field(default_factory=dict)
-    kept: dict[str, int] = field(default_factory=dict)
-    cut_off: list[str] = field(default_factory=list)
-    nobody_enriched: dict[str, int] = field(default_factory=dict)
-    became: dict[str, tuple[JobState, float]] = field(default_factory=dict, repr=False)
+    anew: dict[str, int] = field(default_factory=dict)  # why outputs that were there were made anew -> how many
+    kept: dict[str, int] = field(default_factory=dict)  # the same of those that were to be kept as they are
+    cut_off: list[str] = field(default_factory=list)  # outputs of runs that the time limit cut off
+    nobody_enriched: dict[str, int] = field(default_factory=dict)  # why no entity got offsets -> in how many outputs
+    became: dict[str, tuple[JobState, float]] = field(default_factory=dict, repr=False)  # by output; what it took [s]
     _shown: set[tuple[str, str]] = field(default_factory=set, repr=False)
 
     def count(self, outcome: JobOutcome) -> None:

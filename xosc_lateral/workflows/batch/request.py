@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from lxml import etree
 
@@ -97,22 +97,16 @@ class Request:
     name: str = ""
 
 
-class Concrete(NamedTuple):
-    """A scenario's file, a suffix of its output's name, its settings, and why it can't be converted, normally empty."""
+def concrete(request: Request, kind: DocumentKind) -> Iterator[tuple[Path, str, ConvertSettings, str]]:
+    """The scenarios that a file stands for: itself, or those of its distribution.
 
-    source: Path
-    suffix: str
-    settings: ConvertSettings
-    error: str = ""
-
-
-def concrete(request: Request, kind: DocumentKind) -> Iterator[Concrete]:
-    """The scenarios that a file stands for: itself, or those of its distribution."""
+    Each its file, a suffix of its output's name, its settings, and why it can't be converted, normally empty.
+    """
     from xosc_lateral.files.openscenario.distribution import read_distribution
 
     scenario, settings = request.scenario, request.settings
     if kind is not DocumentKind.DISTRIBUTION:
-        yield Concrete(scenario, "", settings)
+        yield scenario, "", settings, ""
         return
     try:
         logical = read_distribution(scenario, allowed=settings.allow)
@@ -128,9 +122,9 @@ def concrete(request: Request, kind: DocumentKind) -> Iterator[Concrete]:
     else:
         for index, values in enumerate(sets):
             parameters = {**values, **settings.parameters}
-            yield Concrete(logical.scenario_file, f"_p{index:05d}", replace(settings, parameters=parameters))
+            yield logical.scenario_file, f"_p{index:05d}", replace(settings, parameters=parameters), ""
         return
-    yield Concrete(scenario, "", settings, " ".join(why.split()))
+    yield scenario, "", settings, " ".join(why.split())
 
 
 def find_requests(

@@ -232,7 +232,7 @@ def _other_row(row: ManifestRow, data: bytes, origin: _Origin) -> Iterator[str]:
 
 def _made_otherwise(output: Path, data: bytes, origin: _Origin) -> list[tuple[Problem, str]]:
     """How today's program makes it otherwise, from what its provenance states."""
-    made = convert_scenario(origin.scenario, output, origin.settings, variant=origin.variant - 1, save=False).data
+    made = convert_scenario(origin.scenario, output, origin.settings, variant=origin.variant - 1, saves=False).data
     stated, now = origin.facts, facts_in(made) or {}
     if made.replace(_version_of(now), _version_of(stated), 1) == data:
         return []

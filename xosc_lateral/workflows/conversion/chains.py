@@ -7,8 +7,9 @@ from collections.abc import Collection, Iterator
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.files.openscenario.write.lateral_actions import LateralAction
-from xosc_lateral.workflows.conversion.result import EntityResult, SampledSegment
+from xosc_lateral.files.openscenario.write.lateral_actions import LateralAction, changing_speed, lateral_actions
+from xosc_lateral.workflows.conversion.load import Played
+from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, SampledSegment
 from xosc_lateral.world.motion.deviation import (
     SETTLING_TIME,
     NaturalSpline,
@@ -34,6 +35,24 @@ LEAST_GAP = 1.0
 """Between vertices. [m]"""
 AT_ONCE = 0.1
 """A segment that begins within this after an action ends begins because of it. [s]"""
+
+
+def chains_of_all(enriched: Enriched, played: Played, names: Collection[str]) -> list[OffsetChain]:
+    """Chains of the named entities, from what was sampled for them, as `played` nominally."""
+    lateral, changing = lateral_actions(played.scenario), changing_speed(played.scenario)
+    return [
+        chain
+        for entity in enriched.entities
+        if entity.name in names
+        for chain in chains_of(
+            entity,
+            played.motion,
+            played.network,
+            lateral.get(entity.name, ()),
+            tows=entity.name in played.trailers.values(),
+            changes_speed=entity.name in changing,
+        )
+    ]
 
 
 def chains_of(

@@ -1,54 +1,48 @@
-"""What lifelike motion brings about: lane departures, gaps between vehicles, headways."""
+"""What lifelike motion brings about: lane departures, gaps, headways, and what a reactive output does when played."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
-from xosc_lateral.base.rows import blocks, give_back, slices_where, stored
-from xosc_lateral.workflows.conversion.result import EntityResult, LaneDeparture
-from xosc_lateral.world.motion.gaps import BoxPath, Gap, smallest_gaps
-from xosc_lateral.world.motion.headways import Following, RoadPath, closest_following
+from xosc_lateral.base.rows import blocks, slices_where, stored
+from xosc_lateral.workflows.conversion.load import ending_at
+from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, LaneDeparture, untouched
+from xosc_lateral.world.motion.gaps import BoxPath, Following, Gap, RoadPath, closest_following, smallest_gaps
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
+from xosc_lateral.world.motion.segments import SegmentKind
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
+from xosc_lateral.world.player.player import play
 from xosc_lateral.world.road.network import RoadNetwork
+from xosc_lateral.world.scenario import Scenario
 
 GAP_STEP = 0.1
 """Between rows that gaps are measured on. [s]"""
+CHANGES = "with offsets, what happens would happen otherwise"
 
 
-HalfWidths = dict[tuple[str, int], FloatArray]
-"""Half of the width of lanes from a row of an entity on, shape (n,). [m]"""
-
-
-def lane_departures(entity: EntityResult, network: RoadNetwork, known: HalfWidths | None = None) -> list[LaneDeparture]:
-    """Where the enriched reference point is outside the nominal lane although the nominal one is inside: worst row.
-
-    `known` keeps half widths for other variants of the same motion.
-    """
-    found: list[LaneDeparture] = []
+def lane_departures(entity: EntityResult, network: RoadNetwork) -> Iterator[LaneDeparture]:
+    """Where the enriched reference point is outside the nominal lane although the nominal one is inside: worst row."""
     motion = entity.motion
     if not entity.deviation.any():
-        return found
+        return
     spans = [(segment.span.first, segment.span.last) for segment in entity.segments]
     for first, last in spans + _lateral_within_a_lane(motion):
         worst: LaneDeparture | None = None
         for rows in blocks(last + 1, first):
-            half = None if known is None else known.get((entity.name, rows.start))
-            if half is None:
-                half = 0.5 * network.lane_width(motion.road[rows], motion.lane[rows], motion.s[rows])
-            if known is not None:
-                known[entity.name, rows.start] = half
+            half = 0.5 * network.lane_width(motion.road[rows], motion.lane[rows], motion.s[rows])
             along_lane = np.where(np.cos(motion.heading_relative[rows]) >= 0.0, 1.0, -1.0)
             beyond = np.abs(motion.offset[rows] + along_lane * entity.deviation[rows]) - half
             left = (beyond > 0.0) & (np.abs(motion.offset[rows]) <= half)
             k = int(np.argmax(np.where(left, beyond, -np.inf)))
             if left[k] and (worst is None or beyond[k] > worst.beyond):
                 worst = LaneDeparture(entity.name, float(motion.time[rows][k]), float(beyond[k]))
-        found += [] if worst is None else [worst]
-    return found
+        if worst is not None:
+            yield worst
 
 
 def _lateral_within_a_lane(motion: EntityMotion) -> list[tuple[int, int]]:
@@ -87,7 +81,6 @@ def gaps_of(motion: NominalMotion, trajectories: Sequence[WorldTrajectory | Enti
         x = np.where(absent, np.nan, path.x[::every])
         x, y, heading = (stored(values) for values in (x, path.y[::every], path.heading[::every]))
         paths.append(BoxPath(entity.name, x, y, heading, box.length, box.width, box.center_x))
-        give_back(len(entity.time))
     return smallest_gaps(motion.entities[0].time[::every], paths)
 
 
@@ -114,3 +107,67 @@ def _road_path(entity: EntityResult, network: RoadNetwork, enriched: bool) -> Ro
     x, y = (np.where(present, values[::every], np.nan) for values in (path.x, path.y))
     speed = path.speed[::every]
     return RoadPath(entity.name, x, y, road, s, t, forward, speed, box.length, box.width, box.center_x)
+
+
+def as_played(
+    enriched: Enriched, written: Scenario, run: NominalMotion, moved: Collection[str], left: Collection[str]
+) -> Enriched:
+    """What a reactive output does when it is played, in place of what was sampled.
+
+    - `written`, `run`: the output and its nominal run, which may end earlier than the one that was sampled for
+    - `moved`, `left`: entities that keep their maneuvers: those with lane offsets, and those that stay as they are
+    """
+    motion = enriched.motion
+    if run.end_time < motion.end_time - motion.step:
+        run = play(
+            ending_at(written, motion.end_time),
+            enriched.network,
+            step=motion.step,
+            time_limit=motion.end_time + motion.step,
+        )
+    played = {entity.name: entity for entity in run.entities}
+    entities = tuple(
+        _measured(entity, played[entity.name])
+        if entity.name in moved
+        else untouched(entity.motion, entity.spans, CHANGES)
+        if entity.name in left
+        else entity
+        for entity in enriched.entities
+    )
+    gaps_after = gaps_of(motion, [entity.trajectory for entity in entities])
+    departures = tuple(chain.from_iterable(lane_departures(entity, enriched.network) for entity in entities))
+    return replace(enriched, entities=entities, gaps_after=gaps_after, departures=departures)
+
+
+def _measured(entity: EntityResult, played: EntityMotion) -> EntityResult:
+    """One entity where it is when the output is played, held where that ends first."""
+    motion = entity.motion
+    rows = np.minimum(np.arange(len(motion.time)), len(played.time) - 1)
+    x, y, z, heading, pitch, roll, speed = (
+        np.asarray(getattr(played, name)[rows]) for name in ("x", "y", "z", "heading", "pitch", "roll", "speed")
+    )
+    deviation: FloatArray = (y - motion.y) * np.cos(motion.heading) - (x - motion.x) * np.sin(motion.heading)
+    segments = tuple(
+        replace(segment, offset=np.interp(segment.time, motion.time, deviation), beyond=np.empty(0))
+        for segment in entity.segments
+    )
+    trajectory = WorldTrajectory(motion.time, x, y, z, heading, pitch, roll, speed)
+    return replace(entity, segments=segments, deviation=deviation, trajectory=trajectory)
+
+
+def stay_as_written(enriched: Enriched, through: Collection[str]) -> tuple[str, ...]:
+    """Which lane changes and lane offsets stay as written although they are to be lifelike, a line each.
+
+    `through`: entities whose movement goes on through them.
+    """
+    lines = []
+    for entity in enriched.entities:
+        spans = (span for span in entity.spans if span.kind is SegmentKind.LATERAL_ACTION)
+        if entity.is_enriched and entity.name not in through and any(spans):
+            lines.append(f"lane changes of '{entity.name}' stay as written: it keeps its actions, the player moves it")
+        for crossing in entity.crossings if entity.is_enriched else ():
+            if crossing.stays:
+                what = "lane change" if crossing.is_lane_change else "lane offset"
+                at = entity.motion.time[crossing.first]
+                lines.append(f"{what} of '{entity.name}' at {at:.1f} s stays as written: {crossing.stays}")
+    return tuple(lines)

@@ -6,26 +6,34 @@ import zlib
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
-from xosc_lateral.base.rows import blocks, columns, give_back, stored
+from xosc_lateral.base.rows import blocks, columns, stored
 from xosc_lateral.drivers.model.drivability import drivable
 from xosc_lateral.drivers.model.plausibility import check_offsets
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampled_offsets import known_sensor, sensor_error
 from xosc_lateral.drivers.model.sampling import OffsetSampler
-from xosc_lateral.workflows.conversion.consequences import HalfWidths, gaps_of, lane_departures
-from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, LaneChanges, Neighbours, SampledSegment
+from xosc_lateral.workflows.conversion.consequences import gaps_of, lane_departures
+from xosc_lateral.workflows.conversion.result import (
+    Enriched,
+    EntityResult,
+    LaneChanges,
+    Neighbours,
+    SampledSegment,
+    nominal_path,
+    untouched,
+)
 from xosc_lateral.workflows.conversion.seen import NOTHING_SEEN, SAMPLE_STEP, Contexts, Seen, going_on, seen_by
 from xosc_lateral.world.motion.crossings import Crossing, beside_written, crossings
 from xosc_lateral.world.motion.deviation import SETTLING_TIME, SampledDeviation, deviation_through
-from xosc_lateral.world.motion.gaps import Gap
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.world.motion.segments import SegmentKind, SegmentSpan, cut_segments, movement_runs
-from xosc_lateral.world.motion.trajectory import WorldTrajectory, displace, distance_driven
+from xosc_lateral.world.motion.trajectory import displace, distance_driven
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.surroundings.give_way import SampledVehicle, give_way
 
@@ -98,11 +106,9 @@ def enrich(
         When the sensor is asked for and a profile knows of none.
     """
     trailers, words = trailers or {}, entropy or {}
-    few = sum(len(entity.time) for entity in motion.entities) <= KEPT_ROWS and not context
-    run = (_run if few else _run.__wrapped__)(
-        motion, network, frozenset(trailers), frozenset(uncertain), neighbours, heeds_controllers, frozenset(through)
+    run = (_kept_run if _is_small(motion) else _Run)(
+        motion, network, frozenset(trailers), frozenset(uncertain), frozenset(through), neighbours, heeds_controllers
     )
-
     lifelike = lane_changes is LaneChanges.LIFELIKE
 
     def drawn_for(index: int, attempt: int) -> _Drawn:
@@ -110,23 +116,9 @@ def enrich(
         driver, spans = drivers.get(entity.name, "not chosen"), run.spans[index]
         if isinstance(driver, str):
             return _Drawn(entity, spans, why=driver)
-        whose, seen = run.seen.get(index, (None, None))
-        if seen is None or whose is not driver:
-            among = replace(motion, entities=(entity,)) if entity.name in uncertain else run.certain
-            seen = seen_by(driver, entity, among, network, run.runs[index], context or {}, neighbours)
-            if few:
-                run.seen[index] = driver, seen
-        own = np.random.SeedSequence(
-            [seed, variant, attempt, zlib.crc32(entity.name.encode()), *words.get(entity.name, ())]
-        )
-        crossed = run.crossings[index]
-        return _draw(
-            _Drawn(entity, spans, driver, seen, crossed, lifelike),
-            driver,
-            own,
-            with_sensor,
-            round(at_least / SAMPLE_STEP),
-        )
+        seed_words = [seed, variant, attempt, zlib.crc32(entity.name.encode()), *words.get(entity.name, ())]
+        blank = _Drawn(entity, spans, driver, run.seen(index, driver, context or {}), run.crossings[index], lifelike)
+        return _draw(blank, driver, np.random.SeedSequence(seed_words), with_sensor, round(at_least / SAMPLE_STEP))
 
     best: Enriched | None = None
     for attempt in range(max(1, attempts)):
@@ -136,9 +128,7 @@ def enrich(
         entities = tuple(_result(one, network) for one in drawn)
         entities = _with_trailers(entities, network, trailers)
         gaps_after = gaps_of(motion, [entity.trajectory for entity in entities])
-        departures = tuple(
-            found for entity in entities for found in lane_departures(entity, network, run.half_widths if few else None)
-        )
+        departures = tuple(chain.from_iterable(lane_departures(entity, network) for entity in entities))
         result = Enriched(motion, network, entities, run.gaps, gaps_after, departures, seed, variant, attempt)
         if best is None or _trouble(result) < _trouble(best):
             best = result
@@ -206,49 +196,67 @@ KEPT_ROWS = 100_000
 for two minutes then keeps about 10 MB. [-]"""
 
 
-class _Run(NamedTuple):
-    """What all variants of a run have in common."""
+class _Run:
+    """What all variants of a run have in common.
 
-    spans: tuple[tuple[SegmentSpan, ...], ...]
-    """Of each entity."""
-    runs: tuple[tuple[tuple[SegmentSpan, ...], ...], ...]
-    """Those that are sampled, one after another without a break, of each entity."""
-    crossings: tuple[tuple[Crossing, ...], ...]
-    """Lane changes and lane offsets in them."""
-    gaps: tuple[Gap, ...]
-    """Of the nominal motion."""
-    certain: NominalMotion
-    """Those alone whose place is."""
-    seen: dict[int, tuple[DriverProfile, Seen]]
-    """By the number of the entity, its last driver and what he sees."""
-    half_widths: HalfWidths
-    """See `lane_departures`."""
+    Parameters
+    ----------
+    motion : NominalMotion
+    network : RoadNetwork
+    pulled, uncertain, through : set of str
+        Entities: trailers; those whose place is not certain; those whose movement goes on through lane changes.
+    neighbours : Neighbours
+    heeds_controllers : bool
+    """
+
+    def __init__(
+        self,
+        motion: NominalMotion,
+        network: RoadNetwork,
+        pulled: frozenset[str],
+        uncertain: frozenset[str],
+        through: frozenset[str],
+        neighbours: Neighbours,
+        heeds_controllers: bool,
+    ) -> None:
+        self._network, self._neighbours, self._uncertain = network, neighbours, uncertain
+        self.spans = [
+            cut_segments(entity, network, is_trailer=entity.name in pulled, heeds_controllers=heeds_controllers)
+            for entity in motion.entities
+        ]
+        self.runs = [
+            movement_runs(motion, entity, network, spans)
+            if entity.name in through
+            else tuple((span,) for span in spans if span.is_road_following)
+            for entity, spans in zip(motion.entities, self.spans, strict=True)
+        ]
+        """Spans that are sampled, one after another without a break, of each entity."""
+        self.crossings = [
+            tuple(crossings(motion, entity, runs)) for entity, runs in zip(motion.entities, self.runs, strict=True)
+        ]
+        """Lane changes and lane offsets in them."""
+        self.gaps = gaps_of(motion, [nominal_path(entity) for entity in motion.entities])
+        self._motion = motion
+        self._certain = replace(motion, entities=tuple(one for one in motion.entities if one.name not in uncertain))
+        self._seen: dict[int, tuple[DriverProfile, Seen]] = {}
+
+    def seen(self, index: int, driver: DriverProfile, contexts: Contexts) -> Seen:
+        """What the driver of an entity sees; looked at once for all variants with the same one."""
+        before, seen = self._seen.get(index, (None, NOTHING_SEEN))
+        if before is not driver or contexts:
+            entity = self._motion.entities[index]
+            among = replace(self._motion, entities=(entity,)) if entity.name in self._uncertain else self._certain
+            seen = seen_by(driver, entity, among, self._network, self.runs[index], contexts, self._neighbours)
+            if not contexts and _is_small(self._motion):
+                self._seen[index] = driver, seen
+        return seen
 
 
-@lru_cache(maxsize=2)  # variants of one run come one after another
-def _run(
-    motion: NominalMotion,
-    network: RoadNetwork,
-    pulled: frozenset[str],
-    uncertain: frozenset[str],
-    neighbours: Neighbours,
-    heeds_controllers: bool,
-    through: frozenset[str],
-) -> _Run:
-    spans = tuple(
-        cut_segments(entity, network, is_trailer=entity.name in pulled, heeds_controllers=heeds_controllers)
-        for entity in motion.entities
-    )
-    gaps = gaps_of(motion, [_nominal(entity) for entity in motion.entities])
-    certain = tuple(one for one in motion.entities if one.name not in uncertain)
-    runs = tuple(
-        movement_runs(motion, entity, network, own)
-        if entity.name in through
-        else tuple((span,) for span in own if span.is_road_following)
-        for entity, own in zip(motion.entities, spans, strict=True)
-    )
-    crossed = tuple(tuple(crossings(motion, entity, own)) for entity, own in zip(motion.entities, runs, strict=True))
-    return _Run(spans, runs, crossed, gaps, replace(motion, entities=certain), {}, {})
+def _is_small(motion: NominalMotion) -> bool:
+    return sum(len(entity.time) for entity in motion.entities) <= KEPT_ROWS
+
+
+_kept_run = lru_cache(maxsize=2)(_Run)  # variants of one run come one after another
 
 
 def _draw(blank: _Drawn, driver: DriverProfile, seed: np.random.SeedSequence, with_sensor: bool, least: int) -> _Drawn:
@@ -261,7 +269,6 @@ def _draw(blank: _Drawn, driver: DriverProfile, seed: np.random.SeedSequence, wi
     for spans, knots, segment, side, responses in blank.seen.segments:
         offset = side * sampler.sample(segment, responses=responses)
         more = least - len(knots)
-        give_back(len(segment.time))
         beyond = side * sampler.copy().sample(going_on(segment, more)) if more > 0 else np.empty(0)
         who = f"profile {driver.name} for {blank.motion.name!r}"
         check_offsets(offset, segment.lane_width[segment.inside], who, segment.time[segment.inside])
@@ -290,7 +297,6 @@ def _apart(
 
 
 def _moved(sample: _Sample, rows: IntArray, move: FloatArray) -> _Sample:
-    give_back(len(rows))
     return sample._replace(offset=stored(sample.offset + np.interp(sample.knots, rows, move)))
 
 
@@ -302,7 +308,6 @@ def _sampled(one: _Drawn, rows: IntArray) -> SampledVehicle:
         for sample in one.samples:
             for span in sample.spans:
                 can_move[(rows >= span.first) & (rows <= span.last)] = span.is_road_following
-    give_back(len(one.motion.time))
     return SampledVehicle(one.motion, stored(deviation), stored(can_move), one.seen.responds, one.seen.alone)
 
 
@@ -359,15 +364,3 @@ def _with_trailers(
         trajectory = displace(trailer.motion, network, deviation)
         results[name] = replace(trailer, deviation=deviation, trajectory=trajectory, why="follows its tractor")
     return tuple(results.values())
-
-
-def untouched(entity: EntityMotion, spans: tuple[SegmentSpan, ...], why: str) -> EntityResult:
-    """An entity as it moves nominally."""
-    no_deviation = np.broadcast_to(0.0, len(entity.time))
-    return EntityResult(entity, spans, None, why, (), no_deviation, _nominal(entity))
-
-
-def _nominal(entity: EntityMotion) -> WorldTrajectory:
-    return WorldTrajectory(
-        entity.time, entity.x, entity.y, entity.z, entity.heading, entity.pitch, entity.roll, entity.speed
-    )

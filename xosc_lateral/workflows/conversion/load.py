@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 
+import numpy as np
 from msgspec import structs
 
+from xosc_lateral.base.rows import BLOCK, blocks
 from xosc_lateral.files.opendrive import read_opendrive
 from xosc_lateral.files.openscenario.read import NO_ROADS, RoadSearch, read_scenario
 from xosc_lateral.files.source import check_regular, guard_input, state_key
 from xosc_lateral.workflows.conversion.settings import STEP
-from xosc_lateral.world.motion.nominal import NominalMotion
+from xosc_lateral.world.motion.nominal import Activity, NominalMotion
 from xosc_lateral.world.player.player import play
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario import Scenario
@@ -34,6 +37,16 @@ class Played:
         return {entity.trailer: entity.name for entity in self.scenario.entities if entity.trailer is not None}
 
 
+@dataclass(frozen=True, slots=True)
+class Loaded:
+    """A scenario and its road; equal where the bytes of all files and the parameters are."""
+
+    files: tuple[tuple[Path, str], ...]  # every file that was parsed and the SHA-256 of its bytes
+    parameters: tuple[tuple[str, str], ...]
+    scenario: Scenario = field(compare=False)
+    network: RoadNetwork = field(compare=False)
+
+
 def play_scenario(
     path: Path,
     *,
@@ -44,21 +57,36 @@ def play_scenario(
     roads: RoadSearch = NO_ROADS,
     strict: bool = False,
 ) -> Played:
-    """Read and play.
+    """Load and play; see `load_scenario`. Raises `FormatError, PlaybackError`: with file, line and element."""
+    loaded = load_scenario(path, parameters=parameters, allowed=allowed, roads=roads, strict=strict)
+    return play_loaded(loaded, step, time_limit)
+
+
+def load_scenario(
+    path: Path,
+    *,
+    parameters: Mapping[str, str] | None = None,
+    allowed: Iterable[Path] = (),
+    roads: RoadSearch = NO_ROADS,
+    strict: bool = False,
+) -> Loaded:
+    """Read a scenario and its road.
 
     - `path`: the ``.xosc`` file
     - `parameters`: values that replace those declared
-    - `time_limit`: [s]
     - `allowed`: folders, besides those around the scenario, that its road and catalogs may lie in
     - `roads`: where else its road may lie
     - `strict`: refuse a missing vehicle catalog, instead of playing a usual car
 
-    Raises `FormatError, PlaybackError`: with file, line and element.
+    Raises `FormatError`: with file, line and element.
     """
     values = tuple(sorted((parameters or {}).items()))
     scenario = _read(path, values, tuple(allowed), roads, strict)
-    network = RoadNetwork(()) if scenario.road_file is None else road_network(scenario.road_file)
-    return _played(_Playable(input_hashes(scenario, network), values, step, time_limit, scenario, network))
+    network, road = RoadNetwork(()), tuple[tuple[Path, str], ...]()
+    if scenario.road_file is not None:
+        network = road_network(scenario.road_file)
+        road = ((scenario.road_file, network.sha256),)
+    return Loaded((*scenario.input_hashes.items(), *road), values, scenario, network)
 
 
 def _read(
@@ -67,53 +95,46 @@ def _read(
     """Read a scenario, once for all its variants if that depends on its own file and on the place of its road alone."""
     state = check_regular(path)
     guard_input(path)
-    before = _read_before(path, parameters, allowed, roads, strict, state_key(state))
-    for scenario in before:
-        if scenario.road_file is None or scenario.road_file.is_file():
-            return scenario
-    scenario = read_scenario(path, dict(parameters), allowed=allowed, roads=roads, strict=strict)
-    if not scenario.catalog_locations and not scenario.remarks:
-        before[:] = [scenario]
-    return scenario
+    reads = _read_once.cache_info().misses
+    scenario = _read_once(path, parameters, allowed, roads, strict, state_key(state))
+    is_fresh = _read_once.cache_info().misses > reads
+    stands_alone = not scenario.catalog_locations and not scenario.remarks
+    if is_fresh or (stands_alone and (scenario.road_file is None or scenario.road_file.is_file())):
+        return scenario
+    return read_scenario(path, dict(parameters), allowed=allowed, roads=roads, strict=strict)
 
 
 @lru_cache(maxsize=2)
-def _read_before(*_key: object) -> list[Scenario]:
-    """The scenario that was read from a file in this state, if it was kept."""
-    return []
-
-
-@lru_cache(maxsize=2)  # as `_played`, whose result is the same object for all variants
-def play_until(played: Played, end: float, *, step: float) -> Played:
-    """The same run, stopped at another time. [s]"""
-    storyboard = played.scenario.storyboard
-    later = structs.replace(storyboard, stop_trigger=at_time(end, "later", storyboard.place))
-    scenario = replace(played.scenario, storyboard=later)
-    return replace(played, motion=play(scenario, played.network, step=step, time_limit=end + 1.0))
-
-
-def input_hashes(scenario: Scenario, network: RoadNetwork) -> tuple[tuple[Path, str], ...]:
-    """Every file that was parsed and the SHA-256 of the bytes that were: scenario, catalogs, road."""
-    road = () if scenario.road_file is None else ((scenario.road_file, network.sha256),)
-    return (*scenario.input_hashes.items(), *road)
-
-
-@dataclass(frozen=True, slots=True)
-class _Playable:
-    """What decides on how a scenario plays, as a key; the scenario itself goes along."""
-
-    files: tuple[tuple[Path, str], ...]
-    parameters: tuple[tuple[str, str], ...]
-    step: float
-    time_limit: float | None
-    scenario: Scenario = field(compare=False)
-    network: RoadNetwork = field(compare=False)
+def _read_once(
+    path: Path,
+    parameters: tuple[tuple[str, str], ...],
+    allowed: tuple[Path, ...],
+    roads: RoadSearch,
+    strict: bool,
+    _state: tuple[int, ...],
+) -> Scenario:
+    return read_scenario(path, dict(parameters), allowed=allowed, roads=roads, strict=strict)
 
 
 @lru_cache(maxsize=2)  # variants of one scenario come one after another, and playing is most of their work
-def _played(playable: _Playable) -> Played:
-    motion = play(playable.scenario, playable.network, step=playable.step, time_limit=playable.time_limit)
-    return Played(playable.scenario, playable.network, motion)
+def play_loaded(loaded: Loaded, step: float, time_limit: float | None) -> Played:
+    """Play nominally; raises `PlaybackError`."""
+    motion = play(loaded.scenario, loaded.network, step=step, time_limit=time_limit)
+    return Played(loaded.scenario, loaded.network, motion)
+
+
+@lru_cache(maxsize=2)  # as `play_loaded`, whose result is the same object for all variants
+def play_until(played: Played, end: float, *, step: float) -> Played:
+    """The same run, stopped at another time. [s]"""
+    motion = play(ending_at(played.scenario, end), played.network, step=step, time_limit=end + 1.0)
+    return replace(played, motion=motion)
+
+
+def ending_at(scenario: Scenario, end: float) -> Scenario:
+    """The same scenario, stopped at a time and by nothing else. [s]"""
+    storyboard = scenario.storyboard
+    later = structs.replace(storyboard, stop_trigger=at_time(end, "later", storyboard.place))
+    return replace(scenario, storyboard=later)
 
 
 def road_network(path: Path) -> RoadNetwork:
@@ -126,3 +147,25 @@ def road_network(path: Path) -> RoadNetwork:
 @lru_cache(maxsize=32)
 def _road_network(path: Path, _state: tuple[int, ...]) -> RoadNetwork:
     return read_opendrive(path)
+
+
+def seed_words(played: Played) -> dict[str, tuple[int, ...]]:
+    """Seed words of each entity from where it starts and how fast: nothing that anybody else does changes them."""
+    words = {}
+    for entity in played.motion.entities:
+        there = ((entity.activity[rows] & Activity.ACTIVE) != 0 for rows in blocks(len(entity.activity)))
+        row = next((BLOCK * k + int(np.argmax(mask)) for k, mask in enumerate(there) if mask.any()), 0)
+        on_road = int(entity.road[row])
+        where = (entity.x[row], entity.y[row]) if on_road < 0 else (entity.s[row], entity.offset[row])
+        road = "" if on_road < 0 else played.network.road_ids[on_road]
+        start = [road, str(entity.lane[row]), *(f"{value:.3f}" for value in (*where, entity.speed[row]))]
+        digest = hashlib.sha256("\0".join(start).encode()).digest()
+        words[entity.name] = tuple(int.from_bytes(digest[k : k + 4], "little") for k in range(0, 16, 4))
+    return words
+
+
+def read_output(data: bytes, output: Path, source: Scenario, *, allowed: Iterable[Path], roads: RoadSearch) -> Scenario:
+    """An output from its bytes, as seen from its place, with what its source was allowed to read."""
+    road = () if source.road_file is None else (source.road_file.parent,)
+    folders = (*allowed, *(path.parent for path in source.input_files), *road)
+    return read_scenario(output, allowed=folders, roads=roads, data=data)

@@ -15,8 +15,7 @@ from xosc_lateral.workflows.playing import figures as figures
 from xosc_lateral.workflows.playing.figures import COMFORTABLE
 from xosc_lateral.workflows.playing.page import add_notes
 from xosc_lateral.workflows.playing.scene import scene_of
-from xosc_lateral.world.motion.gaps import MAXIMUM_GAP, Gap
-from xosc_lateral.world.motion.headways import Following
+from xosc_lateral.world.motion.gaps import MAXIMUM_GAP, Following, Gap
 
 MOST_PANELS, MOST_DYNAMICS = 12, 6
 """Entities with panels of their own, for offsets and for dynamics; those with the largest offsets come first."""
@@ -41,7 +40,7 @@ GAP_TIMES = ("at [s]", "at [s] ")
 
 def conversion_page(conversion: ConvertedScenario) -> str:
     """HTML page on one converted scenario, self-contained; same input, same bytes."""
-    enriched = conversion.enriched
+    enriched = conversion.movement
     done = [entity for entity in enriched.entities if entity.is_enriched]
     page = Page(f"{conversion.source.name}: lateral movement added")
     page.lead(
@@ -52,7 +51,7 @@ def conversion_page(conversion: ConvertedScenario) -> str:
             else "No entity was enriched; the reasons are listed below."
         )
         + f" The scenario runs for {enriched.motion.end_time:.1f} s (ended by the {enriched.motion.ended_by}). "
-        f"The result is in `{conversion.output.name}`."
+        f"The result is in `{(conversion.output or conversion.source).name}`."
     )
     page.key_figures(_key_figures(enriched, done))
     page.lead(under_test(conversion))
@@ -93,12 +92,12 @@ def _provenance(conversion: ConvertedScenario) -> dict[str, object]:
     made = conversion.provenance
     return {
         "scenario": conversion.source.name,
-        "output": conversion.output.name,
+        "output": (conversion.output or conversion.source).name,
         "under test": list(made.ego) or "none",
         "written as": [f"{name}: {WRITTEN_AS[mode]}" for name, mode in made.modes.items()],
         "neighbours": [
             f"{one.name}: {beside_text(one.profile, made.options['neighbours'])}"
-            for one in conversion.enriched.entities
+            for one in conversion.movement.entities
             if one.is_enriched and one.profile is not None
         ],
         "seed": made.options["seed"],
@@ -108,12 +107,12 @@ def _provenance(conversion: ConvertedScenario) -> dict[str, object]:
         "profiles are valid for": sorted(
             {
                 f"{one.profile.name}: {one.profile.validity.in_words() or 'not stated'}"
-                for one in conversion.enriched.entities
+                for one in conversion.movement.entities
                 if one.is_enriched and one.profile is not None
             }
         ),
         "inputs": [f"{name} ({sha[:12]})" for name, sha in made.inputs.items()],
-        "output hash": conversion.output_sha256,
+        "output hash": conversion.sha256,
     }
 
 

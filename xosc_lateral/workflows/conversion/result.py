@@ -101,6 +101,19 @@ class EntityResult:
         return _derivative(self.lateral_acceleration(), self.motion.time)
 
 
+def untouched(entity: EntityMotion, spans: tuple[SegmentSpan, ...], why: str) -> EntityResult:
+    """An entity as it moves nominally."""
+    no_deviation = np.broadcast_to(0.0, len(entity.time))
+    return EntityResult(entity, spans, None, why, (), no_deviation, nominal_path(entity))
+
+
+def nominal_path(entity: EntityMotion) -> WorldTrajectory:
+    """Its nominal motion as a path."""
+    return WorldTrajectory(
+        entity.time, entity.x, entity.y, entity.z, entity.heading, entity.pitch, entity.roll, entity.speed
+    )
+
+
 def _derivative(values: FloatArray, time: FloatArray) -> FloatArray:
     return np.gradient(values, time[1] - time[0]) if len(time) > 2 else np.zeros_like(values)
 
@@ -224,21 +237,66 @@ class ConversionProvenance:
     @property
     def mode(self) -> str:
         """Of all vehicles that were enriched: "trajectory", "lane-offset", "mixed"; empty: nobody was."""
-        found = sorted(set(self.modes.values()))
-        return "mixed" if len(found) > 1 else "".join(found)
+        modes = sorted(set(self.modes.values()))
+        return "mixed" if len(modes) > 1 else "".join(modes)
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(eq=False, repr=False, slots=True)
 class ConvertedScenario:
-    """One converted scenario."""
+    """A converted scenario: nominal and enriched motion, what to know about it, and how to get it again."""
 
-    source: Path
-    output: Path
-    output_sha256: str  # SHA-256 of the output's bytes
-    enriched: Enriched  # nominal and enriched motion, segments, gaps
+    source: Path  # the scenario that was read
+    output: Path | None  # the scenario that was written; None if none was
+    sha256: str  # of the output's bytes
+    movement: Enriched  # nominal and enriched motion, segments, gaps
     provenance: ConversionProvenance
-    warnings: tuple[str, ...]  # what a user has to know, a line each
-    data: bytes = b""  # the converted scenario, if it was not to be written
+    warnings: tuple[str, ...] = ()  # what a user has to know, a line each
+    content: bytes = b""  # the output's bytes, if they were not written
     is_replay: bool = True  # everything happens by the clock of the nominal run, whoever drives
-    shifts: tuple[EventShift, ...] = ()  # of events of a reactive output, the largest under several egos
+    # shifts: how much earlier or later events of a reactive output come, the largest under several egos [s]
+    shifts: tuple[EventShift, ...] = ()
     controllers: Mapping[str, Control] = field(default_factory=dict)  # of entities that are left to them
+    report: Path | None = None  # page that was written, if one was
+
+    @property
+    def data(self) -> bytes:
+        """The converted scenario's bytes."""
+        return self.content if self.output is None else self.output.read_bytes()
+
+    @property
+    def entities(self) -> tuple[str, ...]:
+        """All entities, in the scenario's order."""
+        return tuple(entity.name for entity in self.movement.entities)
+
+    @property
+    def enriched(self) -> tuple[str, ...]:
+        """Those that got offsets."""
+        return tuple(entity.name for entity in self.movement.entities if entity.is_enriched)
+
+    @property
+    def ego(self) -> tuple[str, ...]:
+        """Vehicles under test: left as they are; empty: there is none, and everything is replayed."""
+        return self.provenance.ego
+
+    @property
+    def modes(self) -> dict[str, str]:
+        """Vehicle that was enriched -> "trajectory" or "lane-offset"."""
+        return dict(self.provenance.modes)
+
+    @property
+    def cut_off(self) -> str | None:
+        """The warning of a run that the time limit cut off."""
+        note = self.movement.motion.cut_off
+        return None if note is None else str(note)
+
+    @property
+    def end_time(self) -> float:
+        """[s]"""
+        return self.movement.motion.end_time
+
+    @property
+    def smallest_gap(self) -> tuple[float | None, float | None]:
+        """Smallest free space between two vehicles, nominal and enriched; None: none come near each other. [m]"""
+        sides = (self.movement.gaps_before, self.movement.gaps_after)
+        before, after = (min((gap.distance for gap in gaps), default=None) for gaps in sides)
+        return before, after

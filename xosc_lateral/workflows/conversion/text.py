@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 from msgspec import structs
 
 from xosc_lateral.drivers.fitting.answers import basis_of, borrows, responses_in_words
 from xosc_lateral.drivers.model.profile import SIDES, DriverProfile
-from xosc_lateral.workflows.conversion.result import ConversionProvenance, ConvertedScenario, EventShift, Neighbours
-from xosc_lateral.world.motion.gaps import Gap
+from xosc_lateral.workflows.conversion.result import ConversionProvenance, ConvertedScenario, Neighbours
 
 WRITTEN_AS = {"trajectory": "a trajectory", "lane-offset": "lane offsets"}
 
 
-def as_text(conversion: ConvertedScenario, report: Path | None = None) -> str:
+def as_text(conversion: ConvertedScenario) -> str:
     """What was done, what was not, what to know."""
-    lines = [f"{conversion.source if conversion.data else conversion.output}"]
+    lines = [f"{conversion.output or conversion.source}"]
     lines.append(f"  {under_test(conversion)}")
-    for entity in conversion.enriched.entities:
+    for entity in conversion.movement.entities:
         if entity.is_enriched and entity.profile is not None:
             mode = conversion.provenance.modes.get(entity.name, "")
             lines.append(
@@ -33,10 +31,10 @@ def as_text(conversion: ConvertedScenario, report: Path | None = None) -> str:
     lines += _responses(conversion)
     if conversion.provenance.options["with_sensor"]:
         lines.append("  offsets include the sensor error of the drives that the profiles were fitted to")
-    lines += [f"  note: {note.what}" for note in conversion.enriched.motion.notes]
+    lines += [f"  note: {note.what}" for note in conversion.movement.motion.notes]
     lines += [f"  warning: {warning}" for warning in conversion.warnings]
-    if report is not None:
-        lines.append(f"report: {report}")
+    if conversion.report is not None:
+        lines.append(f"report: {conversion.report}")
     return "\n".join(lines)
 
 
@@ -51,7 +49,7 @@ def beside_text(profile: DriverProfile, neighbours: str) -> str:
 def _responses(conversion: ConvertedScenario) -> list[str]:
     """How drivers respond to vehicles beside them: a line for all who do so alike."""
     alike: dict[str, list[str]] = {}
-    for entity in conversion.enriched.entities:
+    for entity in conversion.movement.entities:
         if entity.is_enriched and entity.profile is not None:
             words = beside_text(entity.profile, conversion.provenance.options["neighbours"])
             alike.setdefault(words, []).append(entity.name)
@@ -70,14 +68,15 @@ def under_test(conversion: ConvertedScenario) -> str:
     )
 
 
-def facts(conversion: ConvertedScenario, report: Path | None = None) -> dict[str, Any]:
+def facts(conversion: ConvertedScenario) -> dict[str, Any]:
     """Plain values about a conversion, rounded to what they are read for: a micrometre, a microsecond."""
-    enriched = conversion.enriched
+    enriched = conversion.movement
+    before, after = (None if gap is None else round(gap, 6) for gap in conversion.smallest_gap)
     return {
         "source": str(conversion.source),
-        "output": None if conversion.data else str(conversion.output),
-        "report": None if report is None else str(report),
-        "sha256": conversion.output_sha256,
+        "output": None if conversion.output is None else str(conversion.output),
+        "report": None if conversion.report is None else str(conversion.report),
+        "sha256": conversion.sha256,
         "end_time": round(enriched.motion.end_time, 6),
         "ended_by": enriched.motion.ended_by,
         "ego": list(conversion.provenance.ego),
@@ -98,8 +97,8 @@ def facts(conversion: ConvertedScenario, report: Path | None = None) -> dict[str
             }
             for entity in enriched.entities
         ],
-        "gap_before": _smallest_gap(enriched.gaps_before),
-        "gap_after": _smallest_gap(enriched.gaps_after),
+        "gap_before": before,
+        "gap_after": after,
         "shifts": [
             {
                 name: round(value, 6) if isinstance(value, float) else value
@@ -113,11 +112,6 @@ def facts(conversion: ConvertedScenario, report: Path | None = None) -> dict[str
     }
 
 
-def _shift_facts(shift: EventShift) -> dict[str, Any]:
-    values = structs.asdict(shift)
-    return {name: round(value, 6) if isinstance(value, float) else value for name, value in values.items()}
-
-
 def _beside_facts(profile: DriverProfile | None) -> dict[str, str] | None:
     return None if profile is None else {side: basis_of(profile, side).value for side in SIDES}
 
@@ -126,7 +120,3 @@ def provenance_record(provenance: ConversionProvenance) -> dict[str, Any]:
     """Provenance of a conversion as plain values."""
     profiles = {name: {"name": profile, "sha256": sha} for name, (profile, sha) in provenance.profiles.items()}
     return asdict(provenance) | {"profiles": profiles}
-
-
-def _smallest_gap(gaps: tuple[Gap, ...]) -> float | None:
-    return min((round(gap.distance, 6) for gap in gaps), default=None)

@@ -19,7 +19,7 @@ from xosc_lateral.files.tables import TABLE_SUFFIXES
 from xosc_lateral.workflows.batch.request import SCENARIO_SUFFIX, DocumentKind, document_kind
 from xosc_lateral.workflows.conversion.convert import convert_scenario
 from xosc_lateral.workflows.conversion.load import Played, play_scenario
-from xosc_lateral.workflows.conversion.modes import chosen_egos
+from xosc_lateral.workflows.conversion.plan import chosen_egos
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
 from xosc_lateral.workflows.detection.tracks import STEP, Rows, Scene, Size, Track, tracks_of
 from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH

@@ -7,7 +7,7 @@ action runs, nothing is reported: both would write the same place.
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -285,7 +285,7 @@ class EsminiTraffic:
 
     def _lanes(self, seen: list[tuple[str, ObjectState]], road: IntArray, anew: bool) -> list[_Lane]:
         """The lanes that vehicles are on; between steps of the model as they were, if they are the same."""
-        network, found = self.network, []
+        network, lanes = self.network, []
         for (name, state), index in zip(seen, road.tolist(), strict=True):
             known = self._lane_of.get(name)
             if known is None or anew or known.place != (index, state.lane):
@@ -300,8 +300,8 @@ class EsminiTraffic:
                         network.pose_at(index, state.lane, s).heading + turned,
                     )  # fmt: skip
                 self._lane_of[name] = known
-            found.append(known)
-        return found
+            lanes.append(known)
+        return lanes
 
     def _on_element(self, name: bytes, kind: int, state: int, path: bytes) -> None:
         """Esmini's callback: a lateral action takes its vehicles, and gives them back."""
@@ -316,20 +316,20 @@ class EsminiTraffic:
 def lateral_actions(scenario: Scenario) -> dict[str, set[str]]:
     """Lateral actions by the paths that esmini gives them -> names of the vehicles that each moves."""
     everybody = {entity.name for entity in scenario.entities}
-    found: dict[str, set[str]] = {}
+    moved_by: defaultdict[str, set[str]] = defaultdict(set)
     for private in scenario.storyboard.init.privates:
         for action in private.actions:
             if isinstance(action.content, LATERAL):
                 word = _INIT_NAMES.get(type(action.content), "LateralAction")
-                found.setdefault(f"Init {private.entity_ref} {word}", set()).add(private.entity_ref)
-    for story in scenario.storyboard.stories:
-        for act in story.acts:
-            for group in act.maneuver_groups:
-                actors = everybody if group.actors.select_triggering_entities else set(group.actors.entity_refs)
-                for maneuver in group.maneuvers:
-                    for event in maneuver.events:
-                        for action in event.actions:
-                            if isinstance(action.content, LATERAL):
-                                names = (story.name, act.name, group.name, maneuver.name, event.name, action.name)
-                                found.setdefault("::".join(names), set()).update(actors)
-    return found
+                moved_by[f"Init {private.entity_ref} {word}"].add(private.entity_ref)
+    groups = ((story, act, group) for story in scenario.storyboard.stories for act in story.acts
+              for group in act.maneuver_groups)  # fmt: skip
+    for story, act, group in groups:
+        actors = everybody if group.actors.select_triggering_entities else set(group.actors.entity_refs)
+        for maneuver in group.maneuvers:
+            for event in maneuver.events:
+                for action in event.actions:
+                    if isinstance(action.content, LATERAL):
+                        parts = (story, act, group, maneuver, event, action)
+                        moved_by["::".join(part.name for part in parts)] |= actors
+    return dict(moved_by)

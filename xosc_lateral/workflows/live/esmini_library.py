@@ -47,10 +47,7 @@ OPTIONAL = {"SE_SetLogFilePath": (None, c.c_char_p), "SE_LogToConsole": (None, c
 
 
 class Player:
-    """An esmini library, its functions by name; the types that a user has declared on them stay as they are.
-
-    Raises `SimulationError`: if it can't be loaded, or lacks a function.
-    """
+    """An esmini library, its functions by name; the types that a user has declared on them stay as they are."""
 
     def __init__(self, library: Any) -> None:
         self.where = str(library) if isinstance(library, str | Path) else "the given library"
@@ -64,8 +61,8 @@ class Player:
                 if name in OPTIONAL:
                     continue
                 raise SimulationError(f"{self.where}: has no function {name}; the library of esmini 3 is needed")
-            own = c.CFUNCTYPE(result, *arguments)((name, library)) if isinstance(library, c.CDLL) else None
-            setattr(self, name, own or getattr(library, name))
+            typed = c.CFUNCTYPE(result, *arguments)((name, library)) if isinstance(library, c.CDLL) else None
+            setattr(self, name, typed or getattr(library, name))
         self._is_known = False
 
     if TYPE_CHECKING:
@@ -73,10 +70,7 @@ class Player:
         def __getattr__(self, name: str) -> Callable[..., Any]: ...
 
     def state(self, number: int) -> ObjectState | None:
-        """Of an object; None if there is none of that number.
-
-        Raises `SimulationError`: if the library's structure is another than ours.
-        """
+        """Of an object; None if there is none. Raises `SimulationError`: the library has another structure."""
         state = ObjectState()
         if not self._is_known:
             self._compare(number)
@@ -103,10 +97,7 @@ _UNTOUCHED = 0xA5
 
 
 def open_player(library: Any, scenario: str | Path, *, window: bool = False) -> Player:
-    """A library that has opened a scenario; quiet, without a log file.
-
-    Raises `SimulationError`: if it is none, or can't open the scenario.
-    """
+    """A library that has opened a scenario; quiet, without a log file. Raises `SimulationError`: it can't."""
     player = Player(library)
     if hasattr(player, "SE_SetLogFilePath"):
         player.SE_SetLogFilePath(b"")

@@ -84,8 +84,8 @@ def drive_on(
     """
     is_first, passed = passed is None, passed or 0.0
     powers = u ** np.arange(6)
-    own = state["curve"] @ powers
-    own_rate = state["curve"][:, 1:] @ (np.arange(1, 6) * powers[:-1]) / step
+    driver = state["curve"] @ powers
+    driver_rate = state["curve"][:, 1:] @ (np.arange(1, 6) * powers[:-1]) / step
     pace = _pace(speed)
     is_driven = following & state["begun"]
     taken_over = is_driven & ~state["following"]
@@ -97,22 +97,22 @@ def drive_on(
     elif taken_over.any():
         was_rate = np.where(np.abs(was_rate) < np.maximum(0.2 * np.abs(speed), 0.1), was_rate, 0.0)  # placed anew
         was_rate = np.where(state["place"] == 0.0, 0.0, was_rate)
-        gap_rate = was_rate - own_rate * pace - aside_rate
-        gap = offset - base - own - aside + (own_rate * pace + aside_rate) * passed  # a step ago
+        gap_rate = was_rate - driver_rate * pace - aside_rate
+        gap = offset - base - driver - aside + (driver_rate * pace + aside_rate) * passed  # a step ago
         _lead_over(state, taken_over, gap, gap_rate, speed)
     went_on = is_driven & state["following"]
-    state["slip"] = np.where(went_on, state["slip"] - (1.0 - pace) * (own - state["own"]), 0.0)
+    state["slip"] = np.where(went_on, state["slip"] - (1.0 - pace) * (driver - state["own"]), 0.0)
     slipped = is_driven & (state["over"] <= 0.0) & (np.abs(state["slip"]) > NEGLIGIBLE_REST)
     if slipped.any():
         _lead_over(state, slipped, state["slip"], np.zeros(len(state)), speed)
         state["slip"][slipped] = 0.0
     rest_rate = _settle(state, passed * pace) * pace
-    place = np.where(is_driven, base + own + state["rest"] + state["slip"] + aside, offset)
-    rate = np.where(is_driven, own_rate * pace + rest_rate + aside_rate, was_rate * (passed > 0.0))
+    place = np.where(is_driven, base + driver + state["rest"] + state["slip"] + aside, offset)
+    rate = np.where(is_driven, driver_rate * pace + rest_rate + aside_rate, was_rate * (passed > 0.0))
     moving = np.abs(speed) > STANDSTILL
     sine = np.divide(rate, speed, out=np.zeros(len(state)), where=moving)
     heading = np.arcsin(np.clip(sine, -1.0, 1.0))
-    state["following"], state["place"], state["own"] = is_driven, place, own
+    state["following"], state["place"], state["own"] = is_driven, place, driver
     return state, Moves(place, np.where(is_driven, rate, 0.0), np.where(is_driven, heading, 0.0), is_driven)
 
 

@@ -49,30 +49,28 @@ def motion_of(rows: pd.DataFrame, scene: Scene, network: RoadNetwork) -> Nominal
     """The rows of a `LiveRun` by vehicle and time; a vehicle is active where there is a row of it."""
     times = np.unique(rows["time"])
     index = {name: k for k, name in enumerate(network.road_ids)}
-    found = []
+    motions = []
     for entity in scene.entities:
-        own = rows[rows["name"] == entity.name].rename(columns={"h": "heading"})
-        seen: dict[str, Any] = {name: own[name].to_numpy(dtype=np.float64) for name in SEEN}
-        seen |= {
-            "road": [index.get(str(road), -1) for road in own["road"]],
-            "lane": own["lane"].to_numpy(dtype=np.int32),
-        }
+        part = rows[rows["name"] == entity.name].rename(columns={"h": "heading"})
+        seen: dict[str, Any] = {name: part[name].to_numpy(dtype=np.float64) for name in SEEN}
+        seen["road"] = [index.get(str(road), -1) for road in part["road"]]
+        seen["lane"] = part["lane"].to_numpy(dtype=np.int32)
         if scene.is_road:  # a player says inertial places, a motion those of the road's file
             seen["x"], seen["y"] = network.header_offset.undo(seen["x"], seen["y"])
             seen["z"] = seen["z"] - network.header_offset.z
             seen["heading"] = seen["heading"] - network.header_offset.heading
-        elif len(own):
+        elif len(part):
             there = network.world_to_lane(*(seen[name] for name in ("x", "y", "z", "heading")))
             seen |= {"road": there.road, "lane": there.lane, "s": there.s}
         columns: dict[str, Any] = {name: np.zeros(len(times)) for name in (*SEEN, "heading_relative")}
         columns |= {name: np.zeros(len(times), dtype=np.int32) for name in ("road", "lane")}
         columns["activity"] = np.zeros(len(times), dtype=np.uint8)
-        at = np.searchsorted(times, own["time"])
+        at = np.searchsorted(times, part["time"])
         for name, values in {**seen, "activity": int(Activity.ACTIVE)}.items():
             columns[name][at] = values
-        found.append(EntityMotion(entity=entity, time=times, **columns))
+        motions.append(EntityMotion(entity=entity, time=times, **columns))
     step = float(times[1] - times[0]) if len(times) > 1 else 0.0
-    return NominalMotion(step, tuple(found), (), float(times[-1]) if len(times) else 0.0, "simulation", ())
+    return NominalMotion(step, tuple(motions), (), float(times[-1]) if len(times) else 0.0, "simulation", ())
 
 
 def sumo_entity(vehicles: Any, name: str) -> Entity:
@@ -86,10 +84,7 @@ def sumo_entity(vehicles: Any, name: str) -> Entity:
 
 
 def sumo_network(net: str) -> RoadNetwork:
-    """The road of a SUMO network, by SUMO's own ``netconvert``.
-
-    Raises `SimulationError`: if that is not there, or can't.
-    """
+    """The road of a SUMO network, by SUMO's own ``netconvert``. Raises `SimulationError`: it is not there, or can't."""
     try:
         from sumo import SUMO_HOME
 

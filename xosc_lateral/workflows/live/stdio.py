@@ -9,12 +9,14 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.base.limits import LIVE_LINE, LIVE_RANGES
 from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.json_text import refuse_depth
 from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.workflows.live.paths import Moves
 from xosc_lateral.workflows.live.traffic import Moment, Traffic
 from xosc_lateral.world.surroundings.moment import OpenDriveRoads, Places
 
@@ -36,10 +38,7 @@ def lines_of(file: BinaryIO) -> Iterator[bytes]:
 
 
 class Pipe:
-    """Answers line by line.
-
-    `road`: OpenDRIVE file: vehicles may then say `road`, `lane` and `s`, and see each other there.
-    """
+    """Answers line by line; with a `road` (OpenDRIVE) vehicles say `road`, `lane` and `s`, and see each other there."""
 
     def __init__(self, profile: DriverProfile, *, seed: int = 0, road: str | Path | None = None) -> None:
         self.network = None if road is None else read_opendrive(road)
@@ -68,76 +67,68 @@ class Pipe:
         try:
             text = line if isinstance(line, str) else line.decode()
             refuse_depth(text)
-            given = json.loads(text)
+            message = json.loads(text)
             if "\\u" in text:
-                json.dumps(given, ensure_ascii=False).encode()  # half a letter is none
+                json.dumps(message, ensure_ascii=False).encode()  # half a letter is none
         except ValueError as error:
             raise SimulationError(f"no JSON: {error}") from error
-        if not isinstance(given, dict):
+        if not isinstance(message, dict):
             raise SimulationError("a line has to be a JSON object")
-        if unknown := given.keys() - {"time", "vehicles", "save", "restore"}:
+        if unknown := message.keys() - {"time", "vehicles", "save", "restore"}:
             raise SimulationError(f"unknown: {min(unknown)!r}; a line says time and vehicles, save, or restore")
-        if "save" in given:
+        if "save" in message:
             return {"state": self.traffic.to_dict()}
-        if "restore" in given:
-            self.traffic.restore(given["restore"])
+        if "restore" in message:
+            self.traffic.restore(message["restore"])
             return {"restored": len(self.traffic)}
-        vehicles = given.get("vehicles")
-        if not isinstance(vehicles, dict) or not all(isinstance(one, dict) for one in vehicles.values()):
+        vehicles = message.get("vehicles")
+        if not isinstance(vehicles, dict) or not all(isinstance(values, dict) for values in vehicles.values()):
             raise SimulationError("`vehicles` has to be an object of objects, by name")
         columns = self._columns.union(*vehicles.values()) & self._known
-        moves = self.traffic.step(_number(given, "time", "the line"), self._moment(vehicles, columns))
+        moves = self.traffic.step(_number(message, "time", "the line"), self._moment(vehicles, columns))
         self._columns = columns
-        values = (moves.offset.tolist(), moves.rate.tolist(), moves.heading.tolist(), moves.steered.tolist())
-        return {
-            "time": given["time"],
-            "vehicles": {
-                name: {"offset": offset, "rate": rate, "heading": heading, "steered": steered}
-                for name, offset, rate, heading, steered in zip(vehicles, *values, strict=True)
-            },
-        }
+        rows = zip(*(column.tolist() for column in moves), strict=True)
+        answers = {name: dict(zip(Moves._fields, row, strict=True)) for name, row in zip(vehicles, rows, strict=True)}
+        return {"time": message["time"], "vehicles": answers}
 
     def _moment(self, vehicles: Mapping[str, Mapping[str, Any]], columns: set[str]) -> Moment:
-        seen = [(f"vehicle {name!r}", one) for name, one in vehicles.items()]
-        for who, one in seen:
-            if unknown := one.keys() - self._known - set(_VEHICLE_KEYS):
-                raise SimulationError(f"{who}: unknown column {min(unknown)!r}; see docs/schemas/live.json")
-        placed = self.network is not None and all(all(key in one for key in _PLACE) for _, one in seen)
+        seen = [(f"vehicle {name!r}", values) for name, values in vehicles.items()]
+        for vehicle, values in seen:
+            if unknown := values.keys() - self._known - set(_VEHICLE_KEYS):
+                raise SimulationError(f"{vehicle}: unknown column {min(unknown)!r}; see docs/schemas/live.json")
+        placed = self.network is not None and all(all(key in values for key in _PLACE) for _, values in seen)
         places = self._places(seen) if placed else None
         if self.network is not None and not placed and seen:
             raise SimulationError(f"with a road, every vehicle says {', '.join(_PLACE)}")
-        width = np.array([_number(one, "lane_width", who, 0.0 if placed else None) for who, one in seen])
+        width = _numbers(seen, "lane_width", 0.0 if placed else None)
         if places is not None and self.network is not None:
             on = places.road >= 0
             width[on] = self.network.lane_width(places.road[on], places.lane[on], places.s[on])
             width[~on] = 1.0
         return Moment(
             tuple(vehicles),
-            np.array([_number(one, "speed", who) for who, one in seen]),
+            _numbers(seen, "speed"),
             width,
-            np.array([_number(one, "offset", who, 0.0) for who, one in seen]),
-            np.array([_flag(one, "following", who, True) for who, one in seen], dtype=np.bool_)
-            & (True if places is None else places.road >= 0),
-            np.array([_flag(one, "driven", who, True) for who, one in seen], dtype=np.bool_),
-            np.array([_flag(one, "is_truck", who, False) for who, one in seen], dtype=np.bool_),
-            base=np.array([_number(one, "base", who, 0.0) for who, one in seen]),
-            context={
-                name: np.array([_number(one, name, who, float("nan")) for who, one in seen]) for name in columns
-            },
+            _numbers(seen, "offset", 0.0),
+            _flags(seen, "following", True) & (True if places is None else places.road >= 0),
+            _flags(seen, "driven", True),
+            _flags(seen, "is_truck", False),
+            base=_numbers(seen, "base", 0.0),
+            context={name: _numbers(seen, name, float("nan")) for name in columns},
             places=places,
         )  # fmt: skip
 
-    def _places(self, seen: list[tuple[str, Mapping[str, Any]]]) -> Places:
+    def _places(self, seen: _Seen) -> Places:
         assert self.network is not None
         roads = {name: index for index, name in enumerate(self.network.road_ids)}
-        for who, one in seen:
-            if isinstance(one["road"], bool) or not isinstance(one["road"], str | int):
-                raise SimulationError(f"{who}: road is {json.dumps(one['road'])[:40]}, expected an id")
-            if not _number(one, "lane", who).is_integer():
-                raise SimulationError(f"{who}: lane is {one['lane']}, expected a whole number")
-        road = np.array([roads.get(str(one["road"]), -1) for _, one in seen], dtype=np.int64)
-        lane = np.array([int(one["lane"]) for _, one in seen], dtype=np.int64)
-        s, offset = (np.array([_number(one, key, who, 0.0) for who, one in seen]) for key in ("s", "offset"))
+        for vehicle, values in seen:
+            if isinstance(values["road"], bool) or not isinstance(values["road"], str | int):
+                raise SimulationError(f"{vehicle}: road is {json.dumps(values['road'])[:40]}, expected an id")
+            if not _number(values, "lane", vehicle).is_integer():
+                raise SimulationError(f"{vehicle}: lane is {values['lane']}, expected a whole number")
+        road = np.array([roads.get(str(values["road"]), -1) for _, values in seen], dtype=np.int64)
+        lane = np.array([int(values["lane"]) for _, values in seen], dtype=np.int64)
+        s, offset = (_numbers(seen, key, 0.0) for key in ("s", "offset"))
         for row in range(len(seen)):
             if road[row] >= 0 and not self.network.has_lane_at(int(road[row]), int(lane[row]), float(s[row])):
                 road[row] = -1
@@ -147,27 +138,35 @@ class Pipe:
             poses = self.network.lane_to_world(road[on], lane[on], s[on], offset[on])
             centre = self.network.lane_to_world(road[on], lane[on], s[on])
             pose[:, on] = poses.x, poses.y, centre.heading
-        size = [np.array([_number(one, key, who, usual) for who, one in seen]) for key, usual in SIZE.items()]
-        return Places(pose[0], pose[1], pose[2], road, lane, s, size[0], size[1], size[2])
+        size = (_numbers(seen, key, usual) for key, usual in SIZE.items())
+        return Places(pose[0], pose[1], pose[2], road, lane, s, *size)
 
 
-def _number(one: Mapping[str, Any], name: str, who: str, missing: float | None = None) -> float:
-    value = one.get(name, missing)
-    if value is None and name in one and name in CONTEXT_UNITS and name not in ("speed", "lane_width"):
+_Seen = list[tuple[str, Mapping[str, Any]]]
+"""Vehicles, as messages name them, and what a line says of them."""
+
+
+def _numbers(seen: _Seen, name: str, missing: float | None = None) -> FloatArray:
+    return np.array([_number(values, name, vehicle, missing) for vehicle, values in seen])
+
+
+def _number(values: Mapping[str, Any], name: str, vehicle: str, missing: float | None = None) -> float:
+    value = values.get(name, missing)
+    if value is None and name in values and name in CONTEXT_UNITS and name not in ("speed", "lane_width"):
         return float("nan")  # JSON's way to say that there is none
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise SimulationError(f"{who}: {name} is {json.dumps(value)[:40]}, expected a number")
+        raise SimulationError(f"{vehicle}: {name} is {json.dumps(value)[:40]}, expected a number")
     believed = LIVE_RANGES.get(name)
     if believed is not None and not believed.low <= value <= believed.high:
-        raise SimulationError(f"{who}: {name} {value!s:.40} is not within [{believed.low:g}, {believed.high:g}]")
+        raise SimulationError(f"{vehicle}: {name} {value!s:.40} is not within [{believed.low:g}, {believed.high:g}]")
     try:
         return float(value)
     except OverflowError as error:
-        raise SimulationError(f"{who}: {name} is a number of {len(str(value))} digits") from error
+        raise SimulationError(f"{vehicle}: {name} is a number of {len(str(value))} digits") from error
 
 
-def _flag(one: Mapping[str, Any], name: str, who: str, usual: bool) -> bool:
-    value = one.get(name, usual)
-    if not isinstance(value, bool):
-        raise SimulationError(f"{who}: {name} is {json.dumps(value)[:40]}, expected true or false")
-    return value
+def _flags(seen: _Seen, name: str, usual: bool) -> BoolArray:
+    for vehicle, values in seen:
+        if not isinstance(value := values.get(name, usual), bool):
+            raise SimulationError(f"{vehicle}: {name} is {json.dumps(value)[:40]}, expected true or false")
+    return np.array([values.get(name, usual) for _, values in seen], dtype=np.bool_)

@@ -54,10 +54,7 @@ _BEND = 20.0
 
 
 def start(words: Iterable[str]) -> Any:
-    """Libsumo with a loaded simulation; the words of SUMO's command line.
-
-    Raises `SimulationError`: if it is not installed, or can't load that.
-    """
+    """Libsumo with a simulation loaded by the words of SUMO's command line. Raises `SimulationError`: it can't."""
     try:
         import libsumo
     except ImportError as error:
@@ -83,15 +80,12 @@ class SumoRoads:
         edges = [name.rpartition("_")[0] for name in self.names]
         numbers = {edge: k for k, edge in enumerate(dict.fromkeys(edges))}
         index = [int(name.rpartition("_")[2]) for name in self.names]
-        lanes = Counter(edges)
-        self.place = {name: (numbers[edge], lanes[edge] - k if self.left_hand else k + 1)
+        self._count = Counter(map(numbers.__getitem__, edges))
+        self.place = {name: (numbers[edge], self._count[numbers[edge]] - k if self.left_hand else k + 1)
                       for name, edge, k in zip(self.names, edges, index, strict=True)}  # fmt: skip
         self._name = {place: name for name, place in self.place.items()}
         self.width = {place: float(connection.lane.getWidth(name)) for name, place in self.place.items()}
         self._length = {place: float(connection.lane.getLength(name)) for name, place in self.place.items()}
-        self._count = dict.fromkeys(numbers.values(), 0)
-        for edge, _ in self._name:
-            self._count[edge] += 1
         self._middle = {
             (edge, lane): sum(self.width[edge, k] for k in range(1, lane)) + 0.5 * self.width[edge, lane]
             for edge, lane in self._name
@@ -101,12 +95,12 @@ class SumoRoads:
     @cached_property
     def _next(self) -> dict[str, str]:
         """The lane that each leads to: by the inner lane of a junction, the straightest way where there are several."""
-        found = {}
+        following = {}
         for name in self.names:
             links = sorted(self._lane.getLinks(name), key=lambda link: (link[6] != "s", link[0]))
             if links:
-                found[name] = links[0][4] or links[0][0]
-        return found
+                following[name] = links[0][4] or links[0][0]
+        return following
 
     @cached_property
     def _before(self) -> dict[str, str]:
@@ -149,18 +143,17 @@ class SumoRoads:
 
     def path(self, road: int, lane: int, s: float) -> list[Reach]:
         """See `Roads`."""
-        found = [Reach(road, 0.0, self._length[road, lane], lane, 0.0, s, 1)]
-        name, ahead, edge = self._name[road, lane], self._length[road, lane] - s, self._length[road, lane]
-        while ahead < SIGHT_DISTANCE + edge and (name := self._next.get(name, "")):
-            place = self.place[name]
-            found.append(Reach(place[0], 0.0, self._length[place], place[1], ahead, 0.0, 1))
-            ahead += self._length[place]
-        name, behind = self._name[road, lane], s
-        while behind < SIGHT_DISTANCE + edge and (name := self._before.get(name, "")):
-            place = self.place[name]
-            behind += self._length[place]
-            found.append(Reach(place[0], 0.0, self._length[place], place[1], -behind, 0.0, 1))
-        return found
+        edge = self._length[road, lane]
+        path = [Reach(road, 0.0, edge, lane, 0.0, s, 1)]
+        for neighbour, way in ((self._next, edge - s), (self._before, s)):
+            name = self._name[road, lane]
+            while way < SIGHT_DISTANCE + edge and (name := neighbour.get(name, "")):
+                place = self.place[name]
+                length = self._length[place]
+                begin = way if neighbour is self._next else -way - length
+                path.append(Reach(place[0], 0.0, length, place[1], begin, 0.0, 1))
+                way += length
+        return path
 
     def directions(self, road: IntArray, lane: IntArray) -> IntArray:
         """See `Roads`: every lane is driven along its own direction."""
@@ -297,20 +290,20 @@ class SumoTraffic:
 
     def _follows(self, name: str, lane: str, offset: float, now: float) -> bool:
         """Whether a vehicle keeps its lane, as far as SUMO is concerned: it wants no other, and lies still in this."""
-        vehicles, own = self.connection.vehicle, self._known[name]
-        before, own.lane = own.lane, lane
+        vehicles, vehicle = self.connection.vehicle, self._known[name]
+        before, vehicle.lane = vehicle.lane, lane
         wishes = [int(vehicles.getLaneChangeState(name, side)[0]) for side in (1, -1)]
         wants = any(wish & _REASONS and wish & _SIDES and not wish & _BLOCKED for wish in wishes)
         changed = before != lane and before.rpartition("_")[0] == lane.rpartition("_")[0]
         wanted, steered = self.moves.get(name, (offset, False))
         if wants or changed or (steered and abs(wanted - offset) > ELSEWHERE):
-            own.busy_until = now + HOLD
-        if own.busy_until is None:
+            vehicle.busy_until = now + HOLD
+        if vehicle.busy_until is None:
             return True
-        sticks_out = abs(offset) + 0.5 * own.width > 0.5 * self.roads.width[self.roads.place[lane]] + _STILL
-        if now < own.busy_until or sticks_out or abs(float(vehicles.getLateralSpeed(name))) > _STILL:
+        sticks_out = abs(offset) + 0.5 * vehicle.width > 0.5 * self.roads.width[self.roads.place[lane]] + _STILL
+        if now < vehicle.busy_until or sticks_out or abs(float(vehicles.getLateralSpeed(name))) > _STILL:
             return False
-        own.busy_until = None
+        vehicle.busy_until = None
         return True
 
 

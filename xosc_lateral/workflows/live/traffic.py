@@ -1,7 +1,7 @@
 """Drivers of the vehicles of a running simulation: once per step they get what it knows, and say where they are.
 
 A driver goes on at the model's step (5 Hz), on what he sees at that moment; in between he follows the curve of
-`model.upsampling`. What he sees he responds to a little later than in a conversion, which knows what comes
+`model.linear_filters`. What he sees he responds to a little later than in a conversion, which knows what comes
 (`OffsetStream.preview`). Where a maneuver has moved a vehicle, its path leads over from there to the driver's.
 """
 
@@ -78,14 +78,12 @@ class Moment:
 
 
 class Traffic:
-    """The drivers of many vehicles.
+    """The drivers of many vehicles: ``Traffic(profile, seed=1).step(time, moment)``.
 
     Parameters
     ----------
-    profile : DriverProfile
-        Who drives.
-    profiles : mapping of str to DriverProfile, optional
-        By vehicle, where it is another.
+    profile, profiles : DriverProfile, mapping of str to DriverProfile
+        Who drives; by vehicle where it is another.
     seed : int
         A vehicle's random numbers follow from it and the vehicle's name, as in a conversion: same seed, same drivers.
     roads : Roads, optional
@@ -94,11 +92,6 @@ class Traffic:
         See `conversion.enrich`.
     left_hand : bool
         One keeps left here.
-
-    Examples
-    --------
-    >>> traffic = Traffic(profile, seed=1)
-    >>> moves = traffic.step(time, moment)
     """
 
     def __init__(
@@ -115,9 +108,9 @@ class Traffic:
         self._roads, self._neighbours, self._left_hand = roads, neighbours, left_hand
         self._profiles: dict[str, DriverProfile] = {"": profile, **(profiles or {})}
         self._step = profile.model.step
-        for one in self._profiles.values():
-            if one.model.step != self._step:
-                raise ValueError(f"{one.name} has steps of {one.model.step} s, {profile.name} of {self._step} s")
+        for other in self._profiles.values():
+            if other.model.step != self._step:
+                raise ValueError(f"{other.name} has steps of {other.model.step} s, {profile.name} of {self._step} s")
         self._groups: dict[str, tuple[OffsetGroup, list[str]]] = {}
         self._names: list[str] = []
         self._index: dict[str, int] = {}
@@ -139,41 +132,38 @@ class Traffic:
         _check(time, self._time, moment)
         context = self._context(moment) if self.is_due(time) else None
         there = np.flatnonzero(moment.driven)
-        who = self._present([moment.names[k] for k in there])
+        drivers = self._present([moment.names[k] for k in there])
         passed = None if self._time is None else time - self._time
         self._time = time
         if context is not None:
-            self._advance(time, moment, context, there, who)
+            self._advance(time, moment, context, there, drivers)
         rate, heading = np.zeros((2, len(moment.names)))
         moves = Moves(moment.offset.copy(), rate, heading, np.zeros(len(moment.names), dtype=np.bool_))
         if len(there):
             rows = (moment.speed[there], moment.offset[there], moment.nominal[there], moment.following[there])
             u = min(max(time / self._step - (self._knots - 1), 0.0), 1.0)
-            self._state[who], found = drive_on(self._state[who], u, self._step, passed, *rows)
-            for values, own in zip(moves, found, strict=True):
-                values[there] = own
+            self._state[drivers], driven = drive_on(self._state[drivers], u, self._step, passed, *rows)
+            for values, part in zip(moves, driven, strict=True):
+                values[there] = part
         return moves
 
     # ---- who is there ------------------------------------------------------------------------------------------------
     def _present(self, names: list[str]) -> IntArray:
         """Drivers of these vehicles, shape (n,): those of others have gone, new ones have come."""
         if names != self._names:
-            gone = self._index.keys() - set(names)
-            if gone:
-                self._keep_vehicles(gone)
-            new = [name for name in names if name not in self._index]
+            there = set(names)
+            if not there >= self._index.keys():
+                self._state = self._state[[name in there for name in self._names]]
+                self._names = [name for name in self._names if name in there]
+                for key, (group, members) in self._groups.items():
+                    group.keep_present(np.array([name in there for name in members], dtype=np.bool_))
+                    self._groups[key] = (group, [name for name in members if name in there])
+            before = set(self._names)
+            new = [name for name in names if name not in before]
             self._names += new
-            self._index.update({name: k for k, name in enumerate(self._names)})
+            self._index = {name: k for k, name in enumerate(self._names)}
             self._state = np.concatenate([self._state, np.zeros(len(new), dtype=DRIVER)])
         return np.array([self._index[name] for name in names], dtype=np.int64)
-
-    def _keep_vehicles(self, gone: set[str]) -> None:
-        self._state = self._state[[name not in gone for name in self._names]]
-        self._names = [name for name in self._names if name not in gone]
-        self._index = {name: k for k, name in enumerate(self._names)}
-        for key, (group, members) in self._groups.items():
-            group.keep_present(np.array([name not in gone for name in members], dtype=np.bool_))
-            self._groups[key] = (group, [name for name in members if name not in gone])
 
     def seed_of(self, name: str) -> np.random.SeedSequence:
         """The random numbers of a vehicle's driver: those of a conversion with this seed."""
@@ -193,31 +183,26 @@ class Traffic:
 
     def _context(self, moment: Moment) -> dict[str, FloatArray]:
         """What everybody sees, checked before anything changes."""
-        found: dict[str, FloatArray] = {"speed": moment.speed, "is_truck": moment.is_truck.astype(np.float64)}
-        acceleration = np.zeros(len(moment.names))
+        columns: dict[str, FloatArray] = {"speed": moment.speed, "is_truck": moment.is_truck.astype(np.float64)}
+        columns["acceleration"] = np.zeros(len(moment.names))
         for row, name in enumerate(moment.names):
             k = self._index.get(name)
             if k is not None and self._state["begun"][k]:
-                acceleration[row] = (moment.speed[row] - self._state["speeds"][k, 0]) / (SPEEDS - 1) / self._step
-        found["acceleration"] = acceleration
+                change = moment.speed[row] - self._state["speeds"][k, 0]
+                columns["acceleration"][row] = change / (SPEEDS - 1) / self._step
         if moment.places is not None and self._roads is not None:
-            found |= look_around(self._roads, moment.places, moment.offset, moment.is_truck)
-        found |= {name: np.asarray(values, dtype=np.float64) for name, values in moment.context.items()}
-        found["lane_width"] = moment.lane_width
-        if self._columns is not None and (missing := set(self._columns) - found.keys()):
+            columns |= look_around(self._roads, moment.places, moment.offset, moment.is_truck)
+        columns |= {name: np.asarray(values, dtype=np.float64) for name, values in moment.context.items()}
+        columns["lane_width"] = moment.lane_width
+        if self._columns is not None and (missing := set(self._columns) - columns.keys()):
             raise SimulationError(f"the simulation says nothing of {min(missing)!r}, which it did before")
-        for name, values in found.items():
-            if (row_ := first_implausible(name, values)) is not None:
-                raise SimulationError(f"vehicle {moment.names[row_]!r}: {implausible(name, float(values[row_]))}")
-        return found
+        for name, values in columns.items():
+            if (bad := first_implausible(name, values)) is not None:
+                raise SimulationError(f"vehicle {moment.names[bad]!r}: {implausible(name, float(values[bad]))}")
+        return columns
 
     def _advance(
-        self,
-        time: float,
-        moment: Moment,
-        context: dict[str, FloatArray],
-        there: IntArray,
-        who: IntArray,
+        self, time: float, moment: Moment, context: dict[str, FloatArray], there: IntArray, all_drivers: IntArray
     ) -> None:
         """On to the model step that is now, or to the last one of those that have passed."""
         if self._columns is None:
@@ -246,11 +231,11 @@ class Traffic:
                 )
             self._state["curve"][drivers] = -curve if other_hand else curve
         state = self._state
-        new = who[~state["begun"][who]]
-        state["speeds"][new] = moment.speed[there][~state["begun"][who], None]
-        state["begun"][who] = True
-        state["speeds"][who] = np.column_stack([state["speeds"][who, 1:], moment.speed[there]])
-        state["wanted"][who] = self._aside(moment, there, who)[there]
+        is_new = ~state["begun"][all_drivers]
+        state["speeds"][all_drivers[is_new]] = moment.speed[there][is_new, None]
+        state["begun"][all_drivers] = True
+        state["speeds"][all_drivers] = np.column_stack([state["speeds"][all_drivers, 1:], moment.speed[there]])
+        state["wanted"][all_drivers] = self._aside(moment, there, all_drivers)[there]
 
     def _width(self, drivers: list[int], width: FloatArray) -> FloatArray:
         """The lane's, a first-order lag behind what it is: a border of two widths is no jump of the path. [m]"""
@@ -258,7 +243,7 @@ class Traffic:
         self._state["width"][drivers] = width + (before - width) * np.exp(-self._step / STEERING)
         return np.asarray(self._state["width"][drivers])
 
-    def _aside(self, moment: Moment, there: IntArray, who: IntArray) -> FloatArray:
+    def _aside(self, moment: Moment, there: IntArray, drivers: IntArray) -> FloatArray:
         """How far everybody wants to move aside, shape (n,). [m]"""
         if moment.places is None or self._neighbours is not Neighbours.BORROW:
             return np.zeros(len(moment.names))
@@ -266,13 +251,13 @@ class Traffic:
         for key, (_, members) in self._groups.items():
             profile = self._profiles[key]
             other_hand = profile.left_hand != self._left_hand
-            rows = there[np.isin(who, [self._index[name] for name in members])]
+            rows = there[np.isin(drivers, [self._index[name] for name in members])]
             for word, basis in (("responds", {Basis.POPULATION}), ("alone", {Basis.MEASURED, Basis.DECLARED})):
                 for side in sides_known(profile, basis, other_hand=other_hand):
                     getattr(response, f"{word}_{side}")[rows] = True
         lateral = np.where(moment.following, moment.offset - moment.nominal, 0.0)
         deviation = lateral.copy()
-        deviation[there] -= np.where(moment.following[there], self._state["aside"][who], 0.0)
+        deviation[there] -= np.where(moment.following[there], self._state["aside"][drivers], 0.0)
         can_move = moment.driven & moment.following
         return give_way_now(moment.places, lateral, deviation, can_move, response, left_hand=self._left_hand)
 
@@ -286,8 +271,8 @@ class Traffic:
             "knots": self._knots,
             "columns": self._columns,
             "drivers": {
-                name: [np.asarray(value).tolist() for value in own]
-                for name, own in zip(self._names, self._state.tolist(), strict=True)
+                name: [np.asarray(value).tolist() for value in row]
+                for name, row in zip(self._names, self._state.tolist(), strict=True)
             },
             "groups": {key: {"members": members, **group.to_dict()} for key, (group, members) in self._groups.items()},
         }, FORMAT)  # fmt: skip
@@ -301,8 +286,8 @@ class Traffic:
         trial, restored = copy(self), copy(self)
         try:
             values = unsealed(state, FORMAT)
-            for one in (trial, restored):
-                one._go_on_from(values)
+            for traffic in (trial, restored):
+                traffic._go_on_from(values)
             trial._try()
         except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
             if isinstance(error, XoscLateralError):
@@ -314,7 +299,7 @@ class Traffic:
         """One step more, with nothing around, as a check of a state."""
         if not all((np.abs(self._state[name]) <= LIVE_RANGES["offset"].high).all() for name in DRIVER.names or ()):
             raise ValueError("a driver's number that none has")
-        begun = [name for name, own in zip(self._names, self._state, strict=True) if own["begun"]]
+        begun = [name for name, is_begun in zip(self._names, self._state["begun"], strict=True) if is_begun]
         if sorted(begun) != sorted(name for _, members in self._groups.values() for name in members):
             raise ValueError("drivers and groups name others")
         if self._time is None and self._columns is None:
@@ -340,8 +325,9 @@ class Traffic:
         self._columns = None if state["columns"] is None else tuple(state["columns"])
         self._names = list(state["drivers"])
         self._index = {name: k for k, name in enumerate(self._names)}
-        rows = [tuple(tuple(one) if isinstance(one, list) else one for one in own) for own in state["drivers"].values()]
-        self._state = np.array(rows, dtype=DRIVER)
+        rows = state["drivers"].values()
+        tuples = [tuple(tuple(value) if isinstance(value, list) else value for value in row) for row in rows]
+        self._state = np.array(tuples, dtype=DRIVER)
         self._groups = {}
         for key, saved in state["groups"].items():
             group = OffsetGroup(self._profiles[key], self._columns or ())

@@ -30,14 +30,9 @@ CHANGED: Mapping[Acts, str] = {
 }
 """What a column effect changes, in words."""
 
-SINGLE_DRIVER_DRIVES = 10
-"""Drives below which a profile is taken to be of one driver."""
-
-SHOWN_DRIVERS, SHOWN_S = 4, 120.0
-"""Sample paths that are drawn, and their length. [s]"""
-
-WRAPPED_ROWS = ("", "lane", "+-", "source", "licence")
-"""Rows of a card that are wrapped in the terminal."""
+SINGLE_DRIVER_DRIVES = 10  # Drives below which a profile is taken to be of one driver.
+SHOWN_DRIVERS, SHOWN_S = 4, 120.0  # Sample paths that are drawn, and their length. [s]
+WRAPPED_ROWS = ("", "valid", "lane", "+-", "source", "licence")  # Rows of a card that are wrapped in the terminal.
 
 
 # ---- the list --------------------------------------------------------------------------------------------------------
@@ -210,8 +205,8 @@ def _outcome(known: Provenance) -> list[tuple[str, str]]:
 
 def _outcome_items(loop: Mapping[str, Any] | None, evaluation: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     if loop:
-        found = ", ".join(loop["found"]) or "nothing"
-        yield "loop", f"started from a {loop['base']} model, seed {loop['seed']}; found: {found}"
+        names = ", ".join(loop["found"]) or "nothing"
+        yield "loop", f"started from a {loop['base']} model, seed {loop['seed']}; found: {names}"
     if short := evaluation.get("snippets"):
         scores = (
             f"distance {short['mean_distance']:.3f}, between real drivers {short['mean_floor']:.3f}, "
@@ -227,14 +222,7 @@ def _outcome_items(loop: Mapping[str, Any] | None, evaluation: Mapping[str, Any]
 
 # ---- the page --------------------------------------------------------------------------------------------------------
 def card_page(profile: DriverProfile, seed: int = 0) -> str:
-    """HTML page; same profile and seed, same bytes.
-
-    Parameters
-    ----------
-    profile : DriverProfile
-    seed : int
-        Of the free runs that are drawn and summed up.
-    """
+    """HTML page; same profile and seed (of the free runs that are drawn), same bytes."""
     runs, step = free_runs(profile, seed), profile.model.step
     (summary, keeping), known = figures_of(profile, seed), profile.provenance
     page = Page(f"Driver profile {profile.name}")

@@ -10,7 +10,7 @@ from typing import Any
 
 from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.base.version import __version__
-from xosc_lateral.drivers.evaluation.distances import Distances
+from xosc_lateral.drivers.evaluation.metrics import Distances
 from xosc_lateral.drivers.loop.close import Finding, LoopResult
 from xosc_lateral.drivers.loop.feedback import Feedback
 from xosc_lateral.drivers.loop.selection import Gain

@@ -23,8 +23,7 @@ LABELS = {
 }
 """The ten metrics, for readers."""
 
-SHOWN_QUANTILES = (0.001, 0.999)
-"""Violins are drawn within these; minimum and maximum are bars of their own."""
+SHOWN_QUANTILES = (0.001, 0.999)  # Violins are drawn within these; minimum and maximum are bars of their own.
 
 
 def violin_figure(
@@ -33,16 +32,9 @@ def violin_figure(
     before: FloatArray | None = None,
     names: tuple[str, str] = ("measured", "sampled"),
 ) -> Figure:
-    """Ten pairs of half violins with bars at minimum, mean and maximum.
+    """Ten pairs of half violins with bars at minimum, mean and maximum, of metrics of shape (n, 10) [m].
 
-    Parameters
-    ----------
-    left, right : array, shape (n, 10)
-        Metrics of snippets, of which the halves are drawn. [m]
-    before : array, shape (n, 10), optional
-        Drawn on the right as an outline.
-    names : tuple of str
-        Of both sides.
+    `before` is drawn on the right as an outline.
     """
     figure = Figure(2, 5, height=150.0, legend=True)
     for k, (panel, name) in enumerate(zip(figure.panels, METRICS, strict=True)):

@@ -1,147 +1,22 @@
-"""The promised calls: `import_drives`, and `reconstruct` with its result."""
+"""The promised calls: `import_drives` with its result, and `reconstruct`."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.drives import file_label
 from xosc_lateral.files.mapping import MappingLike
-from xosc_lateral.files.output_paths import claim, output_file, output_folder
+from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.workflows.conversion.options import spelled_out, values_of
 from xosc_lateral.workflows.recordings.importers import find_importer
 from xosc_lateral.workflows.recordings.importers.table import Imported, as_imported
-from xosc_lateral.workflows.recordings.reconstruct import (
-    Reconstructed,
-    ReconstructKeywords,
-    ReconstructSettings,
-    drivers_table,
-    fitted_profiles,
-    reconstruct_recording,
-)
+from xosc_lateral.workflows.recordings.settings import ReconstructKeywords, ReconstructSettings
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths
 
-
-@spelled_out(ReconstructSettings)
-def reconstruct(
-    recording: PathLike,
-    output: PathLike | None = None,
-    *,
-    format: str | None = None,  # noqa: A002 (as in `import_drives`)
-    road: PathLike | None = None,
-    columns: MappingLike | None = None,
-    force: bool = False,
-    **options: Unpack[ReconstructKeywords],
-) -> Reconstruction:
-    """Turn a recording into maneuvers, a road and drivers.
-
-    Parameters
-    ----------
-    recording : str or Path
-        Tracks of several vehicles: DLR Highway Traffic, levelX, OSI traces, CommonRoad, SUMO's FCD output, or a table.
-    output : str or Path, optional
-        Folder to write to, see `Reconstruction.write`; without it nothing is written.
-    format : str, optional
-        "dlr-ht", "levelx", "osi", "commonroad", "fcd" or "tracks"; without it, told from the file.
-    road : str or Path, optional
-        OpenDRIVE file, for recordings that come without their lanes; SUMO's network, for its FCD output.
-    columns : dict, path or TableMapping, optional
-        Name -> ``COLUMN[:UNIT]`` for tables of tracks, or a saved mapping's file.
-    force : bool
-        Replace files that this package did not write.
-    options
-        `recordings.reconstruct.ReconstructSettings`: which part and which vehicles, and what is written of them.
-
-    Raises
-    ------
-    FormatError, NotEnoughDataError
-    """
-    from xosc_lateral.workflows.recordings.recordings import read_recording
-
-    settings = ReconstructSettings(**values_of(ReconstructSettings, options))
-    traffic = read_recording(Path(recording), kind=format, road=None if road is None else Path(road), columns=columns)
-    result = Reconstruction(reconstruct_recording(traffic, settings))
-    if output is not None:
-        result.write(output, force=force)
-    return result
-
-
-class Reconstruction(Result):
-    """A scenario with its road and drivers, and how near it is to the recording."""
-
-    __slots__ = ("_made", "outputs")
-
-    def __init__(self, made: Reconstructed) -> None:
-        self._made = made
-        self.outputs: tuple[Path, ...] = ()
-        """Files that were written."""
-
-    @property
-    def name(self) -> str:
-        """Of the files, without suffix."""
-        return self._made.traffic.name
-
-    @property
-    def scenario(self) -> str:
-        """The OpenSCENARIO document."""
-        return self._made.scenario
-
-    @property
-    def left_out(self) -> tuple[str, ...]:
-        """Vehicles, and parts of them, that are not in the scenario: a line each, with the reason."""
-        return self._made.recording.left_out
-
-    def headline(self) -> str:
-        """One line."""
-        return str(self).splitlines()[0]
-
-    def __str__(self) -> str:
-        from xosc_lateral.workflows.recordings.page import as_text
-
-        return as_text(self.to_dict())
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per vehicle: when it is there, its maneuvers, residuals and driver."""
-        return pd.DataFrame(self.to_dict()["vehicles"])
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values, as ``--json`` prints them and the report holds them."""
-        from xosc_lateral.workflows.recordings.page import facts_of
-
-        return facts_of(self._made) | {"outputs": [str(path) for path in self.outputs]}
-
-    def write(self, folder: PathLike, *, force: bool = False) -> tuple[Path, ...]:
-        """Write NAME.xosc and its road, drivers.csv for `convert`, report.html and report.json, all or none.
-
-        Returns
-        -------
-        tuple of Path
-        """
-        from xosc_lateral.files.atomic import write_atomically
-        from xosc_lateral.files.json_text import canonical_json
-        from xosc_lateral.workflows.recordings.page import facts_of, page_of
-
-        made, where = self._made, output_folder(folder)
-        facts = facts_of(made)
-        files: dict[str, bytes | str] = {
-            made.traffic.road_name: made.traffic.road,
-            f"{made.traffic.name}.xosc": made.scenario,
-            **fitted_profiles(made),
-            "report.html": page_of(made, facts),
-            "report.json": canonical_json(facts),
-        }
-        table = where / "drivers.csv"
-        paths = {where / name: data for name, data in files.items()}
-        kept = {path for path in made.traffic.sources if path.exists() and (where / path.name).exists()}
-        same = {path for path in paths if any(path.resolve() == one.resolve() for one in kept)}
-        claim([*(path for path in paths if path not in same), table], made.traffic.sources, force=force)
-        for path, data in paths.items():
-            if path not in same:  # a road that lies there already stays as it is
-                write_atomically(path, data)
-        drivers_table(made, table)
-        self.outputs = (*paths, table)
-        return self.outputs
+if TYPE_CHECKING:
+    from xosc_lateral.workflows.recordings.reconstruction import Reconstruction
 
 
 def import_drives(
@@ -189,9 +64,12 @@ class ImportedDrives(Result):
         return f"{known.source}: {known.vehicles} vehicles, {known.hours:g} h"
 
     def __str__(self) -> str:
-        from xosc_lateral.workflows.recordings.importers.table import describe
-
-        return describe(self._imported.provenance)
+        record = self._imported.provenance
+        rows = ", ".join(f"{count} {state}" for state, count in record.rows.items())
+        head = f"{record.source}: {record.vehicles} vehicles, {record.hours:g} h kept (rows: {rows})"
+        lanes = ["  " + ", ".join(f"{name} {value}" for name, value in lane.items()) for lane in record.lanes]
+        notes = [f"  note: {note}" for note in record.notes]
+        return "\n".join([head, *lanes, *notes, f"licence: {record.licence}"])
 
     def to_frame(self) -> pd.DataFrame:
         """The drive table: what `fit` and the other calls take."""
@@ -212,3 +90,48 @@ class ImportedDrives(Result):
         claim([output], [source for source in self.sources if source.is_file()], force=force)
         write_imported(self._imported, output)
         return output
+
+
+@spelled_out(ReconstructSettings)
+def reconstruct(
+    recording: PathLike,
+    output: PathLike | None = None,
+    *,
+    format: str | None = None,  # noqa: A002 (as in `import_drives`)
+    road: PathLike | None = None,
+    columns: MappingLike | None = None,
+    force: bool = False,
+    **options: Unpack[ReconstructKeywords],
+) -> Reconstruction:
+    """Turn a recording into maneuvers, a road and drivers.
+
+    Parameters
+    ----------
+    recording : str or Path
+        Tracks of several vehicles: DLR Highway Traffic, levelX, OSI traces, CommonRoad, SUMO's FCD output, or a table.
+    output : str or Path, optional
+        Folder to write to, see `Reconstruction.write`; without it nothing is written.
+    format : str, optional
+        "dlr-ht", "levelx", "osi", "commonroad", "fcd" or "tracks"; without it, told from the file.
+    road : str or Path, optional
+        OpenDRIVE file, for recordings that come without their lanes; SUMO's network, for its FCD output.
+    columns : dict, path or TableMapping, optional
+        Name -> ``COLUMN[:UNIT]`` for tables of tracks, or a saved mapping's file.
+    force : bool
+        Replace files that this package did not write.
+    options
+        `recordings.settings.ReconstructSettings`: which part and which vehicles, and what is written of them.
+
+    Raises
+    ------
+    FormatError, NotEnoughDataError
+    """
+    from xosc_lateral.workflows.recordings.reconstruct import reconstruct_recording
+    from xosc_lateral.workflows.recordings.recordings import read_recording
+
+    settings = ReconstructSettings(**values_of(ReconstructSettings, options))
+    traffic = read_recording(Path(recording), kind=format, road=None if road is None else Path(road), columns=columns)
+    result = reconstruct_recording(traffic, settings)
+    if output is not None:
+        result.write(output, force=force)
+    return result

@@ -58,10 +58,7 @@ def require_headings(heading: FloatArray, way: FloatArray, speed: FloatArray, pa
 
 
 def require_lane_direction(agreement: FloatArray, speed: FloatArray, where: str, path: Path) -> BoolArray:
-    """Rows that drive against their lane, shape (n,); refuse a recording that does so.
-
-    `agreement`: cosine of the way and the lane's direction of travel, NaN in no lane. [-] `where`: what lanes are from.
-    """
+    """Rows against their lane by the cosine of way and lane (NaN: in none), shape (n,); refuse a recording of them."""
     against = (speed > MOVING_SPEED) & (agreement < 0.0)
     share = _share(against[(speed > MOVING_SPEED) & np.isfinite(agreement)])
     if share > MAX_AGAINST:

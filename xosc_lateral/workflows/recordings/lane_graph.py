@@ -24,12 +24,10 @@ class LaneGraph:
     facing: Mapping[tuple[int, int], tuple[FloatArray, FloatArray]] = field(default_factory=dict)
 
     def layout(self) -> tuple[IntArray, list[tuple[FloatArray, FloatArray]], IntArray]:
-        """Part of the network, ways along each piece with the stations that they lie at [m], and its rank (growing to
-        the left).
+        """Part of the network, ways along each piece with their stations [m], and its rank, growing to the left.
 
-        Breadth first from the first piece of each part. Where ways meet that are of different length, as in a ring or
-        beyond a junction, the first one found counts; pieces that come to lie on one another there (two ways into one
-        place of a layout) get parts of their own.
+        Breadth first from the first piece of each part. Where ways of different length meet, the first one counts;
+        pieces that come to lie on one another there get parts of their own.
         """
         n = len(self.length)
         part, rank = np.full(n, -1), np.zeros(n, dtype=np.int64)
@@ -61,10 +59,7 @@ class LaneGraph:
         return np.array([0.0, self.length[piece]]), np.array([start, start + self.length[piece]])
 
     def stations(self, piece: IntArray, along: FloatArray) -> tuple[IntArray, FloatArray, IntArray, FloatArray]:
-        """Part, station [m] and rank of places in pieces, and metres along the piece per metre of station [-].
-
-        Shape (n,) each; `along`: from the piece's start. [m]
-        """
+        """Part, station [m], rank of places `along` pieces [m], and metres along a piece per metre of station."""
         part, lines, rank = self.layout()
         station, scale = np.array(along, dtype=np.float64), np.ones(len(along))
         for number in np.unique(piece):
@@ -112,12 +107,11 @@ def neighbour_columns(
     *,
     scale: FloatArray | float = 1.0,
 ) -> dict[str, FloatArray]:
-    """Columns of leader and neighbours, shape (n,) each, see `find_neighbours`; rows sorted by vehicle and time.
+    """Columns of leader and neighbours, see `find_neighbours`, at every instant, whoever is missing in a frame
+    included.
 
-    At every instant of the recording everybody is where it is then, whoever is missing in a frame included.
-
-    `piece`: -1: in no lane. `middle`: of the vehicle, along its piece. [m] `time`, `step`: usual from row to row. [s]
-    `speed`: [m/s] `length`: [m] `scale`: metres along the lane per metre of `middle`. [-]
+    Rows sorted by vehicle and time, shape (n,); `piece`: -1: in no lane; `middle`: of the vehicle, along its piece. [m]
+    `step`: usual from row to row. [s] `scale`: metres along the lane per metre of `middle`. [-]
     """
     inside, piece = piece >= 0, np.maximum(piece, 0)
     part, station, rank, own_scale = graph.stations(piece, middle)
@@ -155,12 +149,9 @@ def find_neighbours(
 ) -> dict[str, FloatArray]:
     """Leader in the same lane and nearest vehicle in the lanes beside: columns of the drive table, shape (n,) each.
 
-    Distances are free space, bumper to bumper along the road, 0 while side by side; infinite where that lane has nobody
-    within `REACH`, NaN where there is no such lane [m]. `*_is_truck` is 1 or 0, and 0 where there is nobody.
-
-    `frame`: equal for rows of the same instant (and carriageway). `lane`: 0 = rightmost driving lane, counting up to
-    the left; negative: in no lane. `s`: vehicle centres along the road, growing in the direction of travel. [m]
-    `length`: of the vehicles. [m] `lane_on_left`, `lane_on_right`: whether there is such a lane, driven the same way.
+    Distances are free space along the road, 0 while side by side; infinite where nobody is within `REACH`, NaN where
+    there is no such lane [m]. `frame`: equal for rows of one instant and carriageway. `lane`: 0 = rightmost driving
+    lane, counting up to the left; negative: in none. `s`: vehicle centres, growing in the direction of travel. [m]
     `scale`: metres along the own lane per metre of `s`. [-]
     """
     known = lane >= 0
@@ -207,10 +198,7 @@ FIRST_STEPS = 100
 
 
 def instants(time: FloatArray, vehicle: IntArray, step: float) -> tuple[IntArray, FloatArray]:
-    """Number of each row's instant, counted up from 0, and that instant's time, shape (n,); rows by vehicle and time.
-
-    `step`: median step of a vehicle. [s]
-    """
+    """Number of each row's instant, counted up from 0, and its time, shape (n,); `step`: median of a vehicle. [s]"""
     stamps, at = np.unique(time, return_inverse=True)
     new = np.r_[True, np.diff(stamps) > STAMP_DISTANCE * step]
     number = np.cumsum(new) - 1
@@ -242,10 +230,7 @@ def _clock(time: FloatArray, vehicle: IntArray, step: float) -> tuple[float, flo
 
 @dataclass(frozen=True, eq=False)
 class Pool:
-    """Every vehicle once at every instant from its first to its last: rows, and instants that it misses for a moment.
-
-    Arrays of shape (m,) but `of_row`.
-    """
+    """Every vehicle at every instant from its first to its last, those that it misses for a moment too; shape (m,)."""
 
     row: IntArray  # row of the recording, or of the last one before
     after: IntArray  # row of the vehicle's next instant with a row; only where `share` is not 0

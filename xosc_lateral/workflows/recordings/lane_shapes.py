@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.workflows.recordings.gate import LANE_AGREEMENT
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks
+from xosc_lateral.workflows.recordings.importers.tracks import PlacedTracks
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
-from xosc_lateral.workflows.recordings.placed import PlacedTracks
 
 SMOOTHED = 20.0  # way over which a lane's turning is averaged into a curvature: bounds are polygons [m]
 
@@ -23,11 +23,7 @@ FACING_STEP = 5.0
 
 
 class LaneShape(ABC):
-    """A lane between two boundaries, in coordinates along and across its centre line.
-
-    `centre`: in the direction of travel, shape (n, 2) or (n, 3). [m] `boundaries`: on its left and right. [m] `beyond`:
-    so far out of their box a point may lie in the lane. [m]
-    """
+    """A lane between its boundaries, in coordinates along and across its centre line, shape (n, 2 or 3). [m]"""
 
     def __init__(self, centre: FloatArray, boundaries: Sequence[FloatArray], beyond: float = 0.0) -> None:
         self.centre = centre
@@ -67,10 +63,9 @@ def place_in_shapes(tracks: Tracks, shapes: Sequence[LaneShape], left: IntArray)
 def find_lanes(
     shapes: Sequence[LaneShape], x: FloatArray, y: FloatArray, heading: FloatArray
 ) -> tuple[IntArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Lanelet that every row drives along (-1: none), way in it, offset, width and curvature: the one it is amid.
+    """Lane that every row drives along, amid which it is (-1: none), way in it, offset, width and curvature.
 
-    Last, the cosine of heading and lane; where the row lies in lanes that are driven another way only, of these; NaN
-    where it lies in none.
+    Last, the cosine of heading and lane, of lanes driven another way too; NaN where the row lies in none.
     """
     n = len(x)
     piece = np.full(n, -1)
@@ -122,10 +117,7 @@ def lane_graph(shapes: Sequence[LaneShape], left: IntArray, following: Sequence[
 
 
 def curvature_along(start: FloatArray, direction: FloatArray, way: FloatArray) -> FloatArray:
-    """Curvature of a polyline, smoothed, at some ways along it, shape as `way`. [1/m]
-
-    `start`: way to each of its points, shape (n + 1,). [m] `direction`: of its pieces, unwrapped, shape (n,). [rad]
-    """
+    """Smoothed curvature [1/m] at ways along a polyline, by the way to its points and its pieces' direction."""
     middles = 0.5 * (start[1:] + start[:-1])
     bend = np.interp(way + 0.5 * SMOOTHED, middles, direction) - np.interp(way - 0.5 * SMOOTHED, middles, direction)
     span = np.minimum(way + 0.5 * SMOOTHED, middles[-1]) - np.maximum(way - 0.5 * SMOOTHED, middles[0])

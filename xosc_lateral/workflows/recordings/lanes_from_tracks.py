@@ -71,14 +71,11 @@ class LaneCentreLine:
 def fit_lane_centre(
     s: FloatArray, d: FloatArray, height: FloatArray, passage: IntArray, *, knot_spacing: float = KNOT_SPACING
 ) -> LaneCentreLine:
-    """Fit one lane's centre.
+    """Fit one lane's centre to rows of vehicles that keep to it, one a second, sorted by passage and time, shape (n,).
+    [m]
 
-    Raises `NotEnoughDataError` if fewer than `MIN_PASSAGES` share any 100 m.
-
-    `s`, `d`: positions of vehicles that keep to this lane, one row a second, sorted by passage and time, shape (n,).
-    [m] `height`: of the vehicles, shape (n,). [m] `passage`: which uninterrupted passage of which vehicle a row belongs
-    to, shape (n,). `knot_spacing`: of the splines; longer: blind to the bends that camera calibration puts into the
-    tracks; shorter: follows single drivers. [m]
+    `passage`: uninterrupted, of one vehicle. `knot_spacing`: longer is blind to the bends that camera calibration puts
+    into the tracks, shorter follows single drivers. [m]
     """
     start, end = _covered(s, passage)
     keep = (s >= start) & (s <= end)

@@ -76,19 +76,13 @@ class Rough:
 
 
 def peak_acceleration(shape: DynamicsShape, change: float, duration: float) -> float:
-    """Largest lateral acceleration of a transition, by which a lane offset states its duration. [m/s2]
-
-    A linear one is given that of the cubic, as in `player.transition`.
-    """
+    """Largest lateral acceleration [m/s2], by which a lane offset states its duration; of a linear one the cubic's."""
     factor = 0.5 * np.pi**2 if shape is DynamicsShape.SINUSOIDAL else 6.0
     return float(factor * abs(change) / duration**2)
 
 
 def fit_transition(time: FloatArray, y: FloatArray, rough: Rough, free: float) -> Transition:
-    """Start, duration and shape by least squares over a grid that is made finer; not before `free` [s].
-
-    Nobody moves from centre to centre: a person is fitted between where he sets off and where he settles.
-    """
+    """Start, duration and shape, not before `free` [s]; of a person, from where he sets off to where he settles."""
     level = rough.after
     if not rough.held and not rough.aborted:
         rough = replace(rough, before=float(y[rough.first]), after=float(y[rough.last]))
@@ -175,17 +169,8 @@ class SpeedProfile:
 
 
 def fit_speed(time: FloatArray, way: FloatArray, *, error: float, apart: float = APART) -> SpeedProfile:
-    """Speed with the fewest corners that a search finds for positions within `error` [m].
+    """Speed with the fewest corners, `apart` [s] at least, for ways [m] at increasing times [s] within `error` [m].
 
-    Parameters
-    ----------
-    time, way : array, shape (n,), n >= 2
-        Increasing times [s], distance driven by then [m].
-    apart : float
-        Between two corners, at least. [s]
-
-    Notes
-    -----
     Greedy: corners are added where the error is largest, taken out while the bound still holds, moved to where the
     squared error is least, and taken out once more. Where corners would have to be closer than `apart` the bound is
     given up.

@@ -1,29 +1,23 @@
-"""A reconstruction for people and machines: residuals, maneuvers, encounters, drivers, and what could not be said."""
+"""A reconstruction as a page: the recorded paths in a player, residuals, vehicles, maneuvers and encounters."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.version import __version__
 from xosc_lateral.files.pages.chart import MEASURED, SAMPLED
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import KeyFigure, Page
-from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.workflows.conversion.result import EntityResult, SampledSegment
 from xosc_lateral.workflows.playing.scene import scene_of
-from xosc_lateral.workflows.recordings.drivers import ChosenDriver
-from xosc_lateral.workflows.recordings.encounters import Beside, Encounter
 from xosc_lateral.workflows.recordings.plan import Residuals, VehiclePlan, planned_motion
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.world.motion.segments import SegmentKind, SegmentSpan
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
-
-if TYPE_CHECKING:
-    from xosc_lateral.workflows.recordings.reconstruct import Reconstructed
+from xosc_lateral.world.road.network import RoadNetwork
 
 FRAME = 0.1  # rows of the page's player [s]
 VEHICLES = {
@@ -43,166 +37,13 @@ ENCOUNTERS = {
     "gap_behind": "gap behind [m]", "time_to_collision_behind": "time to collision behind [s]",
 }  # fmt: skip
 """Columns of the page's tables: keys of the rows, and headings."""
-WORTH_NAMING = 1.0
-"""A position that is off by more is named in the list of what could not be expressed, across beside the lane's own
-spread. [m]"""
 
 
-def summary(plans: Sequence[VehiclePlan], residuals: Sequence[Residuals], duration: float) -> dict[str, float]:
-    """Counts, and residuals of all vehicles together. [m], [s]"""
-    along, across = (np.concatenate([getattr(one, name) for one in residuals]) for name in ("along", "across"))
-    in_lane = np.concatenate([one.in_lane for one in residuals])
-    driven = sum(float(plan.speed.time[-1] - plan.speed.time[0]) for plan in plans)
-    corners = sum(len(plan.speed.time) - 2 for plan in plans)
-    return {
-        "vehicles": len(plans),
-        "duration": round(duration, 3),
-        "lane_changes": sum(len(plan.changes) for plan in plans),
-        "other_lateral_maneuvers": sum(len(plan.lateral.transitions) - len(plan.changes) for plan in plans),
-        "corners_per_minute": round(60.0 * corners / driven, 2),
-        "along_p95": round(float(np.quantile(np.abs(along), 0.95)), 4),
-        "along_largest": round(float(np.abs(along).max()), 4),
-        "across_rms": round(_rms(across), 4),
-        "across_in_lane_rms": round(_rms(across[in_lane]), 4),
-        "across_in_maneuvers_rms": round(_rms(across[~in_lane]), 4),
-    }
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt((values**2).mean())) if len(values) else 0.0
-
-
-def vehicle_rows(
-    plans: Sequence[VehiclePlan], residuals: Sequence[Residuals], drivers: Sequence[ChosenDriver]
-) -> list[dict[str, Any]]:
-    """One row per vehicle. [s], [m]"""
-    return [
-        {
-            "entity": plan.name,
-            "recorded_as": plan.vehicle.name,
-            "class": plan.vehicle.kind,
-            "from": round(plan.present[0], 3),
-            "to": round(plan.present[1], 3),
-            "corners": len(plan.speed.time) - 2,
-            "lane_changes": len(plan.changes),
-            "along_rms": round(_rms(one.along), 4),
-            "along_largest": round(float(np.abs(one.along).max()), 4) if len(one.along) else 0.0,
-            "across_in_lane_rms": round(_rms(one.across[one.in_lane]), 4),
-            "across_in_maneuvers_rms": round(_rms(one.across[~one.in_lane]), 4),
-            "profile": driver.profile,
-            "why": driver.why,
-        }
-        for plan, one, driver in zip(plans, residuals, drivers, strict=True)
-    ]
-
-
-def maneuver_rows(plans: Sequence[VehiclePlan], relative: Any) -> list[dict[str, Any]]:
-    """One row per lateral maneuver, in order of time. [s], [m]"""
-    rows = []
-    for plan in plans:
-        distances = relative.get(plan.name, ({}, {}))[0]
-        for number, one in enumerate(plan.lateral.transitions):
-            kind = "lane change" if one.lanes else "aborted lane change" if one.aborted else "lane offset"
-            trigger = distances.get(number)
-            rows.append(
-                {
-                    "entity": plan.name,
-                    "kind": kind,
-                    "side": "left" if one.change > 0 else "right",
-                    "start": round(one.start, 3),
-                    "duration": round(one.duration, 3),
-                    "shape": one.shape.value,
-                    "lanes": abs(one.lanes),
-                    "residual": round(one.residual, 4),
-                    "bell_residual": round(one.bell_residual, 4) if np.isfinite(one.bell_residual) else None,
-                    "cut_off": one.cut,
-                    "begins": "by the clock" if trigger is None else f"{trigger.distance:.1f} m from {trigger.other}",
-                }
-            )
-    return sorted(rows, key=lambda row: (row["start"], row["entity"]))
-
-
-def encounter_rows(met: Sequence[Encounter]) -> list[dict[str, Any]]:
-    """One row per lane change and braking. [s], [m]; None: nobody, or it never comes to it."""
-    rows = []
-    for one in met:
-        row: dict[str, Any] = {"kind": one.kind, "entity": one.vehicle, "time": round(one.time, 3), "side": one.side}
-        for word, other in (("ahead", one.ahead), ("behind", one.behind)):
-            row |= {word: None if other is None else other.name} | _numbers(word, other)
-        rows.append(row)
-    return rows
-
-
-def _numbers(word: str, other: Beside | None) -> dict[str, float | None]:
-    known = other is not None and np.isfinite(other.time_to_collision)
-    return {
-        f"gap_{word}": None if other is None else round(float(other.gap), 2),
-        f"time_to_collision_{word}": round(float(other.time_to_collision), 2) if known and other is not None else None,
-    }
-
-
-def not_expressed(plans: Sequence[VehiclePlan], residuals: Sequence[Residuals], left_out: Sequence[str]) -> list[str]:
-    """What the scenario does not say, or not as well as asked for: a line each."""
-    lines = list(left_out)
-    for plan, one in zip(plans, residuals, strict=True):
-        cut = sum(each.cut for each in plan.lateral.transitions)
-        if cut:
-            lines.append(f"{plan.name}: {cut} lateral maneuvers begin or end outside of the recording")
-        for word, values in (("along the road", one.along), ("beside its maneuvers", one.across)):
-            if len(values) and (worst := float(np.abs(values).max())) > WORTH_NAMING:
-                row = int(np.abs(values).argmax())
-                lines.append(f"{plan.name}: up to {worst:.2f} m {word}, at {one.time[row]:.1f} s")
-    fitted = [one for plan in plans for one in plan.lateral.transitions if np.isfinite(one.bell_residual)]
-    if bells := sum(one.is_bell for one in fitted):
-        lines.append(
-            f"{bells} of {len(fitted)} lane changes are nearer to the bell of drivers than to a maneuver's shape: "
-            "convert --lane-changes lifelike has it"
-        )
-    return lines
-
-
-def recorded_path(plan: VehiclePlan, time: FloatArray, motion: EntityMotion) -> WorldTrajectory:
-    """What was recorded, on the rows of a motion."""
-    vehicle = plan.vehicle
-    held = np.clip(time, vehicle.time[0], vehicle.time[-1])
-    x, y = (np.interp(held, vehicle.time, values) for values in (vehicle.x, vehicle.y))
-    speed = np.hypot(np.gradient(x, time), np.gradient(y, time)) if len(time) > 1 else motion.speed
-    return WorldTrajectory(time, x, y, motion.z, motion.heading, motion.pitch, motion.roll, speed)
-
-
-def facts_of(made: Reconstructed) -> dict[str, Any]:
-    """Everything that is known of a reconstruction, as plain values."""
-    recording, plans, residuals = made.recording, made.plans, made.residuals
-    return {
-        "name": made.traffic.name,
-        "recording": made.traffic.sources[0].name,
-        "window": [round(recording.start, 3), round(recording.end, 3)],
-        "host": made.host,
-        "summary": summary(plans, residuals, recording.end - recording.start),
-        "vehicles": vehicle_rows(plans, residuals, made.drivers),
-        "maneuvers": maneuver_rows(plans, made.relative),
-        "encounters": encounter_rows(made.encounters),
-        "not_expressed": [*made.traffic.notes, *not_expressed(plans, residuals, recording.left_out)],
-        "provenance": {"package_version": __version__, "inputs": parsed_hashes(made.files)},
-    }
-
-
-def page_of(made: Reconstructed, facts: dict[str, Any]) -> str:
+def page_of(
+    facts: dict[str, Any], plans: Sequence[VehiclePlan], residuals: Sequence[Residuals], network: RoadNetwork
+) -> str:
     """HTML page, self-contained: the recorded paths in the player, the planned ones as ghosts."""
-    plans, residuals, network = made.plans, made.residuals, made.traffic.network
     numbers = facts["summary"]
-    time = np.arange(0.0, numbers["duration"] + 1e-9, FRAME)
-    pairs = []
-    for plan in plans:
-        motion = planned_motion(plan, time, network)
-        across = np.interp(time, plan.vehicle.time, plan.vehicle.offset + plan.vehicle.levels[0])
-        deviation = across - plan.lateral.at(np.clip(time, *plan.present))
-        span = SegmentSpan(SegmentKind.ROAD_FOLLOWING, 0, len(time) - 1, 0.0, float(time[-1]))
-        shown, path = SampledSegment(span, time, deviation), recorded_path(plan, time, motion)
-        pairs.append((motion, EntityResult(motion, (), None, "", (shown,), deviation, path)))
-    motions = NominalMotion(
-        FRAME, tuple(motion for motion, _ in pairs), (), float(time[-1]), "end of the recording", ()
-    )
     page = Page(f"{facts['name']}: from the recording to maneuvers")
     page.lead(
         f"{numbers['vehicles']} vehicles of `{facts['recording']}`, {facts['window'][0]:.1f} to "
@@ -224,8 +65,7 @@ def page_of(made: Reconstructed, facts: dict[str, Any]) -> str:
         "From above. Filled boxes are the recorded vehicles, dashed outlines (nominal) the places that the maneuvers "
         "give them. Click a vehicle to follow it, point at it for its values, drag to look elsewhere.",
     )
-    scene = scene_of(motions, network, [result for _, result in pairs])
-    page.player(scene, "Recorded and reconstructed traffic from above")
+    page.player(_scene(plans, network, numbers["duration"]), "Recorded and reconstructed traffic from above")
     page.section(
         "Residuals",
         "Recorded less planned. Along the road, the speed profile is at fault: "
@@ -238,30 +78,41 @@ def page_of(made: Reconstructed, facts: dict[str, Any]) -> str:
         "Distribution of the residuals of all vehicles.",
         "Histograms of recorded less planned position, along and across the road",
     )
-    page.section("Vehicles")
-    _add_table(page, facts["vehicles"], VEHICLES, "Profile: who drives it in a twin.")
-    page.section("Lateral maneuvers")
     cut = "Residual of the fitted shape. Cut off: the recording begins or ends within it."
-    _add_table(page, facts["maneuvers"], MANEUVERS, cut)
-    page.section("Encounters")
-    _add_table(
-        page,
-        facts["encounters"],
-        ENCOUNTERS,
+    met = (
         "Every lane change, half way, and every braking at its begin: who is ahead and behind in the lane it leads to, "
-        "free space between the bumpers, and time until that is used up.",
+        "free space between the bumpers, and time until that is used up."
     )
+    for title, key, headings, caption in (
+        ("Vehicles", "vehicles", VEHICLES, "Profile: who drives it in a twin."),
+        ("Lateral maneuvers", "maneuvers", MANEUVERS, cut),
+        ("Encounters", "encounters", ENCOUNTERS, met),
+    ):
+        page.section(title)
+        shown = [{heading: row[name] for name, heading in headings.items()} for row in facts[key]]
+        # times to 0.1 s, lengths to 1 cm
+        formats = {heading: ".1f" if "[s]" in heading else ".2f" for heading in headings.values() if "[" in heading}
+        page.table(shown, caption, formats=formats)
     page.section("Not expressed")
     page.items(facts["not_expressed"])
     page.text("" if facts["not_expressed"] else "Nothing was left out.")
     return page.html(facts["provenance"])
 
 
-def _add_table(page: Page, rows: Sequence[dict[str, Any]], headings: dict[str, str], caption: str) -> None:
-    """Rows under readable headings; times to 0.1 s, lengths to 1 cm."""
-    shown = [{heading: row[key] for key, heading in headings.items()} for row in rows]
-    formats = {one: ".1f" if "[s]" in one else ".2f" for one in headings.values() if "[" in one}
-    page.table(shown, caption, formats=formats)
+def _scene(plans: Sequence[VehiclePlan], network: RoadNetwork, duration: float) -> str:
+    """The player's: recorded paths over planned motions."""
+    time = np.arange(0.0, duration + 1e-9, FRAME)
+    motions, results = list[EntityMotion](), list[EntityResult]()
+    for plan in plans:
+        motion = planned_motion(plan, time, network)
+        across = np.interp(time, plan.vehicle.time, plan.vehicle.offset + plan.vehicle.levels[0])
+        deviation = across - plan.lateral.at(np.clip(time, *plan.present))
+        span = SegmentSpan(SegmentKind.ROAD_FOLLOWING, 0, len(time) - 1, 0.0, float(time[-1]))
+        shown, path = SampledSegment(span, time, deviation), recorded_path(plan, time, motion)
+        motions.append(motion)
+        results.append(EntityResult(motion, (), None, "", (shown,), deviation, path))
+    nominal = NominalMotion(FRAME, tuple(motions), (), float(time[-1]), "end of the recording", ())
+    return scene_of(nominal, network, results)
 
 
 def _spread(residuals: Sequence[Residuals]) -> Figure:
@@ -281,19 +132,10 @@ def _spread(residuals: Sequence[Residuals]) -> Figure:
     return figure
 
 
-def as_text(facts: dict[str, Any]) -> str:
-    """For a person, at the command line."""
-    numbers, files = facts["summary"], facts["outputs"]
-    profiles = [row["profile"] for row in facts["vehicles"] if row["profile"]]
-    counted = ", ".join(f"{profiles.count(name)} {name}" for name in sorted(set(profiles)))
-    lines = [
-        f"{facts['name']}: {numbers['vehicles']} vehicles, {numbers['duration']:g} s, {numbers['lane_changes']} lane "
-        f"changes, {numbers['corners_per_minute']:g} changes of acceleration a minute",
-        f"  along the road: 95 % within {numbers['along_p95']:.2f} m, all within {numbers['along_largest']:.2f} m",
-        f"  across: {numbers['across_rms']:.2f} m rms, of which in lane {numbers['across_in_lane_rms']:.2f} m, "
-        f"in maneuvers {numbers['across_in_maneuvers_rms']:.2f} m",
-        f"  drivers: {counted or 'none'}",
-        f"  not expressed: {len(facts['not_expressed'])} lines in the report" if facts["not_expressed"] else "",
-        *(f"  {path}" for path in files),
-    ]
-    return "\n".join(line for line in lines if line)
+def recorded_path(plan: VehiclePlan, time: FloatArray, motion: EntityMotion) -> WorldTrajectory:
+    """What was recorded, on the rows of a motion."""
+    vehicle = plan.vehicle
+    held = np.clip(time, vehicle.time[0], vehicle.time[-1])
+    x, y = (np.interp(held, vehicle.time, values) for values in (vehicle.x, vehicle.y))
+    speed = np.hypot(np.gradient(x, time), np.gradient(y, time)) if len(time) > 1 else motion.speed
+    return WorldTrajectory(time, x, y, motion.z, motion.heading, motion.pitch, motion.roll, speed)

@@ -114,13 +114,7 @@ def _plan(name: str, vehicle: RecordedVehicle, network: RoadNetwork, length: flo
 
 
 def planned_motion(plan: VehiclePlan, time: FloatArray, network: RoadNetwork) -> EntityMotion:
-    """Where the plan has the vehicle: what any player makes of it, but for its frames.
-
-    Parameters
-    ----------
-    time : array, shape (n,)
-        [s]; rows before it appears, and after it has left, are not active.
-    """
+    """Where the plan has the vehicle at times [s], shape (n,): what any player makes of it, but for its frames."""
     vehicle = plan.vehicle
     begin, end = plan.present
     held = np.clip(time, begin, end)
@@ -171,10 +165,7 @@ def _beside_lanes(lateral: LateralPlan, vehicle: RecordedVehicle, network: RoadN
 
 
 def _target(vehicle: RecordedVehicle, network: RoadNetwork, one: Transition) -> int:
-    """Lane that a transition leads to, by its id where the transition begins.
-
-    The recorded lane at that moment may be a neighbour of the one that the maneuver is in: lanes are counted.
-    """
+    """Lane that a transition leads to, counted from where it begins: the recorded lane there may be a neighbour."""
     base, _ = vehicle.levels
     row = min(int(np.searchsorted(vehicle.time, one.start)), len(base) - 1)
     road, lane = int(vehicle.road[row]), int(vehicle.lane[row])

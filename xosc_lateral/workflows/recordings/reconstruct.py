@@ -1,41 +1,41 @@
-"""From a recording to a folder: scenario, road, drivers and report."""
+"""From a recording to maneuvers, a road and drivers.
+
+Which of several profiles drove a vehicle, the likelihood of how it moved in its lane says. A profile has none in closed
+form, but its free runs say how a summary of windows scatters between drivers and within one: a normal model of the
+summary's mean (synthetic likelihood [1]_, with a random effect per driver).
+
+References
+----------
+.. [1] S. N. Wood, "Statistical inference for noisy nonlinear ecological dynamic systems", Nature 466, 2010.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TypedDict
 
 import numpy as np
 
+from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, XoscLateralError
-from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.rows import true_slices
+from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.base.texts import composed
+from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.evaluation.metrics import free_runs
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.files.openscenario.write.build import Version, named
-from xosc_lateral.files.output_tables import write_frame
-from xosc_lateral.files.profiles import find_profile, list_profiles, profile_bytes, read_profile
-from xosc_lateral.files.source import parsed_hashes
-from xosc_lateral.workflows.conversion import options as say
+from xosc_lateral.files.profiles import find_profile, list_profiles, read_profile
 from xosc_lateral.workflows.conversion.drivers import AUTO_PROFILE
-from xosc_lateral.workflows.conversion.options import Paths, option
-from xosc_lateral.workflows.recordings.drivers import (
-    ChosenDriver,
-    WindowModel,
-    choose_driver,
-    drive_of,
-    in_lane_offsets,
-)
-from xosc_lateral.workflows.recordings.encounters import Encounter, encounters, relative_triggers
+from xosc_lateral.workflows.recordings.encounters import encounters, relative_triggers
 from xosc_lateral.workflows.recordings.plan import Residuals, VehiclePlan, plan_vehicles, residuals_of
-from xosc_lateral.workflows.recordings.recorded import Recording, Track, place_tracks
+from xosc_lateral.workflows.recordings.reconstruction import ChosenDriver, Reconstruction
+from xosc_lateral.workflows.recordings.recorded import Track, place_tracks
 from xosc_lateral.workflows.recordings.recordings import RecordedTraffic
-from xosc_lateral.workflows.recordings.scenario import Triggers, reconstructed_scenario
+from xosc_lateral.workflows.recordings.scenario import reconstructed_scenario
+from xosc_lateral.workflows.recordings.settings import ReconstructSettings
 
-VERSIONS: dict[str, Version] = {named(version): version for version in ((1, 0), (1, 1), (1, 2), (1, 3))}
-"""Of the standard that can be written."""
 LONG_DRIVE = 100.0
 """Of road-following, for a profile of one vehicle: ten windows that the evaluation compares drivers by. [s]"""
 LONGEST_WINDOW = 3600.0  # a scenario of more can't be looked at, and times in ms or us instead of s give it [s]
@@ -43,197 +43,65 @@ AROUND = 100.0  # who comes as near as this to the vehicle in question, along or
 NO_HOST = "none"  # stands for no vehicle under test
 
 
-def _version(text: str) -> str:
-    if text not in VERSIONS:
-        raise ValueError(f"version {text!r}, expected {', '.join(VERSIONS)}")
-    return text
-
-
-@dataclass(frozen=True, slots=True)
-class ReconstructSettings:
-    """What is reconstructed, and how: keywords of `reconstruct`, and options of the command line.
-
-    Parameters
-    ----------
-    begin, end : float, optional
-        Part of the recording. [s]
-    vehicles : collection of str, optional
-        These alone.
-    around, window : str, float
-        A vehicle and those who come near it, for so long in the middle of its passage. [s]
-    host : str, optional
-        The vehicle under test, which `convert` leaves to the system that drives it; by default the recording's own
-        host; "none": there is none.
-    error : float
-        Positions along the road are within this; smaller: more corners in the speeds. [m]
-    version : str
-        Of OpenSCENARIO, "1.0" to "1.3".
-    relative : bool
-        Lane changes and braking begin at a distance to another vehicle, where the recording bears it out.
-    exact : bool
-        Recorded paths as trajectories, instead of maneuvers.
-    fit : bool
-        A driver profile of its own for every vehicle that drove long enough.
-    library : path or paths
-        Folders with further profiles to choose from.
-    """
-
-    # What is said of one option stays together.
-    # fmt: off
-    begin: float | None = option(
-        None, float, "--from", kind=float | None, show_default=False, help="Begin there [s].",
-    )
-    end: float | None = option(None, float, "--to", kind=float | None, show_default=False, help="End there [s].")
-    vehicles: frozenset[str] | None = option(
-        None, say.names, kind=list[str] | None, metavar="ID", help="This vehicle alone; may be repeated.",
-    )
-    around: str | None = option(
-        None, str, kind=str | None, metavar="ID", show_default=False,
-        help="This vehicle and those who come near it.",
-    )
-    window: float = option(
-        60.0, float, kind=float, min=1, max=3600, help="Length of the part that --around takes [s].",
-    )
-    host: str | None = option(
-        None, str, kind=str | None, metavar="ID", show_default=False,
-        help="The vehicle under test; default: the host of an OSI trace; none: no vehicle.",
-    )
-    error: float = option(
-        0.5, float, kind=float, min=0.01,
-        help="Positions along the road are within this [m]: the smaller, the more corners.",
-    )
-    version: str = option("1.2", _version, kind=str, metavar="1.0..1.3", help="Version of OpenSCENARIO to write.")
-    relative: bool = option(
-        False, bool, "--relative", kind=bool, help="Cut-ins and braking begin at a distance to another vehicle.",
-    )
-    exact: bool = option(
-        False, bool, "--exact", kind=bool, help="Recorded paths as trajectories, no maneuvers.",
-    )
-    fit: bool = option(
-        False, bool, "--fit", kind=bool, help="Fit a profile to everybody who drove long enough.",
-    )
-    library: tuple[Path, ...] = option((), say.paths)
-    # fmt: on
-
-
-class ReconstructKeywords(TypedDict, total=False):
-    """The same names for type checkers, with what a call may be given."""
-
-    begin: float | None
-    end: float | None
-    vehicles: Collection[str] | None
-    around: str | None
-    window: float
-    host: str | None
-    error: float
-    version: str
-    relative: bool
-    exact: bool
-    fit: bool
-    library: Paths
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Reconstructed:
-    """A scenario as text, how it was made, and how far it is from the recording.
-
-    Residuals and drivers are in the order of the plans; `relative` holds, by entity, triggers that are distances, and
-    `fitted`, by name, profiles of single vehicles.
-    """
-
-    traffic: RecordedTraffic
-    recording: Recording
-    plans: tuple[VehiclePlan, ...]
-    scenario: str
-    residuals: tuple[Residuals, ...]
-    encounters: tuple[Encounter, ...]
-    relative: Mapping[str, Triggers]
-    drivers: tuple[ChosenDriver, ...]
-    fitted: Mapping[str, DriverProfile]
-    settings: ReconstructSettings
-
-    @property
-    def host(self) -> str | None:
-        """Entity that is the vehicle under test."""
-        wanted = _host_name(self.traffic, self.settings)
-        return next((plan.name for plan in self.plans if plan.vehicle.name == wanted), None)
-
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """Inputs that are files."""
-        return tuple(path for path in self.traffic.sources if path.is_file())
-
-
-def reconstruct_recording(traffic: RecordedTraffic, settings: ReconstructSettings) -> Reconstructed:
-    """Choose vehicles, plan their maneuvers, write the scenario in memory and play it.
-
-    Raises `FormatError`: a vehicle that is not in the recording, a window without time; `NotEnoughDataError`: if no
-    vehicle is left.
-    """
+def reconstruct_recording(traffic: RecordedTraffic, settings: ReconstructSettings) -> Reconstruction:
+    """Choose vehicles, plan their maneuvers, write the scenario in memory, and say who drove."""
     vehicles = None if settings.vehicles is None else frozenset(map(composed, settings.vehicles))
     settings = replace(settings, vehicles=vehicles, host=composed(settings.host), around=composed(settings.around))
-    tracks, begin, end = chosen(traffic, settings)
-    recording = place_tracks(tracks, traffic.network, begin, end)
-    plans = plan_vehicles(recording, traffic.network, error=settings.error)
-    by_name = {plan.vehicle.name: plan.name for plan in plans}
-    host = _host_name(traffic, settings)
-    if settings.host is not None and host is not None and host not in by_name:
+    no_host = settings.host == NO_HOST and all(track.name != NO_HOST for track in traffic.tracks)
+    host = None if no_host else settings.host or traffic.host
+    tracks, begin, end = chosen(traffic, settings, settings.host and host)
+    recording, network = place_tracks(tracks, traffic.network, begin, end), traffic.network
+    plans = plan_vehicles(recording, network, error=settings.error)
+    entity = next((plan.name for plan in plans if plan.vehicle.name == host), None)
+    if settings.host is not None and host is not None and entity is None:
         raise FormatError(f"host {settings.host!r} is not among the reconstructed vehicles", path=traffic.sources[0])
     relative = {}
     if settings.relative and not settings.exact:
-        relative = {plan.name: relative_triggers(plan, plans, traffic.network) for plan in plans}
+        relative = {plan.name: relative_triggers(plan, plans, network) for plan in plans}
+    major, minor = map(int, settings.version.split("."))
     scenario = reconstructed_scenario(
         plans,
-        traffic.network,
+        network,
         road_file=traffic.road_name,
         duration=end - begin,
-        version=VERSIONS[settings.version],
-        host=None if host is None else by_name.get(host),
+        version=(major, minor),
+        host=entity,
         description=f"{traffic.name}: reconstructed from {traffic.sources[0].name}, {begin:g} to {end:g} s",
         relative=relative,
         exact=settings.exact,
     )
     residuals = tuple(map(residuals_of, plans))
-    met = encounters(plans, traffic.network)
     drivers, fitted = _drivers(plans, residuals, settings)
-    return Reconstructed(
-        traffic, recording, plans, scenario, residuals, met, relative, tuple(drivers), fitted, settings
-    )
-
-
-def _host_name(traffic: RecordedTraffic, settings: ReconstructSettings) -> str | None:
-    """Recorded name of the vehicle under test."""
-    if settings.host == NO_HOST and all(track.name != NO_HOST for track in traffic.tracks):
-        return None
-    return settings.host or traffic.host
+    met = encounters(plans, network)
+    return Reconstruction(traffic, recording, plans, scenario, residuals, met, relative, drivers, fitted, entity)
 
 
 def _drivers(
     plans: Sequence[VehiclePlan], residuals: Sequence[Residuals], settings: ReconstructSettings
-) -> tuple[list[ChosenDriver], dict[str, DriverProfile]]:
+) -> tuple[tuple[ChosenDriver, ...], dict[str, DriverProfile]]:
     """A profile for each vehicle: its own, the likeliest of the library, or the population's."""
     from xosc_lateral.drivers.fitting.fitting import fit_profile
 
     population = find_profile(AUTO_PROFILE, settings.library)
     paths = {path.stem: path for path in reversed(list_profiles(settings.library))}
     models = {name: _window_model(path, path.stat().st_mtime_ns) for name, path in paths.items()}
-    chosen, fitted = list[ChosenDriver](), dict[str, DriverProfile]()
+    drivers, fitted = list[ChosenDriver](), dict[str, DriverProfile]()
     for plan, residual in zip(plans, residuals, strict=True):
         if plan.lateral.is_played:
-            chosen.append(ChosenDriver("", 0.0, 0.0, "stands still in its lane: no person drove it"))
+            drivers.append(ChosenDriver("", 0.0, 0.0, "stands still in its lane: no person drove it"))
             continue
         stretches = in_lane_offsets(plan, residual)
-        one = choose_driver([offset for _, offset, _ in stretches], models, population.stem)
-        if settings.fit and one.seconds >= LONG_DRIVE:
+        driver = choose_driver([offset for _, offset, _ in stretches], models, population.stem)
+        if settings.fit and driver.seconds >= LONG_DRIVE:
             drive = drive_of(plan, residual)
             assert drive is not None
             try:
                 fitted[plan.name] = fit_profile([drive], name=plan.name)
-                one = replace(one, profile=f"drivers/{plan.name}.json", why="fitted to its own drive")
+                driver = replace(driver, profile=f"drivers/{plan.name}.json", why="fitted to its own drive")
             except XoscLateralError as error:
-                one = replace(one, why=f"{one.why}; can't be fitted: {error}")
-        chosen.append(one)
-    return chosen, fitted
+                driver = replace(driver, why=f"{driver.why}; can't be fitted: {error}")
+        drivers.append(driver)
+    return tuple(drivers), fitted
 
 
 @lru_cache(maxsize=64)
@@ -241,30 +109,13 @@ def _window_model(path: Path, _changed: int) -> WindowModel:
     return WindowModel.of(read_profile(path))
 
 
-def drivers_table(made: Reconstructed, path: Path) -> None:
-    """Write the table of one row that `convert` takes: the scenario, who is under test, and everybody's profile."""
-    drivers = {plan.name: driver.profile for plan, driver in zip(made.plans, made.drivers, strict=True)}
-    driven = {name: profile for name, profile in drivers.items() if profile and name != made.host}
-    cells = {"scenario": f"{made.traffic.name}.xosc"} | ({} if made.host is None else {"ego": made.host})
-    cells |= {f"profile:{name}": profile for name, profile in driven.items()} | {"only": ";".join(driven)}
-    write_frame(pd.DataFrame([cells]), path, {"inputs": parsed_hashes(made.files)})
-
-
-def fitted_profiles(made: Reconstructed) -> dict[str, bytes]:
-    """Files of the profiles that were fitted, by their paths below the folder."""
-    return {f"drivers/{name}.json": profile_bytes(profile) for name, profile in made.fitted.items()}
-
-
-def chosen(traffic: RecordedTraffic, settings: ReconstructSettings) -> tuple[list[Track], float, float]:
-    """Tracks and window of time [s] that the settings ask for.
-
-    Raises `FormatError`: a vehicle that is not in the recording, a window without time.
-    """
+def chosen(
+    traffic: RecordedTraffic, settings: ReconstructSettings, host: str | None
+) -> tuple[list[Track], float, float]:
+    """Tracks and window of time [s] that the settings ask for."""
     by_name = {track.name: track for track in traffic.tracks}
     source = traffic.sources[0]
-    host = settings.host and _host_name(traffic, settings)
-    asked = {"vehicles": settings.vehicles or (), "around": [settings.around], "host": [host]}
-    for word, names in asked.items():
+    for word, names in {"vehicles": settings.vehicles or (), "around": [settings.around], "host": [host]}.items():
         for name in names:
             if name is not None and name not in by_name:
                 some = ", ".join(list(by_name)[:8])
@@ -299,3 +150,95 @@ def _comes_near(track: Track, centre: Track, begin: float, end: float) -> bool:
         for axis in "xy"
     ]
     return bool((np.hypot(*away) <= AROUND).any())  # nobody where they are not there at once
+
+
+WINDOW, STEP = 10.0, 0.2
+"""Of movement that is summed up, as long as the evaluation's snippets; between rows, as profiles have it. [s]"""
+MINIMUM_LOG_ODDS = 2.0  # another profile than the population's has to be likelier by this: weights of 7 to 1 [nat]
+FREE_RUNS = 40  # of each profile, five minutes each: 30 windows of 40 drivers
+LEAST_SPREAD = 1e-4  # of a path in a window, below which its logarithm would say something about digits [m]
+
+
+def in_lane_offsets(plan: VehiclePlan, residuals: Residuals) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
+    """Stretches of road-following of `WINDOW` and more: time [s], offset and lane width [m] every `STEP`."""
+    vehicle = plan.vehicle
+    rows = len(vehicle.time) - len(residuals.time)
+    time, width = residuals.time, vehicle.lane_width[rows:]
+    following = residuals.in_lane & (np.interp(time, plan.speed.time, plan.speed.speed) >= MINIMUM_SPEED)
+    parts = []
+    for part in true_slices(following):
+        even = np.arange(time[part.start], time[part.stop - 1] + 1e-9, STEP)
+        if len(even) * STEP > WINDOW:
+            across, wide = (np.interp(even, time[part], each[part]) for each in (residuals.across, width))
+            parts.append((even, across, wide))
+    return parts
+
+
+def choose_driver(stretches: Sequence[FloatArray], models: Mapping[str, WindowModel], population: str) -> ChosenDriver:
+    """The likeliest profile of offsets in lane [m], every `STEP`."""
+    seen = [_summaries(_windows(offset)) for offset in stretches]
+    seconds = STEP * sum(map(len, stretches))
+    if not seen:
+        return ChosenDriver("", seconds, 0.0, f"no {WINDOW:g} s of road-following in one piece")
+    windows = np.concatenate(seen)
+    gains = {
+        name: model.log_likelihood(windows) - models[population].log_likelihood(windows)
+        for name, model in models.items()
+    }
+    best = max(gains, key=lambda name: gains[name])
+    if best != population and gains[best] > MINIMUM_LOG_ODDS:
+        return ChosenDriver(best, seconds, gains[best], "likeliest of the library")
+    return ChosenDriver(population, seconds, 0.0, "the population's: no other is clearly likelier")
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class WindowModel:
+    """How window summaries of a profile scatter."""
+
+    mean: FloatArray  # mean offset [m], log spread [log m], log lateral speed [log m/s], shape (3,)
+    # between, within: covariance of drivers' means, and of windows about their driver's mean, shape (3, 3)
+    between: FloatArray
+    within: FloatArray
+
+    @classmethod
+    def of(cls, profile: DriverProfile, seed: int = 0) -> WindowModel:
+        """From free runs."""
+        every = max(1, round(STEP / profile.model.step))
+        runs = free_runs(profile, seed, drivers=FREE_RUNS)[:, ::every]
+        each = [_summaries(_windows(run)) for run in runs]
+        means = np.array([one.mean(axis=0) for one in each])
+        within = np.mean([np.cov(one.T) for one in each], axis=0)
+        between = np.cov(means.T) - within / len(each[0])
+        values, vectors = np.linalg.eigh(between)
+        between = (vectors * np.maximum(values, 0.0)) @ vectors.T
+        return cls(means.mean(axis=0), between, within)
+
+    def log_likelihood(self, windows: FloatArray) -> float:
+        """Of the mean of one driver's windows, shape (k, 3). [nat]"""
+        covariance = self.between + self.within / len(windows)
+        away = windows.mean(axis=0) - self.mean
+        return float(-0.5 * (away @ np.linalg.solve(covariance, away) + np.linalg.slogdet(covariance)[1]))
+
+
+def _windows(offset: FloatArray) -> FloatArray:
+    """Whole windows, shape (k, m). [m]"""
+    length = round(WINDOW / STEP)
+    return offset[: len(offset) // length * length].reshape(-1, length)
+
+
+def _summaries(windows: FloatArray) -> FloatArray:
+    """Mean, log spread, log lateral speed of each window, shape (k, 3)."""
+    spread = np.maximum(windows.std(axis=1), LEAST_SPREAD)
+    speed = np.sqrt((np.diff(windows, axis=1) ** 2).mean(axis=1)) / STEP
+    return np.column_stack([windows.mean(axis=1), np.log(spread), np.log(np.maximum(speed, LEAST_SPREAD))])
+
+
+def drive_of(plan: VehiclePlan, residuals: Residuals) -> Drive | None:
+    """A vehicle's road-following as a drive that a profile can be fitted to; None: there is none."""
+    parts = in_lane_offsets(plan, residuals)
+    if not parts:
+        return None
+    time, offset, width = (np.concatenate([part[k] for part in parts]) for k in range(3))
+    run = np.repeat(np.arange(len(parts)), [len(part[0]) for part in parts])
+    speed = np.interp(time, plan.speed.time, plan.speed.speed)
+    return Drive(plan.name, time, offset, width, {"speed": speed, "lane_width": width}, run=run)

@@ -72,10 +72,9 @@ class Recording:
 
 
 def lane_levels(offset: FloatArray, lane_width: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Lateral position of each row's lane centre from the first row's [m], and how many lanes to its left it is.
+    """Lateral position of each row's lane centre from the first row's [m], and how many lanes to its left; shape (n,).
 
-    A step of the offset by more than half a lane is a new lane; one lane that goes over into another one ahead has
-    none. Shape (n,) each, as the arguments.
+    A step of the offset by more than half a lane is a new lane; one lane that goes over into another ahead has none.
     """
     step, width = np.diff(offset), 0.5 * (lane_width[1:] + lane_width[:-1])
     lanes = np.where(np.abs(step) > 0.5 * width, -np.round(step / width), 0.0)
@@ -100,10 +99,7 @@ class Track:
 
 
 def place_tracks(tracks: Sequence[Track], network: RoadNetwork, start: float, end: float) -> Recording:
-    """Each vehicle's longest passage in driving lanes within a window of time.
-
-    Raises `NotEnoughDataError`: if no vehicle is left.
-    """
+    """Each vehicle's longest passage in driving lanes within a window of time. Raises `NotEnoughDataError`."""
     vehicles, left_out = list[RecordedVehicle](), list[str]()
     for track in tracks:
         inside = (np.hypot(track.x, track.y) < FARTHEST) & np.isfinite(track.heading)
@@ -185,8 +181,7 @@ def _steady_heading(
 ) -> FloatArray:
     """Headings averaged over `HEADING_WINDOW` of way: those of a vehicle that stands are from when it last moved.
 
-    One that never moves points along its lane; against it only where its headings agree on that. They tell nothing
-    where all of them are 0, as differences of equal positions are.
+    One that never moves points along its lane, or against it where its headings agree, and are not all 0.
     """
     speed = np.hypot(*velocity)
     driven = np.where(speed >= MOVING_SPEED, speed, 0.0) * np.gradient(time) if len(time) > 1 else np.zeros(1)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,11 +63,7 @@ class RecordedTraffic:
 def read_recording(
     source: Path, *, kind: str | None = None, road: Path | None = None, columns: MappingLike | None = None
 ) -> RecordedTraffic:
-    """Read a recording.
-
-    `kind`: its format, one of `READERS`; without it, told from the name. `road`: OpenDRIVE file, for formats that come
-    without one. `columns`: name -> ``COLUMN[:UNIT]``, of tables. Raises `FormatError`, `NotEnoughDataError`.
-    """
+    """Read a recording. `kind`: one of `READERS`, else told from the name. `road`: OpenDRIVE. `columns`: of tables."""
     kind = kind or format_of(source)
     if kind not in READERS:
         raise FormatError(f"no recording format {kind!r}; there are {', '.join(READERS)}", path=source)
@@ -113,7 +110,7 @@ def _osi(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraf
 def _commonroad(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
     from xosc_lateral.workflows.recordings.importers.commonroad import read_obstacles
 
-    tracks, shapes, graph = read_obstacles(source)
+    tracks, shapes, graph, _ = read_obstacles(source, source.stem)
     names = tuple(name.removeprefix(f"{source.stem}:") for name in tracks.names)
     own = None if road is not None else roads_of_lanes(driven_lanes(shapes, graph), name_of(source)).encode()
     return _on_road(replace(tracks, names=names), source, road, own)
@@ -146,24 +143,22 @@ def _on_road(tracks: Tracks, source: Path, road: Path | None, own: bytes | None 
     heading = tracks.heading - network.header_offset.heading
     every = slice(None, None, max(1, len(x) // GATE_ROWS))
     require_along_lanes(network, x[every], y[every], heading[every], tracks.speed[every], source)
-    found, notes = [], []
-    for k, rows in enumerate(_rows_of(tracks.vehicle)):
-        rows = rows[_thinned(tracks.time[rows])]
-        name, kind = tracks.names[k], str(tracks.kind[rows[0]])
-        length, width = float(tracks.length[rows[0]]), USUAL_WIDTH.get(kind, 1.8)
-        given = width if tracks.width is None else float(tracks.width[rows[0]])
-        if 0.0 < length <= MAXIMUM_LENGTH and 0.0 < given <= MAXIMUM_WIDTH:
-            width = given
-        else:
-            usual = USUAL_LENGTH.get(kind, 4.6)
-            notes.append(f"{name}: no vehicle has {length:g} m x {given:g} m, {usual:g} m x {width:g} m are taken")
-            length = usual
-        middle = REAR_AXLE * length if tracks.rear is None else float(tracks.rear[rows[0]])
+    vehicles, notes = [], []
+    for name, rows in zip(tracks.names, _rows_of_vehicles(tracks.vehicle, tracks.time), strict=True):
+        first = rows[0]
+        kind, length = str(tracks.kind[first]), float(tracks.length[first])
+        usual = USUAL_LENGTH.get(kind, 4.6), USUAL_WIDTH.get(kind, 1.8)
+        width = usual[1] if tracks.width is None else float(tracks.width[first])
+        if not (0.0 < length <= MAXIMUM_LENGTH and 0.0 < width <= MAXIMUM_WIDTH):
+            taken = f"{usual[0]:g} m x {usual[1]:g} m are taken"
+            notes.append(f"{name}: no vehicle has {length:g} m x {width:g} m, {taken}")
+            length, width = usual
+        middle = REAR_AXLE * length if tracks.rear is None else float(tracks.rear[first])
         ahead = 0.0 if tracks.is_reference or tracks.rear is not None else middle
-        at = tracks.time[rows], x[rows], y[rows], heading[rows]
-        found.append(Track(name, kind, length, width, USUAL_HEIGHT.get(kind, 1.5), ahead, middle, *at))
+        box = length, width, USUAL_HEIGHT.get(kind, 1.5), ahead, middle
+        vehicles.append(Track(name, kind, *box, tracks.time[rows], x[rows], y[rows], heading[rows]))
     sources = (source,) if road is None else (source, road)
-    return RecordedTraffic(name_of(source), tuple(found), network, data, road_name, sources, tuple(notes))
+    return RecordedTraffic(name_of(source), tuple(vehicles), network, data, road_name, sources, tuple(notes))
 
 
 def driven_lanes(shapes: Sequence[LaneShape], graph: LaneGraph) -> list[DrivenLane]:
@@ -174,49 +169,41 @@ def driven_lanes(shapes: Sequence[LaneShape], graph: LaneGraph) -> list[DrivenLa
     ]
 
 
-def _rows_of(vehicle: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """Rows of each vehicle; they are sorted by it."""
-    return np.split(np.arange(len(vehicle)), np.flatnonzero(np.diff(vehicle)) + 1)
-
-
-def _thinned(time: FloatArray) -> NDArray[np.bool_]:
-    """Rows `STEP` apart, or as recorded where that is slower; always the first and the last."""
-    number = np.floor((time - time[0]) / STEP + 1e-6)
-    kept = np.r_[True, np.diff(number) > 0]
-    kept[-1] = True
-    return np.asarray(kept, dtype=np.bool_)
+def _rows_of_vehicles(vehicle: NDArray[Any], time: FloatArray) -> Iterator[NDArray[np.intp]]:
+    """Rows of each vehicle, by which they are sorted, `STEP` apart or as recorded; always the first and the last."""
+    for rows in np.split(np.arange(len(vehicle)), np.flatnonzero(vehicle[1:] != vehicle[:-1]) + 1):
+        number = np.floor((time[rows] - time[rows[0]]) / STEP + 1e-6)
+        yield rows[np.r_[True, np.diff(number[:-1]) > 0, True][: len(rows)]]
 
 
 # ---- recordings whose road is made -----------------------------------------------------------------------------------
-def _made(road: WrittenRoad, tracks: Sequence[Track], sources: Sequence[Path], notes: Sequence[str]) -> RecordedTraffic:
+def _made(road: WrittenRoad, tracks: Sequence[Track], source: Path, *notes: str) -> RecordedTraffic:
     data = road.to_xml().encode()
-    about = data, f"{road.name}.xodr", tuple(sources), tuple(notes)
-    return RecordedTraffic(road.name, tuple(tracks), parse_opendrive(data, road.name), *about)
+    network = parse_opendrive(data, road.name)
+    return RecordedTraffic(road.name, tuple(tracks), network, data, f"{road.name}.xodr", (source,), notes)
 
 
 def _dlr(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
     table = dlr_ht.read_tracks(source)
-    lanes = dlr_ht.find_lanes(table)
-    made = dlr_road(lanes)
+    made = dlr_road(dlr_ht.find_lanes(table))
     kinds = dlr_ht.vehicle_classes(table)
     x = table["center_easting"].to_numpy() - made.origin[0]
     y = table["center_northing"].to_numpy() - made.origin[1]
-    time, vehicle = table["time"].to_numpy(), table["vehicle"].to_numpy()
+    time = table["time"].to_numpy()
     usual = np.array([USUAL_WIDTH.get(str(kind), 1.8) for kind in kinds])
     width = table[dlr_ht.WIDTH].to_numpy() if dlr_ht.WIDTH in table else usual
-    sizes = table["dimension_length"].to_numpy(), width, table["dimension_height"].to_numpy()
+    length, height = table["dimension_length"].to_numpy(), table["dimension_height"].to_numpy()
     names = table["id"].astype(str).to_numpy(dtype=str)
     short = _short(names)
     tracks = []
-    for rows in _rows_of(vehicle):
-        rows = rows[_thinned(time[rows])]
+    for rows in _rows_of_vehicles(table["vehicle"].to_numpy(), time):
         first = rows[0]
-        length, wide, high = (float(size[first]) for size in sizes)
         heading = np.arctan2(np.gradient(y[rows]), np.gradient(x[rows])) if len(rows) > 1 else np.zeros(1)
-        box = length, wide, high, REAR_AXLE * length, REAR_AXLE * length
-        tracks.append(Track(short[names[first]], str(kinds[first]), *box, time[rows], x[rows], y[rows], heading))
+        box = float(length[first]), float(width[first]), float(height[first])
+        name, kind, ahead = short[names[first]], str(kinds[first]), REAR_AXLE * box[0]
+        tracks.append(Track(name, kind, *box, ahead, ahead, time[rows], x[rows], y[rows], heading))
     note = "the road is that of the traffic: lane centres are those of its vehicles, nobody measured markings"
-    return _made(made, tracks, [source], [note])
+    return _made(made, tracks, source, note)
 
 
 def _levelx(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
@@ -233,28 +220,26 @@ def _levelx(source: Path, road: Path | None, columns: TableMapping) -> RecordedT
     levelx.require(table, levelx.HIGHD_COLUMNS, files[0])
     lower, upper = (np.sort(levelx.markings(about, side, files[0])) for side in ("lower", "upper"))
     middle = 0.5 * (upper[-1] + lower[0])
-    ways = meta.set_index("id")["drivingDirection"]
-    classes = meta.set_index("id")["class"].astype(str).str.lower()
-    x0 = float(np.floor(table["x"].min() - AROUND))
-    length = float(np.ceil(table["x"].max() + table["width"].max() + AROUND)) - x0
+    table = table.sort_values(["id", "frame"], ignore_index=True)
+    meta = meta.set_index("id").loc[table["id"]]
+    kinds, is_ahead = meta["class"].astype(str).str.lower().to_numpy(), meta["drivingDirection"].to_numpy() == 2
+    time, length, width = table["frame"].to_numpy(dtype=np.float64) / rate, table["width"], table["height"]
+    x, y = (table["x"] + 0.5 * length).to_numpy(), -(table["y"] + 0.5 * width).to_numpy()  # y points down there
     tracks = []
-    for name, rows in table.sort_values(["id", "frame"]).groupby("id"):
-        time = rows["frame"].to_numpy(dtype=np.float64) / rate
-        rows, time = rows[_thinned(time)], time[_thinned(time)]
-        size, wide, kind = float(rows["width"].iloc[0]), float(rows["height"].iloc[0]), str(classes[name])
-        x, y = (rows["x"] + 0.5 * rows["width"]).to_numpy(), -(rows["y"] + 0.5 * rows["height"]).to_numpy()
-        heading = np.full(len(time), 0.0 if ways[name] == 2 else np.pi)
-        box = size, wide, USUAL_HEIGHT.get(kind, 1.5), REAR_AXLE * size, REAR_AXLE * size
-        tracks.append(Track(str(name), kind, *box, time, x, y, heading))
+    for rows in _rows_of_vehicles(table["id"].to_numpy(), time):
+        first = rows[0]
+        name, kind, ahead = str(table["id"][first]), str(kinds[first]), REAR_AXLE * float(length[first])
+        box = float(length[first]), float(width[first]), USUAL_HEIGHT.get(kind, 1.5), ahead, ahead
+        heading = np.full(len(rows), 0.0 if is_ahead[first] else np.pi)
+        tracks.append(Track(name, kind, *box, time[rows], x[rows], y[rows], heading))
+    sides = ((middle - float(upper[-1]), np.diff(upper)[::-1]), (float(lower[0]) - middle, np.diff(lower)))
     left, right = (
-        [WrittenLane.even("median", inner), *(WrittenLane.even("driving", float(one)) for one in widths)]
-        for inner, widths in (
-            (middle - float(upper[-1]), np.diff(upper)[::-1]),
-            (float(lower[0]) - middle, np.diff(lower)),
-        )
+        [WrittenLane.even("median", inner), *(WrittenLane.even("driving", float(width)) for width in widths)]
+        for inner, widths in sides
     )
-    plan = np.array([[0.0, x0, -middle, 0.0, length]])  # y points down in the recording
-    return _made(WrittenRoad(f"highd-{files[0].name.split('_')[0]}", plan, left, right), tracks, [files[0]], [])
+    x0 = float(np.floor(table["x"].min() - AROUND))
+    plan = np.array([[0.0, x0, -middle, 0.0, float(np.ceil((table["x"].max() + length.max()) + AROUND)) - x0]])
+    return _made(WrittenRoad(f"highd-{files[0].name.split('_')[0]}", plan, left, right), tracks, files[0])
 
 
 def _short(names: NDArray[np.str_]) -> dict[str, str]:
@@ -266,41 +251,25 @@ def _short(names: NDArray[np.str_]) -> dict[str, str]:
     return {name: name[common:] for name in every}
 
 
-def dlr_road(found: dlr_ht.Carriageways) -> WrittenRoad:
-    """Both carriageways along one reference line; lanes where their traffic drives.
-
-    A lane's width is the distance of the two centres of its direction; what is left to the reference line is the
-    median's.
-    """
-    line = found.reference
+def dlr_road(lanes: dlr_ht.Carriageways) -> WrittenRoad:
+    """Both carriageways along one line; a lane is as wide as its direction's centres are apart."""
+    line = lanes.reference
     middle = line.place(np.array([0.5 * line.length]), 0)[0]
     origin = float(np.round(middle[0])), float(np.round(middle[1]))
     s = np.linspace(0.0, line.length, max(2, round(line.length / WIDTH_PIECE)) + 1)
     sides = []
     for name in ("southbound", "northbound"):
-        outer, inner = found.lanes[name]
         along = s if name == "northbound" else line.length - s
-        distance = [-one.at(np.clip(along, one.start, one.end), np.full(len(s), one.height)) for one in (inner, outer)]
-        width = distance[1] - distance[0]
-        median = distance[0] - 0.5 * width
-        sides.append(
-            [
-                WrittenLane.through("median", s, median),
-                WrittenLane.through("driving", s, width),
-                WrittenLane.through("driving", s, width),
-                WrittenLane.even("shoulder", SHOULDER),
-            ]
+        outer, inner = (
+            -lane.at(np.clip(along, lane.start, lane.end), np.full(len(s), lane.height)) for lane in lanes.lanes[name]
         )
+        width = outer - inner
+        driving = WrittenLane.through("driving", s, width)
+        median = WrittenLane.through("median", s, inner - 0.5 * width)
+        sides.append([median, driving, driving, WrittenLane.even("shoulder", SHOULDER)])
     return WrittenRoad("dlr-ht", curved_plan(line, origin), sides[0], sides[1], origin)
 
 
-Reader = Callable[[Path, "Path | None", TableMapping], RecordedTraffic]
-READERS: dict[str, Reader] = {
-    "dlr-ht": _dlr,
-    "levelx": _levelx,
-    "tracks": _tracks,
-    "osi": _osi,
-    "commonroad": _commonroad,
-    "fcd": _fcd,
-}
-"""Format -> its reader."""
+READERS: dict[str, Callable[[Path, Path | None, TableMapping], RecordedTraffic]] = {
+    "dlr-ht": _dlr, "levelx": _levelx, "tracks": _tracks, "osi": _osi, "commonroad": _commonroad, "fcd": _fcd,
+}  # fmt: skip

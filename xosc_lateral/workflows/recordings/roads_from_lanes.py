@@ -200,10 +200,7 @@ def _turning(points: FloatArray) -> float:
 
 
 def _aside(edge: FloatArray, line: ReferenceLine, s: FloatArray, samples: FloatArray) -> FloatArray:
-    """How far to the left of a line an edge lies, at places along it where these are its samples; NaN where it is not.
-
-    Shape as `s`. [m]
-    """
+    """How far to the left of a line an edge lies, at its samples, shape as `s`; NaN where the edge is not. [m]"""
     from scipy.spatial import cKDTree
 
     way = np.r_[0.0, np.cumsum(np.hypot(*np.diff(edge[:, :2], axis=0).T))]

@@ -50,26 +50,10 @@ def reconstructed_scenario(
     relative: Mapping[str, Triggers] | None = None,
     exact: bool = False,
 ) -> str:
-    """The document, the same bytes each time.
+    """The document, the same bytes each time; it ends after `duration` [s].
 
-    Parameters
-    ----------
-    plans : sequence of VehiclePlan
-    network : RoadNetwork
-    road_file : str
-        As seen from the scenario.
-    duration : float
-        The scenario ends then. [s]
-    version : (int, int)
-        Of the standard.
-    host : str, optional
-        Entity that is the vehicle under test.
-    description : str
-        For the header.
-    relative : mapping of str to triggers, optional
-        Entity -> what of it begins by a distance instead of the clock.
-    exact : bool
-        Recorded paths as trajectories, instead of maneuvers.
+    `host`: entity under test. `relative`: entity -> what of it begins by a distance instead of the clock. `exact`:
+    recorded paths as trajectories, instead of maneuvers.
     """
     entities, actions = etree.Element("Entities"), etree.Element("Actions")
     story = build.story("Recorded")
@@ -120,10 +104,7 @@ def plain_text(text: str) -> str:
 
 
 class _Vehicle:
-    """One vehicle: its entity, where it starts and what it does.
-
-    `values` gets the parameters that are used by name, with their values.
-    """
+    """One vehicle: its entity, where it starts and what it does; `values` gets the parameters used by name."""
 
     def __init__(
         self, plan: VehiclePlan, network: RoadNetwork, version: Version, act: etree._Element, values: dict[str, str]

@@ -17,7 +17,7 @@ from msgspec import Struct
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
-from xosc_lateral.base.rows import blocks, give_back, rows_where, scratch, slices_where
+from xosc_lateral.base.rows import blocks, rows_where, scratch, slices_where
 from xosc_lateral.world.motion.nominal import Activity
 
 VERTEX_STEP = 0.1
@@ -303,7 +303,6 @@ def _head(time: FloatArray, way: FloatArray, until: float, step: float) -> Float
             return np.concatenate([*times, following[: int(np.argmax(over))]])
         times.append(following)
         count = min(2 * count, 10_000)
-        give_back()
 
 
 def _tail(time: FloatArray, way: FloatArray, step: float) -> list[float]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import PlaybackError
-from xosc_lateral.base.rows import BLOCK, columns, give_back, stored
+from xosc_lateral.base.rows import BLOCK, columns, stored
 from xosc_lateral.world.motion.nominal import CUT_OFF, Activity, NominalMotion, Note
 from xosc_lateral.world.player.drive import drive, halt_at_road_end
 from xosc_lateral.world.player.recorder import NO_LANE
@@ -210,7 +210,6 @@ class _Player:
         if self.times:
             self._times_put_away.append(stored(np.array(self.times)))
             del self.times[:]
-        give_back()
 
     def _result(self, ended_by: str, cut_off: Note | None) -> NominalMotion:
         simulation = self.simulation

@@ -91,7 +91,10 @@ class StoryboardElement:
             self.start()
         if self.state is _RUNNING:
             for child in self.children:
-                if child.state is _STANDBY or (child.state is _RUNNING and (child.children or child.stop_trigger)):
+                if child.state is _STANDBY:
+                    if child.start_trigger is None or not child.start_trigger.rests:
+                        child.evaluate_triggers(time)
+                elif child.state is _RUNNING and (child.children or child.stop_trigger):
                     child.evaluate_triggers(time)
 
     def step(self, time: float, step: float) -> None:
@@ -152,7 +155,7 @@ class StoryboardElement:
         parent = self.parent
         if parent is None or parent.kind is None or parent.state is State.COMPLETE:
             return
-        if all(child.state is State.COMPLETE for child in parent.children):
+        if all(child.state is State.COMPLETE for child in reversed(parent.children)):  # the last one mostly is not
             parent.end()
 
 

@@ -17,18 +17,30 @@ from xosc_lateral.world.scenario.enums import ConditionEdge
 Check = Callable[[], bool]
 
 
+class Watch:
+    """What is told of changes; a check that goes by it gives the same until then.
+
+    `wake`: tells the trigger that looks at it; `is_settled`: the next look gives what the last one gave.
+    """
+
+    wake: Callable[[], None] | None = None
+    is_settled = False
+
+    def forget(self) -> None:
+        """Before the owner waits again: what happened until then no longer counts."""
+
+
 @dataclass(slots=True, eq=False)
 class RunningCondition:
     """One condition: its present value, edge-filtered and delayed.
 
-    `check`: the bare condition, at the present moment; `delay`: [s]; `forget`: makes the bare condition forget what
-    happened before its owner waits again.
+    `check`: the bare condition, at the present moment; `delay`: [s]; `watch`: what tells the bare condition of changes.
     """
 
     check: Check
     edge: ConditionEdge
     delay: float
-    forget: Callable[[], None] | None = None
+    watch: Watch | None = None
     _last: bool = False
     _armed: bool = False
     _history: list[tuple[float, bool]] = field(default_factory=list)
@@ -52,6 +64,17 @@ class RunningCondition:
         self._time, self._value = time, filtered
         return self._value if self.delay <= 0.0 else self._delayed(time - self.delay)
 
+    @property
+    def is_watched(self) -> bool:
+        """Whether its value changes only a while after a word of its watch."""
+        return self.watch is not None and self.edge is ConditionEdge.NONE
+
+    def settled_value(self) -> bool | None:
+        """What it gives until something changes; None: that may be something else in the next frame."""
+        if self.watch is None or not self.watch.is_settled or self._read < len(self._history) or not self.is_watched:
+            return None
+        return self._history[-1][1] if self._history else self._last
+
     def rearm(self) -> None:
         """After the trigger fired: the next evaluation gives no edge."""
         self._armed = False
@@ -61,8 +84,8 @@ class RunningCondition:
         self._history.clear()
         self._read = 0
         self._time = -inf
-        if self.forget is not None:
-            self.forget()
+        if self.watch is not None:
+            self.watch.forget()
 
     def _filter(self, now: bool) -> bool:
         edge = self.edge
@@ -94,9 +117,24 @@ class RunningTrigger:
 
     groups: tuple[tuple[RunningCondition, ...], ...]
     when_empty: bool = field(kw_only=True)
+    rests: bool = field(default=False, init=False)
+    """It can't fire before one of its conditions is told of a change."""
+    _may_rest: bool = field(default=False, init=False)
+
+    def __post_init__(self) -> None:
+        """Be woken by what its conditions watch."""
+        for condition in (condition for group in self.groups for condition in group):
+            if condition.watch is not None:
+                condition.watch.wake = self._wake
+        self._may_rest = bool(self.groups) and all(
+            bool(group) and group[0].is_watched and all(one.is_watched for one in group if one.delay > 0.0)
+            for group in self.groups
+        )
 
     def evaluate(self, time: float) -> bool:
         """Whether it fires at `time`. [s]"""
+        if self.rests:
+            return False
         if not self.groups:
             return self.when_empty
         fired = False
@@ -110,10 +148,26 @@ class RunningTrigger:
             for group in self.groups:
                 for condition in group:
                     condition.rearm()
+        self.rests = self._may_rest and not fired and all(map(_stays_false, self.groups))
         return fired
+
+    def _wake(self) -> None:
+        self.rests = False
 
     def reset(self) -> None:
         """Forget earlier values."""
+        self.rests = False
         for group in self.groups:
             for condition in group:
                 condition.reset()
+
+
+def _stays_false(group: tuple[RunningCondition, ...]) -> bool:
+    """Whether a group can't hold before something changes; what comes after a false condition is not looked at."""
+    holds = True
+    for condition in group:
+        value = condition.settled_value()
+        if value is None and (holds or condition.delay > 0.0):
+            return False
+        holds = holds and value is True
+    return not holds

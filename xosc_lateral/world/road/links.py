@@ -149,11 +149,14 @@ class Links:
 
     def _roads_back(self, here: Road, junction: str, direction: int) -> Iterator[tuple[int, str]]:
         """Roads of a junction that lead to this one's end (+1) or start (-1) by their own links, and by which end."""
-        touches = RoadLink("road", here.id, "end" if direction > 0 else "start")
+        touched = "end" if direction > 0 else "start"
         for index, other in enumerate(self.roads):
-            if other.junction == junction:
-                ends = (other.predecessor, "start"), (other.successor, "end")
-                yield from ((index, contact) for back, contact in ends if back == touches)
+            ends = ((other.predecessor, "start", -1), (other.successor, "end", 1)) if other.junction == junction else ()
+            for back, contact, way in ends:
+                if back is None or (back.element_type, back.element_id) != ("road", here.id):
+                    continue
+                if (back.contact or self._contact_of(index, way, self._index[here.id])) == touched:
+                    yield index, contact
 
 
 def _lanes_linked_to(here: Road, lane: Lane, direction: int, other: Road, contact: str) -> list[int]:

@@ -18,12 +18,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
-from xosc_lateral.base.rows import empty, give_back, put
+from xosc_lateral.base.rows import empty, put
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.enums import VehicleCategory
-from xosc_lateral.world.scenario.environment import Environment, Weather
-from xosc_lateral.world.scenario.global_actions import EnvironmentAction
+from xosc_lateral.world.scenario.global_actions import Environment, EnvironmentAction, Weather
 from xosc_lateral.world.surroundings.around import (
     IN_SIGHT,
     SIGHT_DISTANCE,
@@ -158,7 +157,6 @@ def _neighbours(
                 who, rows = others[k // len(members)], members[k % len(members)]
                 gap = free_space(seen, box, Extent(*(values[who] for values in extent)))
                 around.add(rows, seen, gap, width[rows], traffic.width[who], traffic.is_truck[who])
-            give_back(len(grid))
     return around.columns(lanes)
 
 
@@ -201,7 +199,6 @@ def _traffic(motion: NominalMotion, network: RoadNetwork, first: int, every: int
         direction = np.where(np.cos(heading) < 0.0, -direction, direction)
         for table, values in zip(tables, (road, s, t, direction), strict=True):
             put(table, slice(begin, begin + together), values.reshape(-1, n))
-        give_back()
     boxes = [one.entity.bounding_box for one in motion.entities]
     length, centre, width = (np.array([getattr(b, name) for b in boxes]) for name in ("length", "center_x", "width"))
     is_truck = np.array([one.entity.vehicle_category in TRUCKS for one in motion.entities])

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
-from xosc_lateral.base.rows import empty, give_back, put, stored
+from xosc_lateral.base.rows import empty, put, stored
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.surroundings.around import smooth_step
@@ -85,7 +85,6 @@ def give_way(
     for k, one in enumerate(sampled):
         for table, values in zip((left, right, *tables), (none, none, *Frame.of(one, rows)[: len(names)]), strict=True):
             put(table, slice(k, k + 1), np.asarray(values))
-        give_back(len(one.motion.time))
     left_hand = np.array(_left_hand(network, sampled, rows), dtype=bool)
     x, y = (
         (np.where(there, row, np.nan) for row, there in zip(table, tables[-1], strict=True)) for table in tables[:2]
@@ -110,7 +109,6 @@ def give_way(
             aside = moved_aside(first, second, Response._make(column[own] for column in responses), left_hand[own])
             np.maximum.at(right[:, stretch], (own, at), np.maximum(0.0 - aside, 0.0))
             np.maximum.at(left[:, stretch], (own, at), np.maximum(aside, 0.0))
-        give_back()
     every = max(1, int(rows[1] - rows[0])) if n > 1 else 1
     smoothed = STEERING / (motion.step * every)
     result: list[FloatArray | None] = []

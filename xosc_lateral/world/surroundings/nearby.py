@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
-from xosc_lateral.base.rows import give_back
 
 BLOCK = 64
 """Rows that one box around a vehicle's path covers: 1.3 s at 50 Hz, 40 m on a motorway. [-]"""
@@ -71,7 +70,6 @@ def _bounds(x: Iterable[FloatArray], y: Iterable[FloatArray]) -> tuple[FloatArra
         starts = np.arange(0, len(point[0]), BLOCK)
         for found, ufunc in ((lows, np.fmin), (highs, np.fmax)):  # they pass over NaN
             found.append(np.stack([ufunc.reduceat(values, starts) for values in point]))
-        give_back(len(point[0]))
     low, high = (np.stack(found[1:] or found, axis=-1) for found in (lows, highs))
     return low, high
 

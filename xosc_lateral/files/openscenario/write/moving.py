@@ -11,7 +11,7 @@ from lxml import etree
 from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.rows import blocks, columns, give_back, stored
+from xosc_lateral.base.rows import blocks, columns, stored
 from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.build import Pose
 from xosc_lateral.files.openscenario.write.draft import Draft
@@ -53,7 +53,6 @@ class Moving:
 
     def pose(self, row: int) -> Pose:
         """Pose in one row."""
-        give_back()
         path = self.path
         heading = wrapped(path.heading[row])
         x, y, z, h, p, r = map(float, (path.x[row], path.y[row], path.z[row], heading, path.pitch[row], path.roll[row]))

@@ -10,7 +10,6 @@ from lxml import etree
 from msgspec import Struct
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.rows import give_back
 from xosc_lateral.files.openscenario.write import build
 
 BLOCK = 1000
@@ -60,7 +59,6 @@ class TimedVertices(Struct, frozen=True, eq=False):
             numbers = build.decimals(block[varies].T, [_DIGITS[k] for k in np.flatnonzero(varies)])
             text = f"\n{indent}".join([vertex] * block.shape[1]) % numbers
             yield (f"\n{indent}" if begin else "") + text
-            give_back()
 
 
 class Vertices:

@@ -19,13 +19,14 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.files.drives import file_labels
+from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.files.xml import read_xml, root_tag
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
-from xosc_lateral.workflows.recordings.importers.table import Imported, guarded
+from xosc_lateral.workflows.recordings.importers.table import Imported, guarded, import_each, paths_of
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks, ground_speed, travel_heading
+from xosc_lateral.workflows.recordings.importers.tracks import import_placed, require_lanes
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
 from xosc_lateral.workflows.recordings.lane_shapes import LaneShape, curvature_along, lane_graph, place_in_shapes
-from xosc_lateral.workflows.recordings.placed import import_each, import_placed, require_lanes
 
 LICENCE = "that of the CommonRoad scenario and of the recording that it was made from"
 
@@ -34,34 +35,31 @@ LICENCE = "that of the CommonRoad scenario and of the recording that it was made
 def import_commonroad(
     sources: Path | Sequence[Path], settings: CutSettings = DEFAULT_CUTS, *, keep_cut: bool = False
 ) -> Imported:
-    """Read one or several scenarios.
-
-    Raises `FormatError` if commonroad-io is not installed, or a file is no CommonRoad scenario; `NotEnoughDataError` if
-    nothing is left once lane changes are cut.
-    """
-    files = [sources] if isinstance(sources, Path) else list(sources)
+    """Read one or several scenarios. Raises `FormatError`, `NotEnoughDataError`."""
+    files = paths_of(sources)
     labels = dict(zip(files, file_labels(files), strict=True))
-    return import_each(files, lambda file: _read(file, labels[file], settings), keep_cut=keep_cut)
+
+    def read(path: Path) -> Imported:
+        tracks, shapes, graph, version = read_obstacles(path, labels[path])
+        placed = place_in_shapes(tracks, shapes, graph.left)
+        require_lanes(placed, "its lanelets", path)
+        about = {"format": "commonroad", "version": version, "licence": LICENCE}
+        return import_placed(placed, graph, settings, keep_cut=True, sources=[path], **about)
+
+    return import_each(files, read, keep_cut=keep_cut)
 
 
-def _read(path: Path, label: str, settings: CutSettings) -> Imported:
+def read_obstacles(path: Path, label: str) -> tuple[Tracks, list[_Lanelet], LaneGraph, str]:
+    """All obstacles that move along a recorded trajectory, lanes, and the scenario's id."""
     scenario = _opened(path)
-    graph, shapes = _graph(scenario)
-    tracks = place_in_shapes(_tracks(scenario, path, label), shapes, graph.left)
-    require_lanes(tracks, "its lanelets", path)
-    about = {"format": "commonroad", "version": str(getattr(scenario, "scenario_id", "unknown")), "licence": LICENCE}
-    return import_placed(tracks, graph, settings, keep_cut=True, sources=[path], **about)
-
-
-def _graph(scenario: Any) -> tuple[LaneGraph, list[_Lanelet]]:
-    """How its lanelets hang together, and their shapes."""
-    lanelets = {lanelet.lanelet_id: lanelet for lanelet in scenario.lanelet_network.lanelets}
-    numbers = {name: k for k, name in enumerate(lanelets)}
-    shapes = [_Lanelet(lanelet) for lanelet in lanelets.values()]
-    beside = [one.adj_left if one.adj_left_same_direction else None for one in lanelets.values()]
+    lanelets = scenario.lanelet_network.lanelets
+    numbers = {lanelet.lanelet_id: k for k, lanelet in enumerate(lanelets)}
+    shapes = [_Lanelet(lanelet) for lanelet in lanelets]
+    beside = [lanelet.adj_left if lanelet.adj_left_same_direction else None for lanelet in lanelets]
     left = np.array([numbers.get(name, -1) for name in beside], dtype=int)
-    following = [[numbers[name] for name in one.successor if name in numbers] for one in lanelets.values()]
-    return lane_graph(shapes, left, following), shapes
+    following = [[numbers[name] for name in lanelet.successor if name in numbers] for lanelet in lanelets]
+    version = str(getattr(scenario, "scenario_id", "unknown"))
+    return _tracks(scenario, path, label), shapes, lane_graph(shapes, left, following), version
 
 
 def _opened(path: Path) -> Any:
@@ -77,19 +75,8 @@ def _opened(path: Path) -> Any:
         what = "commonroad-io needs protobuf 3.20, the extra `osi` a later one: use an environment for each"
         raise FormatError(what, path=path) from error
     read_xml(path)  # no entities, and no larger than ours may be
-    try:
-        scenario, _ = CommonRoadFileReader(str(path)).open()
-    except Exception as error:  # whatever its parser meets in a foreign file
-        reason = " ".join(str(error).split())[:200]
-        raise FormatError(f"not a CommonRoad scenario that commonroad-io can read: {reason}", path=path) from error
-    return scenario
-
-
-def read_obstacles(path: Path) -> tuple[Tracks, list[_Lanelet], LaneGraph]:
-    """All obstacles that move along a recorded trajectory, and lanes. Raises `FormatError`, `NotEnoughDataError`."""
-    scenario = _opened(path)
-    graph, shapes = _graph(scenario)
-    return _tracks(scenario, path, path.stem), shapes, graph
+    with foreign_errors(path, "not a CommonRoad scenario that commonroad-io can read"):
+        return CommonRoadFileReader(str(path)).open()[0]
 
 
 def _tracks(scenario: Any, path: Path, label: str) -> Tracks:

@@ -72,11 +72,7 @@ LICENCE = (
 
 @guarded
 def import_dlr_ht(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cut: bool = False) -> Imported:
-    """Read the trajectory CSV, the data set's zip or the wheel of `tasi` that holds it.
-
-    Returns Imported: table with columns drive, time, offset, lane_width, speed, context, vehicle_class, and (with
-    `keep_cut`) `state` naming why a row would have been cut.
-    """
+    """Read the trajectory CSV, the data set's zip or the wheel of `tasi` that holds it."""
     tracks = read_tracks(source)
     found = find_lanes(tracks, settings)
     forward, reference, s_road = found.forward, found.reference, found.s

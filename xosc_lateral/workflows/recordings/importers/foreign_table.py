@@ -16,6 +16,7 @@ from xosc_lateral.files.columns import comma_numbers
 from xosc_lateral.files.drives import drives_of_table, file_labels, labels_apart, translated
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping, factor, spelled
 from xosc_lateral.files.tables import read_table, text_encoding
+from xosc_lateral.workflows.recordings.importers.table import paths_of
 
 HEADERS = {
     "time": r"time|timestamp|t|zeit|zeitstempel|sec|seconds",
@@ -75,13 +76,9 @@ SIGNS = {"offset": "positive to the LEFT of travel, else :-m", "curvature": "pos
 
 
 def import_table(sources: Path | Sequence[Path], *, mapping: MappingLike | None = None) -> pd.DataFrame:
-    """Tables under standard names, in standard units; a table without `drive` is a drive called after its file.
-
-    `mapping`: without it, headers are taken to be standard names. Raises `FormatError`, `NotEnoughDataError`: as
-    `files.drives.read_drives`: what is written here can be read.
-    """
+    """Tables under standard names and units, as they can be read; without `drive`, a drive called after its file."""
     known = as_mapping(mapping)
-    files = [sources] if isinstance(sources, Path) else list(sources)
+    files = paths_of(sources)
     made = []
     for path, label in zip(files, file_labels(files), strict=True):
         table = translated(read_table(path, known), known, path)
@@ -95,10 +92,7 @@ def import_table(sources: Path | Sequence[Path], *, mapping: MappingLike | None 
 
 
 def propose_mapping(files: Sequence[Path]) -> str:
-    """TOML of a mapping of these tables, with what each line was guessed from.
-
-    Raises `FormatError`: if they can't be read, or have no column in common.
-    """
+    """TOML of a mapping of these tables, with what each line was guessed from."""
     tables = [read_table(path).rename(columns=lambda name: str(name).strip()) for path in files]
     shared = [name for name in tables[0].columns if all(name in table.columns for table in tables)]
     if not shared:

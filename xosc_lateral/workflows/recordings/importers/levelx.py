@@ -18,7 +18,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -50,10 +50,7 @@ VEHICLES = ("car", "van", "truck", "bus", "motorcycle", "trailer")
 
 @guarded
 def import_levelx(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cut: bool = False) -> Imported:
-    """Read one recording (its ``XX_tracks.csv``) or a folder of them; highD and exiD are recognised by their columns.
-
-    Raises `FormatError` if a file or a column is missing, or the exiD sign is undecided.
-    """
+    """Read one recording (its ``XX_tracks.csv``) or a folder of them, of highD or exiD, told by their columns."""
     tracks_files = sorted(source.glob("*_tracks.csv")) if source.is_dir() else [source]
     if not tracks_files:
         raise FormatError("no XX_tracks.csv in this folder", path=source)
@@ -66,12 +63,11 @@ def import_levelx(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cu
 
 def _read_recording(path: Path, settings: CutSettings) -> tuple[pd.DataFrame, str, float]:
     """Table with `state`, layout and step of one recording."""
-    tracks, tracks_meta, recording = read_recording_files(path)
-    number = path.name.split("_")[0]
-    step = 1.0 / frame_rate(recording, path)
+    tracks, meta, recording = read_recording_files(path)
+    number, step = path.name.split("_")[0], 1.0 / frame_rate(recording, path)
     if "latLaneCenterOffset" in tracks.columns:
-        return _from_exid(tracks, tracks_meta, number, step, path, settings), "exiD", step
-    return _from_highd(tracks, tracks_meta, recording, number, step, path, settings), "highD", step
+        return _from_exid(tracks, meta, number, step, path, settings), "exiD", step
+    return _from_highd(tracks, meta, recording, number, step, path, settings), "highD", step
 
 
 def read_recording_files(path: Path) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
@@ -213,8 +209,8 @@ def _first(column: pd.Series) -> FloatArray:
 def _left_sign(lateral: FloatArray, tracks: pd.DataFrame, vehicle: IntArray, step: float, path: Path) -> float:
     """+1 if the offset grows when a vehicle heads to the left of its lane's course, -1 if it shrinks.
 
-    By the correlation of the way to the left, from the heading, with the rate of the offset; the heading is taken
-    against its own mean over 4 s, which takes the road's course out of it.
+    By the correlation of its rate with the way to the left, by the heading less its own mean over 4 s (the road's
+    course).
     """
     heading = np.unwrap(np.radians(tracks["heading"].to_numpy()))
     half = max(1, round(2.0 / step))
@@ -240,8 +236,19 @@ def _about_mean(values: FloatArray, rows: IntArray, half: int) -> FloatArray:
 def _exid_neighbours(tracks: pd.DataFrame, is_truck: NDArray[np.bool_]) -> dict[str, FloatArray]:
     """Leader and neighbours from the ids that come along; distances bumper to bumper. Which lanes there are is not in
     the tracks, so beside, NaN is no lane as well as nobody."""
-    row_of = _rows_by_frame_and_track(tracks)
-    lead, lead_row = tracks["leadDHW"].to_numpy(dtype=np.float64), row_of(_ids(tracks["leadId"]))
+    frame = tracks["frame"].to_numpy(dtype=np.int64)
+    places = pd.MultiIndex.from_arrays([frame, tracks["trackId"].to_numpy(dtype=np.int64)])
+    rows, places = np.flatnonzero(~places.duplicated()), places.drop_duplicates()
+    heading = np.radians(tracks["heading"].to_numpy())
+    east, north, length = (tracks[name].to_numpy(dtype=np.float64) for name in ("xCenter", "yCenter", "length"))
+
+    def rows_of(column: str) -> IntArray:
+        """Row of the vehicle of the first id at the same frame; -1: none."""
+        ids = np.nan_to_num(_first(tracks[column]), nan=-1.0).astype(np.int64)
+        place = places.get_indexer(pd.MultiIndex.from_arrays([frame, ids]))
+        return np.where(place >= 0, rows[place], -1)
+
+    lead, lead_row = tracks["leadDHW"].to_numpy(dtype=np.float64), rows_of("leadId")
     there = (lead_row >= 0) & (lead >= 0.0) & (lead <= REACH)
     near = {
         "lead_distance": np.where(there, lead, np.inf),
@@ -249,39 +256,12 @@ def _exid_neighbours(tracks: pd.DataFrame, is_truck: NDArray[np.bool_]) -> dict[
     }
     for side in ("left", "right"):
         best, truck = np.full(len(tracks), np.inf), np.zeros(len(tracks))
-        for who in ("Lead", "Rear", "Alongside"):
-            other = row_of(_ids(tracks[f"{side}{who}Id"]))
-            gap = np.where(other >= 0, _free_space(tracks, other), np.inf)
+        for place in ("Lead", "Rear", "Alongside"):
+            other = rows_of(f"{side}{place}Id")
+            along = (east[other] - east) * np.cos(heading) + (north[other] - north) * np.sin(heading)
+            free = np.maximum(np.abs(along) - 0.5 * (length + length[other]), 0.0)
+            gap = np.where(other >= 0, free, np.inf)
             closer = (gap < best) & (gap <= REACH)
             best, truck = np.where(closer, gap, best), np.where(closer, is_truck[other], truck)
         near |= {f"{side}_distance": np.where(np.isfinite(best), best, np.nan), f"{side}_is_truck": truck}
     return near
-
-
-def _free_space(tracks: pd.DataFrame, other: IntArray) -> FloatArray:
-    """Free space lengthwise between every row's vehicle and that of row `other`. [m]"""
-    heading = np.radians(tracks["heading"].to_numpy())
-    east, north, length = (tracks[name].to_numpy(dtype=np.float64) for name in ("xCenter", "yCenter", "length"))
-    along = (east[other] - east) * np.cos(heading) + (north[other] - north) * np.sin(heading)
-    return np.asarray(np.maximum(np.abs(along) - 0.5 * (length + length[other]), 0.0))
-
-
-def _ids(column: pd.Series) -> IntArray:
-    """First id of each row, -1 where there is none."""
-    return np.nan_to_num(_first(column), nan=-1.0).astype(np.int64)
-
-
-def _rows_by_frame_and_track(tracks: pd.DataFrame) -> Callable[[IntArray], IntArray]:
-    """Function from track ids, one per row, to the row of that track at the same frame (-1: none)."""
-    frame, track = tracks["frame"].to_numpy(dtype=np.int64), tracks["trackId"].to_numpy(dtype=np.int64)
-    size = int(track.max()) + 2
-    key = frame * size + track
-    order = np.argsort(key, kind="stable")
-
-    def row_of(ids: IntArray) -> IntArray:
-        wanted = frame * size + ids
-        place = np.clip(np.searchsorted(key[order], wanted), 0, len(key) - 1)
-        found = (ids >= 0) & (ids < size) & (key[order][place] == wanted)
-        return np.where(found, order[place], -1)
-
-    return row_of

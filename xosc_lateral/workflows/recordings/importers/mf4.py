@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +41,7 @@ from xosc_lateral.files.mapping import ColumnSource, MappingLike, as_mapping, fa
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import LONGEST_MESSAGE, foreign_errors
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
-from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
+from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded, paths_of
 
 POSITIONS = (("offset", "lane_width"), ("distance_left", "distance_right"))
 LICENCE = "your own recording"
@@ -57,10 +57,6 @@ SPARSE_STEPS = 2.5
 """A channel of few samples has a gap where more than two in a row are missing: of its own median steps. [-]"""
 
 
-Resampler: TypeAlias = "Callable[[FloatArray, FloatArray, FloatArray], FloatArray]"
-"""Times, values and an even grid into values there."""
-
-
 @dataclass(frozen=True, eq=False)
 class Channel:
     """A mapped channel."""
@@ -72,15 +68,14 @@ class Channel:
     notes: tuple[str, ...] = ()  # what a user has to know
 
     def breaks(self, jump: float = np.inf) -> NDArray[np.bool_]:
-        """Steps from sample to sample across which nothing is known, shape (n - 1,): gaps, and jumps by more than so
-        much."""
+        """Gaps between samples, and jumps by more than so much, across which nothing is known, shape (n - 1,)."""
         step = np.diff(self.time)
         broken = step > max(MAX_GAP, SPARSE_STEPS * float(np.median(step))) + 1e-9
         if not self.is_stepwise:
             broken |= np.abs(np.diff(self.values)) > jump
         return np.asarray(broken)
 
-    def at(self, time: FloatArray, broken: NDArray[np.bool_], low_pass: Resampler) -> NDArray[Any]:
+    def at(self, time: FloatArray, broken: NDArray[np.bool_], *, is_position: bool) -> NDArray[Any]:
         """Values at these times, evenly spaced [s]; NaN (None of words) before the first and past the last sample, and
         within steps that are broken. A sample stands for its step, so that the last one is not the end."""
         after = np.clip(np.searchsorted(self.time, time), 1, len(self.time) - 1)
@@ -91,17 +86,16 @@ class Channel:
             values = self.values[nearest].astype(object if self.values.dtype == object else np.float64)
             values[~known] = None if values.dtype == object else np.nan
             return values
-        found = np.full(len(time), np.nan)
+        values, low_pass = np.full(len(time), np.nan), resample if is_position else average
         edges = [0, *(np.flatnonzero(broken) + 1).tolist(), len(self.time)]
         for first, end in pairwise(edges):
-            own = slice(first, end)
             before, past = (1e-9 if edge in edges[1:-1] else held for edge in (first, end))
             rows = np.flatnonzero((time >= self.time[first] - before) & (time <= self.time[end - 1] + past))
             if len(rows) and end - first > 1:
-                found[rows] = low_pass(self.time[own], self.values[own], time[rows])
+                values[rows] = low_pass(self.time[first:end], self.values[first:end], time[rows])
             elif len(rows):
-                found[rows] = self.values[first]
-        return found
+                values[rows] = self.values[first]
+        return values
 
 
 @guarded
@@ -114,43 +108,37 @@ def import_mf4(
 ) -> Imported:
     """Read mapped channels of bus logs at an even step, over the time that all position channels of a log cover.
 
-    Raises `FormatError` if the map lacks the position, asammdf is not installed, a log can't be read, a channel is not
-    in it, or the unit in the file measures something else.
-
-    `sources`: each log is a drive of its own, called after its file. `channels`: words ``NAME=CHANNEL[:UNIT]``.
-    `mapping`: more of them, saved. `step`: of the table [s]. Messages that stay away for longer than `fit` bridges
-    leave a gap.
+    Each log is a drive called after its file. `channels`: words ``NAME=CHANNEL[:UNIT]``; `mapping`: more of them,
+    saved. `step`: of the table [s]. Messages that stay away for longer than `fit` bridges leave a gap.
     """
-    files = [sources] if isinstance(sources, Path) else list(sources)
-    saved = as_mapping(mapping)
-    sources_of = {**saved.columns, **parse_map(channels)}
-    if not any(set(pair) <= sources_of.keys() for pair in POSITIONS):
-        raise FormatError(f"{channels_wanted(files[0])}; mapped: {', '.join(sources_of) or 'nothing'}", path=files[0])
-    read = {}
-    for file in files:
+    files, saved = paths_of(sources), as_mapping(mapping)
+    wanted = {**saved.columns, **parse_map(channels)}
+    if not any(set(pair) <= wanted.keys() for pair in POSITIONS):
+        raise FormatError(f"{channels_wanted(files[0])}; mapped: {', '.join(wanted) or 'nothing'}", path=files[0])
+    tables, notes = list[pd.DataFrame](), list[str]()
+    units: dict[str, set[str]] = {name: set() for name in wanted}  # that columns were read in; logs may differ
+    for file, label in zip(files, file_labels(files), strict=True):
         with _opened(file) as log:
-            read[file] = {
-                name: _read_channel(log, name, wanted, file, saved.missing) for name, wanted in sources_of.items()
-            }
-    named = zip(read.items(), file_labels(files), strict=True)
-    tables, notes = zip(*(_table(signals, file, name, step) for (file, signals), name in named), strict=True)
-    table = pd.concat([from_middle(own, saved, file) for own, file in zip(tables, files, strict=True)])
-    table = table.reset_index(drop=True)
-    # column -> unit that it was read in; several where logs differ
-    every = {name: {signals[name].unit for signals in read.values()} for name in sources_of}
-    units = {name: " | ".join(sorted(found)) for name, found in every.items()}
-    settings = {"step": step, "channels": list(channels), "units": units}
-    said = [note for signals in read.values() for channel in signals.values() for note in channel.notes]
-    every_note = tuple(dict.fromkeys([*said, *(note for own in notes for note in own)]))
-    about = {"format": "mf4", "licence": LICENCE, "settings": settings, "step": step, "notes": every_note}
-    return finished(table, keep_cut=False, sources=files, **about)
+            signals = {name: _read_channel(log, name, source, file, saved.missing) for name, source in wanted.items()}
+        for name, channel in signals.items():
+            units[name].add(channel.unit)
+            notes += channel.notes
+        tables.append(from_middle(_table(signals, file, label, step), saved, file))
+    for table in tables:
+        known = {name: table[name].notna().mean() for name in wanted if name in table}
+        notes += [
+            f"{table['drive'].iloc[0]}: {name} is known in {100 * share:.0f} % of the time"
+            for name, share in known.items()
+            if share < 1.0 and name not in POSITIONS[0] + POSITIONS[1]
+        ]
+    every_unit = {name: " | ".join(sorted(words)) for name, words in units.items()}
+    settings = {"step": step, "channels": list(channels), "units": every_unit}
+    about = {"format": "mf4", "licence": LICENCE, "settings": settings, "notes": tuple(dict.fromkeys(notes))}
+    return finished(pd.concat(tables, ignore_index=True), keep_cut=False, sources=files, step=step, **about)
 
 
 def channels_wanted(source: Path) -> str:
-    """What the channel map has to name, and the channels that there are to choose from: for who has no map yet.
-
-    Raises `FormatError` when it can't be read as MDF.
-    """
+    """What the channel map has to name, and the channels that there are to choose from: for who has no map yet."""
     with _opened(source) as log:
         names = _names(log)
     listed = ", ".join(names[:LISTED]) + (", ..." if len(names) > LISTED else "")
@@ -178,16 +166,13 @@ def _opened(source: Path) -> Iterator[Any]:
         try:
             log = MDF(opened.file if isinstance(opened.file, io.BytesIO) else source)
         except Exception as error:
-            raise FormatError(f"{_NO_MDF}: {_stated_unit(error)}", path=source) from None
+            raise FormatError(f"{_NO_MDF}: {_reason(error)}", path=source) from None
         with log:
             yield log
 
 
-def _stated_unit(error: Exception) -> str:
-    """Words of an error, after which nothing is left of what it broke off.
-
-    asammdf's half-made objects complain on standard error when they are disposed of: here, and unheard.
-    """
+def _reason(error: Exception) -> str:
+    """Words of an error, whose half-made objects, which complain on standard error, are disposed of here, unheard."""
     reason = " ".join(str(error).split())[:LONGEST_MESSAGE] or type(error).__name__
     hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
     try:
@@ -212,60 +197,61 @@ def _read_channel(
         raise FormatError(f"no channel {wanted.column}{_alike(log, named)}", path=source, element=name)
     signals = [log.get(group=group, index=index) for group, index in places]
     notes = _of_one_name(signals, [group for group, _ in places], name, named, wrong)
-    signal = max(signals, key=lambda one: len(one.samples))
+    signal = max(signals, key=lambda signal: len(signal.samples))
     samples, stamps = signal.samples, np.asarray(signal.timestamps, dtype=np.float64)
-    kind = samples.dtype.kind
+    kind, stated, is_quantity = samples.dtype.kind, str(signal.unit or ""), _is_quantity(name, "")
     if kind in "SU":
-        if _is_quantity(name, ""):
+        if is_quantity:
             raise wrong(" holds words, not numbers")
         words = [word.decode("utf-8", "replace") if isinstance(word, bytes) else str(word) for word in samples.tolist()]
-        found = Channel(stamps, np.array([word.strip("\x00 ") for word in words], dtype=object), "", True)
+        read = Channel(stamps, np.array([word.strip("\x00 ") for word in words], dtype=object), "", True)
     elif kind not in "fiub" or samples.ndim != 1:
         raise wrong(f" holds {samples.dtype}, neither numbers nor words")
     else:
-        try:
-            unit, by = _unit(str(signal.unit or ""), name, wanted)
-        except ValueError as error:
-            more = f"name the unit with --map {name}={wanted.column}:UNIT"
-            raise wrong(f" is in {str(signal.unit or '')!r}: {error}; {more}") from error
+        unit, by = stated, 1.0
+        if wanted.unit:
+            unit, by = wanted.unit, wanted.factor
+        elif (known := spelled(stated)) != "" and (known is not None or is_quantity):
+            try:
+                by = factor(name, stated if known is None else known)
+            except ValueError as error:
+                more = f"name the unit with --map {name}={wanted.column}:UNIT"
+                raise wrong(f" is in {stated!r}: {error}; {more}") from error
         raw = np.asarray(samples, dtype=np.float64)
         if missing is None:
             refuse_marker(raw, name, source)
-        values = np.where(np.isin(raw, [one for one in missing or () if not isinstance(one, str)]), np.nan, raw) * by
+        markers = [marker for marker in missing or () if not isinstance(marker, str)]
+        values = np.where(np.isin(raw, markers), np.nan, raw) * by
         if len(stamps) != len(values) or np.abs(stamps).max(initial=0.0) > TIME.value or (np.diff(stamps) < 0).any():
             raise wrong(f": times that do not increase, or are beyond {TIME}")
         finite = np.isfinite(values) & np.isfinite(stamps) & np.r_[True, np.diff(stamps) > 0.0]
-        stepwise = kind in "iub" and not _is_quantity(name, unit)
-        if not unit and _is_quantity(name, ""):
-            notes = [*notes, f"{name}: channel {wanted.column} has no unit, {_standard_unit(name)} is taken"]
-        found = Channel(stamps[finite], values[finite], unit, stepwise, tuple(notes))
-    if len(found.values) < 2:
-        raise wrong(f" has {len(found.values)} values; two are needed")
-    return found
+        if not unit and is_quantity:
+            notes = [*notes, f"{name}: channel {wanted.column} has no unit, {CONTEXT_UNITS.get(name, 'm')} is taken"]
+        is_stepwise = kind in "iub" and not _is_quantity(name, unit)
+        read = Channel(stamps[finite], values[finite], unit, is_stepwise, tuple(notes))
+    if len(read.values) < 2:
+        raise wrong(f" has {len(read.values)} values; two are needed")
+    return read
 
 
 def _of_one_name(
     signals: Sequence[Any], groups: Sequence[int], name: str, channel: str, wrong: Callable[[str], FormatError]
 ) -> list[str]:
     """What to say of channels of one name in several groups; refuse those that contradict each other."""
-    known = [one for one in signals if len(one.samples)]
+    known = [signal for signal in signals if len(signal.samples)]
     if len(known) < 2:
         return []
     there = ", ".join(f"{channel}@{group}" for group in groups)
-    if all(one.samples.dtype.kind in "fiub" and one.samples.ndim == 1 for one in known):
-        first = max(known, key=lambda one: len(one.samples))
+    if all(signal.samples.dtype.kind in "fiub" and signal.samples.ndim == 1 for signal in known):
+        first = max(known, key=lambda signal: len(signal.samples))
         spread = max(float(np.std(first.samples.astype(np.float64))), 1e-9)
-        for one in known:
-            both = (one.timestamps >= first.timestamps[0]) & (one.timestamps <= first.timestamps[-1])
-            other = np.interp(one.timestamps[both], first.timestamps, first.samples.astype(np.float64))
-            apart = np.abs(one.samples[both].astype(np.float64) - other)
+        for signal in known:
+            both = (signal.timestamps >= first.timestamps[0]) & (signal.timestamps <= first.timestamps[-1])
+            other = np.interp(signal.timestamps[both], first.timestamps, first.samples.astype(np.float64))
+            apart = np.abs(signal.samples[both].astype(np.float64) - other)
             if both.any() and float(np.median(apart)) > MAX_CHANNEL_DISTANCE * spread:
                 raise wrong(f" is in several groups, which differ: name one of {there}")
     return [f"{name}: channel {channel} is in several groups ({there}): the one with most samples is taken"]
-
-
-def _standard_unit(name: str) -> str:
-    return CONTEXT_UNITS.get(name, "m")
 
 
 def _alike(log: Any, wanted: str) -> str:
@@ -277,24 +263,14 @@ def _alike(log: Any, wanted: str) -> str:
     return f"; like it are {', '.join(close[:8])}" if close else f"; the log has {len(names)} others, none alike"
 
 
-def _unit(given: str, name: str, wanted: ColumnSource) -> tuple[str, float]:
-    """Unit that counts, and the factor from it to the standard table's; `ValueError`: it measures something else."""
-    if wanted.unit:
-        return wanted.unit, wanted.factor
-    unit = spelled(given)
-    if unit == "" or (unit is None and not _is_quantity(name, "")):
-        return given, 1.0
-    return given, factor(name, given if unit is None else unit)
-
-
 def _is_quantity(name: str, unit: str) -> bool:
     """Whether a column holds a physical quantity: by the standard table, or by its unit."""
     known = (*POSITIONS[0], *POSITIONS[1], "time")
     return name in known or CONTEXT_UNITS.get(name, "-") != "-" or is_measured(spelled(unit.lstrip("-")) or "")
 
 
-def _table(signals: dict[str, Channel], source: Path, drive: str, step: float) -> tuple[pd.DataFrame, list[str]]:
-    """Rows at an even step with their `state`, and what a user has to know."""
+def _table(signals: dict[str, Channel], source: Path, drive: str, step: float) -> pd.DataFrame:
+    """Rows at an even step with their `state`."""
     position = [name for pair in POSITIONS for name in pair if name in signals]
     start = max(float(signals[name].time[0]) for name in position)
     end = min(float(signals[name].time[-1]) for name in position)
@@ -303,28 +279,16 @@ def _table(signals: dict[str, Channel], source: Path, drive: str, step: float) -
     if (rows := (end - start) / step) > CLOCK_ROWS.value:
         raise FormatError(CLOCK_ROWS.refusal(rows), path=source)
     time = np.asarray(start + step * np.arange(int((end - start) / step) + 1), dtype=np.float64)
-    width = _lane_width(signals)
+    sides = ("lane_width",) if "lane_width" in signals else POSITIONS[1]
+    width = sum(float(np.median(signals[name].values)) for name in sides)
     columns: dict[str, NDArray[Any]] = {}
     for name, channel in signals.items():
-        is_position = name in position
-        broken = channel.breaks(JUMP * width if is_position and name != "lane_width" else np.inf)
-        columns[name] = channel.at(time, broken, resample if is_position else average)
-    missing = {name: np.isnan(columns[name]) for name in position}
-    unknown = np.any(list(missing.values()), axis=0)
-    if "distance_left" in missing:  # one side has jumped, the other not yet
+        broken = channel.breaks(JUMP * width if name in position and name != "lane_width" else np.inf)
+        columns[name] = channel.at(time, broken, is_position=name in position)
+    unknown = np.any([np.isnan(columns[name]) for name in position], axis=0)
+    if "distance_left" in position:  # one side has jumped, the other not yet
         unknown |= np.abs(columns["distance_left"] + columns["distance_right"] - width) > JUMP * width
     state = np.where(unknown, "gap", KEPT_ROWS)
     if "speed" in columns:
         state = np.where((state == KEPT_ROWS) & np.isnan(columns["speed"]), "no speed", state)
-    others = [name for name, values in columns.items() if name not in missing and pd.isna(values).any()]
-    notes = [
-        f"{drive}: {name} is known in {100 * (~pd.isna(columns[name])).mean():.0f} % of the time" for name in others
-    ]
-    return pd.DataFrame({"drive": drive, "time": np.round(time - start, 6), **columns, "state": state}), notes
-
-
-def _lane_width(signals: dict[str, Channel]) -> float:
-    """Median. [m]"""
-    if "lane_width" in signals:
-        return float(np.median(signals["lane_width"].values))
-    return sum(float(np.median(signals[name].values)) for name in POSITIONS[1])
+    return pd.DataFrame({"drive": drive, "time": np.round(time - start, 6), **columns, "state": state})

@@ -34,7 +34,7 @@ from xosc_lateral.drivers.drives.cleaning import RESOLUTION, RUN, VALID_BELOW
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import unpacked_text
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
-from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
+from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded, paths_of
 
 LICENCE = (
     "OpenACC, AstaZero campaign: (c) European Union, Joint Research Centre, CC BY 4.0 (doi:10.1016/j.trc.2021.103047). "
@@ -71,11 +71,8 @@ HEADER_LINES = 50  # lines before the header, at most: the campaign's files have
 def import_openacc(
     source: Path | Sequence[Path], *, lane_width: float = LANE_WIDTH, keep_cut: bool = False
 ) -> Imported:
-    """AstaZero's files, one or several, as they are in the catalogue (.csv, .csv.gz): a drive for each car and file.
-
-    `lane_width`: of the road, which nobody measured. [m]
-    """
-    paths = [source] if isinstance(source, Path) else list(source)
+    """A drive for each car of AstaZero's files (.csv, .csv.gz). `lane_width`: of the road, not measured. [m]"""
+    paths = paths_of(source)
     cars = [car for path in paths for car in _cars(path)]
     if not cars:
         raise NotEnoughDataError(f"{paths[0]}: no car moves")
@@ -189,10 +186,7 @@ class _Loop:
         return np.asarray(cross / np.hypot(*first.T) ** 3)
 
     def place(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Index along the points, with its fraction, and distance to the left, shape (n,) each. [-], [m]
-
-        Across the line it is as between the normals of both neighbours, so that nothing jumps from point to point.
-        """
+        """Index along the points with its fraction, and distance to the left [m], as between two normals."""
         from scipy.spatial import cKDTree
 
         points, normals = self.points, self.normals()

@@ -18,18 +18,17 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.drives import file_labels
 from xosc_lateral.files.opendrive import parse_opendrive, read_opendrive
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
-from xosc_lateral.workflows.recordings.importers.table import Imported, guarded
-from xosc_lateral.workflows.recordings.importers.tracks import place_on_road
+from xosc_lateral.workflows.recordings.importers.table import Imported, guarded, import_each, paths_of
+from xosc_lateral.workflows.recordings.importers.tracks import (
+    PlacedTracks,
+    import_placed,
+    place_on_road,
+    require_lanes,
+)
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
 from xosc_lateral.workflows.recordings.lane_shapes import place_in_shapes
 from xosc_lateral.workflows.recordings.osi.read import Recorded, read_osi
 from xosc_lateral.workflows.recordings.osi.shapes import lanes_of
-from xosc_lateral.workflows.recordings.placed import (
-    PlacedTracks,
-    import_each,
-    import_placed,
-    require_lanes,
-)
 
 LICENCE = "that of the trace"
 
@@ -48,13 +47,10 @@ def import_osi(
 ) -> Imported:
     """Read one or several traces of ground truth or sensor views.
 
-    Raises `FormatError`: The extra is missing; no trace; no lanes; no such vehicle; `NotEnoughDataError` if nothing is
-    left once lane changes are cut.
-
     `host`: keep this vehicle alone: its identifier or name in the trace; "host": the trace's host vehicle. `road`:
     OpenDRIVE file to take lanes from. `channel`: topic of an MCAP file with several.
     """
-    files = [sources] if isinstance(sources, Path) else list(sources)
+    files = paths_of(sources)
     labels = dict(zip(files, file_labels(files), strict=True))
 
     def read(path: Path) -> Imported:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import wraps
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -50,11 +51,8 @@ class Imported:
     provenance: ImportRecord
 
 
-def make_provenance(table: pd.DataFrame, *, sources: Sequence[Path], step: float, **about: Any) -> ImportRecord:
-    """Record of an import, from the table with its column `state` and rows `step` seconds apart.
-
-    `about`: the fields of `ImportRecord` that can't be counted: format, licence, settings, and more where there is.
-    """
+def record_of(table: pd.DataFrame, *, sources: Sequence[Path], step: float, **about: Any) -> ImportRecord:
+    """Record of a table with its column `state` and rows `step` seconds apart; `about`: what can't be counted."""
     return ImportRecord(
         source=", ".join(source.name for source in sources),
         sha256=hash_files(sources),
@@ -66,38 +64,54 @@ def make_provenance(table: pd.DataFrame, *, sources: Sequence[Path], step: float
 
 
 def finished(table: pd.DataFrame, *, keep_cut: bool, sources: Sequence[Path], **about: Any) -> Imported:
-    """A table with its column `state` and its record, see `make_provenance`; without the rows that are cut.
-
-    Raises `NotEnoughDataError` if nothing is left.
-    """
-    record = make_provenance(table, sources=sources, **about)
-    return without_cut(table, record, keep_cut, sources[0])
+    """A table with its record, see `record_of`; without the rows that are cut, unless they are wanted."""
+    return without_cut(table, record_of(table, sources=sources, **about), keep_cut, sources[0])
 
 
 def without_cut(table: pd.DataFrame, record: ImportRecord, keep_cut: bool, source: Path) -> Imported:
-    """The table without the rows that are cut and without `state`, unless they are wanted.
-
-    Raises `NotEnoughDataError` if nothing is left.
-    """
+    """The table without the rows that are cut and without `state`, unless wanted. Raises `NotEnoughDataError`."""
     kept = table if keep_cut else table[table["state"] == KEPT_ROWS].drop(columns="state")
     if kept.empty:
         raise NotEnoughDataError(f"{source}: nothing is left of {len(table)} rows ({dict(record.rows)})")
     return Imported(kept.reset_index(drop=True), record)
 
 
+def paths_of(sources: Path | Sequence[Path]) -> list[Path]:
+    """One or several."""
+    return [sources] if isinstance(sources, Path) else list(sources)
+
+
+def import_each(sources: Path | Sequence[Path], read: Callable[[Path], Imported], *, keep_cut: bool) -> Imported:
+    """One table and one record of one or several files, each read with what would be cut."""
+    files = paths_of(sources)
+    parts = [read(file) for file in files]
+    record = parts[0].provenance
+    if len(parts) > 1:
+        rows = Counter[str]()
+        for part in parts:
+            rows.update(part.provenance.rows)
+        record = replace(
+            record,
+            source=", ".join(file.name for file in files),
+            sha256=hash_files(files),
+            rows=dict(rows),
+            vehicles=sum(part.provenance.vehicles for part in parts),
+            hours=round(sum(part.provenance.hours for part in parts), 3),
+            notes=tuple(note for part in parts for note in part.provenance.notes),
+        )
+    table = pd.concat([part.table for part in parts], ignore_index=True)
+    return without_cut(table, record, keep_cut, files[0])
+
+
 Importer = TypeVar("Importer", bound="Callable[..., Imported | pd.DataFrame]")
 
 
 def guarded(read: Importer) -> Importer:
-    """An importer whose source, damaged in whatever way, ends in one line, and never in a table of nonsense.
-
-    Raises `NotEnoughDataError`: Too little is left; the message begins with the source; `FormatError`: whatever else
-    breaks in the source; offsets and lane widths that are none; a column beyond `limits`.
-    """
+    """An importer whose source, however damaged, ends in one line that names it, never in a table of nonsense."""
 
     @wraps(read)
     def within(source: Path | Sequence[Path], *args: Any, **settings: Any) -> Imported | pd.DataFrame:
-        path = source if isinstance(source, Path) else source[0]
+        path = paths_of(source)[0]
         with foreign_errors(path, "can't be imported"), np.errstate(all="ignore"):
             try:
                 made = read(source, *args, **settings)
@@ -152,7 +166,7 @@ def as_imported(
     if isinstance(made, Imported):
         return made
     table = made if "drive" in made.columns else made.assign(drive=file_label(sources[0]))
-    record = make_provenance(
+    record = record_of(
         table.assign(state=KEPT_ROWS),
         format=format,
         sources=[source for source in sources if source.is_file()],
@@ -179,12 +193,3 @@ def hash_files(paths: Sequence[Path]) -> str:
     if len(paths) == 1:
         return parsed_hash(paths[0])
     return hashlib.sha256("".join(map(parsed_hash, paths)).encode()).hexdigest()
-
-
-def describe(provenance: ImportRecord) -> str:
-    """What was imported, for a person."""
-    rows = ", ".join(f"{count} {state}" for state, count in provenance.rows.items())
-    head = f"{provenance.source}: {provenance.vehicles} vehicles, {provenance.hours:g} h kept (rows: {rows})"
-    lanes = ["  " + ", ".join(f"{name} {value}" for name, value in lane.items()) for lane in provenance.lanes]
-    notes = [f"  note: {note}" for note in provenance.notes]
-    return "\n".join([head, *lanes, *notes, f"licence: {provenance.licence}"])

@@ -99,12 +99,7 @@ def rate(values: FloatArray, vehicle: IntArray, time: FloatArray, step: float, w
 
 
 def read_tracks(path: Path, columns: Sequence[str] = (), mapping: MappingLike | None = None) -> Tracks:
-    """Read a table of tracks.
-
-    `columns`: ``NAME=COLUMN[:UNIT]`` for headers that aren't understood, and for units other than m, s, rad, m/s.
-    Raises `FormatError`: a missing column, no number where one is needed. Raises `NotEnoughDataError`: no vehicle with
-    two rows.
-    """
+    """Read a table of tracks. `columns`: ``NAME=COLUMN[:UNIT]`` for other headers and units than usual."""
     saved = as_mapping(mapping)
     is_log = is_esmini_log(path)
     table = read_esmini_log(path) if is_log else read_table(path, saved)
@@ -242,11 +237,7 @@ def is_esmini_log(path: Path) -> bool:
 
 
 def read_esmini_log(path: Path) -> pd.DataFrame:
-    """Rows of all vehicles, one below the other: the columns of `_LOGGED`, and `time`.
-
-    A line holds a group of columns for every vehicle that is there at that time, the head those for the first line.
-    Raises `FormatError`: a column is missing, or the table is damaged.
-    """
+    """Columns of `_LOGGED` and `time`, one vehicle below the other: a line has a group of columns for each."""
     with open_source(path) as source, foreign_errors(path, "can't be read as a log of esmini"):
         text = unpacked_text(source)
         head = (text.readline().decode("utf-8", "replace") for _ in range(MOST_LINES))

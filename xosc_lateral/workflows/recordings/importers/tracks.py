@@ -1,4 +1,4 @@
-"""Tracks of any recording on a known road into the standard drive table.
+"""Tracks in their lanes, of any recording on a known road, into the standard drive table.
 
 A table of x, y (and heading, speed, length and class where there are any) in the coordinates of an OpenDRIVE road. The
 road says which lane a vehicle is in and how far from its centre, what the lane is like, and who is ahead and beside.
@@ -6,19 +6,23 @@ road says which lane a vehicle is in and how far from its centre, what the lane 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.mapping import MappingLike
 from xosc_lateral.files.opendrive import read_opendrive
-from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
-from xosc_lateral.workflows.recordings.importers.table import Imported, guarded
-from xosc_lateral.workflows.recordings.importers.track_table import Tracks, read_tracks
-from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
-from xosc_lateral.workflows.recordings.placed import PlacedTracks, import_placed, require_lanes
+from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings, Rows, cut_table
+from xosc_lateral.workflows.recordings.gate import MOVING_SPEED, require_lane_direction
+from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
+from xosc_lateral.workflows.recordings.importers.track_table import Tracks, rate, read_tracks
+from xosc_lateral.workflows.recordings.lane_graph import LaneGraph, neighbour_columns
 from xosc_lateral.world.road.lanes import DRIVING, beside
 from xosc_lateral.world.road.network import RoadNetwork
 
@@ -39,15 +43,11 @@ def import_tracks(
     settings: CutSettings = DEFAULT_CUTS,
     keep_cut: bool = False,
 ) -> Imported:
-    """Read tracks on a known road.
+    """Read tracks on a known road, an OpenDRIVE file.
 
-    Raises `FormatError`: A missing column, or tracks that lie beside the road; `NotEnoughDataError` if nothing is left
-    once lane changes are cut.
-
-    `source`: CSV or Parquet table, one row per vehicle and instant; x and y are the vehicle's middle (or lie `rear`
-    behind it, where there is that column), in the road's coordinates. Or a log that esmini wrote (``--csv_logger``).
-    `road`: OpenDRIVE file. `columns`: ``NAME=COLUMN[:UNIT]`` for `vehicle`, `time`, `x`, `y`, `heading`, `speed`,
-    `length`, `rear`, `vehicle_class`. `mapping`: more of them, saved.
+    `source`: table of one row per vehicle and instant, or a log of esmini (``--csv_logger``); x and y are the vehicle's
+    middle, or lie `rear` behind it, in the road's coordinates. `columns`: ``NAME=COLUMN[:UNIT]``; `mapping`: more,
+    saved.
     """
     network = read_opendrive(road)
     placed, graph = place_on_road(read_tracks(source, columns, mapping), network)
@@ -57,10 +57,7 @@ def import_tracks(
 
 
 def place_on_road(tracks: Tracks, network: RoadNetwork) -> tuple[PlacedTracks, LaneGraph]:
-    """Every row's driving lane, and what the road is like there. x and y are inertial: the header's offset is undone.
-
-    Raises `FormatError`: the road has no driving lane.
-    """
+    """Every row's driving lane, and what the road is like there; x and y are inertial: the header's offset goes."""
     pieces, graph = lane_graph(network)
     if not pieces:
         raise FormatError("the road has no driving lane that tracks could lie in", path=network.path)
@@ -129,3 +126,71 @@ def _following(
         return []
     found = pieces.get((step.road, network.roads[step.road].section_number(step.s), step.lane))
     return [] if found is None or found == pieces[index, k, name] else [found]
+
+
+TRUCKS = ("truck", "bus", "trailer", "semitrailer", "lorry", "van_trailer", "truck_trailer")
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedTracks:
+    """Tracks and where each of their rows lies; arrays of shape (n,)."""
+
+    tracks: Tracks
+    piece: IntArray  # of the lane graph; -1: in no lane
+    along: FloatArray  # way of x, y from the piece's start, in the direction of travel [m]
+    offset: FloatArray  # offset, lane_width: NaN in no lane [m]
+    lane_width: FloatArray
+    agreement: FloatArray  # cosine of the way and the lane's direction; NaN in no lane [-]
+    road: Mapping[str, FloatArray] = field(default_factory=dict)  # columns that it has there: curvature, lane_index ...
+    scale: FloatArray | float = 1.0  # metres along the lane per metre of `along` [-]
+
+
+def require_lanes(placed: PlacedTracks, where: str, path: Path) -> None:
+    """Refuse tracks that lie beside all lanes, or drive against them. Raises `FormatError`."""
+    require_lane_direction(placed.agreement, placed.tracks.speed, where, path)
+    if not (placed.piece >= 0).any():
+        x, y = placed.tracks.x, placed.tracks.y
+        there = f"x from {x.min():.1f} to {x.max():.1f} m, y from {y.min():.1f} to {y.max():.1f} m"
+        what = f"no row lies in a driving lane of {where}: {there}; are both in the same coordinates?"
+        raise FormatError(what, path=path)
+
+
+def import_placed(
+    placed: PlacedTracks, graph: LaneGraph, settings: CutSettings, *, only: Collection[str] | None = None, **about: Any
+) -> Imported:
+    """Neighbours, cuts and record, see `table.finished`; of the vehicles in `only` alone, if it is given."""
+    table = _drive_table(placed, graph, settings)
+    if only is not None:
+        table = table[table["drive"].isin(only)].reset_index(drop=True)
+    return finished(table, settings=asdict(settings), step=placed.tracks.step, **about)
+
+
+def _drive_table(placed: PlacedTracks, graph: LaneGraph, settings: CutSettings) -> pd.DataFrame:
+    """The drive table with its column `state`."""
+    tracks, inside = placed.tracks, placed.piece >= 0
+    is_truck = np.isin(tracks.kind, TRUCKS)
+    middle = placed.along if tracks.rear is None else placed.along + tracks.rear  # gaps count from there
+    near = neighbour_columns(
+        graph, placed.piece, middle, tracks.time, tracks.vehicle, tracks.step, tracks.speed, tracks.length, is_truck,
+        scale=placed.scale,
+    )  # fmt: skip
+    # A number that changes with the lane, and lateral position without jumps: a new piece ahead is no new lane.
+    step = np.diff(placed.offset, prepend=placed.offset[:1])
+    same = np.r_[False, tracks.vehicle[1:] == tracks.vehicle[:-1]]
+    jump = same & (np.abs(step) > 0.5 * placed.lane_width)
+    lane = np.cumsum(jump | (np.r_[False, inside[1:] != inside[:-1]] & same) | ~same).astype(np.int64)
+    sideways = np.cumsum(np.where(jump | ~same | ~np.isfinite(step), 0.0, step))
+    columns = {
+        "drive": np.array(tracks.names, dtype=object)[tracks.vehicle],
+        "time": np.round(tracks.time, 4),
+        "offset": placed.offset,
+        "lane_width": placed.lane_width,
+        "speed": tracks.speed,
+        "acceleration": rate(tracks.speed, tracks.vehicle, tracks.time, tracks.step, 1.0),
+        **placed.road,
+        **near,
+    }
+    against = (tracks.speed > MOVING_SPEED) & (placed.agreement < 0.0)
+    rows = Rows(tracks.vehicle, tracks.time, lane, tracks.step)
+    reasons = {"no lane": ~inside, **({"against the lane": against & inside} if against.any() else {})}
+    return cut_table(columns, rows, settings, sideways=sideways, reasons=reasons, kind=tracks.kind, is_truck=is_truck)

@@ -47,11 +47,7 @@ class Recorded:
 
 
 def read_osi(path: Path, channel: str | None = None) -> Recorded:
-    """Read a trace, message by message.
-
-    Raises `FormatError`: No trace; a vehicle without a position; times that are none; `NotEnoughDataError`: No vehicle
-    in two messages.
-    """
+    """Read a trace, message by message. Raises `FormatError`, `NotEnoughDataError`."""
     with Trace(path, channel) as trace:
         collected = _Collected(path)
         for number, message in enumerate(trace, 1):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,54 +20,54 @@ SHOWING_ROWS = 20_000  # so many rows of a trace show which way its lanes are dr
 
 @dataclass(frozen=True)
 class _Lane:
-    """Identifier, lines in the direction of travel, lanes on the left, and those that follow."""
+    """As a trace has it; pairs are of what is ahead or on the left along its lines, and of what is behind or right."""
 
-    number: int
-    centre: FloatArray
     left: FloatArray
     right: FloatArray
-    beside: tuple[int, ...]
-    following: tuple[int, ...]
+    centre: FloatArray | None  # None: midway between the boundaries
+    is_ahead: bool | None  # whether it is driven along its lines; None: the trace does not say
+    beside: tuple[list[int], list[int]]
+    onward: tuple[list[int], list[int]]
+
+    def strip(self, *, is_ahead: bool = True) -> Strip:
+        """With lines in the direction of travel."""
+        lines = (self.left, self.right) if is_ahead else (self.right[::-1], self.left[::-1])
+        centre = middle(*lines) if self.centre is None else self.centre if is_ahead else self.centre[::-1]
+        return Strip(centre, *lines)
 
 
 def lanes_of(recorded: Recorded) -> tuple[list[Strip], LaneGraph] | None:
-    """Driving lanes with a boundary on both sides: logical lanes where there are any, else physical ones.
-
-    None: the trace has no such lane.
-    """
-    lanes = list(_logical(recorded)) or list(_physical(recorded))
+    """Driving lanes with a boundary on both sides: logical ones where there are any, else physical ones, else None."""
+    lanes = _logical(recorded) or _physical(recorded)
     if not lanes:
         return None
-    strips = [Strip(lane.centre, lane.left, lane.right) for lane in lanes]
-    numbers = {lane.number: k for k, lane in enumerate(lanes)}
+    shown = _driven_ahead({number: lane for number, lane in lanes.items() if lane.is_ahead is None}, recorded)
+    ways = {number: 0 if shown.get(number, lane.is_ahead is not False) else 1 for number, lane in lanes.items()}
+    strips = [lane.strip(is_ahead=ways[number] == 0) for number, lane in lanes.items()]
+    numbers = {number: k for k, number in enumerate(lanes)}
+    courses = [(strip.centre[-1] - strip.centre[0])[:2] for strip in strips]
     left = np.full(len(lanes), -1)
-    for k, lane in enumerate(lanes):
-        for other in lane.beside:
-            if other in numbers and _way(strips[k]) @ _way(strips[numbers[other]]) > 0.0:
+    for k, (number, lane) in enumerate(lanes.items()):
+        for other in lane.beside[ways[number]]:
+            if other in numbers and courses[k] @ courses[numbers[other]] > 0.0:
                 left[k] = numbers[other]
-    following = [[numbers[one] for one in lane.following if one in numbers] for lane in lanes]
+    following = [[numbers[n] for n in lane.onward[ways[name]] if n in numbers] for name, lane in lanes.items()]
     return strips, lane_graph(strips, left, following)
 
 
-def _way(strip: Strip) -> FloatArray:
-    return np.asarray((strip.centre[-1] - strip.centre[0])[:2])
-
-
-def _physical(recorded: Recorded) -> Iterable[_Lane]:
+def _physical(recorded: Recorded) -> dict[int, _Lane]:
     kinds = osi("osi3.osi_lane_pb2").Lane.Classification
-    lanes, edges = recorded.things["lane"], recorded.things["lane_boundary"]
+    things = recorded.things["lane"]
     # writers of proto3 leave out what is false: a lane that says nothing is driven backwards; where none says anything,
     # vehicles show it
-    known = any(lane.classification.HasField("centerline_is_driving_direction") for lane in lanes.values())
-    found = []
-    for number, lane in lanes.items():
+    known = any(lane.classification.HasField("centerline_is_driving_direction") for lane in things.values())
+    lanes = {}
+    for number, lane in things.items():
         about = lane.classification
         if about.type not in (kinds.TYPE_DRIVING, kinds.TYPE_INTERSECTION):
             continue
-        left, right = (
-            _chained([_points(edges[i.value].boundary_line) for i in ids if i.value in edges])
-            for ids in (about.left_lane_boundary_id, about.right_lane_boundary_id)
-        )
+        edges = recorded.things["lane_boundary"]
+        left, right = (_edge(edges, ids) for ids in (about.left_lane_boundary_id, about.right_lane_boundary_id))
         if left is None or right is None:
             continue
         centre = np.array([(p.x, p.y, p.z) for p in about.centerline], dtype=np.float64).reshape(-1, 3)
@@ -76,84 +76,63 @@ def _physical(recorded: Recorded) -> Iterable[_Lane]:
         else:
             right = _aligned(right, left)
             centre = middle(left, right)
-        found.append((number, about, centre, left, right))
-    beside = {number: [*about.left_adjacent_lane_id, *about.right_adjacent_lane_id] for number, about, *_ in found}
-    shown = {} if known else _driven_ahead({lane[0]: lane[2:] for lane in found}, beside, recorded)
-    for number, about, centre, left, right in found:
-        ahead = about.centerline_is_driving_direction if known else shown.get(number, True)
-        pairs = [(pair.antecessor_lane_id.value, pair.successor_lane_id.value) for pair in about.lane_pairing]
-        on_left = about.left_adjacent_lane_id if ahead else about.right_adjacent_lane_id
-        following = tuple(dict.fromkeys(pair[1 if ahead else 0] for pair in pairs))
-        lines = (centre, left, right) if ahead else (centre[::-1], right[::-1], left[::-1])
-        yield _Lane(number, *lines, tuple(other.value for other in on_left), following)
+        is_ahead = about.centerline_is_driving_direction if known else None
+        pairs = [(pair.successor_lane_id.value, pair.antecessor_lane_id.value) for pair in about.lane_pairing]
+        beside = [n.value for n in about.left_adjacent_lane_id], [n.value for n in about.right_adjacent_lane_id]
+        following = list(dict.fromkeys(pair[0] for pair in pairs)), list(dict.fromkeys(pair[1] for pair in pairs))
+        lanes[number] = _Lane(left, right, centre, is_ahead, beside, following)
+    return lanes
 
 
-def _driven_ahead(
-    lines: Mapping[int, Sequence[FloatArray]], beside: Mapping[int, Sequence[Any]], recorded: Recorded
-) -> dict[int, bool]:
+def _logical(recorded: Recorded) -> dict[int, _Lane]:
+    kinds = osi("osi3.osi_logicallane_pb2").LogicalLane
+    words = ("NORMAL", "EXIT", "ENTRY", "ONRAMP", "OFFRAMP", "CONNECTINGRAMP", "UNKNOWN")
+    driven = {kinds.Type.Value(f"TYPE_{word}") for word in words}
+    directions = {kinds.MOVE_DIRECTION_INCREASING_S: True, kinds.MOVE_DIRECTION_DECREASING_S: False}
+    lanes = {}
+    for number, lane in recorded.things["logical_lane"].items():
+        edges, ends = recorded.things["logical_lane_boundary"], (lane.start_s, lane.end_s)
+        left, right = (_edge(edges, ids, *ends) for ids in (lane.left_boundary_id, lane.right_boundary_id))
+        if lane.type in driven and left is not None and right is not None:
+            beside = _numbers(lane.left_adjacent_lane), _numbers(lane.right_adjacent_lane)
+            onward = _numbers(lane.successor_lane), _numbers(lane.predecessor_lane)
+            lanes[number] = _Lane(left, right, None, directions.get(lane.move_direction), beside, onward)
+    return lanes
+
+
+def _numbers(lanes: Any) -> list[int]:
+    return [lane.other_lane_id.value for lane in lanes]
+
+
+def _driven_ahead(lanes: Mapping[int, _Lane], recorded: Recorded) -> dict[int, bool]:
     """Whether lanes, by number, are driven along their lines: as their vehicles do, else as the nearest lane beside."""
-    tracks, found = recorded.tracks, dict[int, bool]()
+    tracks, shown = recorded.tracks, dict[int, bool]()
     rows = np.arange(0, len(tracks.x), max(1, len(tracks.x) // SHOWING_ROWS))
     rows = rows[tracks.speed[rows] > MOVING_SPEED]
-    for number, (centre, left, right) in lines.items():
-        strip = Strip(centre, left, right)
+    for number, lane in lanes.items():
+        strip = lane.strip()
         near = rows[strip.may_hold(tracks.x[rows], tracks.y[rows])]
         if len(near):
             way, aside, width, direction, _ = strip.place(tracks.x[near], tracks.y[near])
             inside = np.isfinite(way) & (np.abs(aside) <= 0.5 * width)
             agreement = float(np.cos(tracks.heading[near] - direction)[inside].sum())
             if agreement != 0.0:
-                found[number] = agreement > 0.0
-    unseen = [number for number in lines if number not in found]
+                shown[number] = agreement > 0.0
+    unseen = [number for number in lanes if number not in shown]
     if unseen:
-        said = ", ".join(map(str, unseen))
-        recorded.notes.append(f"lanes {said}: no direction, and no vehicle that shows it: taken as the lane beside")
+        names = ", ".join(map(str, unseen))
+        recorded.notes.append(f"lanes {names}: no direction, and no vehicle that shows it: taken as the lane beside")
     for _ in unseen:
-        for number in [number for number in unseen if number not in found]:
-            ways = [found[other.value] for other in beside[number] if other.value in found]
+        for number in [number for number in unseen if number not in shown]:
+            ways = [shown[other] for side in lanes[number].beside for other in side if other in shown]
             if ways:
-                found[number] = ways[0]
-    return found
+                shown[number] = ways[0]
+    return shown
 
 
-def _logical(recorded: Recorded) -> Iterable[_Lane]:
-    kinds = osi("osi3.osi_logicallane_pb2").LogicalLane
-    driven = {
-        kinds.Type.Value(f"TYPE_{name}")
-        for name in ("NORMAL", "EXIT", "ENTRY", "ONRAMP", "OFFRAMP", "CONNECTINGRAMP", "UNKNOWN")
-    }
-    lanes, edges = recorded.things["logical_lane"], recorded.things["logical_lane_boundary"]
-    found = []
-    for number, lane in lanes.items():
-        if lane.type not in driven:
-            continue
-        left, right = (
-            _chained([_points(edges[i.value].boundary_line, lane.start_s, lane.end_s) for i in ids if i.value in edges])
-            for ids in (lane.left_boundary_id, lane.right_boundary_id)
-        )
-        if left is not None and right is not None:
-            found.append((number, lane, left, right))
-    directed = (kinds.MOVE_DIRECTION_INCREASING_S, kinds.MOVE_DIRECTION_DECREASING_S)
-    open_lanes = [entry for entry in found if entry[1].move_direction not in directed]
-    sides = {
-        number: [other.other_lane_id for other in (*lane.left_adjacent_lane, *lane.right_adjacent_lane)]
-        for number, lane, _, _ in open_lanes
-    }
-    shown = _driven_ahead({n: (middle(left, right), left, right) for n, _, left, right in open_lanes}, sides, recorded)
-    for number, lane, left, right in found:
-        ahead = shown.get(number, lane.move_direction != kinds.MOVE_DIRECTION_DECREASING_S)
-        beside = lane.left_adjacent_lane if ahead else lane.right_adjacent_lane
-        onward = lane.successor_lane if ahead else lane.predecessor_lane
-        if not ahead:
-            left, right = right[::-1], left[::-1]
-        yield _Lane(
-            number,
-            middle(left, right),
-            left,
-            right,
-            tuple(one.other_lane_id.value for one in beside),
-            tuple(one.other_lane_id.value for one in onward),
-        )
+def _edge(edges: Mapping[int, Any], ids: Any, start: float = 0.0, end: float = 0.0) -> FloatArray | None:
+    """The boundaries of these identifiers as one line, within start and end of s where they say s. [m]"""
+    return _chained([_points(edges[i.value].boundary_line, start, end) for i in ids if i.value in edges])
 
 
 def _points(points: Any, start: float = 0.0, end: float = 0.0) -> FloatArray:

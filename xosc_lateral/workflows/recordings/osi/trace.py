@@ -20,10 +20,8 @@ TRUTHS = ("GROUND_TRUTH", "SENSOR_VIEW")
 class Trace:
     """An open trace; use it as a context.
 
-    Raises `FormatError`: No trace, or none of ground truth; `XoscLateralError`: The extra `osi` is not installed.
-
     `channel`: topic of an MCAP file; without it the one that holds ground truth, else a sensor view. `notes`: channels
-    that are not read. `opendrive`: the road, where the file has it as OpenDRIVE.
+    that are not read. `opendrive`: the road, where the file has it.
     """
 
     def __init__(self, path: Path, channel: str | None = None) -> None:
@@ -135,10 +133,7 @@ COLUMNS = ("total_nanos", "idx", *KINDS, *(name for names in PLACES.values() for
 
 
 class OmegaPrimeReader:
-    """Its messages one by one, as the readers of traces give them.
-
-    `opendrive`: the road, where the file has it in this form. Raises `FormatError`: not such a file.
-    """
+    """Its messages one by one, as the readers of traces give them; `opendrive`: the road, where the file has it so."""
 
     def __init__(self, path: Path) -> None:
         import pyarrow.parquet as pq

@@ -1,0 +1,116 @@
+"""A converted scenario: what `convert` gives back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from xosc_lateral.base.lazy import pd
+from xosc_lateral.files.output_paths import claim, output_file
+from xosc_lateral.workflows.conversion.result import ConvertedScenario
+from xosc_lateral.workflows.result import PathLike, Result, write_page
+from xosc_lateral.world.motion.nominal import Activity
+
+if TYPE_CHECKING:
+    from xosc_lateral.files.pages.figure import Figure
+
+
+class Conversion(ConvertedScenario, Result):
+    """A converted scenario, with what there is to see of it: words, table, figure, traces, page."""
+
+    __slots__ = ()
+
+    def headline(self) -> str:
+        """One line."""
+        where = self.source.name if self.output is None else f"{self.source.name} -> {self.output}"
+        warned = f", {len(self.warnings)} warnings" if self.warnings else ""
+        return f"{where}: {len(self.enriched)} of {len(self.entities)} entities enriched{warned}"
+
+    def __str__(self) -> str:
+        from xosc_lateral.workflows.conversion.text import as_text
+
+        return as_text(self)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per entity and step (of those that exist then): where it is, and how far from where it nominally was.
+
+        Columns: `time` [s], `name`, `x`, `y`, `z` [m], `h` [rad], `speed` [m/s], `road`, `lane` (nominal), `offset`
+        (from the middle of that lane, positive left) [m], `deviation` (what enriching added) [m], `x_nominal`,
+        `y_nominal` [m].
+        """
+        ids = np.array([*self.movement.network.road_ids, ""], dtype=object)
+        frames = []
+        for number, entity in enumerate(self.movement.entities):
+            motion, path = entity.motion, entity.trajectory
+            frame = pd.DataFrame(
+                {
+                    "time": motion.time,
+                    "name": motion.name,
+                    "x": path.x,
+                    "y": path.y,
+                    "z": path.z,
+                    "h": path.heading,
+                    "speed": path.speed,
+                    "road": ids[motion.road],
+                    "lane": motion.lane,
+                    "offset": motion.offset + entity.deviation,
+                    "deviation": entity.deviation,
+                    "x_nominal": motion.x,
+                    "y_nominal": motion.y,
+                    "entity": number,
+                }
+            )
+            frames.append(frame[(motion.activity & Activity.ACTIVE) != 0])
+        rows = pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=["time", "entity"])
+        return rows.sort_values(["time", "entity"], kind="stable", ignore_index=True).drop(columns="entity")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them."""
+        from xosc_lateral.workflows.conversion.text import facts
+
+        return facts(self)
+
+    def plot(self) -> Figure | None:
+        """Nominal beside enriched paths, across the road over along it; None when no entity is on a road."""
+        from xosc_lateral.workflows.playing.figures import paths_stretched
+
+        return paths_stretched(self.movement)
+
+    def write_osi(self, path: PathLike, *, force: bool = False) -> tuple[Path, Path]:
+        """Write two ASAM OSI traces (extra `osi`), enriched and, as ``NAME_nominal``, what the maneuvers alone give.
+
+        Returns
+        -------
+        tuple of Path
+            The two files: ``.mcap`` or ``.osi``, one `GroundTruth` per step.
+        """
+        from xosc_lateral.files.osi.write import host_of, write_osi
+
+        enriched, nominal = outputs = osi_files(path, self.source)
+        claim(outputs, [self.source], force=force)
+        made = self.movement
+        host = host_of(made.motion, self.ego)
+        words = f"{self.source.name}, enriched by xosc-lateral, seed {made.seed}, variant {made.variant + 1}"
+        paths = [entity.trajectory for entity in made.entities]
+        write_osi(enriched, made.motion, made.network, paths, host=host, description=words)
+        words = f"{self.source.name}, as its maneuvers say"
+        write_osi(nominal, made.motion, made.network, host=host, description=words)
+        return outputs
+
+    def write_report(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the HTML page about what was changed."""
+        from xosc_lateral.workflows.conversion.page import conversion_page
+
+        name = f"{(self.output or self.source).stem}.html"
+        self.report = write_page(path, name, lambda: conversion_page(self), inputs=[self.source], force=force)
+        return self.report
+
+
+def osi_files(output: PathLike, source: Path) -> tuple[Path, Path]:
+    """Files of the enriched and of the nominal trace; an output that is a folder gets a usual name."""
+    from xosc_lateral.files.osi import SUFFIXES
+
+    enriched = output_file(output, f"{source.stem}_gt.mcap", SUFFIXES)
+    return enriched, enriched.with_name(f"{enriched.stem}_nominal{enriched.suffix}")
