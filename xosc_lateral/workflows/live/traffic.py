@@ -1,7 +1,7 @@
 """Drivers of the vehicles of a running simulation: once per step they get what it knows, and say where they are.
 
 A driver goes on at the model's step (5 Hz), on what he sees at that moment; in between he follows the curve of
-`model.upsampling`. What he sees he responds to a little later than in a conversion, which knows what comes
+`model.linear_filters`. What he sees he responds to a little later than in a conversion, which knows what comes
 (`OffsetStream.preview`). Where a maneuver has moved a vehicle, its path leads over from there to the driver's.
 """
 
