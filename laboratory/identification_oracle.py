@@ -42,14 +42,14 @@ def oracle(case: dict[str, Any], bare: pd.DataFrame, coarse: Coarse) -> dict[str
         scores = np.stack([np.bincount(coarse.drive[valid], column * noise) for column in design.T], axis=1)
         power = scores.T @ scores
     else:
-        power = _power_of_rotations(design, noise - noise.mean())
+        power = power_of_rotations(design, noise - noise.mean())
     errors = np.sqrt(np.diag(inverse @ power @ inverse))
     weaker = int(np.argmin(np.abs(sizes) / errors))
     size, error = case["size"] * sizes[weaker], case["size"] * errors[weaker]
     return {"oracle_z": float(size / error), "oracle_size": float(size), "oracle_error": float(error)}
 
 
-def _power_of_rotations(design: Values, noise: Values) -> Values:
+def power_of_rotations(design: Values, noise: Values) -> Values:
     """Mean outer product of the scores of rotated noise, shape (k, k), over all rotations of a minute and more."""
     turned = np.fft.rfft(noise)[:, None] * np.conj(np.fft.rfft(design, axis=0))
     scores = np.fft.irfft(turned, len(noise), axis=0)[LEAST_SHIFT_S:-LEAST_SHIFT_S]

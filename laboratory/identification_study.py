@@ -25,7 +25,7 @@ from laboratory.identification_oracle import coarse_of, oracle, oracle_between
 from laboratory.identification_tables import calibration, summary, table
 from laboratory.outcome_lines import append_outcome, read_outcomes
 from xosc_lateral.drivers.loop.identify import VETOED, identify
-from xosc_lateral.drivers.loop.selection import ERROR_BUDGET, TERMS
+from xosc_lateral.drivers.loop.selection import TERMS
 from xosc_lateral.drivers.loop.timeline import Coarse, coarse_mean
 
 
@@ -48,10 +48,11 @@ def run(case: dict[str, Any], protocol: dict[str, Any], seconds: float) -> dict[
         if one.why == VETOED
     ]
     outcome["feedback"] = [
-        [one.column, round(one.coherence, 3), round(one.predicted_share, 3), one.doubtful] for one in found.feedback
+        [one.column, round(one.coherence, 3), round(one.predicted_share, 3), one.doubtful]
+        for one in found.usable.feedback
     ]
-    outcome["p_mean"] = found.least("mean")
-    outcome["p"] = {name: p for name in ERROR_BUDGET if (p := found.least(name)) is not None}
+    outcome["p"] = {one.component: one.p_value for one in found.selection.rejected}
+    outcome["p"] |= {one.term.component: one.p_value for one in found.selection.accepted}
     if case["name"].startswith("slow vehicles"):
         outcome |= oracle_between(case, table)
     elif "size" in case:
@@ -72,7 +73,7 @@ def _size(case: dict[str, Any], found: Any, coarse: Coarse, bare: pd.DataFrame) 
     planted = coarse.offset - coarse_of(bare).offset
     strength = coarse_mean(coarse.strength(effects[0]))[coarse.valid]
     alike = float(np.sign(np.cov(strength, planted[coarse.valid])[0, 1]))
-    return {"found_size": alike * abs(told.size), "found_error": told.error}
+    return {"found_size": alike * abs(told.size_m), "found_error": told.size_error}
 
 
 def main() -> None:

@@ -79,7 +79,7 @@ def table(outcomes: list[dict[str, Any]]) -> str:
 
 def calibration(outcomes: list[dict[str, Any]]) -> str:
     """p-values on nulls, and cover of the intervals."""
-    p = np.array([one["p_mean"] for one in outcomes if one["type"].startswith("null") and one["p_mean"] is not None])
+    p = np.array([one["p"]["mean"] for one in outcomes if one["type"].startswith("null") and "mean" in one["p"]])
     told = [one for one in outcomes if "oracle_size" in one]
     cover = (
         np.mean([abs(one["oracle_size"] - one["size"]) <= NORMAL_95 * one["oracle_error"] for one in told])

@@ -43,7 +43,7 @@ from xosc_lateral.drivers.fitting.fitting import fit_population, fit_profile, fi
 from xosc_lateral.drivers.fitting.sensor.runs import driver_runs
 from xosc_lateral.drivers.model.profile import POPULATION as ANSWERS
 from xosc_lateral.drivers.model.profile import DriverProfile, Metadata, Provenance
-from xosc_lateral.drivers.model.sensor.model import SensorModel
+from xosc_lateral.drivers.model.sensor import SensorModel
 from xosc_lateral.files.drives import drives_of_table, read_drives
 from xosc_lateral.files.source import parsed_hash
 from xosc_lateral.workflows.recordings.importers.dlr_ht import HIGHEST_FREQUENCY, import_dlr_ht

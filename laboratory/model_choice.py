@@ -24,11 +24,11 @@ from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.evaluation.classifier import classifier_two_sample_test
 from xosc_lateral.drivers.evaluation.metrics import METRICS, snippet_distances, split_groups
 from xosc_lateral.drivers.fitting.models.autoregressive.fit import fit_autoregressive
+from xosc_lateral.drivers.fitting.models.autoregressive.fit_coarse import DEFAULT_SETTINGS
 from xosc_lateral.drivers.fitting.models.autoregressive.fit_matching import matched, simulate
-from xosc_lateral.drivers.fitting.models.autoregressive.settings import DEFAULT_SETTINGS
-from xosc_lateral.drivers.fitting.models.two_level.fit import fit_two_level
+from xosc_lateral.drivers.fitting.models.two_level import fit_two_level
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
-from xosc_lateral.drivers.model.core.autoregressive.volatility import Volatility
+from xosc_lateral.drivers.model.core.autoregressive.parameters import Volatility
 from xosc_lateral.drivers.model.core.base import Start
 from xosc_lateral.files.drives import read_drives
 

@@ -21,7 +21,7 @@ from laboratory.fair_measure import halves
 from laboratory.markers import show
 from xosc_lateral.drivers.drives.cuts import all_runs
 from xosc_lateral.drivers.drives.drive import Run
-from xosc_lateral.drivers.drives.periodogram import Detrend, periodograms
+from xosc_lateral.drivers.drives.filters import Detrend, periodograms
 from xosc_lateral.drivers.evaluation.snippets import sample_runs
 from xosc_lateral.drivers.fitting.fitting import fit_profile
 from xosc_lateral.drivers.model.profile import DriverProfile

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.base.segment import Segment
-from xosc_lateral.drivers.fitting.models.two_level.fit import fit_two_level
+from xosc_lateral.drivers.fitting.models.two_level import fit_two_level
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import sample_offsets
 from xosc_lateral.drivers.model.stream import OffsetStream

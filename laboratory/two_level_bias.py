@@ -11,7 +11,7 @@ import argparse
 
 import numpy as np
 
-from xosc_lateral.drivers.fitting.models.two_level.correction import correct_two_level
+from xosc_lateral.drivers.fitting.models.two_level import correct_two_level
 from xosc_lateral.drivers.model.core.registry import model_named
 from xosc_lateral.drivers.model.core.two_level.model import TwoLevelModel
 from xosc_lateral.workflows.profiles.fit import fit

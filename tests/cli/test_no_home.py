@@ -30,7 +30,7 @@ for implementation in (caching.CodeLibraryCacheImpl, caching.CompileResultCacheI
     implementation._locator_classes = []  # as where no folder can be written
 
 from xosc_lateral.cli import main
-from xosc_lateral.drivers.model.jit_kernel import WORTH_IMPORTING
+from xosc_lateral.drivers.model.linear_filters import WORTH_IMPORTING
 
 for words in (
     ["template", "write", "cut-in", "-o", "."],

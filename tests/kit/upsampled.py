@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.drivers.model.upsampling import extrapolate, piece
+from xosc_lateral.drivers.model.linear_filters import extrapolate, piece
 
 FloatArray = NDArray[np.float64]
 

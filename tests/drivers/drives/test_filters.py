@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from xosc_lateral.drivers.drives.filters import kaiser_design, low_pass, mirrored
-from xosc_lateral.drivers.drives.periodogram import Detrend, hann, periodograms
+from xosc_lateral.drivers.drives.filters import Detrend, hann, kaiser_design, low_pass, mirrored, periodograms
 
 
 @pytest.mark.parametrize("attenuation", [21.0, 35.0, 50.0])

@@ -10,7 +10,7 @@ import pytest
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main
-from xosc_lateral.drivers.drives.frozen import frozen_rows
+from xosc_lateral.drivers.drives.cleaning import frozen_rows
 from xosc_lateral.files.drives import drives_of_table, read_drives
 
 WIDTH = 3.5

@@ -13,7 +13,7 @@ from xosc_lateral.drivers.evaluation.realism import Beside, Realism, score_reali
 from xosc_lateral.drivers.evaluation.snippets import SnippetCondition, sample_runs, sensor_noise, snippets_of
 from xosc_lateral.drivers.fitting.fitting import fit_runs
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.drivers.model.sensor.model import SensorModel
+from xosc_lateral.drivers.model.sensor import SensorModel
 from xosc_lateral.workflows.profiles.realism_text import realism_lines, start_fade_note
 
 SHORT = SnippetCondition(10.0, False)

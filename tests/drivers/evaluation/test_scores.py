@@ -28,7 +28,7 @@ from xosc_lateral.drivers.evaluation.scores import score_profile, score_snippets
 from xosc_lateral.drivers.evaluation.snippets import snippets_of
 from xosc_lateral.drivers.evaluation.spectra import autocorrelation, spectrum
 from xosc_lateral.drivers.fitting.fitting import fit_runs
-from xosc_lateral.drivers.fitting.models.two_level.fit import split_levels
+from xosc_lateral.drivers.fitting.models.two_level import split_levels
 from xosc_lateral.drivers.model.profile import DriverProfile
 
 # ---- metrics and distances -------------------------------------------------------------------------------------------

@@ -26,7 +26,7 @@ from xosc_lateral.drivers.fitting.fast_part import (
 from xosc_lateral.drivers.fitting.fitting import fit_profile
 from xosc_lateral.drivers.model.core.base import ModelKind
 from xosc_lateral.drivers.model.sampled_offsets import sample_free
-from xosc_lateral.drivers.model.sensor.model import SensorModel
+from xosc_lateral.drivers.model.sensor import SensorModel
 from xosc_lateral.drivers.model.validity import Validity
 
 STEP = 0.2

@@ -8,8 +8,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from tests.kit.coarse import movement
 from xosc_lateral.base.errors import DriverProfileError
-from xosc_lateral.drivers.fitting.models.two_level.correction import correct_two_level, leaving_rate
-from xosc_lateral.drivers.fitting.models.two_level.fit import fit_two_level
+from xosc_lateral.drivers.fitting.models.two_level import correct_two_level, fit_two_level, leaving_rate
 from xosc_lateral.workflows.profiles.fit import fit
 
 

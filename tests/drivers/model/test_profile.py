@@ -20,7 +20,7 @@ from xosc_lateral.drivers.model.profile import (
     profile_schema,
     sampling_hash,
 )
-from xosc_lateral.drivers.model.sensor.model import SensorModel
+from xosc_lateral.drivers.model.sensor import SensorModel
 
 LINE = Linear(acts=Acts.LOCATION, column="grade", coefficients=(0.05,), errors=(0.01,), reference=(0.0,))
 BARE = DriverProfile(name="bare", model=POPULATION)

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from tests.kit.upsampled import upsample
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.segment import Segment
-from xosc_lateral.drivers.fitting.models.two_level.fit import fit_two_level
+from xosc_lateral.drivers.fitting.models.two_level import fit_two_level
 from xosc_lateral.drivers.model.effects import (
     EFFECTS,
     Acts,

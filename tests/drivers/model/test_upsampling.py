@@ -7,7 +7,7 @@ import pytest
 from numpy.polynomial import Polynomial
 
 from tests.kit.upsampled import upsample
-from xosc_lateral.drivers.model.upsampling import extrapolate, piece
+from xosc_lateral.drivers.model.linear_filters import extrapolate, piece
 
 SAMPLES = np.random.default_rng(1).normal(size=12)
 

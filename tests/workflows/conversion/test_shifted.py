@@ -12,7 +12,7 @@ from xosc_lateral.workflows.conversion.load import Played
 from xosc_lateral.workflows.conversion.meaning import keep_meaning
 from xosc_lateral.workflows.conversion.shifts import Change, Comparison, compare_runs
 from xosc_lateral.world.motion.nominal import NominalMotion
-from xosc_lateral.world.motion.offset_chain import Move, OffsetChain, Ring
+from xosc_lateral.world.motion.offset_chain import Move, OffsetChain, Ring, Size, resized
 
 
 def _compare(before: Played, after_: Played) -> Comparison:
@@ -65,7 +65,24 @@ def test_the_smallest_change_that_helps_is_one_chain_of_one_vehicle() -> None:
     kept = keep_meaning(chains, _nobody(), attempt)
     assert kept.changes == ()
     assert [chain.ring.origin for chain in kept.chains] == [pytest.approx(0.025), 0.1, 0.1]
-    assert kept.smaller == {"A": (0.25, False)}
+    assert kept.smaller == {"A": (Size(0.25), False)}
+
+
+def test_a_contact_costs_the_largest_offsets_alone() -> None:
+    """Planted: B is touched where it is farther than 0.16 m from the middle; all else stays as it was sampled."""
+    change = Comparison((), (Change("contact of 'Ego' and 'B' at 8.0 s", "Ego", 8.0, "is new"),))
+    ring = Ring(0.05, (Move(0.0, 3.0, -0.1), Move(0.0, 4.0, 0.25), Move(0.0, 3.0, -0.15)))
+    chains = [_chain("A", None), OffsetChain("B", None, ring)]
+
+    def attempt(some: list[OffsetChain]) -> list[Comparison]:
+        ring = next(chain.ring for chain in some if chain.entity == "B")
+        place = ring.origin + sum(move.change for move in ring.moves[:2])
+        return [change if place > 0.16 else Comparison((), ())]
+
+    kept = keep_meaning(chains, _nobody(), attempt)
+    assert kept.chains[0] == chains[0] and kept.smaller == {"B": (Size(limit=0.75), True)}
+    assert [move.change for move in kept.chains[1].ring.moves] == pytest.approx([-0.1, 0.2, -0.1])
+    assert "lane offsets of 'B' are at most 0.75 times the largest that was sampled" in next(kept.warnings(()))
 
 
 def test_what_no_change_of_offsets_helps_against_is_told_and_costs_nobody_offsets() -> None:
@@ -77,10 +94,8 @@ def test_what_no_change_of_offsets_helps_against_is_told_and_costs_nobody_offset
 
 
 def test_moves_of_another_size_lead_back_to_where_they_began() -> None:
-    from xosc_lateral.world.motion.offset_chain import scaled
-
     chain = replace(_chain("A", None), placed_t=-1.9, side=-1.0)
-    half = scaled(chain, 0.5)
+    half = resized(chain, Size(0.5))
     assert [move.change for move in half.ring.moves] == [-0.1, 0.1]
     assert half.placed_t == pytest.approx(-1.85)
-    assert scaled(chain, 0.0).ring.moves == ()
+    assert resized(chain, Size(0.0)).ring.moves == ()

@@ -296,3 +296,45 @@ def test_a_vehicle_under_test_can_not_be_enriched_and_none_stands_alone(
     assert main([*words, "--only", "Ego"]) == 1
     assert "--ego none" in capsys.readouterr().err
     assert main([*words, "--ego", "none", "--ego", "A"]) == 2
+
+
+def _moves_on(path: Path, name: str, *moments: int) -> list[bool]:
+    """Whether a vehicle moves sideways in the 4 s from each moment on when a scenario is played."""
+    vehicle = next(entity for entity in play_scenario(path).motion.entities if entity.name == name)
+    windows = [(vehicle.time >= moment) & (vehicle.time < moment + 4.0) for moment in moments]
+    return [bool(np.ptp(vehicle.offset[rows]) > 0.01) for rows in windows]
+
+
+def test_movement_goes_on_after_a_lane_change_that_is_stopped_half_way(tmp_path: Path) -> None:
+    stopping = event("stopping", at(4.5), speed_action("24")).replace("parallel", "override")
+    text = scenario_text(
+        entities=entity("Ego", controller=EXTERNAL) + entity("A"),
+        init=private("Ego") + private("A", teleport("200"), speed_action("25")),
+        stories=stories(("A", event("change", at(3.0), CHANGE) + stopping)),
+        stop=time_condition(25),
+    )
+    path = write_scenario(tmp_path, text)
+    run = play_scenario(path).motion
+    assert next(one.end for one in run.actions if one.path[-2:-1] == ("change",)) == pytest.approx(4.5, abs=0.05)
+    xl.convert(path, tmp_path / "out.xosc", mode="lane-offset", seed=1)
+    assert _moves_on(path, "A", 6, 12, 20) == [False, False, False]
+    assert _moves_on(tmp_path / "out.xosc", "A", 6, 12, 20) == [True, True, True]
+
+
+def test_a_vehicle_that_is_added_later_moves_from_then_on(tmp_path: Path) -> None:
+    adding = (
+        '<GlobalAction><EntityAction entityRef="Late"><AddEntityAction><Position><LanePosition roadId="1" laneId="-2" '
+        's="150"/></Position></AddEntityAction></EntityAction></GlobalAction>'
+    )
+    text = scenario_text(
+        entities=entity("Ego", controller=EXTERNAL) + entity("Late"),
+        init=private("Ego"),
+        stories=stories(
+            ("Late", event("add", at(3.0), adding) + event("go", state("add", "completeState"), speed_action("25")))
+        ),
+        stop=time_condition(25),
+    )
+    path = write_scenario(tmp_path, text)
+    made = xl.convert(path, tmp_path / "out.xosc", mode="lane-offset", seed=1)
+    assert made.modes == {"Late": "lane-offset"}
+    assert _moves_on(tmp_path / "out.xosc", "Late", 6, 12, 20) == [True, True, True]

@@ -14,7 +14,7 @@ from xosc_lateral.base.shipped import shipped_folder
 from xosc_lateral.cli import main
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampled_offsets import known_sensor, sensor_error
-from xosc_lateral.drivers.model.sensor.model import SensorModel
+from xosc_lateral.drivers.model.sensor import SensorModel
 from xosc_lateral.files.openscenario.provenance import MARK
 from xosc_lateral.files.profiles import read_profile, write_profile
 from xosc_lateral.workflows.conversion.convert import convert

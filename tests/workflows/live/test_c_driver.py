@@ -13,7 +13,7 @@ from tests.kit.compiled import SANITIZED, CompiledDriver, build, row_of, segment
 from tests.kit.effects import EXAMPLES
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.cli import main
-from xosc_lateral.drivers.fitting.models.two_level.fit import fit_two_level
+from xosc_lateral.drivers.fitting.models.two_level import fit_two_level
 from xosc_lateral.drivers.model.effects import Acts, Factor, Form, HiddenEffect, Linear, Nearness, Product, Threshold
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import sample_offsets

@@ -139,7 +139,7 @@ def test_the_population_and_single_vehicles_are_shipped():
 def test_most_shipped_profiles_differ_beyond_what_their_few_minutes_tell():
     """But for the refined one, whose effects even traffic doesn't show, and single drivers with 2 to 4 minutes each."""
     compared = compare([read_profile(path.stem) for path in list_profiles() if path.stem != "motorway-refined"], 0)
-    assert max(map(len, compared.groups)) <= 4 and len(compared.groups) >= 5
+    assert max(map(len, compared.groups)) <= 4 and len(compared.groups) >= 4
 
 
 def test_the_refined_profile_says_what_the_loop_found_and_differs_little_from_the_direct_fit():
@@ -218,8 +218,8 @@ def test_each_pair_of_profiles_has_a_verdict_and_none_is_alike_that_differs(caps
     lines = capsys.readouterr().out.splitlines()
     pairs = [re.split(r" {2,}", line) for line in lines if re.match(r"\S+, \S+  ", line)]
     assert len(pairs) == 6
-    for _, distance, chance, verdict in pairs:
-        assert verdict.startswith("differ" if float(distance) > float(chance) else "not told apart")
+    for *_, verdict in pairs:
+        assert verdict.startswith("differ" if float(verdict.rpartition("= ")[2]) <= 0.05 else "not told apart")
     differing = {frozenset(names.split(", ")) for names, *_, verdict in pairs if verdict.startswith("differ")}
     for line in (line for line in lines if line.startswith("alike: ")):
         assert not any(pair <= set(line.removeprefix("alike: ").split(", ")) for pair in differing)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from xosc_lateral.world.motion.headways import RoadPath, closest_following
+from xosc_lateral.world.motion.gaps import RoadPath, closest_following
 
 TIME = np.arange(0.0, 10.0, 0.1)
 LENGTH, WIDTH, CENTRE = 5.0, 2.0, 1.4

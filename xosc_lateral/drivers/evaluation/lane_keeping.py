@@ -11,7 +11,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.drives.cuts import HALF_WIDTH
-from xosc_lateral.drivers.model.jit_kernel import prepare
+from xosc_lateral.drivers.model.linear_filters import prepare
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import sample_offsets
 from xosc_lateral.drivers.model.seeds import child
@@ -181,9 +181,11 @@ def summarise(drives: FloatArray, step: float) -> MovementSummary:
     )
 
 
-def figures_of(profile: DriverProfile, seed: int = 0) -> tuple[MovementSummary, LaneKeeping]:
+def figures_of(
+    profile: DriverProfile, seed: int = 0, drives: FloatArray | None = None
+) -> tuple[MovementSummary, LaneKeeping]:
     """The figures by which a profile is known everywhere, of one set of sampled drives in even traffic."""
-    drives, step = highway_drives(profile, seed), profile.model.step
+    drives, step = highway_drives(profile, seed) if drives is None else drives, profile.model.step
     known = profile.provenance
     recorded = None
     if known.hours > 0.0 and known.drives and "derived_from" not in known.fit:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, MovementSummary, figures_of
+from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, MovementSummary, figures_of, highway_drives
 from xosc_lateral.drivers.evaluation.metrics import (
     DRIVERS,
     DURATION,
@@ -19,6 +20,7 @@ from xosc_lateral.drivers.evaluation.metrics import (
     wasserstein,
 )
 from xosc_lateral.drivers.evaluation.scores import SNIPPET
+from xosc_lateral.drivers.evaluation.sizes import LEVEL, Difference, Sizes, differences, sizes_of_samples, surest
 from xosc_lateral.drivers.evaluation.spectra import Spectrum, spectrum
 from xosc_lateral.drivers.model.profile import DriverProfile
 
@@ -34,6 +36,8 @@ class ComparedProfile:
     runs: FloatArray  # Shape (drivers, n). [m]
     summary: MovementSummary
     keeping: LaneKeeping
+    measured: Sizes | None  # Of the drives that it was fitted on, where it knows them.
+    sampled: Sizes  # Of its own drives, as sure as if it had been fitted on such.
     spectrum: Spectrum
 
 
@@ -75,26 +79,37 @@ class Compared:
         return np.sqrt(0.5 * (itself[:, None] ** 2 + itself[None, :] ** 2))
 
     @property
-    def groups(self) -> tuple[tuple[str, ...], ...]:
-        """Profiles that are alike, each with each (complete linkage): no further apart than halves of their drivers."""
-        from scipy.cluster.hierarchy import fcluster, linkage
-        from scipy.spatial.distance import squareform
+    def differences(self) -> dict[tuple[str, str], list[Difference]]:
+        """What each pair differs by, of the drives that both were fitted on, else of drives sampled from both."""
+        return {(one.profile.name, two.profile.name): _between(one, two) for one, two in combinations(self.profiles, 2)}
 
-        between = self.distance / np.maximum(self.floors, 1e-12)
-        np.fill_diagonal(between, 0.0)
-        labels = fcluster(linkage(squareform(between, checks=False), "complete"), 1.0, "distance")
+    @property
+    def groups(self) -> tuple[tuple[str, ...], ...]:
+        """Profiles that are alike, each with each (complete linkage): they differ no more than two fits of a driver."""
+        from scipy.cluster.hierarchy import fcluster, linkage
+
+        apart = np.array([surest(parts) for parts in self.differences.values()])
+        labels = fcluster(linkage(1.0 - apart, "complete"), 1.0 - LEVEL, "distance")
         names = self.names
         return tuple(tuple(names[k] for k in np.flatnonzero(labels == label)) for label in dict.fromkeys(labels))
+
+
+def _between(one: ComparedProfile, two: ComparedProfile) -> list[Difference]:
+    if one.measured is not None and two.measured is not None:
+        return differences(one.measured, two.measured)
+    return differences(one.sampled, two.sampled)
 
 
 def compare(profiles: Sequence[DriverProfile], seed: int) -> Compared:
     """Sample every profile in even traffic and measure each against each; the first's luck is no other's."""
     compared = []
     for number, profile in enumerate(profiles):
-        runs = free_runs(profile, seed + number)
-        compared.append(
-            ComparedProfile(profile, runs, *figures_of(profile, seed), spectrum(list(runs), profile.model.step))
-        )
+        runs, drives, step = free_runs(profile, seed + number), highway_drives(profile, seed), profile.model.step
+        known = profile.provenance.fit
+        measured = None if "derived_from" in known else Sizes.from_dict(known.get("sizes", {}))
+        sampled = sizes_of_samples(drives, step, *_fitted_drives(profile))
+        figures = figures_of(profile, seed, drives)
+        compared.append(ComparedProfile(profile, runs, *figures, measured, sampled, spectrum(list(runs), step)))
     return Compared(tuple(compared), *_distances(compared, seed), seed)
 
 
@@ -109,17 +124,19 @@ def _distances(profiles: Sequence[ComparedProfile], seed: int) -> tuple[FloatArr
     scale = np.where(scale > 0.0, scale, 1.0)
     distances = np.empty((len(profiles), len(profiles), len(METRICS)))
     for row in range(len(profiles)):
-        fitted = _fitted_drivers(profiles[row].profile)
+        fitted = round(_fitted_drives(profiles[row].profile)[1] / DURATION)
         distances[row, row] = _from_itself(drivers[row], fitted, scale, np.random.default_rng([seed, row]))
         for column in range(row):
             distances[row, column] = distances[column, row] = _per_metric(pooled[row], pooled[column]) / scale
     return distances, scale
 
 
-def _fitted_drivers(profile: DriverProfile) -> int:
-    """Of how many free runs a profile's drives are worth, half of them where that is not known."""
+def _fitted_drives(profile: DriverProfile) -> tuple[int, float]:
+    """How many drives a profile was fitted on, and how long they are [s]; half of the free runs' if unknown."""
     known = profile.provenance
-    return round(3600.0 * known.hours / DURATION) if known.hours and "derived_from" not in known.fit else DRIVERS // 2
+    if not known.hours or "derived_from" in known.fit:
+        return DRIVERS // 2, DURATION * (DRIVERS // 2)
+    return max(known.drives, 1), 3600.0 * known.hours
 
 
 def _from_itself(drivers: Sequence[FloatArray], fitted: int, scale: FloatArray, rng: np.random.Generator) -> FloatArray:

@@ -42,7 +42,7 @@ def scores_to_dict(scores: ProfileScores) -> dict[str, Any]:
             },
         },
         "compared_below_hz": scores.below,
-        "realism": [_condition_to_dict(one) for one in scores.realism.conditions],
+        "realism": [_condition_to_dict(each) for each in scores.realism.conditions],
         "variance_m2": {
             "real": _variance_to_dict(scores.realism.variance_real),
             "sampled": _variance_to_dict(scores.realism.variance_sampled),
@@ -51,12 +51,12 @@ def scores_to_dict(scores: ProfileScores) -> dict[str, Any]:
         "long_snippets": None if scores.long_snippets is None else _snippets_to_dict(scores.long_snippets),
         "evaluations": [
             {
-                "number": one.number,
-                "coarse": one.coarse,
-                "fine": one.fine,
-                "distances": _rounded(one.distances.by_metric),
+                "number": each.number,
+                "coarse": each.coarse,
+                "fine": each.fine,
+                "distances": _rounded(each.distances.by_metric),
             }
-            for one in scores.evaluations
+            for each in scores.evaluations
         ],
         "spectrum": {
             "frequency_hz": [round(float(f), 5) for f in scores.spectrum_real.frequency],
@@ -89,30 +89,30 @@ def _snippets_to_dict(scores: SnippetScores) -> dict[str, Any]:
     }
 
 
-def _condition_to_dict(one: ConditionScores) -> dict[str, Any]:
+def _condition_to_dict(each: ConditionScores) -> dict[str, Any]:
     return {
-        "seconds": one.condition.seconds,
-        "start": "same" if one.condition.same_start else "free",
-        "band": f"below {one.condition.below:g} Hz" if one.condition.slow else "all",
-        "sampled": "driver and sensor" if one.with_sensor else "driver",
-        "count": one.count,
-        "families": {name: {**_beside_to_dict(value), "unit": value.unit} for name, value in one.families.items()},
-        "distances": {name: _beside_to_dict(value) for name, value in one.named.items()},
+        "seconds": each.condition.seconds,
+        "start": "same" if each.condition.same_start else "free",
+        "band": f"below {each.condition.below:g} Hz" if each.condition.slow else "all",
+        "sampled": "driver and sensor" if each.with_sensor else "driver",
+        "count": each.count,
+        "families": {name: {**_beside_to_dict(value), "unit": value.unit} for name, value in each.families.items()},
+        "distances": {name: _beside_to_dict(value) for name, value in each.named.items()},
         "indicators": {
             name: {"real": round(real, 5), "sampled": round(sampled, 5), "unit": unit}
-            for (name, (real, sampled)), unit in zip(one.means.items(), UNITS, strict=True)
+            for (name, (real, sampled)), unit in zip(each.means.items(), UNITS, strict=True)
         },
-        "auc": None if one.alone is None else _areas_to_dict(one),
+        "auc": None if each.alone is None else _areas_to_dict(each),
     }
 
 
-def _beside_to_dict(one: Beside) -> dict[str, float | None]:
-    ratio = round(one.ratio, 3) if isfinite(one.ratio) else None
-    return {"value": round(one.value, 4), "floor": round(one.floor, 4), "ratio": ratio}
+def _beside_to_dict(each: Beside) -> dict[str, float | None]:
+    ratio = round(each.ratio, 3) if isfinite(each.ratio) else None
+    return {"value": round(each.value, 4), "floor": round(each.floor, 4), "ratio": ratio}
 
 
-def _areas_to_dict(one: ConditionScores) -> dict[str, Any]:
-    areas = {"movement": one.alone, "with_context": one.jointly, "real_drivers": one.floor}
+def _areas_to_dict(each: ConditionScores) -> dict[str, Any]:
+    areas = {"movement": each.alone, "with_context": each.jointly, "real_drivers": each.floor}
     return {
         name: None
         if area is None
@@ -129,11 +129,11 @@ def _variance_to_dict(parts: VarianceParts) -> dict[str, float]:
     }
 
 
-def _margins_to_dict(one: Margins) -> dict[str, float]:
+def _margins_to_dict(each: Margins) -> dict[str, float]:
     return {
-        "share_near_marking": round(one.share_near, 5),
-        "excursions_per_hour": round(one.excursions_per_hour, 2),
-        "largest_offset_m": round(one.largest, 3),
+        "share_near_marking": round(each.share_near, 5),
+        "excursions_per_hour": round(each.excursions_per_hour, 2),
+        "largest_offset_m": round(each.largest, 3),
     }
 
 

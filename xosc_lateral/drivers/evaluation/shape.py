@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.drives.periodogram import tapered_powers
+from xosc_lateral.drivers.drives.filters import tapered_powers
 
 # Columns of `shape_features`; most are features of catch22.
 SHAPES = (

@@ -18,7 +18,7 @@ from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.evaluation.metrics import Distances, metric_distances, snippet_metrics
 from xosc_lateral.drivers.evaluation.spectra import STOP_FREQUENCY
-from xosc_lateral.drivers.fitting.models.two_level.fit import split_levels
+from xosc_lateral.drivers.fitting.models.two_level import split_levels
 from xosc_lateral.drivers.model.core.base import Start
 from xosc_lateral.drivers.model.core.two_level.model import PAPER_SETTINGS
 from xosc_lateral.drivers.model.profile import DriverProfile

@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.drivers.drives.drive import Run
-from xosc_lateral.drivers.drives.filters import filtered, low_pass_between
-from xosc_lateral.drivers.drives.periodogram import tapered_powers
+from xosc_lateral.drivers.drives.filters import filtered, low_pass_between, tapered_powers
 
 MANY_SEGMENTS = 8  # With so many segments without a gap, spectra are taken from these only.
 

@@ -22,7 +22,7 @@ from xosc_lateral.drivers.fitting.fast_part import (
     shows_growth,
     with_fast_part,
 )
-from xosc_lateral.drivers.fitting.sensor.quantisation import uniform_variance
+from xosc_lateral.drivers.fitting.sensor.periodogram import uniform_variance
 from xosc_lateral.drivers.model.core.base import ModelKind
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.validity import Band, Validity

@@ -31,17 +31,20 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
 from xosc_lateral.base.numbers import all_significant, significant
 from xosc_lateral.drivers.drives.drive import Run
-from xosc_lateral.drivers.drives.filters import filtered, low_pass_between
-from xosc_lateral.drivers.drives.periodogram import Detrend, periodograms
+from xosc_lateral.drivers.drives.filters import Detrend, filtered, low_pass_between, periodograms
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.fitting.models.autoregressive.fit import rounded
-from xosc_lateral.drivers.fitting.models.autoregressive.fit_coarse import coarse_power, scaled_spectrum, shaped
+from xosc_lateral.drivers.fitting.models.autoregressive.fit_coarse import (
+    FitSettings,
+    coarse_power,
+    scaled_spectrum,
+    shaped,
+)
 from xosc_lateral.drivers.fitting.models.autoregressive.fit_matching import autocovariance, fit_volatility, log_power
-from xosc_lateral.drivers.fitting.models.autoregressive.settings import FitSettings
 from xosc_lateral.drivers.fitting.sensor.vehicle_bound import KNOTS, interpolation
 from xosc_lateral.drivers.model.core.autoregressive.coarse import BORDER, COARSE_EVERY, FREQUENCIES
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
-from xosc_lateral.drivers.model.core.autoregressive.volatility import Volatility
+from xosc_lateral.drivers.model.core.autoregressive.parameters import Volatility
 from xosc_lateral.drivers.model.core.noise import NOISE_VARIANCE
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Piecewise
 from xosc_lateral.drivers.model.profile import DriverProfile

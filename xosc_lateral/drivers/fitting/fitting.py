@@ -11,6 +11,7 @@ from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.drives.cuts import PAPER_RULES, CutRules, all_runs
 from xosc_lateral.drivers.drives.drive import Drive, Run
+from xosc_lateral.drivers.evaluation.sizes import sizes_of_runs
 from xosc_lateral.drivers.fitting.answers import answer_effects, measure_beside
 from xosc_lateral.drivers.fitting.bands import in_bands, split_by_band
 from xosc_lateral.drivers.fitting.place import LEAST_DRIVES, fit_place, without_place
@@ -19,7 +20,7 @@ from xosc_lateral.drivers.model.core.base import CoreModel, ModelKind
 from xosc_lateral.drivers.model.core.registry import model_named
 from xosc_lateral.drivers.model.effects import ColumnEffect
 from xosc_lateral.drivers.model.profile import DriverProfile, Provenance
-from xosc_lateral.drivers.model.sensor.model import SensorModel
+from xosc_lateral.drivers.model.sensor import SensorModel
 
 
 def fit_profile(
@@ -133,6 +134,6 @@ def _fitted_on(runs: Sequence[Run], core: CoreModel, known: Provenance) -> Prove
         hours=round(seconds / 3600.0, 4),
         drives=len({run.drive for run in runs}),
         runs=len(runs),
-        fit={**known.fit, "model": core.kind, "step_s": core.step},
+        fit={**known.fit, "model": core.kind, "step_s": core.step, "sizes": sizes_of_runs(runs, core.step).to_dict()},
         package_version=__version__,
     )

@@ -18,7 +18,15 @@ from xosc_lateral.drivers.loop.core_model import (
 )
 from xosc_lateral.drivers.loop.cross_validation import Progress, folds_of, held_out_words
 from xosc_lateral.drivers.loop.explained import Explained, explained_share
-from xosc_lateral.drivers.loop.held_out import HeldOut, Scorecard, Setting, fit_without, score_held_out, score_runs
+from xosc_lateral.drivers.loop.held_out import (
+    HeldOut,
+    Scorecard,
+    Setting,
+    fit_refined,
+    fit_without,
+    score_held_out,
+    score_runs,
+)
 from xosc_lateral.drivers.loop.identify import Identified, identify, initial_terms
 from xosc_lateral.drivers.loop.model import Description, Fitted, Term
 from xosc_lateral.drivers.loop.omnibus import Omnibus, check_remainder
@@ -193,7 +201,8 @@ def close_loop(
     progress(0.95, "refitting on everything")
     refined = base
     if selection.accepted or not given or lacks:
-        refined = fit_without(selection.final, everything, setting.refined_kind, name, provenance)
+        began_with = base if given else None
+        refined = fit_refined(selection.final, setting.refined_kind, name, provenance, began_with)
     findings = [describe_finding(*one, selection.final, scored) for one in _accepted(selection)]
     findings += [_finding(lack.described(), scored, kind=lack.KIND, p_value=lack.p_value) for lack in lacks]
     rng = generator(root, LoopSeed.SNIPPETS)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +22,7 @@ from xosc_lateral.drivers.evaluation.metrics import (
     metric_distances,
     snippet_metrics,
 )
+from xosc_lateral.drivers.fitting.bands import in_bands, measured
 from xosc_lateral.drivers.fitting.fitting import fit_population, fit_runs
 from xosc_lateral.drivers.fitting.place import COLUMNS as KNOWN_TO_THE_BASE
 from xosc_lateral.drivers.loop.columns import Column
@@ -71,7 +72,8 @@ def runs_without(timeline: Timeline, removal: Removal, used: BoolArray) -> list[
             if len(time) * STEP >= MIN_RUN:
                 movement, width = movement_without(timeline, removal, rows), timeline.lane_width[rows]
                 context = {column: values[rows] for column, values in known.items()}
-                runs.append(Run(name, len(runs), time, movement, width, context, frozenset()))
+                run = Run(name, len(runs), time, movement, width, context)
+                runs.append(replace(run, valid_below=timeline.valid_below, resolution=timeline.resolution))
     return runs
 
 
@@ -198,6 +200,23 @@ def fit_without(
     read = {column for effect in effects for column in effect.columns}  # what they say is measured, and taken out here
     beside = {side: one for side, one in profile.beside.items() if read.isdisjoint(COLUMNS[side])}
     return structs.replace(profile, effects=(*profile.effects, *effects), beside=beside)
+
+
+def fit_refined(
+    fitted: Fitted, kind: ModelKind, name: str, provenance: Provenance | None, base: DriverProfile | None
+) -> DriverProfile:
+    """The profile that is handed out: of all rows, and what it is valid for.
+
+    Scores are of the movement that the drives show; where they state up to which frequency that is driving, the profile
+    has above it what the base has that one began with, as with `fit --prior`; without a base, nothing.
+    """
+    everything = np.ones(len(fitted.coarse.timeline), dtype=np.bool_)
+    profile = fit_without(fitted, everything, kind, name, provenance)
+    runs = runs_without(fitted.coarse.timeline, removal_of(fitted), everything)
+    if fitted.coarse.timeline.valid_below is None:
+        return structs.replace(profile, validity=measured(runs))
+    prior = base if base is not None and base.model.kind == ModelKind.AUTOREGRESSIVE else None
+    return in_bands(profile, runs, prior=prior)
 
 
 def _quantities(fitted: Fitted, columns: list[Column]) -> dict[str, FloatArray]:

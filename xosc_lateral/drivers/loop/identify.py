@@ -102,10 +102,10 @@ def identify(
 def _beside_time(search: Search, selection: Selection) -> Selection:
     """Columns that changed as a change with time would, which explains about as much: either may be why."""
     for one in selection.accepted:
-        if not isinstance(one.term, MeanTerm) or not search.coarse.lasts:
+        if not isinstance(one.term, MeanTerm | SpreadTerm) or not search.coarse.lasts:
             continue
         without = selection.without([one.term], "").final
-        test = StepTerm.test(search, without)
+        test = (StepTerm if isinstance(one.term, MeanTerm) else TimeSpreadTerm).test(search, without)
         if test is None or test.term is None or not test.term.passes(search, test.p_value, without):
             continue
         by_time = fit_model(search.coarse, (*without.terms, test.term))

@@ -55,6 +55,8 @@ class Timeline:
     periods: Mapping[str, float] = field(default_factory=dict)  # Full circle of the columns that wrap around.
     # Columns measured by the camera that measured the offset, and misjudged markings: their errors are the offset's.
     of_one_camera: frozenset[str] = frozenset()
+    valid_below: float | None = None  # Frequency up to which all drives that state one show driving. [Hz]
+    resolution: float | None = None  # Coarsest of the offsets. [m]
 
     def __len__(self) -> int:
         return len(self.time)
@@ -136,6 +138,8 @@ def join_drives(drives: Sequence[Drive], rules: CutRules = TRACE_RULES) -> Timel
         levels=frozenset.intersection(*(part.levels for part in kept)),
         periods=periods,
         of_one_camera=frozenset({"lane_width"} if any(drive.mended for drive in drives) else ()),
+        valid_below=min((drive.valid_below for drive in drives if drive.valid_below is not None), default=None),
+        resolution=max((drive.resolution for drive in drives if drive.resolution is not None), default=None),
     )
 
 

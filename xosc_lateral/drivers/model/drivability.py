@@ -21,7 +21,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.drives.filters import filtered
-from xosc_lateral.drivers.fitting.sensor.quantisation import COARSEST, uniform_variance
+from xosc_lateral.drivers.fitting.sensor.periodogram import COARSEST, uniform_variance
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import sample_offsets
 

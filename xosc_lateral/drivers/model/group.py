@@ -17,10 +17,10 @@ from xosc_lateral.base.segment import FADES
 from xosc_lateral.drivers.model.effects import Acts, EffectTerms
 from xosc_lateral.drivers.model.effects.base import terms_of
 from xosc_lateral.drivers.model.effects.response import Response, ResponseState
+from xosc_lateral.drivers.model.linear_filters import extrapolate, piece
 from xosc_lateral.drivers.model.process import DriveProcess, Movement, combine, offsets_of
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.records import plain, read_as
-from xosc_lateral.drivers.model.upsampling import extrapolate, piece
 
 BLOCK = 64
 """Model steps drawn at once for a driver. [-]"""

@@ -2,10 +2,64 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
+
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.model.jit_kernel import JitKernel, worth_compiling
+from xosc_lateral.base.lazy import njit
+
+WORTH_IMPORTING = 50_000
+"""Loop steps from which on numba is imported for them: three hours of driving. Who samples that much does so often."""
+
+WORTH_CALLING = 200
+"""Loop steps from which on the compiled loop is used when numba is there already."""
+
+
+def worth_compiling(steps: int) -> bool:
+    """Whether a loop of so many steps is faster compiled, the import of numba counted in."""
+    return steps >= WORTH_IMPORTING or (steps >= WORTH_CALLING and "numba" in sys.modules)
+
+
+def prepare(steps: int) -> None:
+    """Have numba loaded when so many steps are worth it: for work that is then done in blocks that are not."""
+    if worth_compiling(steps):
+        import numba  # noqa: F401
+
+
+class JitKernel:
+    """A function over arrays with a plain Python body; call it with the count of its steps first.
+
+    Importing numba costs 0.4 s, more than a scenario of a minute needs; a sample of hours needs it. Both ways
+    run the same operations in the same order: the numbers are the same to the last bit (no fast-math, no fused
+    multiply-add).
+
+    The body indexes its arguments with whole numbers only. It gets lists in plain Python (three times as fast as arrays
+    there) and arrays when compiled, and writes its results into its array arguments.
+    """
+
+    def __init__(self, body: Callable[..., Any]) -> None:
+        self.body = body
+        self._compiled: Callable[..., Any] | None = None
+
+    def __call__(self, steps: int, inputs: Sequence[Any], outputs: Sequence[np.ndarray[Any, Any]]) -> Any:
+        """Run ``body(*inputs, *outputs)``; its return value is handed through."""
+        if worth_compiling(steps):
+            return self.compiled()(*inputs, *outputs)
+        lists = [output.tolist() for output in outputs]
+        result = self.body(*(value.tolist() if isinstance(value, np.ndarray) else value for value in inputs), *lists)
+        for output, values in zip(outputs, lists, strict=True):
+            output[...] = values
+        return result
+
+    def compiled(self) -> Callable[..., Any]:
+        """The compiled body; from the cache on disk where there is one."""
+        if self._compiled is None:
+            self._compiled = njit(self.body)
+        return self._compiled
+
 
 WORTH_VECTORISING = 16
 """Recursions side by side from which on a step of all of them is one operation of numpy. [-]"""
@@ -112,3 +166,33 @@ def convolve(values: FloatArray, kernel: FloatArray) -> FloatArray:
     for k in range(half):
         result += kernel[k] * (values[k : k + n] + values[len(kernel) - 1 - k :][:n])
     return np.asarray(result)
+
+
+# ---- a curve through samples with continuous lateral speed and acceleration ----
+# Each piece is the quintic that meets value, slope and second derivative at both of its samples, where slope and second
+# derivative are the central differences there. It needs one sample before and one behind the piece, no more, so that a
+# stream can follow it; a spline through all samples would need them all.
+# Derived here: six conditions (value, slope and second derivative at u = 0 and 1) fix the six coefficients; solved by
+# hand.
+
+Number = TypeVar("Number", float, FloatArray)
+
+
+def piece(before: Number, here: Number, there: Number, behind: Number) -> tuple[Number, ...]:
+    """Six coefficients in u, from 0 at `here` to 1 at `there`, lowest power first; of one piece or of many."""
+    rise = there - here
+    slope, next_slope = 0.5 * (there - before), 0.5 * (behind - here)
+    bend, next_bend = there - 2.0 * here + before, behind - 2.0 * there + here
+    return (
+        here,
+        slope,
+        0.5 * bend,
+        10.0 * rise - 6.0 * slope - 4.0 * next_slope - 1.5 * bend + 0.5 * next_bend,
+        -15.0 * rise + 8.0 * slope + 7.0 * next_slope + 1.5 * bend - next_bend,
+        6.0 * rise - 3.0 * slope - 3.0 * next_slope - 0.5 * bend + 0.5 * next_bend,
+    )
+
+
+def extrapolate(before: Number, last: Number) -> Number:
+    """The sample that would follow on a straight line. [unit of the samples]"""
+    return 2.0 * last - before

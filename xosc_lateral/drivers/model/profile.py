@@ -20,7 +20,7 @@ from xosc_lateral.drivers.model.core.base import CoreModel
 from xosc_lateral.drivers.model.core.registry import CORE_MODELS, any_model
 from xosc_lateral.drivers.model.effects import Effect, any_effect
 from xosc_lateral.drivers.model.records import Record, read_as, schema_hook, set_once
-from xosc_lateral.drivers.model.sensor.model import SensorModel
+from xosc_lateral.drivers.model.sensor import SensorModel
 from xosc_lateral.drivers.model.validity import Validity
 
 SIDES = ("left", "right")

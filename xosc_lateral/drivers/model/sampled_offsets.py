@@ -22,7 +22,7 @@ from xosc_lateral.drivers.model.plausibility import check_offsets
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import sample_offsets
 from xosc_lateral.drivers.model.seeds import DriveSeed, child, generator
-from xosc_lateral.drivers.model.sensor.model import SensorModel
+from xosc_lateral.drivers.model.sensor import SensorModel
 
 MEAN_SPEED = 30.0
 """Of a free run whose speed nobody named: about 108 km/h. [m/s]"""

@@ -12,7 +12,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.model.effects import ColumnEffect, EffectTerms
 from xosc_lateral.drivers.model.effects.base import step_of
-from xosc_lateral.drivers.model.jit_kernel import prepare
+from xosc_lateral.drivers.model.linear_filters import prepare
 from xosc_lateral.drivers.model.process import DriveProcess, combine
 from xosc_lateral.drivers.model.profile import DriverProfile
 

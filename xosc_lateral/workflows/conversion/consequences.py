@@ -12,8 +12,7 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.rows import blocks, slices_where, stored
 from xosc_lateral.workflows.conversion.load import ending_at
 from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, LaneDeparture, untouched
-from xosc_lateral.world.motion.gaps import BoxPath, Gap, smallest_gaps
-from xosc_lateral.world.motion.headways import Following, RoadPath, closest_following
+from xosc_lateral.world.motion.gaps import BoxPath, Following, Gap, RoadPath, closest_following, smallest_gaps
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.motion.segments import SegmentKind
 from xosc_lateral.world.motion.trajectory import WorldTrajectory

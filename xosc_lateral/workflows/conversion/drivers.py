@@ -36,8 +36,8 @@ NO_DRIVER = {
 """Vehicles that "auto" leaves alone, and why."""
 
 PROVING_GROUND_WIDTH = 6.0
-"""A lane wider than this is none of a road (2 to 6 m are), but a proving ground's: vehicles keep to lines that the
-scenario's geometry draws, and not to a lane. [m]"""
+"""A lane wider than this, alone in its direction, is none of a road (2 to 6 m are), but a proving ground's: vehicles
+keep to lines that the scenario's geometry draws, and not to a lane. [m]"""
 
 
 def choose_drivers(
@@ -97,25 +97,27 @@ def hidden_by_libraries(libraries: tuple[Path, ...]) -> tuple[str, ...]:
 def without_proving_grounds(
     drivers: Drivers, motion: NominalMotion, network: RoadNetwork, named: Iterable[str]
 ) -> Drivers:
-    """Drivers, but for vehicles in a lane that is none of a road: why they get none. `named` ones keep theirs."""
+    """Drivers, but for vehicles in a lone lane that is none of a road: why they get none. `named` ones keep theirs."""
     kept = set(named)
     moved = dict(drivers)
     for entity in motion.entities:
         if isinstance(moved.get(entity.name), DriverProfile) and entity.name not in kept:
-            width = _median_width(entity, network)
-            if width > PROVING_GROUND_WIDTH:
+            width, lanes = _usual_lane(entity, network)
+            if width > PROVING_GROUND_WIDTH and lanes <= 1.0:
                 moved[entity.name] = (
                     f"lane of {width:.1f} m, a proving ground's: keeps its line (--entity NAME=PROFILE moves it)"
                 )
     return moved
 
 
-def _median_width(entity: EntityMotion, network: RoadNetwork) -> float:
-    """Of the lanes that an entity is in, a row a second; 0 where it is in none. [m]"""
+def _usual_lane(entity: EntityMotion, network: RoadNetwork) -> tuple[float, float]:
+    """Medians over a row a second: width of its lane [m], and driving lanes of its direction; 0 where it is in none."""
     step = max(1, len(entity.time) // max(1, round(float(entity.time[-1] - entity.time[0]))))
-    road, lane, s = entity.road[::step], entity.lane[::step], entity.s[::step]
-    there = np.asarray(road >= 0, dtype=np.bool_) & np.asarray(lane != 0, dtype=np.bool_)
-    return float(np.median(network.lane_width(road[there], lane[there], s[there]))) if there.any() else 0.0
+    rows = np.flatnonzero((entity.road[::step] >= 0) & (entity.lane[::step] != 0)) * step
+    if not len(rows):
+        return 0.0, 0.0
+    road, lane, s = entity.road[rows], entity.lane[rows], entity.s[rows]
+    return float(np.median(network.lane_width(road, lane, s))), float(np.median(network.lane_index(road, lane, s)[1]))
 
 
 def validity_warnings(enriched: Enriched) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ from xosc_lateral.workflows.conversion.load import Played
 from xosc_lateral.workflows.conversion.result import EventShift
 from xosc_lateral.workflows.conversion.shifts import Change, Comparison, compare_runs, largest_of
 from xosc_lateral.world.motion.nominal import NominalMotion
-from xosc_lateral.world.motion.offset_chain import OffsetChain, scaled
+from xosc_lateral.world.motion.offset_chain import OffsetChain, Size, resized
 from xosc_lateral.world.player.player import play
 from xosc_lateral.world.scenario import Action, Event, Maneuver, ManeuverGroup, Scenario, Story
 from xosc_lateral.world.scenario.conditions import StoryboardElementStateCondition, at_time
@@ -55,16 +55,16 @@ movement is again what it was. [-]"""
 LEAST_DURATION = 20.0
 """Of that run. [s]"""
 
-SIZES = (1.0, 0.5, 0.25, 0.0)
-"""Times what was sampled: sizes that are tried for the moves before a conflict, all of them without a path, which makes
-a car's way a millimetre longer in 400 m. [-]"""
+SIZES = (Size(), Size(limit=0.75), Size(limit=0.5), Size(0.5), Size(0.25), Size(0.0))
+"""Sizes that are tried for the moves before a conflict: a contact comes of the largest offsets alone. All of them are
+without a path, which makes a car's way a millimetre longer in 400 m."""
 LARGE_SHIFT = 0.3
 """Of its duration, by which an action lasts longer or shorter without a word. [-]"""
 MOST_TRIALS = 40
 """Of a conversion: beyond, what is left is told. [-]"""
 
-Factors = dict[int, float]
-"""Number of a chain -> times what was sampled, where that, or how it is driven, was changed."""
+Sizes = dict[int, Size]
+"""By the number of a chain, where it is driven otherwise than sampled."""
 
 
 Speeds = tuple[tuple[float, float, float], ...]
@@ -184,13 +184,13 @@ def with_speeds(scenario: Scenario, motion: NominalMotion, egos: Collection[str]
 class KeptChains:
     """Chains that leave what happens as it was, the runs with them, and what is left that could not be mended.
 
-    `smaller`: entity -> least factor of its moves, and whether that is in all of its chains.
+    `smaller`: entity -> least size of its moves, and whether all of its chains are smaller.
     """
 
     chains: tuple[OffsetChain, ...]
     comparisons: tuple[Comparison, ...]
     changes: tuple[Change, ...]
-    smaller: dict[str, tuple[float, bool]]
+    smaller: dict[str, tuple[Size, bool]]
 
     @property
     def shifts(self) -> tuple[EventShift, ...]:
@@ -201,9 +201,10 @@ class KeptChains:
         """A line each: who stays as it is, whose moves are smaller, what takes much longer, what happens otherwise."""
         for name in sorted(left):
             yield f"'{name}' stays as it is: {CHANGES}"
-        for name, (factor, everywhere) in sorted(self.smaller.items()):
+        for name, ((factor, limit), everywhere) in sorted(self.smaller.items()):
             if name not in left:
                 size = "none" if factor == 0.0 else f"{factor:g} times what was sampled"
+                size = size if factor < 1.0 else f"at most {limit:g} times the largest that was sampled"
                 where = "" if everywhere else " before a maneuver"
                 yield f"lane offsets of '{name}' are {size}{where}: {CHANGES}"
         for shift in self.shifts:
@@ -232,37 +233,36 @@ def keep_meaning(
     attempt : callable
         Writes with some chains and plays.
     """
-    factors: Factors = {}
+    sizes: Sizes = {}
     trials = 1
 
-    def applied(some: Factors) -> list[OffsetChain]:
-        sized = [scaled(chain, some[k]) if k in some else chain for k, chain in enumerate(chains)]
-        return [chain for chain in sized if chain.ring.moves]
+    def applied(some: Sizes) -> list[OffsetChain]:
+        driven = [resized(chain, some[k]) if k in some else chain for k, chain in enumerate(chains)]
+        return [chain for chain in driven if chain.ring.moves]
 
     comparisons = attempt(chains)
     changes = _changes(comparisons)
     stuck = set[tuple[int, int]]()
     while changes and trials < MOST_TRIALS:
-        blamed = _blamed(changes, chains, motion, factors, stuck, len(changes))
+        blamed = _blamed(changes, chains, motion, sizes, stuck)
         if blamed is None:
             break
-        first = SIZES.index(factors[blamed]) + 1 if blamed in factors else int(chains[blamed].path is None)
+        first = SIZES.index(sizes[blamed]) + 1 if blamed in sizes else int(chains[blamed].path is None)
         for smaller in SIZES[first:]:
-            trial = factors | {blamed: smaller}
-            found = attempt(applied(trial))
+            trial = sizes | {blamed: smaller}
+            outcome = attempt(applied(trial))
             trials += 1
-            if len(_changes(found)) < len(changes):
-                factors, comparisons, changes = trial, found, _changes(found)
+            if len(_changes(outcome)) < len(changes):
+                sizes, comparisons, changes = trial, outcome, _changes(outcome)
                 break
         else:
             stuck.add((blamed, len(changes)))
-    least: dict[str, tuple[float, bool]] = {}
-    for k, factor in ((k, factor) for k, factor in factors.items() if factor < 1.0):
-        name = chains[k].entity
-        own = [j for j, chain in enumerate(chains) if chain.entity == name]
-        before = least.get(name, (1.0, False))[0]
-        least[name] = min(before, factor), all(j in factors for j in own)
-    return KeptChains(tuple(applied(factors)), tuple(comparisons), tuple(changes), least)
+    reduced = {k: size for k, size in sizes.items() if size < Size()}
+    least: dict[str, tuple[Size, bool]] = {}
+    for name in dict.fromkeys(chains[k].entity for k in reduced):
+        theirs = [k for k, chain in enumerate(chains) if chain.entity == name]
+        least[name] = min(reduced.get(k, Size()) for k in theirs), all(k in sizes for k in theirs)
+    return KeptChains(tuple(applied(sizes)), tuple(comparisons), tuple(changes), least)
 
 
 def _changes(comparisons: Sequence[Comparison]) -> list[Change]:
@@ -274,9 +274,8 @@ def _blamed(
     changes: Sequence[Change],
     chains: Sequence[OffsetChain],
     motion: NominalMotion,
-    factors: Factors,
+    sizes: Sizes,
     stuck: Collection[tuple[int, int]],
-    count: int,
 ) -> int | None:
     """The chain whose moves most likely change what happens: its entity's, the nearest before; else any other."""
 
@@ -286,8 +285,8 @@ def _blamed(
 
     order: list[int] = []
     for change in changes:
-        own = [k for k, chain in enumerate(chains) if chain.entity == change.entity]
-        order += sorted(own, key=lambda k: (begins(chains[k]) > change.time, -begins(chains[k])))
+        theirs = [k for k, chain in enumerate(chains) if chain.entity == change.entity]
+        order += sorted(theirs, key=lambda k: (begins(chains[k]) > change.time, -begins(chains[k])))
     order += range(len(chains))
-    free = (k for k in order if factors.get(k, 1.0) > 0.0 and (k, count) not in stuck)
+    free = (k for k in order if sizes.get(k, Size()) > SIZES[-1] and (k, len(changes)) not in stuck)
     return next(free, None)

@@ -15,8 +15,7 @@ from xosc_lateral.workflows.playing import figures as figures
 from xosc_lateral.workflows.playing.figures import COMFORTABLE
 from xosc_lateral.workflows.playing.page import add_notes
 from xosc_lateral.workflows.playing.scene import scene_of
-from xosc_lateral.world.motion.gaps import MAXIMUM_GAP, Gap
-from xosc_lateral.world.motion.headways import Following
+from xosc_lateral.world.motion.gaps import MAXIMUM_GAP, Following, Gap
 
 MOST_PANELS, MOST_DYNAMICS = 12, 6
 """Entities with panels of their own, for offsets and for dynamics; those with the largest offsets come first."""

@@ -17,8 +17,7 @@ from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.model import effects as kinds
 from xosc_lateral.drivers.model.core.autoregressive.coarse import COARSE_EVERY, TICKS, phases
 from xosc_lateral.drivers.model.core.autoregressive.model import HEADROOM, KNEE, AutoregressiveModel
-from xosc_lateral.drivers.model.core.autoregressive.parameters import CANDIDATES
-from xosc_lateral.drivers.model.core.autoregressive.volatility import SLOW_CORRELATION_TIME
+from xosc_lateral.drivers.model.core.autoregressive.parameters import CANDIDATES, SLOW_CORRELATION_TIME
 from xosc_lateral.drivers.model.core.two_level.model import TwoLevelModel
 from xosc_lateral.drivers.model.effects.base import LOG_LIMIT
 from xosc_lateral.drivers.model.effects.response import split_shift

@@ -1,7 +1,7 @@
 """Drivers of the vehicles of a running simulation: once per step they get what it knows, and say where they are.
 
 A driver goes on at the model's step (5 Hz), on what he sees at that moment; in between he follows the curve of
-`model.upsampling`. What he sees he responds to a little later than in a conversion, which knows what comes
+`model.linear_filters`. What he sees he responds to a little later than in a conversion, which knows what comes
 (`OffsetStream.preview`). Where a maneuver has moved a vehicle, its path leads over from there to the driver's.
 """
 
@@ -288,7 +288,8 @@ class Traffic:
             values = unsealed(state, FORMAT)
             for traffic in (trial, restored):
                 traffic._go_on_from(values)
-            trial._try()
+            with np.errstate(over="raise"):
+                trial._try()
         except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
             if isinstance(error, XoscLateralError):
                 raise SimulationError(str(error)) from error

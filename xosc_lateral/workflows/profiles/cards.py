@@ -32,7 +32,7 @@ CHANGED: Mapping[Acts, str] = {
 
 SINGLE_DRIVER_DRIVES = 10  # Drives below which a profile is taken to be of one driver.
 SHOWN_DRIVERS, SHOWN_S = 4, 120.0  # Sample paths that are drawn, and their length. [s]
-WRAPPED_ROWS = ("", "lane", "+-", "source", "licence")  # Rows of a card that are wrapped in the terminal.
+WRAPPED_ROWS = ("", "valid", "lane", "+-", "source", "licence")  # Rows of a card that are wrapped in the terminal.
 
 
 # ---- the list --------------------------------------------------------------------------------------------------------
@@ -205,8 +205,8 @@ def _outcome(known: Provenance) -> list[tuple[str, str]]:
 
 def _outcome_items(loop: Mapping[str, Any] | None, evaluation: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     if loop:
-        found = ", ".join(loop["found"]) or "nothing"
-        yield "loop", f"started from a {loop['base']} model, seed {loop['seed']}; found: {found}"
+        names = ", ".join(loop["found"]) or "nothing"
+        yield "loop", f"started from a {loop['base']} model, seed {loop['seed']}; found: {names}"
     if short := evaluation.get("snippets"):
         scores = (
             f"distance {short['mean_distance']:.3f}, between real drivers {short['mean_floor']:.3f}, "

@@ -16,6 +16,8 @@ References
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
@@ -122,10 +124,19 @@ class OffsetChain(Struct, frozen=True):
     path: OffsetPath | None = None
 
 
-def scaled(chain: OffsetChain, factor: float) -> OffsetChain:
-    """With moves of another size that take as long, and without a path; none at all with 0."""
-    ring, placed = chain.ring, chain.placed_t
-    places = np.round(factor * np.cumsum([ring.origin, *(move.change for move in ring.moves[:-1])]), RESOLUTION)
+class Size(NamedTuple):
+    """How much of a chain is driven: times what was sampled, and how far from the middle, of the largest offset. [-]"""
+
+    factor: float = 1.0
+    limit: float = 1.0
+
+
+def resized(chain: OffsetChain, size: Size) -> OffsetChain:
+    """With moves of another size that take as long, and without a path; none at all with a factor of 0."""
+    ring, placed, factor = chain.ring, chain.placed_t, size.factor
+    places = np.cumsum([ring.origin, *(move.change for move in ring.moves[:-1])])
+    farthest = size.limit * np.abs(places).max()
+    places = np.round(factor * np.clip(places, -farthest, farthest), RESOLUTION)
     changes = np.round(np.diff(np.append(places, places[:1])), RESOLUTION).tolist() if factor else ()
     moves = tuple(replace(move, change=change) for move, change in zip(ring.moves, changes, strict=False) if change)
     if placed is not None:

@@ -159,6 +159,8 @@ class EntityState:
     trailer: EntityState | None = None
     actions: list[Running] = field(default_factory=list)
     """All that it may do: those of the init first."""
+    running: set[Running] = field(default_factory=set)
+    """What of it runs."""
     is_watched: bool = False
     """Somebody else looks at it, perhaps in every frame."""
 
@@ -274,7 +276,7 @@ class EntityState:
 
     def acts(self) -> bool:
         """Whether one of its actions runs."""
-        return any(action.is_running for action in self.actions)
+        return bool(self.running)
 
     def body_frame(self, vector: tuple[float, float, float]) -> tuple[float, float, float]:
         """A world vector along the entity's own axes (in the plane)."""

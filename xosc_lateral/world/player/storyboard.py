@@ -155,7 +155,7 @@ class StoryboardElement:
         parent = self.parent
         if parent is None or parent.kind is None or parent.state is State.COMPLETE:
             return
-        if all(child.state is State.COMPLETE for child in parent.children):
+        if all(child.state is State.COMPLETE for child in reversed(parent.children)):  # the last one mostly is not
             parent.end()
 
 

@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from xosc_lateral.drivers.fitting.models.autoregressive.fit_coarse import _far_covariance, _restored, fit_coarse
-from xosc_lateral.drivers.fitting.models.autoregressive.settings import DEFAULT_SETTINGS
+from xosc_lateral.drivers.fitting.models.autoregressive.fit_coarse import (
+    DEFAULT_SETTINGS,
+    _far_covariance,
+    _restored,
+    fit_coarse,
+)
 from xosc_lateral.drivers.model.core.autoregressive.coarse import (
     BORDER,
     COARSE_EVERY,

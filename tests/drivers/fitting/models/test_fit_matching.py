@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from tests.kit.core_models import POPULATION, STEADY
-from xosc_lateral.drivers.fitting.models.autoregressive.fit_coarse import scaled_spectrum
+from xosc_lateral.drivers.fitting.models.autoregressive.fit_coarse import DEFAULT_SETTINGS, scaled_spectrum
 from xosc_lateral.drivers.fitting.models.autoregressive.fit_matching import (
     LARGEST_STEP,
     MOST_CORRELATED,
@@ -26,7 +26,6 @@ from xosc_lateral.drivers.fitting.models.autoregressive.fit_matching import (
     matched,
     simulate,
 )
-from xosc_lateral.drivers.fitting.models.autoregressive.settings import DEFAULT_SETTINGS
 from xosc_lateral.drivers.model.core.autoregressive.coarse import GRID, Autoregression
 
 NOTHING, SLOPES = np.zeros(7), np.ones(2)

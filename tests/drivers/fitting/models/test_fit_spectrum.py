@@ -9,12 +9,12 @@ from scipy.signal import welch
 
 from tests.kit.core_models import STEADY
 from xosc_lateral.drivers.fitting.models.autoregressive.fit_coarse import (
+    DEFAULT_SETTINGS,
     _typical_power,
     fit_spectrum,
     shaped,
     window_of,
 )
-from xosc_lateral.drivers.fitting.models.autoregressive.settings import DEFAULT_SETTINGS
 from xosc_lateral.drivers.model.core.autoregressive.coarse import Autoregression
 from xosc_lateral.drivers.model.core.noise import NOISE_VARIANCE, ShapedNoise
 

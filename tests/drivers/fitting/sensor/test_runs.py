@@ -14,7 +14,7 @@ from xosc_lateral.drivers.fitting.sensor.periodogram import WINDOWS
 from xosc_lateral.drivers.fitting.sensor.runs import driver_runs, durations_of, rows_of
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampled_offsets import known_sensor, sensor_error
-from xosc_lateral.drivers.model.sensor.model import SensorModel
+from xosc_lateral.drivers.model.sensor import SensorModel
 
 STEP = 0.2
 SEED = np.random.SeedSequence(5)

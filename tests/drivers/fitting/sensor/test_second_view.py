@@ -15,7 +15,7 @@ from xosc_lateral.drivers.drives.drive import Drive, MarkingShares, Run
 from xosc_lateral.drivers.fitting.sensor.runs import driver_runs, half_widths_of
 from xosc_lateral.drivers.fitting.sensor.second_view import KNOTS, SecondView, second_view
 from xosc_lateral.drivers.fitting.sensor.separation import Separation, separate
-from xosc_lateral.drivers.model.sensor.model import SensorModel
+from xosc_lateral.drivers.model.sensor import SensorModel
 
 FloatArray = NDArray[np.float64]
 STEP = 0.2

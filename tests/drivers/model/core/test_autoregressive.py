@@ -15,13 +15,13 @@ from tests.kit.profiles import as_drive
 from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
 from xosc_lateral.drivers.drives.cuts import PAPER_RULES, all_runs
 from xosc_lateral.drivers.fitting.models.autoregressive.fit import fit_autoregressive
+from xosc_lateral.drivers.fitting.models.autoregressive.fit_coarse import FitSettings
 from xosc_lateral.drivers.fitting.models.autoregressive.fit_matching import simulate
-from xosc_lateral.drivers.fitting.models.autoregressive.settings import FitSettings
 from xosc_lateral.drivers.loop.timeline import Timeline, join_drives, local_mean
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
-from xosc_lateral.drivers.model.core.autoregressive.volatility import Volatility
+from xosc_lateral.drivers.model.core.autoregressive.parameters import Volatility
 from xosc_lateral.drivers.model.core.base import Start
-from xosc_lateral.drivers.model.jit_kernel import worth_compiling
+from xosc_lateral.drivers.model.linear_filters import worth_compiling
 from xosc_lateral.drivers.model.records import plain, read_as
 
 

@@ -19,9 +19,8 @@ from xosc_lateral.drivers.model.core.autoregressive.coarse import (
     split_bands,
 )
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
-from xosc_lateral.drivers.model.core.autoregressive.parameters import draw_drivers
+from xosc_lateral.drivers.model.core.autoregressive.parameters import Volatility, draw_drivers
 from xosc_lateral.drivers.model.core.autoregressive.parts import COARSE, FINE, Factors, begin_factors
-from xosc_lateral.drivers.model.core.autoregressive.volatility import Volatility
 from xosc_lateral.drivers.model.core.base import Start
 from xosc_lateral.files.profiles import read_profile
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
-from xosc_lateral.drivers.fitting.models.two_level.fit import fit_markov_chain
+from xosc_lateral.drivers.fitting.models.two_level import fit_markov_chain
 from xosc_lateral.drivers.model.core.two_level.markov import AliasTable, MarkovChain, bin_of, open_traps
 from xosc_lateral.drivers.model.core.two_level.model import walk
 

@@ -7,8 +7,7 @@ import pytest
 
 from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
 from xosc_lateral.drivers.model.core.noise import NOISE_VARIANCE, ShapedNoise, fit_shaped_noise, mean_power
-from xosc_lateral.drivers.model.jit_kernel import JitKernel
-from xosc_lateral.drivers.model.linear_filters import _convolve_compiled, convolve
+from xosc_lateral.drivers.model.linear_filters import JitKernel, _convolve_compiled, convolve
 
 
 def test_even_damping_leaves_white_noise_white() -> None:

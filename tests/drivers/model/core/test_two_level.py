@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from xosc_lateral.base.errors import DriverProfileError
-from xosc_lateral.drivers.fitting.models.two_level.fit import fit_two_level, split_levels
+from xosc_lateral.drivers.fitting.models.two_level import fit_two_level, split_levels
 from xosc_lateral.drivers.model.core.base import Start
 from xosc_lateral.drivers.model.core.two_level.model import PAPER_SETTINGS, TwoLevelModel, TwoLevelSettings
 from xosc_lateral.drivers.model.records import plain, read_as
@@ -125,7 +125,7 @@ def test_same_seed_same_numbers_other_seed_others(model: TwoLevelModel) -> None:
 def test_short_samples_come_without_numba() -> None:
     code = (
         "import sys, numpy as np\n"
-        "from xosc_lateral.drivers.fitting.models.two_level.fit import fit_two_level\n"
+        "from xosc_lateral.drivers.fitting.models.two_level import fit_two_level\n"
         "model = fit_two_level([np.sin(np.arange(600) / 20) * 0.1])\n"
         "model.stream(np.random.SeedSequence(0)).take(100)\n"
         "assert 'numba' not in sys.modules and 'pandas' not in sys.modules and 'scipy' not in sys.modules\n"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from xosc_lateral.base.errors import DriverProfileError
-from xosc_lateral.drivers.fitting.models.two_level.fit import fit_two_level
+from xosc_lateral.drivers.fitting.models.two_level import fit_two_level
 from xosc_lateral.drivers.model.core.base import Start
 from xosc_lateral.drivers.model.core.two_level.model import TwoLevelModel, TwoLevelSettings, TwoLevelState, _first_bins
 from xosc_lateral.drivers.model.records import plain, read_as

@@ -7,7 +7,7 @@ import pytest
 
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.fitting.models.autoregressive.fit_matching import autocovariance, fit_volatility, log_power
-from xosc_lateral.drivers.model.core.autoregressive.volatility import Volatility, averaged_covariance
+from xosc_lateral.drivers.model.core.autoregressive.parameters import Volatility, averaged_covariance
 
 
 def wander(n: int, memory: float, rng: np.random.Generator) -> np.ndarray:

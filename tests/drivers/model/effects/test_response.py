@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 from tests.kit.profiles import whole_terms
 from xosc_lateral.drivers.model.effects import Drift
 from xosc_lateral.drivers.model.effects.response import Response, respond, split_shift
-from xosc_lateral.drivers.model.jit_kernel import WORTH_IMPORTING
+from xosc_lateral.drivers.model.linear_filters import WORTH_IMPORTING
 
 STEP = 0.2
 LAGS = (0.0, 1.0, -1.0, 0.6, 0.53, -0.71, 0.05, -0.05, 1e-12, -1e-12, 9.9, -9.9, 10.0, -10.0, 55.5, -55.5)

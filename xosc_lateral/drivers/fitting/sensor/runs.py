@@ -13,7 +13,7 @@ from xosc_lateral.drivers.drives.drive import Drive, Run
 from xosc_lateral.drivers.drives.resampling import STEP, resample
 from xosc_lateral.drivers.fitting.sensor.periodogram import PASSED, WINDOWS
 from xosc_lateral.drivers.fitting.sensor.separation import separate
-from xosc_lateral.drivers.model.sensor.model import SensorModel
+from xosc_lateral.drivers.model.sensor import SensorModel
 
 LEAST_BAND = 0.35
 """A driver's corrections fall off from 0.27 Hz on: noise shows beyond. [Hz]"""

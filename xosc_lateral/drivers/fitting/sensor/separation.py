@@ -20,16 +20,19 @@ from xosc_lateral.base.numbers import NORMAL_95, all_significant
 from xosc_lateral.drivers.drives.filters import scale_frequencies
 from xosc_lateral.drivers.fitting.sensor.explanations import Explanation, explanations
 from xosc_lateral.drivers.fitting.sensor.likelihood import Colour, Known, Measured, Solution, solve
-from xosc_lateral.drivers.fitting.sensor.periodogram import PASSED, Periodogram, periodogram, windows_of
-from xosc_lateral.drivers.fitting.sensor.quantisation import (
+from xosc_lateral.drivers.fitting.sensor.periodogram import (
     COARSEST,
+    PASSED,
+    Periodogram,
+    periodogram,
     quantisation_step,
     rounding_density,
     uniform_variance,
+    windows_of,
 )
 from xosc_lateral.drivers.fitting.sensor.second_view import LEVEL_SD, SecondView, second_view
 from xosc_lateral.drivers.fitting.sensor.vehicle_bound import density
-from xosc_lateral.drivers.model.sensor.model import SensorModel
+from xosc_lateral.drivers.model.sensor import SensorModel
 
 PLAUSIBLE = 6.0
 """Explanations whose information criterion is within this of the best count for the interval: e^-3 as likely. [-]"""

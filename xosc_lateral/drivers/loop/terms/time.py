@@ -41,8 +41,9 @@ from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.search import Search
 from xosc_lateral.drivers.loop.significance import LoopSeed
 from xosc_lateral.drivers.loop.squares import SLOW_S, fine_squares, log_sizes, quick_squares, slow_squares
+from xosc_lateral.drivers.loop.terms.column import ColumnTerm
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
-from xosc_lateral.drivers.loop.terms.spread import what_a_column_may_do, what_columns_do
+from xosc_lateral.drivers.loop.terms.spread import SpreadTerm, what_a_column_may_do, what_columns_do
 from xosc_lateral.drivers.loop.timeline import COARSE, Coarse
 from xosc_lateral.drivers.model.effects import Effect, Step, TimeSmooth
 from xosc_lateral.drivers.model.seeds import generator
@@ -113,23 +114,17 @@ class StepTerm(_MeanByTime):
         smooth = smooth_probabilities(slow[:, 0], waves, ORDERS)
         order = min(smooth, key=lambda one: smooth[one])
         settling = [TimeMeanTerm(1, settling_s=seconds) for seconds in SETTLING_S]
-
-        def priced(term: Term, parameters: int) -> float:
-            price = 0.5 * parameters * float(np.log(coarse.valid.sum()))
-            return fit_model(coarse, (*fitted.terms, term)).log_likelihood - price
-
         forms = {
-            "step": priced(step, STEP_PARAMETERS),
-            "smooth": priced(TimeMeanTerm(order), order),
-            "settling": max(priced(one, STEP_PARAMETERS) for one in settling),
+            "step": _priced(fitted, step, STEP_PARAMETERS),
+            "smooth": _priced(fitted, TimeMeanTerm(order), order),
+            "settling": max(_priced(fitted, form, STEP_PARAMETERS) for form in settling),
         }
         best = max(forms, key=lambda one: forms[one])
         others = tuple(one for one in forms if one != best and forms[one] > forms[best] - AS_LIKELY)
         found: StepTerm | TimeMeanTerm = TimeMeanTerm(form=best, others=others)
         found = replace(step, others=others) if best == "step" else found
         if cls.passes(search, p_value, fitted):
-            columns = (term for term in _plain_terms(search) if priced(term, 1) > forms[best] - AS_LIKELY)
-            found = replace(found, alike=tuple(dict.fromkeys(term.columns for term in columns)))
+            found = replace(found, alike=_columns_as_likely(search, fitted, MeanTerm, forms[best]))
         return Outcome(found, (), p_value)
 
     def matches(self, other: Self) -> bool:
@@ -214,6 +209,7 @@ class TimeSpreadTerm(Term):
     weight: ClassVar[float] = 2.0
     order: int = max(ORDERS)  # Half cosines that it is made of.
     slow: bool = False  # Of the slower movement only.
+    alike: Alternatives = ()
 
     @property
     def predictable(self) -> bool:
@@ -250,7 +246,14 @@ class TimeSpreadTerm(Term):
         best = best_beside(known)
         if best is not None and best[0] > SURER * p_column:
             best = best_beside(np.concatenate([known, may_act], axis=1))
-        return None if best is None else Outcome(cls(slow=best[1]), (), best[0])
+        if best is None:
+            return None
+        p_value, slow = best
+        alike: Alternatives = ()
+        if not slow and cls.passes(search, p_value, fitted):
+            by_time = max(_priced(fitted, cls(order), order) for order in SPREAD_ORDERS)
+            alike = _columns_as_likely(search, fitted, SpreadTerm, by_time)
+        return Outcome(cls(slow=slow, alike=alike), (), p_value)
 
     def matches(self, other: Self) -> bool:
         """Whichever movement changes."""
@@ -298,10 +301,17 @@ def _named(form: str, others: tuple[str, ...], when: str) -> tuple[str, str]:
     return CHANGE_WITH_TIME, f"{form}, {when}; about as likely: {', '.join(others)}"
 
 
-def _plain_terms(search: Search) -> list[MeanTerm]:
-    """Columns as they are: one that changes as the mean does may be why."""
+def _priced(fitted: Fitted, term: Term, parameters: int) -> float:
+    """Log-likelihood with one more term, less Schwarz's price of its parameters. [nat]"""
+    price = 0.5 * parameters * float(np.log(fitted.coarse.valid.sum()))
+    return fit_model(fitted.coarse, (*fitted.terms, term)).log_likelihood - price
+
+
+def _columns_as_likely(search: Search, fitted: Fitted, kind: type[ColumnTerm], by_time: float) -> Alternatives:
+    """Columns that as they are explain about as much as time does, whose priced likelihood is `by_time`."""
     plain = (one for one in search.quantities.candidates if one.family is Family.PLAIN and len(one.contrast) == 1)
-    return [MeanTerm.of(structs.replace(one.effect, response_s=1.0)) for one in plain]
+    terms = (kind.of(structs.replace(one.effect, response_s=1.0)) for one in plain)
+    return tuple(dict.fromkeys(term.columns for term in terms if _priced(fitted, term, 1) > by_time - AS_LIKELY))
 
 
 def penalised_cosines(sizes: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:

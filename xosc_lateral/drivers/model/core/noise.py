@@ -15,7 +15,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
-from xosc_lateral.drivers.drives.periodogram import periodograms
+from xosc_lateral.drivers.drives.filters import periodograms
 from xosc_lateral.drivers.model.records import Record, frozen_array, set_once
 
 N_KNOTS = 11

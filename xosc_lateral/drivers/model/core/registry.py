@@ -35,7 +35,7 @@ class KnownModel:
 
 
 def _fit_two_level(rel_offsets: Sequence[FloatArray], drives: Sequence[str]) -> CoreModel:
-    from xosc_lateral.drivers.fitting.models.two_level.fit import fit_two_level  # who samples does not fit
+    from xosc_lateral.drivers.fitting.models.two_level import fit_two_level  # who samples does not fit
 
     return fit_two_level(rel_offsets)
 

@@ -146,10 +146,12 @@ class _Acts:
             if item is None:
                 build.time_trigger(act, "StartTrigger", 0.0, self._version)
             else:
-                group = build.sub(act, "StartTrigger/ConditionGroup")
-                build.state_condition(group, item.kind, item.reference, "endTransition", 0.0)
-                if before is not None:
-                    build.state_condition(group, "act", before, "completeState", 0.0)
+                trigger = build.sub(act, "StartTrigger")
+                for transition in ("endTransition", "stopTransition"):
+                    group = build.sub(trigger, "ConditionGroup")
+                    build.state_condition(group, item.kind, item.reference, transition, 0.0)
+                    if before is not None:
+                        build.state_condition(group, "act", before, "completeState", 0.0)
             self._add_stop(act, name)
             before = name
 

@@ -47,7 +47,10 @@ class RunningAction(StoryboardElement):
         self._number = -1
         """Of its record in the simulation."""
         self._is_refused = False
+        self._rank = 0
+        """Among those of its actor, as in the file."""
         if actor is not None:
+            self._rank = len(actor.actions)
             actor.actions.append(self)
         self._prepare()
 
@@ -91,12 +94,14 @@ class RunningAction(StoryboardElement):
             self.simulation.record_end(self._number)
             self._finish()
         super().change(state, transition)
+        if self.actor is not None:
+            (self.actor.running.add if self.is_running else self.actor.running.discard)(self)
 
     def make_room(self) -> bool:
         """End what the actor does in a domain that this action needs."""
         if self.actor is not None and self.domains:
-            for other in self.actor.actions:
-                if other.state is State.RUNNING and other is not self and other.domains & self.domains:
+            for other in sorted(self.actor.running, key=lambda action: action._rank):
+                if other.is_running and other is not self and other.domains & self.domains:
                     other.end()
         return True
 

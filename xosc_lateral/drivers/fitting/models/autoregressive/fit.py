@@ -22,12 +22,16 @@ from msgspec.structs import replace
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.base.numbers import all_significant, significant
-from xosc_lateral.drivers.fitting.models.autoregressive.fit_coarse import fit_coarse, fit_spectrum
+from xosc_lateral.drivers.fitting.models.autoregressive.fit_coarse import (
+    DEFAULT_SETTINGS,
+    FitSettings,
+    fit_coarse,
+    fit_spectrum,
+)
 from xosc_lateral.drivers.fitting.models.autoregressive.fit_matching import matched, with_volatility
-from xosc_lateral.drivers.fitting.models.autoregressive.settings import DEFAULT_SETTINGS, FitSettings
 from xosc_lateral.drivers.model.core.autoregressive.coarse import FREQUENCIES, Autoregression, largest_root, split_bands
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
-from xosc_lateral.drivers.model.core.autoregressive.volatility import Volatility
+from xosc_lateral.drivers.model.core.autoregressive.parameters import Volatility
 
 DIGITS = 5
 """Significant digits kept of a fitted number: a hundredth of its standard error and less. What another processor gives

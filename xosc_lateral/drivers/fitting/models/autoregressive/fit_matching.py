@@ -18,9 +18,8 @@ import numpy as np
 from msgspec.structs import replace
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.drives.periodogram import Detrend, periodograms
-from xosc_lateral.drivers.fitting.models.autoregressive.fit_coarse import rise, scaled_spectrum, window_of
-from xosc_lateral.drivers.fitting.models.autoregressive.settings import FitSettings
+from xosc_lateral.drivers.drives.filters import Detrend, periodograms
+from xosc_lateral.drivers.fitting.models.autoregressive.fit_coarse import FitSettings, rise, scaled_spectrum, window_of
 from xosc_lateral.drivers.model.core.autoregressive.coarse import (
     BORDER,
     COARSE_EVERY,
@@ -29,7 +28,7 @@ from xosc_lateral.drivers.model.core.autoregressive.coarse import (
     split_bands,
 )
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
-from xosc_lateral.drivers.model.core.autoregressive.volatility import Volatility, averaged_covariance
+from xosc_lateral.drivers.model.core.autoregressive.parameters import Volatility, averaged_covariance
 from xosc_lateral.drivers.model.core.base import Start
 
 SIMULATED, SNIPPETS_EACH = 4000, 3

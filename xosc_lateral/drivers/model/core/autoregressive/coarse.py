@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.drives.filters import filtered, low_pass
-from xosc_lateral.drivers.model.jit_kernel import JitKernel, worth_compiling
+from xosc_lateral.drivers.model.linear_filters import JitKernel, worth_compiling
 from xosc_lateral.drivers.model.records import Record, frozen_array, set_once
 
 BORDER = 0.4

@@ -9,8 +9,11 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.drivers.model.core.autoregressive.coarse import COARSE_EVERY, TICKS, interpolate
-from xosc_lateral.drivers.model.core.autoregressive.parameters import AutoregressiveParameters, DriverState
-from xosc_lateral.drivers.model.core.autoregressive.volatility import SLOW_CORRELATION_TIME
+from xosc_lateral.drivers.model.core.autoregressive.parameters import (
+    SLOW_CORRELATION_TIME,
+    AutoregressiveParameters,
+    DriverState,
+)
 from xosc_lateral.drivers.model.linear_filters import convolve, recur
 from xosc_lateral.drivers.model.seeds import AutoregressiveSeed, generator
 

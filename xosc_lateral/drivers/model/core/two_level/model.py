@@ -24,8 +24,7 @@ from xosc_lateral.drivers.model.core.base import CoreModel, Start
 from xosc_lateral.drivers.model.core.mean_reversion import ClockState, take_at_rate
 from xosc_lateral.drivers.model.core.noise import KERNEL_TAPS, N_KNOTS, ShapedNoise
 from xosc_lateral.drivers.model.core.two_level.markov import N_BINS, AliasTable, MarkovChain, bin_of
-from xosc_lateral.drivers.model.jit_kernel import JitKernel
-from xosc_lateral.drivers.model.linear_filters import convolve
+from xosc_lateral.drivers.model.linear_filters import JitKernel, convolve
 from xosc_lateral.drivers.model.records import Record, frozen_array, set_once
 from xosc_lateral.drivers.model.seeds import TwoLevelSeed, generator
 

@@ -1,1 +1,0 @@
-"""Fits the two-level model of Neis and Beyerer to the letter."""
