@@ -30,7 +30,7 @@ def export_c(profile: DriverProfile, folder: str | Path) -> list[Path]:
 
     Raises `DriverProfileError` if the profile has an effect or a core model of a plug-in.
     """
-    texts = c_sources(profile) | {name: _filled(name, profile) for name in ("CMakeLists.txt", "example.c")}
+    texts = c_sources(profile) | {name: filled(name, profile) for name in ("CMakeLists.txt", "example.c")}
     written = [Path(folder) / name for name in texts]
     Path(folder).mkdir(parents=True, exist_ok=True)
     for path, text in zip(written, texts.values(), strict=True):
@@ -54,13 +54,14 @@ def c_sources(profile: DriverProfile) -> dict[str, str]:
         "ALL_KNOWN": str((1 << len(inputs_of(profile))) - 1),
     }
     return {
-        f"{name}.h": _filled("driver.h", profile, words),
-        f"{name}.c": _filled("driver.c", profile),
+        f"{name}.h": filled("driver.h", profile, words),
+        f"{name}.c": filled("driver.c", profile),
         f"{name}_profile.h": _named("\n".join(numbers) + "\n", profile),
     }
 
 
-def _filled(template: str, profile: DriverProfile, words: Mapping[str, str] | None = None) -> str:
+def filled(template: str, profile: DriverProfile, words: Mapping[str, str] | None = None) -> str:
+    """A template with words in place of those between @, and names of the profile's own."""
     text = files("xosc_lateral").joinpath("resources", "driver_c", template).read_text(encoding="utf-8")
     for word, value in (words or {}).items():
         text = text.replace(f"@{word}@", value)
