@@ -18,7 +18,8 @@ from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.base.numbers import all_significant
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.resampling import STEP
-from xosc_lateral.drivers.fitting.answers import NEIGHBOURS, SCALE, cluster_robust_slopes, most_beside, neighbour_shapes
+from xosc_lateral.drivers.fitting.neighbours import NEIGHBOURS, SCALE, most_beside, neighbour_shapes
+from xosc_lateral.drivers.fitting.regression import clustered_least_squares
 from xosc_lateral.drivers.model.core.autoregressive.coarse import split_bands
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Levels, Linear, Piecewise, Proximity
 
@@ -191,7 +192,7 @@ def _regressed(observed: FloatArray, quantities: FloatArray, drive: IntArray) ->
     theta = (1.0 - np.sqrt(within / (within + counts * between + 1e-30)))[drive]
     columns = [column - theta * (np.bincount(drive, column) / counts)[drive] for column in (*design.T, observed)]
     x, y = np.column_stack(columns[:-1]), columns[-1]
-    slopes, covariance = cluster_robust_slopes(x, y, drive)
+    slopes, covariance = clustered_least_squares(x, y, drive)
     return slopes[1:], covariance[1:, 1:]
 
 

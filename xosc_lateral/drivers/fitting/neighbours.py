@@ -1,4 +1,4 @@
-"""Whether a driver answers to vehicles beside him: measured, declared, or unknown.
+"""How a driver responds to vehicles beside him: measured, declared, or unknown.
 
 Measured means that enough driving beside somebody was seen to say how far he moves, also when that is not at all. What
 is unknown is a population's to lend.
@@ -18,6 +18,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.fitting.regression import clustered_least_squares
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Linear, Proximity
 from xosc_lateral.drivers.model.profile import COLUMNS, SIDES, Basis, Beside, DriverProfile
 
@@ -172,28 +173,12 @@ def _within_drives(runs: Sequence[Run], near: Mapping[str, Sequence[FloatArray]]
     table = _centred(table, groups)
     observed, design = table[:, 0], table[:, 1:]
     distinct, cluster = np.unique(number, axis=0, return_inverse=True)
-    slopes, covariance = cluster_robust_slopes(design, observed, cluster.ravel())
+    slopes, covariance = clustered_least_squares(design, observed, cluster.ravel())
     blocks, free = len(distinct), max(len(observed) - len(numbers) - design.shape[1], 1)
     covariance *= blocks / max(blocks - 1, 1) * len(observed) / free
     known = np.diag(design.T @ design)[:sides] > 1e-6
     errors = np.where(known & (blocks > 2), CLUSTERED * np.sqrt(np.maximum(np.diag(covariance)[:sides], 0.0)), np.inf)
     return np.where(known, slopes[:sides], 0.0), errors
-
-
-def cluster_robust_slopes(design: FloatArray, observed: FloatArray, cluster: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Slopes, shape (k,), of observations, shape (n,), by a design, shape (n, k), and their covariance, shape (k, k).
-
-    The covariance is robust against whatever the observations of one cluster, 0, 1, 2 ..., share.
-    """
-    inverse = np.linalg.pinv(design.T @ design)
-    slopes = inverse @ design.T @ observed
-    scores = cluster_sums(design * (observed - design @ slopes)[:, None], cluster)
-    return slopes, inverse @ (scores.T @ scores) @ inverse
-
-
-def cluster_sums(rows: FloatArray, cluster: IntArray) -> FloatArray:
-    """Sums of rows, shape (n, k), over each cluster 0, 1, 2 ..., shape (clusters, k)."""
-    return np.column_stack([np.bincount(cluster, column) for column in rows.T])
 
 
 def _centred(table: FloatArray, groups: IntArray) -> FloatArray:
