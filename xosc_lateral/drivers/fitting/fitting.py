@@ -80,9 +80,9 @@ def _marking_notes(drives: Sequence[Drive]) -> Mapping[str, float]:
     rows = sum(map(len, drives))
     if not mended:
         return {}
-    one = sum(count * shares.one_marking for count, shares in mended) / rows
-    none = sum(count * shares.no_marking for count, shares in mended) / rows
-    return {"one_marking": round(one, 4), "no_marking": round(none, 4)}
+    followed = sum(count * shares.one_marking for count, shares in mended) / rows
+    left_out = sum(count * shares.no_marking for count, shares in mended) / rows
+    return {"one_marking": round(followed, 4), "no_marking": round(left_out, 4)}
 
 
 def fit_population(

@@ -87,33 +87,33 @@ def measure_beside(runs: Sequence[Run]) -> dict[str, Beside]:
         return {}
     near = {side: [_rows_beside(run, shape) for run in runs] for side, shape in shapes.items()}
     slopes, errors = _within_drives(runs, near)
-    found = {}
+    measured = {}
     for side, slope, error in zip(shapes, slopes, errors, strict=True):
         beside = np.concatenate(near[side]) > np.exp(-1.0)
         seconds, away = STEP * beside.sum(), STEP * (~beside).sum()
         sure = error <= MEASURED_ERROR and min(seconds, away) >= LEAST_SECONDS
         if sure:
-            found[side] = Beside(
+            measured[side] = Beside(
                 Basis.MEASURED, round(float(seconds), 1), round(float(slope), 4), round(float(error), 4)
             )
-    return found
+    return measured
 
 
 def answer_effects(runs: Sequence[Run], known: Mapping[str, Beside]) -> list[ColumnEffect]:
     """Effects of measured shifts that are beyond chance, pooled with the population's as their errors ask."""
     from msgspec.structs import replace
 
-    found: list[ColumnEffect] = []
-    for side, one in known.items():
+    effects: list[ColumnEffect] = []
+    for side, beside in known.items():
         shape = _shape(runs, side)
-        if shape is None or one.basis is not Basis.MEASURED or abs(one.shift) <= SIGNIFICANT * one.error:
+        if shape is None or beside.basis is not Basis.MEASURED or abs(beside.shift) <= SIGNIFICANT * beside.error:
             continue
         mean, spread = AMONG_DRIVERS[side]
-        own = spread**2 / (spread**2 + one.error**2)
-        size, error = own * one.shift + (1.0 - own) * mean, np.sqrt(own) * one.error
+        weight = spread**2 / (spread**2 + beside.error**2)
+        size, error = weight * beside.shift + (1.0 - weight) * mean, np.sqrt(weight) * beside.error
         numbers = {"coefficients": (round(size, 4),), "errors": (round(float(error), 4),), "reference": (0.0,)}
-        found.append(replace(shape, **numbers))
-    return found
+        effects.append(replace(shape, **numbers))
+    return effects
 
 
 def _shape(runs: Sequence[Run], side: str) -> ColumnEffect | None:
