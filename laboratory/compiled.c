@@ -29,7 +29,7 @@ int main(int count, char **words)
     DRIVER_inputs inputs;
     DRIVER_outputs outputs;
     size_t at = 0;
-    int i, k;
+    int i, k, with;
     for (i = 0; i < drivers; i++) {
         DRIVER_start(&driver[i], 1U, (uint32_t)i, 0.0, DRIVER_ALL_KNOWN);
     }
@@ -47,17 +47,19 @@ int main(int count, char **words)
     }
     whole = seconds(CLOCK_THREAD_CPUTIME_ID) - begun;
     printf("%.2f %% of a core for %d drivers at %d Hz (mean offset %.3f m)\n", 100.0 * whole / steps * rate, drivers, rate, sum / (double)all);
-    for (k = 0; k < steps; k++) { /* once more, each call by itself; the clock itself takes its part */
-        inputs.speed = 30.0 + 5.0 * sin(0.001 * k);
-        for (i = 0; i < drivers; i++, at++) {
+    for (with = 0; with < 2; with++) { /* once more, the clock alone and with the call: an interrupted thread shows in both */
+        for (at = 0; at < all; at++) {
             const double before = seconds(CLOCK_THREAD_CPUTIME_ID);
-            DRIVER_step(&driver[i], (double)(steps + k) / rate, &inputs, &outputs);
+            if (with) {
+                DRIVER_step(&driver[at % (size_t)drivers], (double)(steps + (int)(at / (size_t)drivers)) / rate, &inputs, &outputs);
+            }
             took[at] = seconds(CLOCK_THREAD_CPUTIME_ID) - before;
         }
+        qsort(took, all, sizeof *took, rising);
+        printf("%s: median %.2f, 99 %% %.2f, 99.99 %% %.2f, worst %.2f us of %lu\n", with ? "a call" : "the clock alone",
+               1e6 * took[all / 2], 1e6 * took[all - 1 - all / 100], 1e6 * took[all - 1 - all / 10000],
+               1e6 * took[all - 1], (unsigned long)all);
     }
-    qsort(took, all, sizeof *took, rising);
-    printf("a call: median %.2f, 99 %% %.2f, 99.99 %% %.2f, worst %.2f us of %lu\n", 1e6 * took[all / 2],
-           1e6 * took[all - 1 - all / 100], 1e6 * took[all - 1 - all / 10000], 1e6 * took[all - 1], (unsigned long)all);
     free(driver);
     free(took);
     return 0;
