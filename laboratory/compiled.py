@@ -1,6 +1,6 @@
 """Drivers in C: time of a call with its distribution, and of many drivers at 100 Hz in one thread.
 
-    python -m laboratory.compiled [--drivers 1000] [--seconds 60] [--profile motorway] [--compiler gcc]
+python -m laboratory.compiled [--drivers 1000] [--seconds 60] [--profile motorway] [--compiler gcc]
 """
 
 from __future__ import annotations
