@@ -173,21 +173,18 @@ def _convert_batch(inputs: Sequence[str], output: str | None, options: Mapping[s
 
     if output is None or output == "-":
         raise typer.BadParameter("several scenarios need a folder for their outputs: -o FOLDER", param_hint="-o")
-    finished = 0
 
     def show(row: Mapping[str, Any]) -> None:
-        nonlocal finished
-        finished += row["state"] != "failed"
         if reply.as_json:
             say_json({"kind": "output", **row})
 
     try:
         result = convert_many(list(inputs), output, on_outcome=show, **options)
     except Interrupted as signal:
-        typer.echo(
-            f"xosc-lateral: interrupted; {finished} outputs in {output} are finished, and the same command continues",
-            err=True,
-        )
+        if signal.finished < 0:
+            raise
+        what = f"{signal.finished} outputs in {output} are finished, and the same command continues"
+        typer.echo(f"xosc-lateral: interrupted; {what}", err=True)
         raise typer.Exit(128 + signal.number) from None
     reply.say_words(str(result), {"kind": "summary", **result.totals()}, err=False)
     if result.cut_off and (reply.quiet or reply.as_json):

@@ -142,27 +142,37 @@ class Fmi(StrEnum):
 
 
 @command(
-    export, "fmu", "A functional mock-up unit (extra fmu).",
-    "export fmu -p motorway -o driver.fmu", "export fmu -p motorway --fmi 3.0 -o driver.fmu",
+    export, "fmu", "A functional mock-up unit, C source and binaries.",
+    "export fmu -p motorway --fmi 3.0 -o driver.fmu", "export fmu -p motorway --python -o driver.fmu",
 )
 def fmu(
     output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.fmu", help="The unit.")],
     profile: Profile = "motorway",
     fmi: Annotated[Fmi, typer.Option(help="Version of FMI.")] = Fmi.TWO,
+    compiler: Annotated[
+        list[str] | None,
+        typer.Option(metavar="CC", help="C compiler to make a binary with; may be repeated. Default: the host's."),
+    ] = None,
+    python: Annotated[
+        bool, typer.Option("--python", help="Call this package instead, where it is simulated (extra fmu).")
+    ] = False,
     library: Library = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write a driver as a functional mock-up unit for co-simulation; it needs this package where it is simulated."""
+    """Write a driver as a functional mock-up unit for co-simulation: C source, with binaries where a compiler is."""
     from xosc_lateral.files.output_paths import claim
     from xosc_lateral.workflows.live.fmu import export_fmu
     from xosc_lateral.workflows.result import given_profile
 
+    if python and compiler:
+        raise typer.BadParameter("a --python unit is not compiled", param_hint="--compiler")
     claim([output], force=force)
-    chosen = given_profile(profile, library or ())
-    export_fmu(chosen, output, fmi=fmi)
+    driver = given_profile(profile, library or ())
+    platforms = export_fmu(driver, output, fmi=fmi, python=python, compilers=compiler or ())
+    content = "calling Python" if python else f"C source, binaries for {', '.join(platforms) or 'no platform'}"
     if not quiet:
-        typer.echo(f"{chosen.name} as FMI {fmi} in {output}", err=True)
+        typer.echo(f"{driver.name} as FMI {fmi} in {output}: {content}", err=True)
 
 
 @command(export, "c", "C99 source for a test bench.", "export c -p motorway -o driver/")
