@@ -14,7 +14,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, MovementSummary, figures_of
 from xosc_lateral.drivers.evaluation.metrics import free_runs
 from xosc_lateral.drivers.evaluation.spectra import spectrum
-from xosc_lateral.drivers.fitting.answers import basis_of, responses_in_words
+from xosc_lateral.drivers.fitting.neighbours import basis_of, responses_in_words
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.drivers.model.profile import SIDES, DriverProfile, Provenance
 from xosc_lateral.files.pages.chart import SAMPLED
