@@ -10,9 +10,7 @@ from pathlib import Path
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.source import read_toml
 
-SETTINGS = frozenset({"ego", "lane_changes", "neighbours"})
-"""Of a conversion (`conversion.settings.ConvertSettings`), that may stand there."""
-
+SETTINGS = frozenset({"ego", "lane_changes", "neighbours"})  # of a conversion, that may stand there
 KEYS = ("library", *sorted(SETTINGS))
 
 

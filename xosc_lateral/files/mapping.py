@@ -101,8 +101,7 @@ def factor(column: str, unit: str) -> float:
     return sign * to_si / target_to_si
 
 
-RECORDED = ("valid_below", "resolution")
-"""What a mapping says of the recordings: driving below a frequency [Hz], offsets to a step [m]."""
+RECORDED = ("valid_below", "resolution")  # what recordings show: driving below a frequency [Hz], offsets to a step [m]
 
 KEYS = (
     "encoding", "separator", "decimal", *RECORDED, "columns", "values", "roles", "rows", "missing", "time_zone",

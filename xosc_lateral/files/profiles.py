@@ -29,9 +29,7 @@ from xosc_lateral.files.tables import foreign_errors
 
 SHIPPED = shipped_folder("driver_profiles")  # profiles that come with the package
 LONGEST_NAME = 200  # characters of a profile's name; file systems take 255 bytes, the suffix included
-
 SUFFIX = ".json"
-
 LIBRARY_VARIABLE = "XOSC_LATERAL_LIBRARY"  # environment variable with folders of profiles, separated as in PATH
 GROUP = "xosc_lateral.profiles"  # entry points of folders with further profiles
 
@@ -103,8 +101,7 @@ def _from_plugins() -> dict[str, Path]:
     return found
 
 
-SCHEMA = Path(__file__).resolve().parents[1] / "resources" / "driver_profile.schema.json"
-"""JSON Schema of a profile file."""
+SCHEMA = Path(__file__).resolve().parents[1] / "resources" / "driver_profile.schema.json"  # of a profile file
 
 
 def read_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -> DriverProfile:
@@ -211,8 +208,7 @@ def _measured(fit: Mapping[str, Any], hours: float) -> str:
     return text + (f"; {100 * fit['frozen']:.1f} % of the rows repeat others: frozen" if "frozen" in fit else "")
 
 
-FIELDS = tuple(name for name in Metadata.__struct_fields__ if name != "tags")
-"""Metadata of a profile that can be set and searched for, besides its tags."""
+FIELDS = tuple(name for name in Metadata.__struct_fields__ if name != "tags")  # that can be set and searched for
 
 
 @dataclass(frozen=True, eq=False, slots=True)

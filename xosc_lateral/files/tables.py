@@ -28,9 +28,7 @@ if TYPE_CHECKING:
 
 PARQUET = ".parquet"
 TABLE_SUFFIXES = (".csv", ".csv.gz", PARQUET)
-
 LONGEST_MESSAGE = 300  # of what a library says about a file; some quote half of it
-
 _CHUNK = 1 << 20
 
 _DOUBLE = 8

@@ -17,7 +17,6 @@ from xosc_lateral.files.source import check_regular, guard_input, open_source, r
 from xosc_lateral.files.tables import unpacked_text
 
 MAX_CACHED_BYTES = 1_000_000  # larger files are read anew each time: catalogs are small, and 16 trees are kept
-
 _BLANKS, _DECLARATION = re.compile(rb"\s*"), re.compile(rb"<\?xml\s[^<>\r\n]*\?>")
 
 _DSL = re.compile(

@@ -68,14 +68,14 @@ def snippet_features(snippets: FloatArray, *, fast: bool = False) -> FloatArray:
 
 def _fast_features(difference: FloatArray) -> FloatArray:
     """Size, largest, tails and turns of second and third differences. [log m], [log m], [-], [-] Shape (n, 8)."""
-    found = []
+    columns = []
     for order in (1, 2):
         values = np.diff(difference, order, axis=1)
         square = (values**2).mean(axis=1)
         tails = (values**4).mean(axis=1) / np.maximum(square**2, 1e-36)
         largest = np.abs(values).max(axis=1)
-        found += [np.log(np.sqrt(square) + 1e-9), np.log(largest + 1e-9), tails, turns(values)]
-    return np.column_stack(found)
+        columns += [np.log(np.sqrt(square) + 1e-9), np.log(largest + 1e-9), tails, turns(values)]
+    return np.column_stack(columns)
 
 
 def _log_power(power: FloatArray, edges: FloatArray) -> FloatArray:
@@ -92,13 +92,13 @@ def context_features(snippets: Snippets, paths: FloatArray) -> FloatArray:
     """
     names = sorted({name for one in snippets.items for name in one.run.context})
     empty = np.full(paths.shape[1], np.nan)
-    found = []
+    columns = []
     for name in names:
         values = np.array(
             [one.run.context[name][one.rows] if name in one.run.context else empty for one in snippets.items]
         )
-        found += _beside(values, paths)
-    return np.column_stack(found) if found else np.empty((len(paths), 0))
+        columns += _beside(values, paths)
+    return np.column_stack(columns) if columns else np.empty((len(paths), 0))
 
 
 def _beside(values: FloatArray, paths: FloatArray) -> list[FloatArray]:

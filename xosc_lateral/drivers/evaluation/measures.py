@@ -90,20 +90,20 @@ def differences(real: Features, other: Features, rows: IntArray, other_rows: Int
     `metrics`, `lane_keeping`: mean Wasserstein distance in standard deviations of the real ones [sd]; `spectrum`: rms
     difference over the bands [dB]; `memory`: rms difference of the autocorrelation [-].
     """
-    found = {
+    families = {
         "metrics": float(np.mean(column_distances(real.metrics[rows], other.metrics[other_rows]))),
         "lane_keeping": float(np.mean(column_distances(real.indicators[rows], other.indicators[other_rows]))),
     }
     if not real.power.shape[1]:  # too short for any band
-        return found | _memory_difference(real, other, rows, other_rows)
+        return families | _memory_difference(real, other, rows, other_rows)
     level, beside = real.power[rows].mean(axis=0) + MINIMUM_POWER, other.power[other_rows].mean(axis=0) + MINIMUM_POWER
-    found["spectrum"] = float(np.sqrt(np.mean((10.0 * np.log10(beside / level)) ** 2)))
-    return found | _memory_difference(real, other, rows, other_rows)
+    families["spectrum"] = float(np.sqrt(np.mean((10.0 * np.log10(beside / level)) ** 2)))
+    return families | _memory_difference(real, other, rows, other_rows)
 
 
 def _memory_difference(real: Features, other: Features, rows: IntArray, other_rows: IntArray) -> dict[str, float]:
-    own, others = autocorrelation_of(real, rows), autocorrelation_of(other, other_rows)
-    return {"memory": float(np.sqrt(np.mean((own - others) ** 2)))}
+    reference, others = autocorrelation_of(real, rows), autocorrelation_of(other, other_rows)
+    return {"memory": float(np.sqrt(np.mean((reference - others) ** 2)))}
 
 
 def autocorrelation_of(features: Features, rows: IntArray) -> FloatArray:

@@ -67,13 +67,13 @@ def variance_parts(windows: FloatArray, drivers: NDArray[np.generic]) -> Varianc
     """
     means = windows.mean(axis=1)
     names, member, counts = np.unique(drivers, return_inverse=True, return_counts=True)
-    own = np.bincount(member, means) / counts
+    driver_means = np.bincount(member, means) / counts
     inside = float(windows.var(axis=1).mean())
     n, k = len(means), len(names)
     if k < 2 or n == k:
         return VarianceParts(float(means.var()), 0.0, inside)
-    within = float(((means - own[member]) ** 2).sum() / (n - k))
-    among = float((counts * (own - means.mean()) ** 2).sum() / (k - 1))
+    within = float(((means - driver_means[member]) ** 2).sum() / (n - k))
+    among = float((counts * (driver_means - means.mean()) ** 2).sum() / (k - 1))
     effective = (n - (counts**2).sum() / n) / (k - 1)
     return VarianceParts(max((among - within) / float(effective), 0.0), within, inside)
 
@@ -145,7 +145,7 @@ def score_realism(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
     driver = dithered(driver, resolution, seed + 3)
     recorded = [path + error for path, error in zip(driver, noise, strict=True)]
     slow_real, slow_driver = ([slow_movement(path, step, below) for path in paths] for paths in (real, driver))
-    found = []
+    conditions = []
     for seconds in LENGTHS:
         cut = snippets_of(runs, seconds, step)
         if len(cut) < MINIMUM_GROUPS or len(np.unique(cut.group)) < 2:
@@ -158,14 +158,16 @@ def score_realism(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
             )
             pairs.insert(0, (SnippetCondition(seconds, False), cut.cut_from(real), cut.cut_from(recorded)))
             pairs.insert(0, (SnippetCondition(seconds, True), cut.cut_from(real), same))
-        found += [
+        conditions += [
             _under(condition, cut, measured, sampled, profile, seed, classify) for condition, measured, sampled in pairs
         ]
     short = snippets_of(runs, LENGTHS[0], step)
     whose = np.array([str(number) for number, _ in short.place])
-    if found and found[0].condition == SnippetCondition(LENGTHS[0], True):
-        found[0] = _with_proper_scores(found[0], profile, short, seed)
-    return Realism(tuple(found), variance_parts(short.offset, whose), variance_parts(short.cut_from(recorded), whose))
+    if conditions and conditions[0].condition == SnippetCondition(LENGTHS[0], True):
+        conditions[0] = _with_proper_scores(conditions[0], profile, short, seed)
+    return Realism(
+        tuple(conditions), variance_parts(short.offset, whose), variance_parts(short.cut_from(recorded), whose)
+    )
 
 
 MINIMUM_ROWS = 6  # Of a snippet that a classifier is shown. [-]
@@ -183,9 +185,9 @@ def _under(
     """Scores of one condition; `real` and `sampled` of shape (n, m). [m]"""
     step = profile.model.step
     highest = PASS_FREQUENCY / STOP_FREQUENCY * condition.below if condition.slow else np.inf
-    own = features_of(real, cut.lane_width, step, highest=highest)
+    measured = features_of(real, cut.lane_width, step, highest=highest)
     made = features_of(sampled, cut.lane_width, step, highest=highest)
-    families, named = _distances(condition, own, made, real, cut.group, seed)
+    families, named = _distances(condition, measured, made, real, cut.group, seed)
     alone = jointly = floor = None
     shown = (real, sampled)
     if condition.slow:
@@ -200,12 +202,17 @@ def _under(
         if condition.slow:
             context = context_features(cut, real), context_features(cut, sampled)
             jointly = classifier_two_sample_test(*shown, group, group, context=context, seed=seed)
-    with_sensor, means = profile.sensor is not None and not condition.slow, named_means(own, made)
+    with_sensor, means = profile.sensor is not None and not condition.slow, named_means(measured, made)
     return ConditionScores(condition, with_sensor, len(cut), families, named, means, alone, jointly, floor)
 
 
 def _distances(
-    condition: SnippetCondition, own: Features, made: Features, real: FloatArray, group: NDArray[np.str_], seed: int
+    condition: SnippetCondition,
+    measured: Features,
+    made: Features,
+    real: FloatArray,
+    group: NDArray[np.str_],
+    seed: int,
 ) -> tuple[dict[str, Beside], dict[str, Beside]]:
     """Over random halves: a half beside its own sampled snippets, and beside the other half; equally many in both."""
     rng = np.random.default_rng(seed)
@@ -214,11 +221,11 @@ def _distances(
         half = split_groups(group, rng)
         rows, others = np.flatnonzero(half), np.flatnonzero(~half)
         stand_ins = _stand_ins(real, group, rows, others, rng) if condition.same_start else None
-        values.append(differences(own, made, rows, rows))
-        floors.append(real_against_real(own, own, rows, others, stand_ins))
-        named.append(named_distances(own.take(rows), made.take(rows)))
+        values.append(differences(measured, made, rows, rows))
+        floors.append(real_against_real(measured, measured, rows, others, stand_ins))
+        named.append(named_distances(measured.take(rows), made.take(rows)))
         beside = others if stand_ins is None else stand_ins[:, 0]
-        named_floors.append(named_distances(own.take(rows), own.take(beside)))
+        named_floors.append(named_distances(measured.take(rows), measured.take(beside)))
     return _beside(values, floors, UNITS), _beside(named, named_floors, {})
 
 
@@ -236,8 +243,8 @@ def _stand_ins(
 ) -> IntArray:
     """Other drivers' snippets with the same start, shape (rows, draws)."""
     count, first = min(FLOOR_DRAWS, len(others)), real[:, 0]
-    own = windows_with_the_same_start(first[rows], group[rows], first[others], group[others], rng, count=count)
-    return others[own]
+    donors = windows_with_the_same_start(first[rows], group[rows], first[others], group[others], rng, count=count)
+    return others[donors]
 
 
 def _with_proper_scores(scores: ConditionScores, profile: DriverProfile, cut: Snippets, seed: int) -> ConditionScores:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from math import isfinite
 from typing import Any
 
@@ -42,7 +43,7 @@ def scores_to_dict(scores: ProfileScores) -> dict[str, Any]:
             },
         },
         "compared_below_hz": scores.below,
-        "realism": [_condition_to_dict(one) for one in scores.realism.conditions],
+        "realism": [_condition_to_dict(each) for each in scores.realism.conditions],
         "variance_m2": {
             "real": _variance_to_dict(scores.realism.variance_real),
             "sampled": _variance_to_dict(scores.realism.variance_sampled),
@@ -51,12 +52,12 @@ def scores_to_dict(scores: ProfileScores) -> dict[str, Any]:
         "long_snippets": None if scores.long_snippets is None else _snippets_to_dict(scores.long_snippets),
         "evaluations": [
             {
-                "number": one.number,
-                "coarse": one.coarse,
-                "fine": one.fine,
-                "distances": _rounded(one.distances.by_metric),
+                "number": each.number,
+                "coarse": each.coarse,
+                "fine": each.fine,
+                "distances": _rounded(each.distances.by_metric),
             }
-            for one in scores.evaluations
+            for each in scores.evaluations
         ],
         "spectrum": {
             "frequency_hz": [round(float(f), 5) for f in scores.spectrum_real.frequency],
@@ -89,53 +90,43 @@ def _snippets_to_dict(scores: SnippetScores) -> dict[str, Any]:
     }
 
 
-def _condition_to_dict(one: ConditionScores) -> dict[str, Any]:
+def _condition_to_dict(scores: ConditionScores) -> dict[str, Any]:
+    areas = {"movement": scores.alone, "with_context": scores.jointly, "real_drivers": scores.floor}
     return {
-        "seconds": one.condition.seconds,
-        "start": "same" if one.condition.same_start else "free",
-        "band": f"below {one.condition.below:g} Hz" if one.condition.slow else "all",
-        "sampled": "driver and sensor" if one.with_sensor else "driver",
-        "count": one.count,
-        "families": {name: {**_beside_to_dict(value), "unit": value.unit} for name, value in one.families.items()},
-        "distances": {name: _beside_to_dict(value) for name, value in one.named.items()},
+        "seconds": scores.condition.seconds,
+        "start": "same" if scores.condition.same_start else "free",
+        "band": f"below {scores.condition.below:g} Hz" if scores.condition.slow else "all",
+        "sampled": "driver and sensor" if scores.with_sensor else "driver",
+        "count": scores.count,
+        "families": {name: {**_beside_to_dict(value), "unit": value.unit} for name, value in scores.families.items()},
+        "distances": {name: _beside_to_dict(value) for name, value in scores.named.items()},
         "indicators": {
             name: {"real": round(real, 5), "sampled": round(sampled, 5), "unit": unit}
-            for (name, (real, sampled)), unit in zip(one.means.items(), UNITS, strict=True)
+            for (name, (real, sampled)), unit in zip(scores.means.items(), UNITS, strict=True)
         },
-        "auc": None if one.alone is None else _areas_to_dict(one),
+        "auc": None
+        if scores.alone is None
+        else {name: None if area is None else _rounded(asdict(area)) for name, area in areas.items()},
     }
 
 
-def _beside_to_dict(one: Beside) -> dict[str, float | None]:
-    ratio = round(one.ratio, 3) if isfinite(one.ratio) else None
-    return {"value": round(one.value, 4), "floor": round(one.floor, 4), "ratio": ratio}
-
-
-def _areas_to_dict(one: ConditionScores) -> dict[str, Any]:
-    areas = {"movement": one.alone, "with_context": one.jointly, "real_drivers": one.floor}
-    return {
-        name: None
-        if area is None
-        else {"auc": round(area.auc, 4), "low": round(area.low, 4), "high": round(area.high, 4)}
-        for name, area in areas.items()
-    }
+def _beside_to_dict(number: Beside) -> dict[str, float | None]:
+    ratio = round(number.ratio, 3) if isfinite(number.ratio) else None
+    return {"value": round(number.value, 4), "floor": round(number.floor, 4), "ratio": ratio}
 
 
 def _variance_to_dict(parts: VarianceParts) -> dict[str, float]:
+    named = {"between_drivers": parts.between, "within_drivers": parts.within, "inside_snippets": parts.inside}
+    return _rounded(named, 6)
+
+
+def _margins_to_dict(margins: Margins) -> dict[str, float]:
     return {
-        "between_drivers": round(parts.between, 6),
-        "within_drivers": round(parts.within, 6),
-        "inside_snippets": round(parts.inside, 6),
+        "share_near_marking": round(margins.share_near, 5),
+        "excursions_per_hour": round(margins.excursions_per_hour, 2),
+        "largest_offset_m": round(margins.largest, 3),
     }
 
 
-def _margins_to_dict(one: Margins) -> dict[str, float]:
-    return {
-        "share_near_marking": round(one.share_near, 5),
-        "excursions_per_hour": round(one.excursions_per_hour, 2),
-        "largest_offset_m": round(one.largest, 3),
-    }
-
-
-def _rounded(values: Mapping[str, float]) -> dict[str, float]:
-    return {name: round(value, 4) for name, value in values.items()}
+def _rounded(values: Mapping[str, float], digits: int = 4) -> dict[str, float]:
+    return {name: round(value, digits) for name, value in values.items()}

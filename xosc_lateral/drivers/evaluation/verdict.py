@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.rows import true_slices
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.filters import Detrend, periodograms
 from xosc_lateral.drivers.drives.resampling import PASS_BAND_EDGES
@@ -91,8 +92,8 @@ def verdict_of(runs: Sequence[Run], sampled: Sequence[FloatArray], groups: Seque
     real, made = (_powers(paths, groups, edges, step) for paths in (measured, sampled))
     bands = []
     for k, (low, high) in enumerate(edges if len(real[0]) else []):
-        (own, own_error), (other, other_error) = (_mean(power[:, k], whose) for power, whose in (real, made))
-        bands.append(BandPower(low, high, own, other, float(np.hypot(own_error, other_error))))
+        (density, density_error), (other, other_error) = (_mean(power[:, k], whose) for power, whose in (real, made))
+        bands.append(BandPower(low, high, density, other, float(np.hypot(density_error, other_error))))
     alarms = {
         speed: (alarms_per_hour(measured, step, speed), alarms_per_hour(sampled, step, speed)) for speed in ALARM_SPEEDS
     }
@@ -108,9 +109,9 @@ def _powers(
     power, whose = [], []
     for path, group in zip(paths, groups, strict=True):
         if len(path) >= size:
-            own = 2.0 * step * periodograms(path, size, detrend=Detrend.ENDS)
-            power += [[row[(frequency >= low) & (frequency < high)].mean() for low, high in edges] for row in own]
-            whose += [group] * len(own)
+            density = 2.0 * step * periodograms(path, size, detrend=Detrend.ENDS)
+            power += [[row[(frequency >= low) & (frequency < high)].mean() for low, high in edges] for row in density]
+            whose += [group] * len(density)
     return np.array(power).reshape(len(power), len(edges)) + 1e-12, np.array(whose, dtype=np.str_)
 
 
@@ -129,7 +130,6 @@ def alarms_per_hour(paths: Sequence[FloatArray], step: float, speed: float) -> f
     for path in paths:
         moves = np.diff(path) / step
         for fast in (moves > speed, moves < -speed):
-            edges = np.flatnonzero(np.diff(np.concatenate([[False], fast, [False]]).astype(np.int8)))
-            count += int((edges[1::2] - edges[::2] >= rows).sum())
+            count += sum(part.stop - part.start >= rows for part in true_slices(fast))
         seconds += len(moves) * step
     return 3600.0 * count / seconds if seconds else 0.0

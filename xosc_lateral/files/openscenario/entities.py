@@ -12,7 +12,7 @@ from xosc_lateral.files.openscenario.declarations import local_scope
 from xosc_lateral.files.openscenario.element import XmlElement
 from xosc_lateral.world.scenario.entity import USUAL_BOX, BoundingBox, Controller, Entity, Performance
 from xosc_lateral.world.scenario.enums import EntityCategory, VehicleCategory
-from xosc_lateral.world.scenario.environment import Environment, TimeOfDay, Weather
+from xosc_lateral.world.scenario.global_actions import Environment, TimeOfDay, Weather
 
 
 def read_environment(owner: XmlElement, context: Context) -> Environment:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from xosc_lateral.files.openscenario.actions import read_actions
+from xosc_lateral.files.openscenario.actions import read_actions, read_transition
 from xosc_lateral.files.openscenario.conditions import read_trigger
 from xosc_lateral.files.openscenario.context import Context, Reader, read_struct
 from xosc_lateral.files.openscenario.declarations import local_scope
 from xosc_lateral.files.openscenario.element import XmlElement
 from xosc_lateral.files.openscenario.entities import read_bounding_box, read_controller, read_performance
 from xosc_lateral.files.openscenario.positions import READERS as POSITION_READERS
-from xosc_lateral.files.openscenario.private_actions import read_transition
 from xosc_lateral.world.scenario.entity import BoundingBox, Controller, Performance
 from xosc_lateral.world.scenario.private_actions import TransitionDynamics
 from xosc_lateral.world.scenario.storyboard import Actors, Event, Init, Maneuver, ManeuverGroup, Private, Story, Trigger

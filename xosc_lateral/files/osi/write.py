@@ -27,7 +27,6 @@ from xosc_lateral.world.scenario.private_actions import LightStateAction
 
 TOPIC = "ground_truth"
 VERSION = (3, 8, 0)  # of OSI, that is written
-
 NANOSECONDS = 1_000_000_000
 
 KINDS = {VehicleCategory.CAR: "MEDIUM_CAR", VehicleCategory.TRUCK: "HEAVY_TRUCK", VehicleCategory.VAN: "DELIVERY_VAN"}
@@ -227,7 +226,6 @@ def _lights(motion: NominalMotion, entity: EntityMotion) -> list[tuple[float, An
 
 
 def _template(entity: Entity, number: int) -> Any:
-    """Identifier, type, classification, size and axles of an entity."""
     kinds = osi("osi3.osi_object_pb2").MovingObject
     box = entity.bounding_box
     made = kinds()

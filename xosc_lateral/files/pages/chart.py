@@ -140,14 +140,14 @@ def ticks_of(panel: Panel, name: str, length: float) -> Ticks:
     """Where ticks stand, 0 to 1, and what is written there."""
     axis: Axis = getattr(panel, name)
     if axis.ticks is not None:
-        found = [(float(axis.share(value)), text) for value, text in axis.ticks]
+        ticks = [(float(axis.share(value)), text) for value, text in axis.ticks]
     else:
         values = (
             _log_places(*axis.ends) if axis.log else _linear_places(*axis.ends, max(2.0, length / TICK_SPACING[name]))
         )
         texts = [_power(value) for value in values.tolist()] if axis.log else _numbers(values)
-        found = list(zip(axis.share(values).tolist(), texts, strict=True))
-    return [(at, text) for at, text in found if -1e-6 <= at <= 1.0 + 1e-6]
+        ticks = list(zip(axis.share(values).tolist(), texts, strict=True))
+    return [(at, text) for at, text in ticks if -1e-6 <= at <= 1.0 + 1e-6]
 
 
 def _linear_places(first: float, last: float, count: float) -> FloatArray:

@@ -101,8 +101,8 @@ class Figure:
                 axes: list[Axis] = [getattr(panel, name) for panel in group]
                 drawn = [getattr(mark, name) for panel in group for mark in panel.marks]
                 held = [value for axis in axes for value in axis.holds]
-                given = next((axis.limits for axis in axes if axis.limits is not None), None)
-                limits = given or _limits(np.concatenate([*drawn, held]), axes[0].log)
+                fixed = next((axis.limits for axis in axes if axis.limits is not None), None)
+                limits = fixed or _limits(np.concatenate([*drawn, held]), axes[0].log)
                 for axis in axes:
                     axis.limits = axis.limits or limits
 

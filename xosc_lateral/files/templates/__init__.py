@@ -17,14 +17,12 @@ from xml.sax.saxutils import quoteattr, unescape
 from xosc_lateral.base.errors import FormatError, XoscLateralError, did_you_mean
 from xosc_lateral.base.plugins import plugins
 from xosc_lateral.base.shipped import shipped_folder
-from xosc_lateral.files.templates.parameter import Declared
+from xosc_lateral.files.templates.parameter import Declared, Settings
 from xosc_lateral.files.templates.plots import TEMPLATES
 from xosc_lateral.files.templates.template import Template
 
 __all__ = ["TEMPLATES", "AnyTemplate", "PlainTemplate", "Template", "all_templates", "find_template"]
-
 GROUP = "xosc_lateral.templates"  # entry points of further templates
-
 SCENARIO, ROAD = ".xosc", ".xodr"
 
 # A comment (to be left alone), or a declaration; a value may hold ">", which ends no tag there.
@@ -62,15 +60,9 @@ class PlainTemplate:
 
     def files(self, chosen: Mapping[str, str] | None = None) -> dict[str, str]:
         """File name -> text of the scenario, with the chosen values as declared ones, and of its road."""
-        by_name = {parameter.name: parameter for parameter in self.parameters}
-        text = self._text
-        for name, value in (chosen or {}).items():
-            if name not in by_name:
-                raise XoscLateralError(
-                    f"unknown setting {name!r}{did_you_mean(name, by_name)}; "
-                    f"there are {', '.join(sorted(by_name)) or 'none'}"
-                )
-            text = _declared(text, name, by_name[name].read(value))
+        settings, text = Settings(self.parameters, chosen or {}), self._text
+        for name in chosen or {}:
+            text = _declared(text, name, settings.text(name))
         return {self.path.name: text, f"{self.name}{ROAD}": self.path.with_suffix(ROAD).read_text(encoding="utf-8")}
 
     @cached_property

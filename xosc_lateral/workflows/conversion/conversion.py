@@ -10,7 +10,7 @@ import numpy as np
 from msgspec import structs
 
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.drivers.fitting.answers import basis_of
+from xosc_lateral.drivers.fitting.neighbours import basis_of
 from xosc_lateral.drivers.model.profile import SIDES
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.workflows.conversion.result import WRITTEN_AS, ConvertedScenario

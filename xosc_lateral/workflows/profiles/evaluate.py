@@ -60,10 +60,10 @@ def evaluate(
     from xosc_lateral.drivers.evaluation.scores import score_profile
 
     driver = given_profile(profile, library)
-    given = given_drives(drives, columns)
-    with naming(given):
-        scores = score_profile(driver, all_runs(given.drives), seed=seed, classify=classify)
-    return Evaluation(scores, driver, given)
+    tables = given_drives(drives, columns)
+    with naming(tables):
+        scores = score_profile(driver, all_runs(tables.drives), seed=seed, classify=classify)
+    return Evaluation(scores, driver, tables)
 
 
 class Evaluation(Result):
@@ -71,8 +71,8 @@ class Evaluation(Result):
 
     __slots__ = ("_given", "_scores", "profile")
 
-    def __init__(self, scores: ProfileScores, profile: DriverProfile, given: GivenDrives) -> None:
-        self._scores, self._given = scores, given
+    def __init__(self, scores: ProfileScores, profile: DriverProfile, tables: GivenDrives) -> None:
+        self._scores, self._given = scores, tables
         self.profile = profile
 
     @property
@@ -131,6 +131,6 @@ class Evaluation(Result):
         """Write the HTML page."""
         from xosc_lateral.workflows.profiles.evaluation_page import evaluation_page
 
-        name, given = f"{self.profile.name}_evaluation.html", self._given
-        made = partial(evaluation_page, self._scores, self.profile, given.inputs)
-        return write_page(path, name, made, inputs=given.files, force=force)
+        name, tables = f"{self.profile.name}_evaluation.html", self._given
+        made = partial(evaluation_page, self._scores, self.profile, tables.inputs)
+        return write_page(path, name, made, inputs=tables.files, force=force)

@@ -49,11 +49,11 @@ def spectrum_figure(scores: ProfileScores) -> Figure:
     figure = Figure(1, 2, height=180.0, legend=True)
     power, memory = figure.panels
     memory.level()
-    for one, correlation, color, label in (
+    for each, correlation, color, label in (
         (scores.spectrum_real, scores.autocorrelation_real, MEASURED, "measured"),
         (scores.spectrum_sampled, scores.autocorrelation_sampled, SAMPLED, "sampled"),
     ):
-        power.line(one.frequency, one.density, color, label=label)
+        power.line(each.frequency, each.density, color, label=label)
         memory.line(scores.lags, correlation, color, label=label)
     power.x.log = power.y.log = memory.x.log = True
     power.title, power.x.label, power.y.label = "Spectrum", "frequency [Hz]", "power density [m²/Hz]"
@@ -84,15 +84,15 @@ def evaluation_text(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         lines += _snippet_lines(scores.long_snippets)
     lines.append("mean distance of the four evaluations (coarse + fine):")
     lines += [
-        f"  ({one.number}) {one.coarse} + {one.fine}: {one.distances.mean:.3f}, worst {one.distances.worst} "
-        f"{one.distances.by_metric[one.distances.worst]:.3f}"
-        for one in scores.evaluations
+        f"  ({each.number}) {each.coarse} + {each.fine}: {each.distances.mean:.3f}, worst {each.distances.worst} "
+        f"{each.distances.by_metric[each.distances.worst]:.3f}"
+        for each in scores.evaluations
     ]
     lines.append(f"spectrum: differs by {scores.spectrum_error:.1f} dB (rms over bands)")
-    for name, one in (("measured", scores.margins_real), ("sampled", scores.margins_sampled)):
+    for name, each in (("measured", scores.margins_real), ("sampled", scores.margins_sampled)):
         lines.append(
-            f"near a marking, {name}: {100 * one.share_near:.2f} % of the time, "
-            f"{one.excursions_per_hour:.1f} times an hour"
+            f"near a marking, {name}: {100 * each.share_near:.2f} % of the time, "
+            f"{each.excursions_per_hour:.1f} times an hour"
         )
     return "\n".join(lines)
 
@@ -152,9 +152,16 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         "Beyerer, 2024) and those of the profile are combined. Evaluation (1) combines the measured coarse part with "
         "the measured fine part, shifted in time: the best that the split allows.",
     )
-    page.table([_part_row(one) for one in scores.evaluations])
-    for one in scores.evaluations[:3]:
-        _add_violins(page, one, f"({one.number}) Coarse part {one.coarse}, fine part {one.fine}.")
+    page.table(
+        [
+            {"evaluation": f"({each.number})", "coarse part": each.coarse, "fine part": each.fine}
+            | {"mean distance": each.distances.mean}
+            | {LABELS[name]: each.distances.by_metric[name] for name in ("std", "range", "diff_mean", "diff_std")}
+            for each in scores.evaluations
+        ]
+    )
+    for each in scores.evaluations[:3]:
+        _add_violins(page, each, f"({each.number}) Coarse part {each.coarse}, fine part {each.fine}.")
     page.section("Spectrum and autocorrelation")
     page.figure(
         spectrum_figure(scores),
@@ -170,11 +177,11 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         [
             {
                 "drives": name,
-                "time near a marking [%]": 100.0 * one.share_near,
-                "excursions [1/h]": one.excursions_per_hour,
-                "largest offset [m]": one.largest,
+                "time near a marking [%]": 100.0 * each.share_near,
+                "excursions [1/h]": each.excursions_per_hour,
+                "largest offset [m]": each.largest,
             }
-            for name, one in (("measured", scores.margins_real), ("sampled", scores.margins_sampled))
+            for name, each in (("measured", scores.margins_real), ("sampled", scores.margins_sampled))
         ]
     )
     return page.html(_provenance(scores, profile, inputs))
@@ -195,9 +202,9 @@ def _add_realism(page: Page, realism: Realism) -> None:
         page.table(ratio_rows(group), heading)
     page.section("Lane keeping")
     formats = {"measured": ".4g", "sampled": ".4g", "distance [sd]": ".3f", "real drivers [sd]": ".3f"}
-    for one in realism.conditions:
-        if not one.condition.same_start:
-            page.table(indicator_rows(one), one.condition.name, formats=formats)
+    for each in realism.conditions:
+        if not each.condition.same_start:
+            page.table(indicator_rows(each), each.condition.name, formats=formats)
     real, sampled = (
         f"{each.between:.4f}, {each.within:.4f} and {each.inside:.4f} m²"
         for each in (realism.variance_real, realism.variance_sampled)
@@ -208,23 +215,12 @@ def _add_realism(page: Page, realism: Realism) -> None:
     )
 
 
-def _add_violins(page: Page, one: PartEvaluation, caption: str) -> None:
+def _add_violins(page: Page, each: PartEvaluation, caption: str) -> None:
     page.figure(
-        violin_figure(one.real, one.artificial),
+        violin_figure(each.real, each.artificial),
         f"{caption} Bars: minimum, mean, maximum.",
-        f"Ten pairs of violins; mean distance {one.distances.mean:.3f}.",
+        f"Ten pairs of violins; mean distance {each.distances.mean:.3f}.",
     )
-
-
-def _part_row(one: PartEvaluation) -> dict[str, object]:
-    shown = ("std", "range", "diff_mean", "diff_std")
-    return {
-        "evaluation": f"({one.number})",
-        "coarse part": one.coarse,
-        "fine part": one.fine,
-        "mean distance": one.distances.mean,
-        **{LABELS[name]: one.distances.by_metric[name] for name in shown},
-    }
 
 
 def _metric_rows(scores: SnippetScores) -> list[tuple[str, float, float]]:
@@ -236,45 +232,47 @@ def _metric_rows(scores: SnippetScores) -> list[tuple[str, float, float]]:
 def _add_metrics(page: Page, scores: SnippetScores) -> None:
     rows = _metric_rows(scores)
     page.table(
-        [{"metric": name, "distance": one, "real drivers": real, "ratio": one / real} for name, one, real in rows],
+        [{"metric": name, "distance": each, "real drivers": real, "ratio": each / real} for name, each, real in rows],
         f"{scores.count} snippets of {scores.seconds:g} s; distances in standard deviations of the measured metric",
         formats={"distance": ".3f", "real drivers": ".3f", "ratio": ".2f"},
-        tones={number: _tone(one / real) for number, (_, one, real) in enumerate(rows[:-1])},
+        tones={number: _tone(each / real) for number, (_, each, real) in enumerate(rows[:-1])},
     )
 
 
 def _snippet_lines(scores: SnippetScores) -> list[str]:
     return [
         f"{scores.count} snippets of {scores.seconds:g} s      distance  real drivers  ratio",
-        *(f"  {name:24s}  {one:8.3f}  {real:12.3f}  {one / real:5.2f}" for name, one, real in _metric_rows(scores)),
+        *(f"  {name:24s}  {each:8.3f}  {real:12.3f}  {each / real:5.2f}" for name, each, real in _metric_rows(scores)),
     ]
 
 
 def _key_figures(realism: Realism) -> list[KeyFigure]:
     """Of the shortest free runs: how near, how well separated."""
     figures = []
-    slow = next((one for one in realism.conditions if one.condition.slow), None)
-    free = next((one for one in realism.conditions if not one.condition.slow and not one.condition.same_start), None)
+    slow = next((each for each in realism.conditions if each.condition.slow), None)
+    free = next(
+        (each for each in realism.conditions if not each.condition.slow and not each.condition.same_start), None
+    )
     if slow is not None:
         ratio = slow.families["metrics"].ratio
         figures.append(KeyFigure(f"{ratio:.2f}", "ten metrics / real drivers", slow.condition.name, _tone(ratio)))
-    for one in (slow, free):
-        if one is not None and one.alone is not None:
-            what = ", with the sensor" if one.with_sensor else ""
-            figures.append(KeyFigure(f"{one.alone.auc:.2f}", "classifier AUC", f"{one.condition.name}{what}"))
+    for each in (slow, free):
+        if each is not None and each.alone is not None:
+            what = ", with the sensor" if each.with_sensor else ""
+            figures.append(KeyFigure(f"{each.alone.auc:.2f}", "classifier AUC", f"{each.condition.name}{what}"))
     return figures
 
 
 def blocks_of(scores: ProfileScores) -> dict[str, float]:
     """Every block of the fair measure over what other real drivers get; classifiers: 1 at AUC 0.5, 2 at 1. [-]"""
     blocks = {}
-    for one in scores.realism.conditions:
-        for family, beside in one.families.items():
+    for each in scores.realism.conditions:
+        for family, beside in each.families.items():
             if isfinite(beside.ratio):
-                blocks[f"{FAMILIES[family]}, {one.condition.name}"] = beside.ratio
-        for name, area in (("classifier", one.alone), ("classifier with context", one.jointly)):
+                blocks[f"{FAMILIES[family]}, {each.condition.name}"] = beside.ratio
+        for name, area in (("classifier", each.alone), ("classifier with context", each.jointly)):
             if area is not None:
-                blocks[f"{name}, {one.condition.name}"] = 1.0 + 2.0 * max(area.auc - 0.5, 0.0)
+                blocks[f"{name}, {each.condition.name}"] = 1.0 + 2.0 * max(area.auc - 0.5, 0.0)
     return blocks
 
 

@@ -104,23 +104,23 @@ def fit(
 
     if corrected and model_named(model).model.kind != ModelKind.TWO_LEVEL:
         raise DriverProfileError(f"model {model}: only the two-level model has a corrected fit")
-    given = given_drives(drives, columns).valid_below(valid_below)
-    slow, fast = split_by_band(given.drives)
+    tables = given_drives(drives, columns).valid_below(valid_below)
+    slow, fast = split_by_band(tables.drives)
     is_partial = not fast and any(drive.valid_below is not None and drive.valid_below < KEEPING_BAND for drive in slow)
     by_default = isinstance(prior, str) and prior == PRIOR
     has_prior = prior is not None and (is_partial or not by_default)
     if by_default and model_named(model).model.kind == ModelKind.TWO_LEVEL:
         has_prior = False
     known = Provenance(
-        source=source or ", ".join(given.inputs),
+        source=source or ", ".join(tables.inputs),
         licence=licence,
-        inputs=dict(given.inputs),
-        fit=dict(summary_of(given.drives)),
+        inputs=dict(tables.inputs),
+        fit=dict(summary_of(tables.drives)),
     )
-    with naming(given):
+    with naming(tables):
         profile = fit_profile(
-            given.drives,
-            name=name or (given.files[0].name.split(".")[0] if given.files else "profile"),
+            tables.drives,
+            name=name or (tables.files[0].name.split(".")[0] if tables.files else "profile"),
             model=model,
             provenance=known,
             sensor_noise=sensor_noise,

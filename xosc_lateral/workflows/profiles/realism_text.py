@@ -51,11 +51,11 @@ def start_fade_note(profile: DriverProfile) -> str:
 def condition_groups(realism: Realism) -> dict[str, list[ConditionScores]]:
     """Conditions that differ in length alone, the most telling first: heading -> by length."""
     groups: dict[str, list[ConditionScores]] = {}
-    for one in sorted(realism.conditions, key=lambda one: (not one.condition.slow, one.condition.same_start)):
-        start = "same start" if one.condition.same_start else "free runs"
-        band = f"below {one.condition.below:g} Hz" if one.condition.slow else "all that was recorded"
-        what = "driver and sensor" if one.with_sensor else "driver"
-        groups.setdefault(f"{start}, {band} ({what})", []).append(one)
+    for each in sorted(realism.conditions, key=lambda each: (not each.condition.slow, each.condition.same_start)):
+        start = "same start" if each.condition.same_start else "free runs"
+        band = f"below {each.condition.below:g} Hz" if each.condition.slow else "all that was recorded"
+        what = "driver and sensor" if each.with_sensor else "driver"
+        groups.setdefault(f"{start}, {band} ({what})", []).append(each)
     return groups
 
 
@@ -63,11 +63,11 @@ def ratio_rows(group: list[ConditionScores]) -> list[dict[str, object]]:
     """A row for each family and each classifier, a column for each length."""
     rows: list[dict[str, object]] = []
     for family, label in FAMILIES.items():
-        if any(family in one.families for one in group):
-            cells = {_length(one): _ratio(one, family) for one in group}
+        if any(family in each.families for each in group):
+            cells = {_length(each): _ratio(each, family) for each in group}
             rows.append({"ratio to real drivers": label, **cells})
     for key, label in AREAS.items():
-        areas = {_length(one): getattr(one, key) for one in group}
+        areas = {_length(each): getattr(each, key) for each in group}
         if any(area is not None for area in areas.values()):
             rows.append({"ratio to real drivers": label, **{length: _area(area) for length, area in areas.items()}})
     return rows
@@ -95,13 +95,13 @@ def realism_lines(realism: Realism) -> list[str]:
     """For the terminal."""
     lines = ["compared with other real drivers (1: as close as they are; AUC 0.5: not distinguishable)"]
     for heading, group in condition_groups(realism).items():
-        lines.append(f"  {heading:46s}" + "".join(f"{_length(one):>18s}" for one in group))
+        lines.append(f"  {heading:46s}" + "".join(f"{_length(each):>18s}" for each in group))
         for row in ratio_rows(group):
             label, *cells = row.values()
             lines.append(f"    {label!s:44s}" + "".join(f"{cell!s:>18s}" for cell in cells))
-    if all(one.alone is None for one in realism.conditions):
+    if all(each.alone is None for each in realism.conditions):
         lines.append("    classifier AUC: not computed")
-    shown = next((one for one in realism.conditions if not one.condition.same_start), None)
+    shown = next((each for each in realism.conditions if not each.condition.same_start), None)
     if shown is not None:
         lines.append(f"lane keeping, {shown.condition.name:24s} measured    sampled   distance  real drivers [sd]")
         for label, real, sampled, distance, floor in (row.values() for row in indicator_rows(shown)):
@@ -115,12 +115,12 @@ def realism_lines(realism: Realism) -> list[str]:
     return lines
 
 
-def _length(one: ConditionScores) -> str:
-    return f"{one.condition.seconds:g} s"
+def _length(each: ConditionScores) -> str:
+    return f"{each.condition.seconds:g} s"
 
 
-def _ratio(one: ConditionScores, family: str) -> str:
-    return f"{one.families[family].ratio:.2f}" if family in one.families else ""
+def _ratio(each: ConditionScores, family: str) -> str:
+    return f"{each.families[family].ratio:.2f}" if family in each.families else ""
 
 
 def _area(area: TwoSampleResult | None) -> str:

@@ -73,14 +73,14 @@ def sample(
         settings: dict[str, Any] = {"duration_s": duration, "speed": speed}
         unknown = [column for column in driver.columns if column not in {"speed", "lane_width"}]
         return Offsets(driver, made, seed, None, settings, [_neutral("a free run", unknown)] if unknown else [])
-    given = given_drives(like if like is not None else context, columns)  # type: ignore[arg-type]
-    warnings = _unknown_columns(driver, given.drives)
+    tables = given_drives(like if like is not None else context, columns)  # type: ignore[arg-type]
+    warnings = _unknown_columns(driver, tables.drives)
     if like is not None:
-        with naming(given):
-            made = list(sample_like(driver, given.drives, snippet, seed, with_sensor=with_sensor))
-        return Offsets(driver, made, seed, given, {"snippet_s": snippet}, warnings)
+        with naming(tables):
+            made = list(sample_like(driver, tables.drives, snippet, seed, with_sensor=with_sensor))
+        return Offsets(driver, made, seed, tables, {"snippet_s": snippet}, warnings)
     return Offsets(
-        driver, list(sample_context(driver, given.drives, seed, with_sensor=with_sensor)), seed, given, {}, warnings
+        driver, list(sample_context(driver, tables.drives, seed, with_sensor=with_sensor)), seed, tables, {}, warnings
     )
 
 
@@ -91,18 +91,13 @@ def _unknown_columns(profile: DriverProfile, drives: Sequence[Drive]) -> list[st
     """
     lacking: dict[tuple[str, ...], list[str]] = {}
     for column in profile.columns:
-        names = tuple(d.name for d in drives if column not in _known(d))
+        names = tuple(d.name for d in drives if column not in {"lane_width", *d.context, *d.empty})
         lacking.setdefault(names, []).append(column)
-    found = [
+    return [
         _neutral(f"drive {names[0]}" if len(names) == 1 else f"{len(names)} of {len(drives)} drives", columns)
         for names, columns in lacking.items()
         if names
     ]
-    return found
-
-
-def _known(drive: Drive) -> set[str]:
-    return {"lane_width", *drive.context, *drive.empty}
 
 
 def _neutral(where: str, columns: Sequence[str]) -> str:
@@ -119,18 +114,18 @@ class Offsets(Result):
         profile: DriverProfile,
         made: Sequence[SampledOffsets],
         seed: int,
-        given: GivenDrives | None,
+        tables: GivenDrives | None,
         settings: dict[str, Any],
         warnings: Sequence[str],
     ) -> None:
-        self._made, self._given, self._settings = made, given, settings
+        self._made, self._given, self._settings = made, tables, settings
         self.profile = profile
         self.seed = seed
         self.warnings = tuple(warnings)
         """What a user has to know, a line each."""
 
     def __len__(self) -> int:
-        return sum(len(one.time) for one in self._made)
+        return sum(len(each.time) for each in self._made)
 
     def headline(self) -> str:
         """One line."""
@@ -146,13 +141,13 @@ class Offsets(Result):
         """
         import numpy as np
 
-        lengths = [len(one.time) for one in self._made]
+        lengths = [len(each.time) for each in self._made]
         numbers = np.repeat(np.arange(len(lengths)), lengths)
-        columns: dict[str, Any] = {"drive": np.repeat([one.drive for one in self._made], lengths)}
+        columns: dict[str, Any] = {"drive": np.repeat([each.drive for each in self._made], lengths)}
         if "snippet_s" in self._settings:
-            columns["snippet"] = np.repeat([one.snippet for one in self._made], lengths)
+            columns["snippet"] = np.repeat([each.snippet for each in self._made], lengths)
         for name in ("time", "offset", "offset_real", "lane_width", "speed"):
-            values = [getattr(one, name) for one in self._made]
+            values = [getattr(each, name) for each in self._made]
             if values and values[0] is not None:
                 columns[name] = np.concatenate(values)
         if np.isnan(columns.get("speed", np.nan)).all():

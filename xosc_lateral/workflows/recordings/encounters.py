@@ -12,13 +12,9 @@ from xosc_lateral.workflows.recordings.plan import VehiclePlan
 from xosc_lateral.world.road.network import RoadNetwork
 
 REACH = 150.0  # who is farther away has nothing to do with it: 5 s at 30 m/s [m]
-BRAKING = 1.0
-"""Deceleration from which a piece of the speed profile is braking: coasting in gear gives less (about 0.5 at 100 km/h).
-[m/s2]"""
-SURE_RATE = 1.0
-"""A distance that passes its value more slowly is no trigger: 0.1 m of error would be more than 0.1 s. [m/s]"""
-WATCHED = 5.0
-"""So long before, a relative trigger is not armed: the same distance may come about earlier, behind the other. [s]"""
+BRAKING = 1.0  # deceleration from which it is braking: coasting in gear gives about 0.5 at 100 km/h [m/s2]
+SURE_RATE = 1.0  # a distance that passes its value more slowly is no trigger: 0.1 m of error is more than 0.1 s [m/s]
+WATCHED = 5.0  # so long before, a trigger is not armed: the same distance may come earlier, behind the other [s]
 BORNE_OUT = 0.2  # so near to the recorded moment the trigger has to come [s]
 
 
@@ -83,7 +79,6 @@ def _row(plan: VehiclePlan, time: float) -> int | None:
 
 
 def _lane(plan: VehiclePlan, row: int, network: RoadNetwork) -> tuple[int, int, int]:
-    """Road, lane, and direction along s (+1 or -1) of a recorded row."""
     vehicle = plan.vehicle
     road, lane = int(vehicle.road[row]), int(vehicle.lane[row])
     return road, lane, network.travel_direction(road, lane) * int(vehicle.way[row])

@@ -16,22 +16,16 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.world.road.network import RoadNetwork
 
-MOVING_SPEED = 3.0
-"""Slower vehicles have no direction: 2 cm of noise over 0.4 s turn the way of one at 3 m/s by 1 degree. [m/s]"""
-
+MOVING_SPEED = 3.0  # slower vehicles have no direction: 2 cm of noise in 0.4 s turn the way at 3 m/s by 1 degree [m/s]
 LANE_AGREEMENT = 0.7  # cosine of a vehicle's direction and that of the lane that it is taken to follow: 45 degrees [-]
 HEADING_AGREEMENT = 0.94  # cosine of a vehicle's heading and of its way: 20 degrees, as of its front at R = 10 m [-]
 WITHIN_EARTH = 4e7  # places beyond are none: the earth's girth [m]
-
 MAX_AGAINST = 0.1
 """Share of the moving rows that may contradict: mirrored or turned recordings have all, or half where headings are
 random; overtaking in the oncoming lane and vehicles that reverse have a few in a hundred. [-]"""
 
-STRAIGHT_AGREEMENT = np.cos(np.radians(3.0))
-"""Cosine of a vehicle's heading and its edge's that is of a straight edge. [-]"""
-
+STRAIGHT_AGREEMENT = np.cos(np.radians(3.0))  # cosine of a heading and its edge's that is straight [-]
 LEAST_SPREAD = 0.1  # standard deviation of places across the road from which their side can be told [m]
-
 CLOCKWISE, NORTH = "counted clockwise", "counted clockwise from north"
 
 

@@ -187,14 +187,9 @@ def find_neighbours(
     }
 
 
-STAMP_DISTANCE = 0.25
-"""Stamps farther apart than this are of two instants ... [steps]"""
-
-INSTANT_WIDTH = 0.5
-"""... if no instant is then wider than this; else every vehicle has a clock of its own. [steps]"""
-
-FIRST_STEPS = 100
-"""A common clock is fitted to so many steps first, then to twice as many, and so on: never off by half a step."""
+STAMP_DISTANCE = 0.25  # stamps farther apart than this are of two instants ... [steps]
+INSTANT_WIDTH = 0.5  # ... if no instant is then wider; else every vehicle has a clock of its own [steps]
+FIRST_STEPS = 100  # a common clock is fitted to so many steps first, then to twice as many: never off by half a step
 
 
 def instants(time: FloatArray, vehicle: IntArray, step: float) -> tuple[IntArray, FloatArray]:

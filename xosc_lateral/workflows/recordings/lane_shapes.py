@@ -16,10 +16,7 @@ from xosc_lateral.workflows.recordings.importers.tracks import PlacedTracks
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
 
 SMOOTHED = 20.0  # way over which a lane's turning is averaged into a curvature: bounds are polygons [m]
-
-
-FACING_STEP = 5.0
-"""Of the places at which two lanes beside each other are compared: at R = 100 m a lane of 3.5 m is off by 2 mm. [m]"""
+FACING_STEP = 5.0  # of places at which lanes beside each other are compared: 2 mm off at R = 100 m [m]
 
 
 class LaneShape(ABC):
@@ -191,7 +188,6 @@ def middle(left: FloatArray, right: FloatArray) -> FloatArray:
 
 
 def _sizes(line: FloatArray) -> FloatArray:
-    """Of the pieces of a line, seen from above, shape (n - 1,). [m]"""
     return np.asarray(np.hypot(*np.diff(line[:, :2], axis=0).T))
 
 

@@ -15,8 +15,7 @@ from xosc_lateral.workflows.recordings.recorded import MOVING_SPEED, RecordedVeh
 
 SETTLED = 0.7  # nobody has settled in a lane who is farther from its centre, see `recordings.cuts` [m]
 CALM = 0.1  # a lane change reaches to where the lateral speed falls below this, see there [m/s]
-CROSSING_RATE = 0.3
-"""A side that crosses a marking faster is in a lane change, see there; one that returns, in an aborted one. [m/s]"""
+CROSSING_RATE = 0.3  # a side that crosses a marking faster is in a lane change; which returns, an aborted one [m/s]
 MAXIMUM_HALF_DURATION = 8.0  # from the crossing to either end, see there [s]
 STILL, STEADY = 1e-3, 0.5  # lateral speed below which a vehicle stands still sideways [m/s], for at least so long [s]
 LEVEL = 0.02  # movement between two still stretches that is worth a maneuver [m]
@@ -234,7 +233,6 @@ class Course:
         return rough
 
     def _excursion(self, level: float, first: int, last: int) -> list[Rough]:
-        """Out of a lane and back into it: two lane offsets."""
         peak = first + int(np.abs(self.y[first : last + 1] - level).argmax())
         side, height = np.sign(self.y[peak] - level), float(self.y[peak])
         begin, end = self._begin(first, peak, level, side), self._end(peak, last, level, -side)

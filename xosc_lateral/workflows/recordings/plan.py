@@ -20,17 +20,9 @@ from xosc_lateral.world.scenario.entity import BoundingBox
 from xosc_lateral.world.scenario.enums import EntityCategory
 from xosc_lateral.world.scenario.place import Place
 
-FRAME = 0.1
-"""Vehicles appear and leave at whole multiples of this: a moment between two frames of a player would place them up to
-a frame's way off. [s]"""
-
-
-ENTERED = 0.2
-"""So long after a recorded vehicle has come onto a road, its planned one has, too: `--error` is between them. [s]"""
-
-PLAYED = 0.2
-"""Share of the error's bound, and of the time between corners, for a track that was played: nothing in it is a driver's
-or a sensor's. [-]"""
+FRAME = 0.1  # vehicles appear and leave at multiples of this: between two frames they would be placed off by a way [s]
+ENTERED = 0.2  # so long after a recorded vehicle comes onto a road, its planned one has, too: `--error` is between [s]
+PLAYED = 0.2  # share of the error's bound and the time between corners for a played track: no driver, no sensor [-]
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -36,8 +36,7 @@ from xosc_lateral.workflows.recordings.recordings import RecordedTraffic
 from xosc_lateral.workflows.recordings.scenario import reconstructed_scenario
 from xosc_lateral.workflows.recordings.settings import ReconstructSettings
 
-LONG_DRIVE = 100.0
-"""Of road-following, for a profile of one vehicle: ten windows that the evaluation compares drivers by. [s]"""
+LONG_DRIVE = 100.0  # of road-following, for a profile of one vehicle: ten windows that the evaluation compares [s]
 LONGEST_WINDOW = 3600.0  # a scenario of more can't be looked at, and times in ms or us instead of s give it [s]
 AROUND = 100.0  # who comes as near as this to the vehicle in question, along or across, belongs to its surroundings [m]
 NO_HOST = "none"  # stands for no vehicle under test
@@ -79,7 +78,6 @@ def reconstruct_recording(traffic: RecordedTraffic, settings: ReconstructSetting
 def _drivers(
     plans: Sequence[VehiclePlan], residuals: Sequence[Residuals], settings: ReconstructSettings
 ) -> tuple[tuple[ChosenDriver, ...], dict[str, DriverProfile]]:
-    """A profile for each vehicle: its own, the likeliest of the library, or the population's."""
     from xosc_lateral.drivers.fitting.fitting import fit_profile
 
     population = find_profile(AUTO_PROFILE, settings.library)
@@ -152,8 +150,7 @@ def _comes_near(track: Track, centre: Track, begin: float, end: float) -> bool:
     return bool((np.hypot(*away) <= AROUND).any())  # nobody where they are not there at once
 
 
-WINDOW, STEP = 10.0, 0.2
-"""Of movement that is summed up, as long as the evaluation's snippets; between rows, as profiles have it. [s]"""
+WINDOW, STEP = 10.0, 0.2  # of movement that is summed up, as the evaluation's snippets; of rows, as in profiles [s]
 MINIMUM_LOG_ODDS = 2.0  # another profile than the population's has to be likelier by this: weights of 7 to 1 [nat]
 FREE_RUNS = 40  # of each profile, five minutes each: 30 windows of 40 drivers
 LEAST_SPREAD = 1e-4  # of a path in a window, below which its logarithm would say something about digits [m]
@@ -221,7 +218,6 @@ class WindowModel:
 
 
 def _windows(offset: FloatArray) -> FloatArray:
-    """Whole windows, shape (k, m). [m]"""
     length = round(WINDOW / STEP)
     return offset[: len(offset) // length * length].reshape(-1, length)
 

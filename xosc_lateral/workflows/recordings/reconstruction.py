@@ -24,9 +24,7 @@ from xosc_lateral.workflows.recordings.recordings import RecordedTraffic
 from xosc_lateral.workflows.recordings.scenario import Triggers
 from xosc_lateral.workflows.result import PathLike, Result
 
-WORTH_NAMING = 1.0
-"""A position that is off by more is named in the list of what could not be expressed, across beside the lane's own
-spread. [m]"""
+WORTH_NAMING = 1.0  # a position off by more is named as not expressed, across beside the lane's own spread [m]
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,12 +18,9 @@ LONGEST_GAP = 1.0  # rows farther apart than this are not of one passage, as in 
 FARTHEST = 1e8  # no map projection gives such a position: the Earth's circumference is 4e7 m [m]
 SHORTEST_STEP = 1e-4  # rows that follow sooner are of the same moment: no sensor has 10 kHz [s]
 MINIMUM_PASSAGE = 2.0  # passages below this are left out: a speed and its change can't be told in less [s]
-LEAP = 1.5
-"""Farther than it can have driven by this much (half a narrow lane): an identifier that has gone to another vehicle.
-[m]"""
+LEAP = 1.5  # farther than it can have driven (half a narrow lane): an identifier that has gone to another vehicle [m]
 BACKWARDS = 0.5  # who falls back so far drives backwards; less is an error of standing vehicles' positions [m]
-MOVING_SPEED = 0.25
-"""Below this a vehicle stands, and the direction of its movement is that of errors: half a walking pace. [m/s]"""
+MOVING_SPEED = 0.25  # below, a vehicle stands, and its direction is that of errors: half a walking pace [m/s]
 VELOCITY_WINDOW = 2.0  # rows whose positions a velocity is fitted to: 0.2 m of noise at 10 Hz are 0.08 m/s in it [s]
 HEADING_WINDOW = 2.0  # way over which a heading is averaged, so that positions' noise does not turn a slow vehicle [m]
 
@@ -200,13 +197,11 @@ def _steady_heading(
 
 
 def _across(velocity: FloatArray, lane_heading: FloatArray) -> NDArray[np.bool_]:
-    """Rows at which it moves across its lane more than along it, as a person on foot does."""
     turn = np.arctan2(velocity[1], velocity[0]) - lane_heading
     return np.asarray((np.abs(np.sin(turn)) > np.abs(np.cos(turn))) & (np.hypot(*velocity) >= MOVING_SPEED))
 
 
 def _backwards(x: FloatArray, y: FloatArray, heading: FloatArray) -> NDArray[np.bool_]:
-    """Rows at which it is behind where it has been."""
     steps = np.diff(x) * np.cos(heading[1:]) + np.diff(y) * np.sin(heading[1:])
     driven = np.cumsum(np.r_[0.0, steps])
     return np.asarray(driven < np.maximum.accumulate(driven) - BACKWARDS)

@@ -16,13 +16,10 @@ from xosc_lateral.files.opendrive.write import Connections, WrittenLane, Written
 from xosc_lateral.world.road.road_from_tracks import ReferenceLine
 
 PIECE_LENGTH = 5.0  # of a curved reference line: a cubic is off by 2 mm on a radius of 10 m, see `curved_plan` [m]
-SAMPLE_LENGTH = 0.5
-"""Between points of a line that widths are measured at: its chord is off by 3 mm on a radius of 10 m. [m]"""
+SAMPLE_LENGTH = 0.5  # between points that widths are measured at: a chord is off by 3 mm on a radius of 10 m [m]
 WIDTH_TOLERANCE = 1e-3  # widths go in straight pieces that are within this [m]
-WHOLE_LENGTH = 0.8
-"""A line of this share of the longest runs along the whole road: what it lacks is that it cuts corners. [-]"""
-ABSENCE_LENGTH = 2.0
-"""A lane that ends so much before its neighbours is none from there on; less is how its boundary was cut. [m]"""
+WHOLE_LENGTH = 0.8  # a line of this share of the longest runs along the whole road: it lacks what corners it cuts [-]
+ABSENCE_LENGTH = 2.0  # a lane that ends so much before its neighbours is none from there; less is how it was cut [m]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -70,7 +67,6 @@ def roads_of_lanes(lanes: Sequence[DrivenLane], name: str, *, left_handed: bool 
 
 
 def _groups(lanes: Sequence[DrivenLane]) -> list[list[int]]:
-    """Numbers of lanes side by side, from left to right."""
     has_right = {lane.beside for lane in lanes}
     groups, grouped = list[list[int]](), set[int]()
     for first in [*(k for k in range(len(lanes)) if k not in has_right), *range(len(lanes))]:  # then rings, if any
@@ -192,7 +188,6 @@ def _length(points: FloatArray) -> float:
 
 
 def _turning(points: FloatArray) -> float:
-    """Of a line, left and right together. [rad]"""
     steps = np.diff(points[:, :2], axis=0)
     steps = steps[np.hypot(*steps.T) > 0.0]
     turns = np.diff(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0])))

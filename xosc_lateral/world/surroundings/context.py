@@ -22,8 +22,7 @@ from xosc_lateral.base.rows import empty, put
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.enums import VehicleCategory
-from xosc_lateral.world.scenario.environment import Environment, Weather
-from xosc_lateral.world.scenario.global_actions import EnvironmentAction
+from xosc_lateral.world.scenario.global_actions import Environment, EnvironmentAction, Weather
 from xosc_lateral.world.surroundings.around import (
     IN_SIGHT,
     SIGHT_DISTANCE,

@@ -71,7 +71,6 @@ BY_SIZE = {
 """Median sizes that no value in the standard unit has, and the unit that they speak for."""
 
 LEVELS = 12  # so many different texts are written out at most
-
 SIGNS = {"offset": "positive to the LEFT of travel, else :-m", "curvature": "positive in LEFT curves, else :-1/m"}
 
 

@@ -62,7 +62,6 @@ def import_levelx(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cu
 
 
 def _read_recording(path: Path, settings: CutSettings) -> tuple[pd.DataFrame, str, float]:
-    """Table with `state`, layout and step of one recording."""
     tracks, meta, recording = read_recording_files(path)
     number, step = path.name.split("_")[0], 1.0 / frame_rate(recording, path)
     if "latLaneCenterOffset" in tracks.columns:

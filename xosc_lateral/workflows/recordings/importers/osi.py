@@ -31,7 +31,6 @@ from xosc_lateral.workflows.recordings.osi.read import Recorded, read_osi
 from xosc_lateral.workflows.recordings.osi.shapes import lanes_of
 
 LICENCE = "that of the trace"
-
 HOST = "host"  # stands for the trace's own host vehicle
 
 
@@ -68,7 +67,6 @@ def import_osi(
 
 
 def _named(recorded: Recorded, host: str, path: Path) -> set[str]:
-    """Tracks of the vehicle that is wanted."""
     wanted = host
     if host == HOST:
         if len(recorded.hosts) != 1:
@@ -84,7 +82,6 @@ def _named(recorded: Recorded, host: str, path: Path) -> set[str]:
 
 
 def _placed(recorded: Recorded, path: Path, road: Path | None) -> tuple[PlacedTracks, LaneGraph, list[Path]]:
-    """Every row in its lane; what the lanes are; the files that said so."""
     tracks, files, network = recorded.tracks, [path], None
     if road is not None:
         network, files, where = read_opendrive(road), [path, road], road.name

@@ -27,7 +27,6 @@ from xosc_lateral.world.road.lanes import DRIVING, beside
 from xosc_lateral.world.road.network import RoadNetwork
 
 LICENCE = "your own recording"
-
 LANE_VALUES = ("lane_width", "agreement", "scale")  # what is found of a lane, and is no column of its road
 INTO_NEXT = 1e-3  # step beyond a section's end that brings one into the next [m]
 Piece = tuple[int, int, int]  # road, lane section, lane
@@ -118,7 +117,6 @@ def lane_graph(network: RoadNetwork) -> tuple[dict[Piece, int], LaneGraph]:
 def _following(
     network: RoadNetwork, pieces: dict[Piece, int], index: int, k: int, name: int, forward: bool
 ) -> list[int]:
-    """Piece straight ahead of this one, in the direction of travel."""
     section = network.roads[index].sections[k]
     end = section.end - INTO_NEXT if forward else section.start + INTO_NEXT
     step = network.advance(index, name, end, 2 * INTO_NEXT)
@@ -166,7 +164,6 @@ def import_placed(
 
 
 def _drive_table(placed: PlacedTracks, graph: LaneGraph, settings: CutSettings) -> pd.DataFrame:
-    """The drive table with its column `state`."""
     tracks, inside = placed.tracks, placed.piece >= 0
     is_truck = np.isin(tracks.kind, TRUCKS)
     middle = placed.along if tracks.rear is None else placed.along + tracks.rear  # gaps count from there

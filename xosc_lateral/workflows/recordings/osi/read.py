@@ -25,9 +25,7 @@ KINDS = {
 }
 """`VehicleClassification.Type` -> vehicle class; others by their own names."""
 
-THINGS = ("lane", "lane_boundary", "logical_lane", "logical_lane_boundary")
-"""Fields of a `GroundTruth` that are kept besides moving objects: lanes in both encodings."""
-
+THINGS = ("lane", "lane_boundary", "logical_lane", "logical_lane_boundary")  # kept of a `GroundTruth` besides objects
 LEAP = 3.0  # farther than twice what it drives in a step, and by this much: not the same vehicle any more [m]
 COLUMNS = 12  # number, time, x, y, yaw, speed, length, pitch, roll; the rear axle, on the ground, from the middle
 

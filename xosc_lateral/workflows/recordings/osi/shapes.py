@@ -172,5 +172,4 @@ def _chained(lines: Sequence[FloatArray]) -> FloatArray | None:
 
 
 def _aligned(line: FloatArray, along: FloatArray) -> FloatArray:
-    """The line in the direction of another one."""
     return line if (line[-1] - line[0])[:2] @ (along[-1] - along[0])[:2] >= 0.0 else line[::-1]

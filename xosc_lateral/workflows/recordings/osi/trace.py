@@ -13,8 +13,7 @@ from xosc_lateral.files.osi import SUFFIXES, osi
 from xosc_lateral.files.source import check_regular, open_source
 from xosc_lateral.files.tables import foreign_errors
 
-TRUTHS = ("GROUND_TRUTH", "SENSOR_VIEW")
-"""Kinds of messages that hold the true world; a sensor view as its global ground truth."""
+TRUTHS = ("GROUND_TRUTH", "SENSOR_VIEW")  # messages of the true world; a sensor view has it as its global ground truth
 
 
 class Trace:
@@ -43,7 +42,6 @@ class Trace:
         self._reader.close()
 
     def __iter__(self) -> Iterator[Any]:
-        """Every `GroundTruth`, in the order of the file."""
         number = 0
         while (result := self._reader.read_message()) is not None:
             number += 1
@@ -111,7 +109,6 @@ def _refuse_channel(path: Path, channel: str | None) -> None:
 
 
 def _chosen(kinds: dict[str, str], channel: str | None) -> str | None:
-    """Topic to read among those of each kind."""
     truths = [topic for wanted in TRUTHS for topic, kind in kinds.items() if kind == wanted]
     if channel is None:
         return truths[0] if truths else None

@@ -10,7 +10,7 @@ from enum import Enum
 from math import copysign, cos, inf, sin, sqrt
 
 from xosc_lateral.world.player.actions.base import Domain, Maker, RunningPrivateAction
-from xosc_lateral.world.player.actions.speed import relative_to
+from xosc_lateral.world.player.actions.longitudinal import relative_to
 from xosc_lateral.world.player.angles import is_forward
 from xosc_lateral.world.player.distances import UNREACHABLE_DISTANCE, Spot, ahead_and_left, apart, road_gap
 from xosc_lateral.world.player.paths.base import Path, PathProgress, nearest_s

@@ -11,8 +11,7 @@ from msgspec.structs import replace
 
 from xosc_lateral.base.errors import FormatError, PlaybackError, UnsupportedElementError
 from xosc_lateral.world.player.paths.base import Path
-from xosc_lateral.world.player.paths.clothoid import ClothoidPath, TimedClothoid
-from xosc_lateral.world.player.paths.nurbs import Control, NurbsPath, clamped_knots
+from xosc_lateral.world.player.paths.curves import ClothoidPath, Control, NurbsPath, TimedClothoid, clamped_knots
 from xosc_lateral.world.player.paths.polyline import Corner, PolylinePath, fill_times, has_gaps_in_time, merge_close
 from xosc_lateral.world.player.positions.on_road import reference_of
 from xosc_lateral.world.player.simulation import Simulation
