@@ -67,9 +67,9 @@ def require_along_lanes(
 ) -> None:
     """Refuse places in the coordinates of a road's file that drive against its lanes. [m], [rad], [m/s]"""
     near = np.flatnonzero(np.abs(x) + np.abs(y) < WITHIN_EARTH)
-    found = network.world_to_lane(x[near], y[near], heading=heading[near])
-    inside = (found.distance <= 0.0) & (found.lane != 0)
-    lane = network.lane_to_world(found.road[inside], found.lane[inside], found.s[inside])
+    place = network.world_to_lane(x[near], y[near], heading=heading[near])
+    inside = (place.distance <= 0.0) & (place.lane != 0)
+    lane = network.lane_to_world(place.road[inside], place.lane[inside], place.s[inside])
     agreement = np.full(len(near), np.nan)
     agreement[inside] = np.cos(heading[near][inside] - lane.heading)
     require_lane_direction(agreement, speed[near], Path(network.path).name or "its lanes", path)

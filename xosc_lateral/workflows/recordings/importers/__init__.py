@@ -41,7 +41,7 @@ def find_importer(name: str) -> Importer:
     if name in IMPORTERS:
         module, _, function = IMPORTERS[name].partition(":")
         return cast("Importer", getattr(import_module(module), function))
-    found: dict[str, Any] = plugins(GROUP)
-    if name not in found:
-        raise FormatError(f"no importer {name!r}; there are {', '.join([*IMPORTERS, *found])}")
-    return cast("Importer", found[name])
+    offered: dict[str, Any] = plugins(GROUP)
+    if name not in offered:
+        raise FormatError(f"no importer {name!r}; there are {', '.join([*IMPORTERS, *offered])}")
+    return cast("Importer", offered[name])

@@ -74,11 +74,11 @@ def _named(recorded: Recorded, host: str, path: Path) -> set[str]:
             raise FormatError(f"host vehicles: {there}; name one with --host", path=path)
         wanted = recorded.hosts[0]
     wanted = {number: name for name, number in recorded.numbers.items()}.get(wanted, wanted)
-    found = {name for name in recorded.tracks.names if name.split("#")[0] == wanted}  # NAME#2 after a leap
-    if not found:
+    names = {name for name in recorded.tracks.names if name.split("#")[0] == wanted}  # NAME#2 after a leap
+    if not names:
         there = ", ".join(recorded.tracks.names[:20])
         raise FormatError(f"no vehicle {host!r}; there are {there}", path=path)
-    return found
+    return names
 
 
 def _placed(recorded: Recorded, path: Path, road: Path | None) -> tuple[PlacedTracks, LaneGraph, list[Path]]:
