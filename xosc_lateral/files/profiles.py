@@ -138,27 +138,17 @@ def profile_bytes(profile: DriverProfile) -> bytes:
     return (canonical_json(profile.to_dict()) + "\n").encode("utf-8")
 
 
+_HASHES: dict[int, tuple[DriverProfile, str]] = {}  # by identity: a profile never changes, and can't all be hashed
+
+
 def profile_hash(profile: DriverProfile) -> str:
     """SHA-256 of the profile file's bytes, in hexadecimal: what outputs name their profile by."""
-    return _hash_of(_Identity(profile))
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class _Identity:
-    """A profile as a key: by identity, for it never changes and its parts can't all be hashed."""
-
-    profile: DriverProfile
-
-    def __hash__(self) -> int:
-        return id(self.profile)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Identity) and other.profile is self.profile
-
-
-@lru_cache(maxsize=32)  # a batch names the same few profiles in thousands of outputs
-def _hash_of(key: _Identity) -> str:
-    return hashlib.sha256(profile_bytes(key.profile)).hexdigest()
+    known = _HASHES.get(id(profile))
+    if known is None:
+        if len(_HASHES) >= 32:  # a batch names the same few profiles in thousands of outputs
+            _HASHES.pop(next(iter(_HASHES)))
+        known = _HASHES[id(profile)] = profile, hashlib.sha256(profile_bytes(profile)).hexdigest()
+    return known[1]
 
 
 def profile_record(profile: DriverProfile) -> dict[str, Any]:

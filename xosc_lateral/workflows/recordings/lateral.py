@@ -186,39 +186,38 @@ class Course:
         return Rough(first, last, begin, high, int(self.lanes[after] - self.lanes[before]), cut=cut)
 
     def _begin(self, before: int, crossing: int, level: float, side: float) -> int:
-        """Row at which movement to a side begins: the last calm one near the level, else the nearest to it."""
+        """Row at which movement to a side begins."""
         low = int(np.searchsorted(self.time, self.time[crossing] - MAXIMUM_HALF_DURATION))
-        away = self.y[low : before + 1] - level
-        calm = np.flatnonzero((side * self.rate[low : before + 1] < CALM) & (np.abs(away) < SETTLED))
-        return low + (int(calm[-1]) if len(calm) else _nearest(away))
+        return self._calm_row(slice(low, before + 1), level, side * self.rate, -1)
 
     def _end(self, crossing: int, after: int, level: float, side: float) -> int:
-        """Row at which movement to a side is over: the first calm one near the level, else the nearest to it."""
+        """Row at which movement to a side is over."""
         high = min(int(np.searchsorted(self.time, self.time[crossing] + MAXIMUM_HALF_DURATION)), len(self.time) - 1)
-        away = self.y[after : high + 1] - level
-        calm = np.flatnonzero((side * self.rate[after : high + 1] < CALM) & (np.abs(away) < SETTLED))
-        return after + (int(calm[0]) if len(calm) else _nearest(away))
+        return self._calm_row(slice(after, high + 1), level, side * self.rate, 0)
+
+    def _calm_row(self, rows: slice, level: float, rate: FloatArray, pick: int) -> int:
+        """The first (0) or last (-1) row near a level at which it hardly moves, else the nearest to it."""
+        away = np.abs(self.y[rows] - level)
+        calm = np.flatnonzero((rate[rows] < CALM) & (away < SETTLED))
+        return int(rows.start) + int(calm[pick] if len(calm) else away.argmin() if len(away) else 0)
 
     def _open_start(self, part: slice) -> list[Rough]:
         """A track that begins far from its lane's centre, moving towards it: within a lane change."""
         begin, level = float(self.y[0]), float(self.base[0])
         towards = -np.sign(begin - level) * self.rate
-        near = np.abs(self.y[part] - level) < SETTLED
-        if abs(begin - level) <= SETTLED or towards[0] < CALM or not near.any():
+        is_near = (np.abs(self.y[part] - level) < SETTLED).any()
+        if abs(begin - level) <= SETTLED or towards[0] < CALM or not is_near:
             return []
-        done = np.flatnonzero(near & (towards[part] < CALM))
-        last = int(done[0]) if len(done) else _nearest(self.y[part] - level)
-        return [Rough(0, last, begin, level, 0, cut=True)]
+        return [Rough(0, self._calm_row(part, level, towards, 0), begin, level, 0, cut=True)]
 
     def _open_end(self, part: slice) -> list[Rough]:
         """A track that ends far from its lane's centre, moving away: within a lane change, or towards a ramp."""
         level, end = float(self.base[-1]), float(self.y[-1])
         away = np.sign(end - level) * self.rate
-        near = np.abs(self.y[part] - level) < SETTLED
-        if abs(end - level) <= SETTLED or away[-1] < CALM or not near.any():
+        is_near = (np.abs(self.y[part] - level) < SETTLED).any()
+        if abs(end - level) <= SETTLED or away[-1] < CALM or not is_near:
             return []
-        calm = np.flatnonzero(near & (away[part] < CALM))
-        first = part.start + (int(calm[-1]) if len(calm) else _nearest(self.y[part] - level))
+        first = self._calm_row(part, level, away, -1)
         return [Rough(first, len(self.y) - 1, level, end, 0, end - level, cut=True)]
 
     def _given_up(self, part: slice) -> list[Rough]:
@@ -240,10 +239,6 @@ class Course:
             Rough(begin, peak, level, height, 0, height - level, aborted=True),
             Rough(peak, end, height, level, 0, aborted=True),
         ]
-
-
-def _nearest(away: FloatArray) -> int:
-    return int(np.abs(away).argmin()) if len(away) else 0
 
 
 def _apart(rough: list[Rough]) -> list[Rough]:
