@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
-from xosc_lateral.workflows.recordings.gate import LANE_AGREEMENT
+from xosc_lateral.workflows.recordings.cuts import LANE_AGREEMENT
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks
 from xosc_lateral.workflows.recordings.importers.tracks import PlacedTracks
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph

@@ -19,7 +19,7 @@ from xosc_lateral.files.opendrive.write import SHOULDER, WIDTH_PIECE, WrittenLan
 from xosc_lateral.files.sumo import read_sumo_net
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.files.xml import root_tag
-from xosc_lateral.workflows.recordings.gate import require_along_lanes
+from xosc_lateral.workflows.recordings.cuts import require_along_lanes
 from xosc_lateral.workflows.recordings.importers import dlr_ht, levelx
 from xosc_lateral.workflows.recordings.importers.fcd import NET_ENDINGS, lanes_of_net, read_fcd
 from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH, Tracks, read_tracks, tracks_of
@@ -95,8 +95,8 @@ def _tracks(source: Path, road: Path | None, columns: TableMapping) -> RecordedT
 
 
 def _osi(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
+    from xosc_lateral.workflows.recordings.importers.osi import lanes_of
     from xosc_lateral.workflows.recordings.osi.read import read_osi
-    from xosc_lateral.workflows.recordings.osi.shapes import lanes_of
 
     recorded = read_osi(source)
     made = recorded.opendrive

@@ -18,8 +18,14 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.mapping import MappingLike
 from xosc_lateral.files.opendrive import read_opendrive
-from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings, Rows, cut_table
-from xosc_lateral.workflows.recordings.gate import MOVING_SPEED, require_lane_direction
+from xosc_lateral.workflows.recordings.cuts import (
+    DEFAULT_CUTS,
+    MOVING_SPEED,
+    CutSettings,
+    Rows,
+    cut_table,
+    require_lane_direction,
+)
 from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks, rate, read_tracks
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph, neighbour_columns
