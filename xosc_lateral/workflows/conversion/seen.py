@@ -17,7 +17,7 @@ from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.rows import blocks, stored
 from xosc_lateral.base.segment import Segment
-from xosc_lateral.drivers.fitting.answers import basis_of
+from xosc_lateral.drivers.fitting.neighbours import basis_of
 from xosc_lateral.drivers.model.profile import COLUMNS, SIDES, Basis, DriverProfile
 from xosc_lateral.drivers.model.sampled_offsets import FUTURE, PAST
 from xosc_lateral.drivers.model.sampling import Responses, responses_to

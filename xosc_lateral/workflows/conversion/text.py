@@ -7,7 +7,7 @@ from typing import Any
 
 from msgspec import structs
 
-from xosc_lateral.drivers.fitting.answers import basis_of, borrows, responses_in_words
+from xosc_lateral.drivers.fitting.neighbours import basis_of, borrows, responses_in_words
 from xosc_lateral.drivers.model.profile import SIDES, DriverProfile
 from xosc_lateral.workflows.conversion.result import ConversionProvenance, ConvertedScenario, Neighbours
 

@@ -138,8 +138,8 @@ class Unit:
         causalities = getattr(package, f"{names}Causality")
         variabilities = getattr(package, f"{names}Variability")
         made = getattr(package, kind)
-        given = {"causality": causalities[causality], "variability": variabilities[variability], **words}
-        self.register_variable(made(name, **given))  # type: ignore[attr-defined]
+        settings = {"causality": causalities[causality], "variability": variabilities[variability], **words}
+        self.register_variable(made(name, **settings))  # type: ignore[attr-defined]
 
     def _register(self, variable: Variable) -> None:
         if variable.unit is not None:
