@@ -403,45 +403,20 @@ static void act(terms_t *terms, int acts, double strength) {
 /* One factor of a component of an effect's quantity; NAN: there is none. */
 static double shaped(const shape_t *shape, double x) {
     const double a = shape->a, b = shape->b;
-    double result = x - a;
     switch (shape->kind) {
-    case MAGNITUDE:
-        result = fabs(x);
-        break;
-    case BEYOND:
-        result = x > a ? x - a : 0.0 * x;
-        break;
-    case SATURATING:
-        result = tanh((x - a) / b);
-        break;
-    case STEP_AT:
-        result = (x - a) * b > 0.0 ? 1.0 : 0.0;
-        break;
-    case HINGE_AT:
-        result = (x - a) * b > 0.0 ? (x - a) * b : 0.0;
-        break;
-    case EQUALS:
-        result = isnan(x) ? 0.0 : fmax(1.0 - fabs(x - a), 0.0);
-        break;
-    case PRESENCE:
-        result = isfinite(x) ? 1.0 : 0.0;
-        break;
-    case NEARNESS:
-        result = isnan(x) ? 0.0 : a / fmax(fabs(x), a);
-        break;
-    case PROXIMITY:
-        result = isnan(x) ? 0.0 : exp(-fabs(x) / a);
-        break;
-    case SINE:
-        result = sin(a * x);
-        break;
-    case COSINE:
-        result = cos(a * x);
-        break;
-    default: /* VALUE: from a */
-        break;
+    case MAGNITUDE: return fabs(x);
+    case BEYOND: return x > a ? x - a : 0.0 * x;
+    case SATURATING: return tanh((x - a) / b);
+    case STEP_AT: return (x - a) * b > 0.0 ? 1.0 : 0.0;
+    case HINGE_AT: return (x - a) * b > 0.0 ? (x - a) * b : 0.0;
+    case EQUALS: return isnan(x) ? 0.0 : fmax(1.0 - fabs(x - a), 0.0);
+    case PRESENCE: return isfinite(x) ? 1.0 : 0.0;
+    case NEARNESS: return isnan(x) ? 0.0 : a / fmax(fabs(x), a);
+    case PROXIMITY: return isnan(x) ? 0.0 : exp(-fabs(x) / a);
+    case SINE: return sin(a * x);
+    case COSINE: return cos(a * x);
+    default: return x - a; /* VALUE */
     }
-    return result;
 }
 
 static double component_of(const component_t *component, const double *columns) {
