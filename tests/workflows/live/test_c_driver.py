@@ -223,6 +223,17 @@ def test_the_cmake_file_builds_it(tmp_path: Path) -> None:
     assert subprocess.run([tmp_path / "b" / "example"], check=True, capture_output=True).stdout.count(b"\n") == 601
 
 
+def test_files_that_are_there_are_replaced_when_told_to(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["export", "c", "-p", "rural", "-o", f"{tmp_path}/c/", "-q"]
+    assert main(words) == 0
+    mine = tmp_path / "c" / "example.c"
+    mine.write_text("mine")
+    assert main(words) == 1 and "--force" in capsys.readouterr().err
+    assert mine.read_text() == "mine"
+    assert main([*words, "--force"]) == 0 and mine.read_text() != "mine"
+    assert main(["export", "c", "-o", str(mine)]) == 1 and "expected a folder" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("name", ["gcc", "clang"])
 def test_ten_thousand_odd_inputs_are_taken_or_refused_under_sanitizers(name: str, tmp_path: Path) -> None:
     program = (Path(__file__).resolve().parents[2] / "kit" / "odd_inputs.c").read_text(encoding="utf-8")
