@@ -26,8 +26,8 @@ _PEAK_SLOPE = {DynamicsShape.LINEAR: 1.0, DynamicsShape.CUBIC: 1.5, DynamicsShap
 class Transition:
     """A transition under way.
 
-    `dimension`: what the parameter is: seconds (`time`, `rate`) or metres (`distance`); `parameter_range`: range of the parameter
-    (a step has none), or peak slope for `rate` (its sign does not matter).
+    `dimension`: what the parameter is: seconds (`time`, `rate`) or metres (`distance`); `parameter_range`: its range (a
+    step has none), or peak slope for `rate` (its sign does not matter).
     """
 
     shape: DynamicsShape
