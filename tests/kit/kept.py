@@ -114,7 +114,7 @@ def played(seed: int) -> dict[str, Any]:
 
 
 def outputs(seed: int) -> dict[str, str]:
-    """Of a made scenario whose vehicles swerve: hash of what is written and noted for each target, or why nothing is."""
+    """Of a made scenario whose vehicles swerve: hash of what is written and noted for a target, or why nothing is."""
     hashes = {}
     with made_file(seed) as path:
         scenario, motion = read_scenario(path), play_scenario(path).motion
