@@ -152,7 +152,14 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         "Beyerer, 2024) and those of the profile are combined. Evaluation (1) combines the measured coarse part with "
         "the measured fine part, shifted in time: the best that the split allows.",
     )
-    page.table([_part_row(each) for each in scores.evaluations])
+    page.table(
+        [
+            {"evaluation": f"({each.number})", "coarse part": each.coarse, "fine part": each.fine}
+            | {"mean distance": each.distances.mean}
+            | {LABELS[name]: each.distances.by_metric[name] for name in ("std", "range", "diff_mean", "diff_std")}
+            for each in scores.evaluations
+        ]
+    )
     for each in scores.evaluations[:3]:
         _add_violins(page, each, f"({each.number}) Coarse part {each.coarse}, fine part {each.fine}.")
     page.section("Spectrum and autocorrelation")
@@ -214,17 +221,6 @@ def _add_violins(page: Page, each: PartEvaluation, caption: str) -> None:
         f"{caption} Bars: minimum, mean, maximum.",
         f"Ten pairs of violins; mean distance {each.distances.mean:.3f}.",
     )
-
-
-def _part_row(each: PartEvaluation) -> dict[str, object]:
-    shown = ("std", "range", "diff_mean", "diff_std")
-    return {
-        "evaluation": f"({each.number})",
-        "coarse part": each.coarse,
-        "fine part": each.fine,
-        "mean distance": each.distances.mean,
-        **{LABELS[name]: each.distances.by_metric[name] for name in shown},
-    }
 
 
 def _metric_rows(scores: SnippetScores) -> list[tuple[str, float, float]]:
