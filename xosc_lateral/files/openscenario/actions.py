@@ -87,10 +87,10 @@ def read_actions(owner: XmlElement, name: str, context: Context) -> list[Action]
 
 
 def _contents(owner: XmlElement) -> list[XmlElement]:
-    found: list[XmlElement] = []
+    elements: list[XmlElement] = []
     for child in owner.children():
-        found.extend(_contents(child) if child.tag in GROUPING else [child])
-    return found
+        elements.extend(_contents(child) if child.tag in GROUPING else [child])
+    return elements
 
 
 def _environment(e: XmlElement, context: Context) -> EnvironmentAction:
@@ -181,8 +181,8 @@ def _animation(e: XmlElement, context: Context) -> AnimationAction:
 def read_transition(e: XmlElement, context: Context) -> TransitionDynamics:
     """How a value goes to its target; a step needs no value."""
     is_step = e.choice("dynamicsShape", DynamicsShape, DynamicsShape.STEP) is DynamicsShape.STEP
-    given = {"value": 0.0} if is_step and e.optional_number("value", finite=False) is None else {}
-    return read_struct(TransitionDynamics, e, context, **given)
+    preset = {"value": 0.0} if is_step and e.optional_number("value", finite=False) is None else {}
+    return read_struct(TransitionDynamics, e, context, **preset)
 
 
 PRIVATE_ACTIONS: dict[str, Reader] = {

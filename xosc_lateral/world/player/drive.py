@@ -146,10 +146,10 @@ def _bridge_gap(state: EntityState, way: int) -> int | None:
     t = state.t
     if not at_end:
         beyond = state.s + way * EPSILON
-        found = network.lane_at(state.road, beyond, t - state.offset_t, lane_types=state.lane_types)
-        if not found.lane or found.lane == state.lane:
+        under_it = network.lane_at(state.road, beyond, t - state.offset_t, lane_types=state.lane_types)
+        if not under_it.lane or under_it.lane == state.lane:
             return None
-        state.move_to(state.road, found.lane, beyond, state.offset_t)
+        state.move_to(state.road, under_it.lane, beyond, state.offset_t)
         return way
     link = road.successor if way > 0 else road.predecessor
     if link is None or link.element_type != "road" or link.element_id not in network.road_ids:
@@ -160,10 +160,10 @@ def _bridge_gap(state: EntityState, way: int) -> int | None:
         t = -t
         _turn_round(state)
     s = 0.0 if entry > 0 else network.roads[index].length
-    found = network.lane_at(index, s, t, lane_types=state.lane_types)
-    if not found.lane:
+    under_it = network.lane_at(index, s, t, lane_types=state.lane_types)
+    if not under_it.lane:
         return None
-    state.move_to(index, found.lane, s, 0.0)
+    state.move_to(index, under_it.lane, s, 0.0)
     return entry
 
 
@@ -173,13 +173,13 @@ def _leave_narrow_lane(state: EntityState) -> None:
     if state.lane == 0 or network.lane_state_at(state.road, state.lane, state.s).width >= EPSILON:
         return
     t = state.t
-    nearest, found = inf, 0
+    nearest, lane_id = inf, 0
     for lane in network.lanes_at(state.road, state.s):
         away = abs(lane.centre_t - t) - 0.5 * lane.width
         if lane.width >= EPSILON and lane.type in state.lane_types and lane.id * state.lane > 0 and away < nearest:
-            nearest, found = away, lane.id
-    if found:
-        state.move_to(state.road, found, state.s, 0.0)
+            nearest, lane_id = away, lane.id
+    if lane_id:
+        state.move_to(state.road, lane_id, state.s, 0.0)
 
 
 def _note_surroundings(state: EntityState, way: int, *, blocked: bool) -> None:

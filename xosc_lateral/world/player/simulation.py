@@ -74,19 +74,19 @@ class TrafficSignals:
     def phase(self, controller: str, time: float) -> str | None:
         """Name of a controller's phase; None: unknown controller, or not started."""
         clock = self._clocks.get(controller)
-        found = None if clock is None else clock.phase_at(time)
-        return None if found is None else found[0].name
+        shown = None if clock is None else clock.phase_at(time)
+        return None if shown is None else shown[0].name
 
     def state(self, signal: str, time: float) -> str | None:
         """What a signal shows; None: nobody has said."""
         best: tuple[str, float] | None = None
         for clock in self._clocks.values():
-            found = clock.phase_at(time)
-            if found is not None and signal in (states := dict(found[0].states)):
-                best = states[signal], found[1]
-        given = self._set.get(signal)
-        if given is not None and (best is None or given[1] >= best[1]):
-            return given[0]
+            phase = clock.phase_at(time)
+            if phase is not None and signal in (states := dict(phase[0].states)):
+                best = states[signal], phase[1]
+        as_set = self._set.get(signal)
+        if as_set is not None and (best is None or as_set[1] >= best[1]):
+            return as_set[0]
         return None if best is None else best[0]
 
     def _start(self, controller: TrafficSignalController) -> float:

@@ -57,13 +57,13 @@ def pull_trailers(entities: Iterable[EntityState]) -> None:
 
 
 def _pull(tow: EntityState, trailer: EntityState) -> None:
-    pose, own = tow.plane, trailer.plane
+    pose, pulled = tow.plane, trailer.plane
     hitch_x = pose.x + _hitch(tow) * cos(pose.heading)
     hitch_y = pose.y + _hitch(tow) * sin(pose.heading)
-    dx, dy = own.x - hitch_x, own.y - hitch_y
+    dx, dy = pulled.x - hitch_x, pulled.y - hitch_y
     length = hypot(dx, dy)
     if length < 1e-9:
-        dx, dy, length = -cos(own.heading), -sin(own.heading), 1.0
+        dx, dy, length = -cos(pulled.heading), -sin(pulled.heading), 1.0
     reach = _coupler(trailer) / length
     heading = wrap(atan2(dy, dx) + pi)
     trailer.put_in_world(free(hitch_x + reach * dx, hitch_y + reach * dy, heading, nan))

@@ -93,24 +93,24 @@ def _way_ahead(state: EntityState, distance: float) -> FloatArray:
         return np.full(MAXIMUM_FRAMES, s)
     way = 1 if state.is_forward else -1
     road, (start, end) = state.network.roads[state.road], state.section
-    found = [s]
-    while start < s < end and len(found) <= MAXIMUM_FRAMES:
+    places = [s]
+    while start < s < end and len(places) <= MAXIMUM_FRAMES:
         low, high, element, begin, centre = road.stretch_of(state.lane, s)
         if isnan(centre):
             s += way * along_reference(state, s, distance)
-            found.append(s)
+            places.append(s)
         elif isinstance(element, Line | Arc):
             move = way * beside_line(element.curvature_at(s - begin), centre + state.offset_t, distance)
             room = (min(high, end) - s if move > 0.0 else s - max(low, start)) / abs(move)
-            count = 1 + int(min(room, MAXIMUM_FRAMES - len(found)))
+            count = 1 + int(min(room, MAXIMUM_FRAMES - len(places)))
             ways = np.add.accumulate(np.array([s] + [move] * count))  # one after the other: the same last bits
             ways = ways[1 : 2 + int(np.count_nonzero((ways[1:-1] >= low) & (ways[1:-1] < high)))]
-            found.extend(ways.tolist())
-            s = found[-1]
+            places.extend(ways.tolist())
+            s = places[-1]
         else:
-            while low <= s < high and len(found) <= MAXIMUM_FRAMES:
+            while low <= s < high and len(places) <= MAXIMUM_FRAMES:
                 s += way * beside_line(element.curvature_at(s - begin), centre + state.offset_t, distance)
-                found.append(s)
-    values = np.array(found[1:])
+                places.append(s)
+    values = np.array(places[1:])
     inside = (values > start) & (values < end)
     return values if inside.all() else values[: int(np.argmin(inside))]

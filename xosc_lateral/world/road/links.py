@@ -34,21 +34,21 @@ class Links:
     def _find_links(self, road: int, lane: int, direction: int) -> Iterator[LaneLink]:
         here = self.roads[road]
         link = here.successor if direction > 0 else here.predecessor
-        found = here.sections[-1 if direction > 0 else 0].by_id.get(lane)
-        if link is None or found is None or lane == 0:
+        lane_here = here.sections[-1 if direction > 0 else 0].by_id.get(lane)
+        if link is None or lane_here is None or lane == 0:
             return
         if link.element_type == "junction":
             onward = [
-                *self._through_junction(here, found, link, direction),
-                *self._back_through_direct_junction(here, found, link, direction),
+                *self._through_junction(here, lane_here, link, direction),
+                *self._back_through_direct_junction(here, lane_here, link, direction),
             ]
-            yield from onward or self._against_traffic(here, found, link, direction)
+            yield from onward or self._against_traffic(here, lane_here, link, direction)
             return
         other = self._index.get(link.element_id)
         if other is None:
             return
         contact = link.contact or self._contact_of(road, direction, other)
-        for target in self._linked_ids(here, found, direction, self.roads[other], contact):
+        for target in self._linked_ids(here, lane_here, direction, self.roads[other], contact):
             yield self._enter(other, target, contact)
 
     def _through_junction(self, here: Road, lane: Lane, link: RoadLink, direction: int) -> Iterator[LaneLink]:
@@ -162,12 +162,12 @@ class Links:
 def _lanes_linked_to(here: Road, lane: Lane, direction: int, other: Road, contact: str) -> list[int]:
     """Lanes at an end of another road that name this lane as their own link, the one that it touches first."""
     lanes = _end_section(other, contact).lanes
-    linked = [one.id for one in lanes if lane.id in (one.predecessors if contact == "start" else one.successors)]
+    linked = [each.id for each in lanes if lane.id in (each.predecessors if contact == "start" else each.successors)]
     if len(linked) < 2:
         return linked
     x, y = lane_pose(here, lane.id, here.length if direction > 0 else 0.0, 0.0)[:2]
-    ends = {one: lane_pose(other, one, 0.0 if contact == "start" else other.length, 0.0) for one in linked}
-    return sorted(linked, key=lambda one: round(hypot(ends[one].x - x, ends[one].y - y), 6))
+    ends = {each: lane_pose(other, each, 0.0 if contact == "start" else other.length, 0.0) for each in linked}
+    return sorted(linked, key=lambda each: round(hypot(ends[each].x - x, ends[each].y - y), 6))
 
 
 def _end_section(road: Road, contact: str) -> LaneSection:

@@ -105,7 +105,7 @@ def _just_before(s: float) -> float:
 
 def gone_on(
     links: Links,
-    found: LaneCoordinates,
+    located: LaneCoordinates,
     near: tuple[int, float],
     point: tuple[float, float],
     *,
@@ -116,12 +116,12 @@ def gone_on(
     At the entry of a junction its roads lie on each other, and a point that is between two vertices of a path has no
     other sign of where it goes. Without such a road it stays where it was found. So the reference player has it.
 
-    `found`: where it is without regard to where it came from. `near`: road and s [m] where it was a moment ago.
+    `located`: where it is without regard to where it came from. `near`: road and s [m] where it was a moment ago.
     `lane_types`: those that count.
     """
     before, s = near
-    if found.road == before or found.distance > LANE_TOLERANCE:
-        return found
+    if located.road == before or located.distance > LANE_TOLERANCE:
+        return located
     road = links.roads[before]
     s, t, _ = project_at(road, *point, s)
     lane = lane_at(road, before, s, t, lane_types).lane
@@ -132,4 +132,4 @@ def gone_on(
         onward = lane_at(other, link.road, s, t, lane_types)
         if abs(ahead) <= LANE_TOLERANCE and onward.distance <= LANE_TOLERANCE and onward.lane != 0:
             return onward
-    return found
+    return located

@@ -205,8 +205,8 @@ class RoadNetwork:
         [m], [-], [m]
         """
         road_ = self.roads[road]
-        found = road_.section_at(s).by_id.get(lane)
-        return (found or find_lane(road_, lane, s)).state_at(s)
+        info = road_.section_at(s).by_id.get(lane)
+        return (info or find_lane(road_, lane, s)).state_at(s)
 
     def lanes_at(self, road: int, s: float) -> tuple[LaneInfo, ...]:
         """All lanes of the cross-section but the centre lane 0, from left to right looking along s. `s` in [m]."""
@@ -249,10 +249,10 @@ class RoadNetwork:
 
         `near` = (road, s) where it was a moment ago makes it cheap, and distinguishes roads that lie on each other.
         """
-        found = self._index.world_to_lane_at(x, y, z, heading, near=near, lane_types=lane_types)
+        located = self._index.world_to_lane_at(x, y, z, heading, near=near, lane_types=lane_types)
         if near is None or near[0] < 0:
-            return found
-        return gone_on(self._links, found, near, (x, y), lane_types=lane_types)
+            return located
+        return gone_on(self._links, located, near, (x, y), lane_types=lane_types)
 
     # ---- where lanes lead --------------------------------------------------------------------------------------------
     def next_lanes(self, road: int, lane: int, direction: int) -> tuple[LaneLink, ...]:

@@ -101,10 +101,10 @@ class Road:
         element = self.elements[i]
         if isinstance(element, Line):
             return low, high, element, self.starts[i], 0.0
-        found = self.section_at(s).by_id.get(lane)
-        if found is None:
+        here = self.section_at(s).by_id.get(lane)
+        if here is None:
             return low, high, element, self.starts[i], nan
-        j = max(bisect_right(found.starts, s) - 1, 0)
-        low = max(low, found.starts[j] if j else -inf)
-        high = min(high, (*found.starts[j + 1 :], inf)[0])
-        return low, high, element, self.starts[i], nan if any(found.centre[j][1:]) else found.centre[j][0]
+        j = max(bisect_right(here.starts, s) - 1, 0)
+        low = max(low, here.starts[j] if j else -inf)
+        high = min(high, (*here.starts[j + 1 :], inf)[0])
+        return low, high, element, self.starts[i], nan if any(here.centre[j][1:]) else here.centre[j][0]

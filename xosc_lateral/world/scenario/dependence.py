@@ -94,18 +94,18 @@ class Dependence:
 
 def dependence(scenario: Scenario, unforeseeable: Collection[str]) -> Dependence:
     """What depends on vehicles under test or with controllers of their own; nothing if there are none."""
-    found = Dependence(set(unforeseeable))
+    result = Dependence(set(unforeseeable))
     if not unforeseeable:
-        return found
+        return result
     size = -1
-    while found.size() != size:
-        size = found.size()
-        _follow_init(scenario, found)
+    while result.size() != size:
+        size = result.size()
+        _follow_init(scenario, result)
         for story in scenario.storyboard.stories:
             for act in story.acts:
-                _follow_act(found, (story.name,), act)
-        found.entities |= {e.trailer for e in scenario.entities if e.trailer is not None and e.name in found.entities}
-    return found
+                _follow_act(result, (story.name,), act)
+        result.entities |= {e.trailer for e in scenario.entities if e.trailer is not None and e.name in result.entities}
+    return result
 
 
 def entity_references(content: object) -> Iterator[str]:
@@ -138,50 +138,52 @@ def refers_to(content: StoryboardElementStateCondition, path: Path) -> bool:
     return _DEPTH.get(content.element_type) == len(path) and path[len(path) - len(wanted) :] == wanted
 
 
-def _follow_init(scenario: Scenario, found: Dependence) -> None:
+def _follow_init(scenario: Scenario, dependence: Dependence) -> None:
     for private in scenario.storyboard.init.privates:
         for action in private.actions:
             # Where others are at the start is known.
-            if not isinstance(action.content, TeleportAction) and found.entities & set(
+            if not isinstance(action.content, TeleportAction) and dependence.entities & set(
                 entity_references(action.content)
             ):
-                found.entities.add(private.entity_ref)
+                dependence.entities.add(private.entity_ref)
 
 
-def _follow_act(found: Dependence, above: Path, act: Act) -> None:
+def _follow_act(dependence: Dependence, above: Path, act: Act) -> None:
     path = (*above, act.name)
-    begins = found.of_trigger(act.start_trigger)
-    stops = found.of_trigger(act.stop_trigger)
+    begins = dependence.of_trigger(act.start_trigger)
+    stops = dependence.of_trigger(act.stop_trigger)
     if begins:
-        found.begins.add(path)
+        dependence.begins.add(path)
     if begins or stops:
-        found.ends |= {path, above}
+        dependence.ends |= {path, above}
     for group in act.maneuver_groups:
-        again = group.maximum_execution_count > 1 and (*path, group.name) in found.ends
+        again = group.maximum_execution_count > 1 and (*path, group.name) in dependence.ends
         for maneuver, event in group.events():
             here = (*path, group.name, maneuver.name, event.name)
-            _follow_event(found, here, act, group, event, cut=begins or stops or again)
+            _follow_event(dependence, here, act, group, event, cut=begins or stops or again)
 
 
-def _follow_event(found: Dependence, path: Path, act: Act, group: ManeuverGroup, event: Event, *, cut: bool) -> None:
-    depends = cut or found.of_trigger(event.start_trigger)
+def _follow_event(
+    dependence: Dependence, path: Path, act: Act, group: ManeuverGroup, event: Event, *, cut: bool
+) -> None:
+    depends = cut or dependence.of_trigger(event.start_trigger)
     actors = set(actors_of(act, group, event))
     refers = False
     for action in event.actions:
         references = set(entity_references(action.content))
         moves = action.is_private and not isinstance(action.content, APPEARANCE)
-        steered = bool(references & found.entities)
+        steered = bool(references & dependence.entities)
         refers |= steered
         if moves and (depends or steered):
-            found.entities |= actors
+            dependence.entities |= actors
         if not action.is_private and depends:
-            found.entities |= references  # appears or is gone then
-            found.values |= {_value(action.content)} - {""}
+            dependence.entities |= references  # appears or is gone then
+            dependence.values |= {_value(action.content)} - {""}
     if depends:
-        found.begins |= {path, *((*path, action.name) for action in event.actions)}
-    if depends or refers or actors & found.entities:
-        found.ends |= {path[:depth] for depth in range(1, len(path) + 1)}
-        found.ends |= {(*path, action.name) for action in event.actions}
+        dependence.begins |= {path, *((*path, action.name) for action in event.actions)}
+    if depends or refers or actors & dependence.entities:
+        dependence.ends |= {path[:depth] for depth in range(1, len(path) + 1)}
+        dependence.ends |= {(*path, action.name) for action in event.actions}
 
 
 def actors_of(act: Act, group: ManeuverGroup, event: Event) -> tuple[str, ...]:

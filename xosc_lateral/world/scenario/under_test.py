@@ -25,12 +25,12 @@ EXTERNAL_NAMES = frozenset({"hero", "ego_vehicle"})
 def vehicles_under_test(scenario: Scenario) -> dict[str, str]:
     """Vehicles that the scenario leaves to somebody else, in its order, and what says so."""
     assigned = assigned_controllers(scenario)
-    found = {}
+    egos = {}
     for entity in scenario.entities:
         why = _why(entity, assigned[entity.name]) if entity.is_vehicle else ""
         if why:
-            found[entity.name] = why
-    return found
+            egos[entity.name] = why
+    return egos
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ def controlled_entities(scenario: Scenario) -> dict[str, Control]:
     for actors, action in _private_actions(scenario):
         for actor in actors if isinstance(action.content, CONTROLLER) else ():
             actions.setdefault(actor, []).append(action.content)
-    found = {}
+    reasons = {}
     for entity in scenario.entities:
         names, domains = dict[str, None](), Domains.NONE
         contents = actions.get(entity.name, [])
@@ -70,8 +70,8 @@ def controlled_entities(scenario: Scenario) -> dict[str, Control]:
             names[AUTOPILOT.name] = None
             domains = Domains.BOTH
         if domains:
-            found[entity.name] = Control(tuple(names), domains)
-    return found
+            reasons[entity.name] = Control(tuple(names), domains)
+    return reasons
 
 
 def _switched_on(contents: Iterable[object]) -> Iterator[Domains]:

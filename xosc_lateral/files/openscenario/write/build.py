@@ -47,13 +47,13 @@ def decimals(values: NDArray[np.float64], digits: Sequence[int]) -> tuple[str, .
     whole = np.rint(scaled)
     rounded = whole / 10.0 ** np.asarray(digits) + 0.0  # no negative zero
     text = msgspec.json.encode(rounded.ravel().tolist()).decode()
-    found = text[1:-1].replace(".0,", ",").removesuffix(".0").split(",")
+    numbers = text[1:-1].replace(".0,", ",").removesuffix(".0").split(",")
     size = np.abs(scaled)
     odd = np.abs(np.abs(scaled - whole) - 0.5) <= 1e-6 + size * np.finfo(np.float64).eps
     odd |= (whole != 0.0) & (np.abs(rounded) < 1e-5) | (size >= 2.0**50)
     for row, column in np.argwhere(odd).tolist():
-        found[row * len(digits) + column] = decimal(values[row, column], digits[column])
-    return tuple(found)
+        numbers[row * len(digits) + column] = decimal(values[row, column], digits[column])
+    return tuple(numbers)
 
 
 def sub(parent: etree._Element, path: str, **attributes: str) -> etree._Element:
@@ -157,12 +157,12 @@ def insert_indented(parent: etree._Element, index: int, element: etree._Element)
     depth = sum(1 for _ in parent.iterancestors()) + 1
     if isinstance(element.tag, str):
         etree.indent(element, indent, level=depth)
-    own, closing = "\n" + indent * depth, "\n" + indent * (depth - 1)
+    opening, closing = "\n" + indent * depth, "\n" + indent * (depth - 1)
     if len(parent) == 0:
-        parent.text = own
+        parent.text = opening
     elif index >= len(parent):
-        parent[-1].tail = own
-    element.tail = closing if index >= len(parent) else own
+        parent[-1].tail = opening
+    element.tail = closing if index >= len(parent) else opening
     parent.insert(index, element)
 
 

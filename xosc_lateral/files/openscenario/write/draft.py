@@ -64,9 +64,9 @@ class Draft:
     @property
     def storyboard(self) -> etree._Element:
         """In the tree."""
-        found = child_of(self.root, "Storyboard")
-        assert found is not None
-        return found
+        board = child_of(self.root, "Storyboard")
+        assert board is not None
+        return board
 
     @property
     def init_actions(self) -> etree._Element:
@@ -90,10 +90,10 @@ class Draft:
     def override_parameters(self) -> None:
         """Write the values that parameters were played with, where they are not the file's own."""
         declarations = self.root.findall("{*}ParameterDeclarations/{*}ParameterDeclaration")
-        own = Scope({parameter_name(item.get("name") or ""): item.get("value") or "" for item in declarations})
+        declared = Scope({parameter_name(item.get("name") or ""): item.get("value") or "" for item in declarations})
         for item in declarations:
             parameter = self.scenario.parameters.get(parameter_name(item.get("name") or ""))
-            if parameter is not None and own.value(parameter.name) != parameter.value:
+            if parameter is not None and declared.value(parameter.name) != parameter.value:
                 item.set("value", parameter.value)
 
 

@@ -76,13 +76,13 @@ def dropped_reason(action: Action, scenario: Scenario) -> str | None:
 
 def note_dropped(draft: Draft, played: Iterable[PlayedAction]) -> None:
     """Name the actions that are neither motion nor kept, with reasons, each place once."""
-    found: dict[tuple[Place, str | None], Unsupported] = {}
+    unsupported: dict[tuple[Place, str | None], Unsupported] = {}
     for item in played:
         reason = dropped_reason(item.action, draft.scenario) if item.path != ("Init",) else None
         if reason is not None:
             place = item.action.place
-            found[place, item.actor] = Unsupported(type(item.action.content).__name__, place, reason)
-    draft.removed += found.values()
+            unsupported[place, item.actor] = Unsupported(type(item.action.content).__name__, place, reason)
+    draft.removed += unsupported.values()
 
 
 def _copied(source: etree._Element, mine: Mapping[str, str], scope: Scope) -> etree._Element:

@@ -175,15 +175,15 @@ def motion_unknown_to(
     if version >= scenario.header.version:
         return {}
     root = parse_xml(scenario.source, scenario.path)
-    found: dict[str, str] = {}
+    reasons: dict[str, str] = {}
     for played in motion.actions:
         actor, content = played.actor, played.action.content
-        if actor is None or actor not in entities or actor in found or not isinstance(content, MOTION):
+        if actor is None or actor not in entities or actor in reasons or not isinstance(content, MOTION):
             continue
         what = newer_than(source_of(played.action, scenario, root), version)
         if what is not None:
-            found[actor] = f"version {build.named(version)} has no {what}"
+            reasons[actor] = f"version {build.named(version)} has no {what}"
     if version < TRAILERS_SINCE:
         trailers = sorted(pulled_entities(scenario, motion) & set(entities))
-        found |= dict.fromkeys(trailers, f"version {build.named(version)} has no Trailer")
-    return found
+        reasons |= dict.fromkeys(trailers, f"version {build.named(version)} has no Trailer")
+    return reasons

@@ -237,8 +237,8 @@ def _pitches(corners: Sequence[Corner], lengths: Sequence[float]) -> tuple[float
         if ahead >= 0 and lengths[ahead + 1] - lengths[ahead] > EPSILON:
             climb = -atan2(heights[ahead + 1] - heights[ahead], lengths[ahead + 1] - lengths[ahead])
         before = pitches[-1] if pitches else 0.0
-        found = corner.pitch if corner.pitch == corner.pitch else climb
-        pitches.append(found if found == found else before)
+        tilt = corner.pitch if corner.pitch == corner.pitch else climb
+        pitches.append(tilt if tilt == tilt else before)
     return tuple(pitches)
 
 
