@@ -8,8 +8,17 @@ from math import hypot, inf, nextafter
 from xosc_lateral.world.road.index import LANE_TOLERANCE
 from xosc_lateral.world.road.lanes import Lane, LaneSection
 from xosc_lateral.world.road.positions import Advance, LaneCoordinates, LaneLink
-from xosc_lateral.world.road.projection import find_lane, lane_at, lane_pose, normal_angle, project_at
-from xosc_lateral.world.road.road import Connection, Junction, Road, RoadLink
+from xosc_lateral.world.road.projection import project_at
+from xosc_lateral.world.road.road import (
+    Connection,
+    Junction,
+    Road,
+    RoadLink,
+    find_lane,
+    lane_at,
+    lane_pose,
+    normal_angle,
+)
 
 End = tuple[int, int]
 """A road as entered: its index, and +1 (at its start, to go along s) or -1 (at its end)."""

@@ -36,8 +36,7 @@ from xosc_lateral.world.road.positions import (
     RoadPath,
     RouteStep,
 )
-from xosc_lateral.world.road.projection import find_lane, lane_at, lane_pose, surface_pose
-from xosc_lateral.world.road.road import Junction, Road
+from xosc_lateral.world.road.road import Junction, Road, find_lane, lane_at, lane_pose, surface_pose
 from xosc_lateral.world.road.routes import path_between, route
 from xosc_lateral.world.road.surface import HeaderOffset
 from xosc_lateral.world.road.tables import NetworkTables
