@@ -10,12 +10,12 @@ from lxml import etree
 from msgspec import Struct
 
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.files.openscenario.actions import READERS
 from xosc_lateral.files.openscenario.catalogs import Boundary, Catalogs, allowed_roots
 from xosc_lateral.files.openscenario.context import Context, read_struct
 from xosc_lateral.files.openscenario.declarations import read_declarations, read_variables
 from xosc_lateral.files.openscenario.element import XmlElement, local_name, means_true
 from xosc_lateral.files.openscenario.entities import read_entities
-from xosc_lateral.files.openscenario.storyboard import READERS
 from xosc_lateral.files.xml import document_of, read_document
 from xosc_lateral.world.scenario import (
     FileHeader,

@@ -13,9 +13,9 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from xosc_lateral.world.player import boxes
+from xosc_lateral.world.player.drive import drawn_by
 from xosc_lateral.world.player.paths.base import nearest_s
 from xosc_lateral.world.player.state import NO_ROAD, EntityState
-from xosc_lateral.world.player.trailers import drawn_by
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.road.positions import RoadPath
 from xosc_lateral.world.scenario.enums import CoordinateSystem, RelativeDistanceType

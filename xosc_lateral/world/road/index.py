@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from xosc_lateral.base.arrays import FloatArray, Int32Array
-from xosc_lateral.world.road.places import lane_at
 from xosc_lateral.world.road.positions import LaneCoordinates, LanePositions
 from xosc_lateral.world.road.projection import Feet, project, project_at
+from xosc_lateral.world.road.road import lane_at
 from xosc_lateral.world.road.samples import Candidates, Samples
 from xosc_lateral.world.road.tables import NetworkTables
 

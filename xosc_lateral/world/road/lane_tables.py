@@ -16,8 +16,7 @@ from numpy.typing import ArrayLike
 from xosc_lateral.base.arrays import FloatArray, Int32Array
 from xosc_lateral.world.road.lanes import DRIVING, MINIMUM_LANE_WIDTH, Lane
 from xosc_lateral.world.road.piecewise import IndexLike, Lookup
-from xosc_lateral.world.road.places import find_lane, limit_at
-from xosc_lateral.world.road.road import Road
+from xosc_lateral.world.road.road import Road, find_lane, limit_at
 
 CHUNK = 8192
 """Places evaluated together: the two dozen temporary arrays of a chunk then stay in the processor's cache."""

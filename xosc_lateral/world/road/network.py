@@ -21,10 +21,8 @@ from xosc_lateral.base.arrays import FloatArray, Int32Array
 from xosc_lateral.base.errors import PlaybackError
 from xosc_lateral.world.road.index import SurfaceIndex
 from xosc_lateral.world.road.lanes import DRIVING
-from xosc_lateral.world.road.links import Links
-from xosc_lateral.world.road.moving import Chooser, advance, gone_on, straightest
+from xosc_lateral.world.road.links import Chooser, Links, advance, gone_on, straightest
 from xosc_lateral.world.road.piecewise import IndexLike
-from xosc_lateral.world.road.places import find_lane, lane_at, lane_pose, surface_pose
 from xosc_lateral.world.road.positions import (
     Advance,
     LaneCoordinates,
@@ -38,7 +36,7 @@ from xosc_lateral.world.road.positions import (
     RoadPath,
     RouteStep,
 )
-from xosc_lateral.world.road.road import Junction, Road
+from xosc_lateral.world.road.road import Junction, Road, find_lane, lane_at, lane_pose, surface_pose
 from xosc_lateral.world.road.routes import path_between, route
 from xosc_lateral.world.road.surface import HeaderOffset
 from xosc_lateral.world.road.tables import NetworkTables

@@ -13,8 +13,7 @@ from itertools import pairwise
 from math import inf
 
 from xosc_lateral.world.road.lanes import DRIVING
-from xosc_lateral.world.road.links import End, Links
-from xosc_lateral.world.road.moving import follow_section
+from xosc_lateral.world.road.links import End, Links, follow_section
 from xosc_lateral.world.road.positions import RoadPath, RouteStep
 from xosc_lateral.world.road.road import Road
 

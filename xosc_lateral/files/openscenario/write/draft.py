@@ -13,8 +13,8 @@ from xosc_lateral.files.openscenario.declarations import final, parameter_name
 from xosc_lateral.files.openscenario.element import at_node, child_of
 from xosc_lateral.files.openscenario.provenance import refuse_converted
 from xosc_lateral.files.openscenario.write import build
+from xosc_lateral.files.openscenario.write.build import Vertices
 from xosc_lateral.files.openscenario.write.target import STANDARD, TargetPlayer
-from xosc_lateral.files.openscenario.write.vertices import Vertices
 from xosc_lateral.files.xml import parse_xml, read_document
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.scenario import Action, Scenario

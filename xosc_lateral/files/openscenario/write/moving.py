@@ -13,9 +13,8 @@ from msgspec import structs
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.rows import blocks, columns, stored
 from xosc_lateral.files.openscenario.write import build
-from xosc_lateral.files.openscenario.write.build import Pose
+from xosc_lateral.files.openscenario.write.build import ColumnsOf, Pose, TimedVertices
 from xosc_lateral.files.openscenario.write.draft import Draft
-from xosc_lateral.files.openscenario.write.vertices import ColumnsOf, TimedVertices
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.motion.path_pieces import (
     LEAST_SPACING,

@@ -12,15 +12,16 @@ from xosc_lateral.files.openscenario.element import child_of
 from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.carla import add_drives, start_of
 from xosc_lateral.files.openscenario.write.draft import Draft, WrittenScenario, source_of
-from xosc_lateral.files.openscenario.write.entities import remove_controllers, rewrite_init
-from xosc_lateral.files.openscenario.write.fit import finish
-from xosc_lateral.files.openscenario.write.moving import Moving, add_trajectories, moving_entities
-from xosc_lateral.files.openscenario.write.non_motion_actions import (
+from xosc_lateral.files.openscenario.write.entities import (
     add_kept_actions,
     dropped_reason,
     is_replaced,
     note_dropped,
+    remove_controllers,
+    rewrite_init,
 )
+from xosc_lateral.files.openscenario.write.fit import finish
+from xosc_lateral.files.openscenario.write.moving import Moving, add_trajectories, moving_entities
 from xosc_lateral.files.openscenario.write.target import STANDARD, Player, TargetPlayer
 from xosc_lateral.files.openscenario.write.versions import newer_than
 from xosc_lateral.files.xml import parse_xml

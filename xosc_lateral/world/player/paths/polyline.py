@@ -18,9 +18,9 @@ from math import atan2, hypot, nan
 from msgspec import Struct
 from msgspec.structs import replace
 
-from xosc_lateral.world.player.angles import difference, wrap
 from xosc_lateral.world.player.paths.base import Path, PathPoint
 from xosc_lateral.world.player.transition import EPSILON
+from xosc_lateral.world.road.positions import difference, wrap
 
 CORNER = 2.0
 """Around a corner, the heading turns over this length before and after it (or half the piece). [m]"""
