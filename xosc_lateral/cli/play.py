@@ -19,6 +19,7 @@ from xosc_lateral.cli.words import (
     Road,
     RoadPath,
     TimeLimit,
+    Verbose,
     Written,
     command,
     pairs,
@@ -111,7 +112,7 @@ def view(
     parameter: Parameters = None, allow: Allow = None, time_limit: TimeLimit = None,
     open_page: Annotated[bool | None, typer.Option("--open/--no-open",
         help="Open the page in the browser. Default: from a terminal.")] = None,
-    force: Force = False, quiet: Quiet = False,
+    force: Force = False, quiet: Quiet = False, verbose: Verbose = False,
 ) -> None:
     """Play any scenario in the browser, on one self-contained page; adds no lateral movement."""
     from xosc_lateral import play

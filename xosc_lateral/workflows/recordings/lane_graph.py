@@ -107,8 +107,7 @@ def neighbour_columns(
     *,
     scale: FloatArray | float = 1.0,
 ) -> dict[str, FloatArray]:
-    """Columns of leader and neighbours, see `find_neighbours`, at every instant, whoever is missing in a frame
-    included.
+    """Columns of leader and neighbours, see `find_neighbours`, at every instant, whoever misses a frame included.
 
     Rows sorted by vehicle and time, shape (n,); `piece`: -1: in no lane; `middle`: of the vehicle, along its piece. [m]
     `step`: usual from row to row. [s] `scale`: metres along the lane per metre of `middle`. [-]

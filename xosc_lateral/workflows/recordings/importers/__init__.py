@@ -23,17 +23,17 @@ Importer: TypeAlias = "Callable[..., Imported | pd.DataFrame]"
 """A source's path, and options by name, into a drive table, or into an `Imported` with a record of its own."""
 
 IMPORTERS = {
-    "dlr-ht": "xosc_lateral.workflows.recordings.importers.dlr_ht:import_dlr_ht",
-    "levelx": "xosc_lateral.workflows.recordings.importers.levelx:import_levelx",
-    "openacc": "xosc_lateral.workflows.recordings.importers.openacc:import_openacc",
-    "mf4": "xosc_lateral.workflows.recordings.importers.mf4:import_mf4",
-    "tracks": "xosc_lateral.workflows.recordings.importers.tracks:import_tracks",
-    "table": "xosc_lateral.workflows.recordings.importers.foreign_table:import_table",
-    "osi": "xosc_lateral.workflows.recordings.importers.osi:import_osi",
-    "fcd": "xosc_lateral.workflows.recordings.importers.fcd:import_fcd",
-    "commonroad": "xosc_lateral.workflows.recordings.importers.commonroad:import_commonroad",
+    "dlr-ht": ".dlr_ht:import_dlr_ht",
+    "levelx": ".levelx:import_levelx",
+    "openacc": ".openacc:import_openacc",
+    "mf4": ".mf4:import_mf4",
+    "tracks": ".tracks:import_tracks",
+    "table": ".foreign_table:import_table",
+    "osi": ".osi:import_osi",
+    "fcd": ".fcd:import_fcd",
+    "commonroad": ".commonroad:import_commonroad",
 }
-"""Format -> its reader, loaded when it is wanted."""
+"""Format -> module here and function that read it, loaded when they are wanted."""
 
 GROUP = "xosc_lateral.importers"  # entry points of further readers
 
@@ -42,7 +42,7 @@ def find_importer(name: str) -> Importer:
     """The reader of a format. Raises `FormatError` if there is none."""
     if name in IMPORTERS:
         module, _, function = IMPORTERS[name].partition(":")
-        return cast("Importer", getattr(import_module(module), function))
+        return cast("Importer", getattr(import_module(module, __name__), function))
     offered: dict[str, Any] = plugins(GROUP)
     if name not in offered:
         raise FormatError(f"no importer {name!r}; there are {', '.join([*IMPORTERS, *offered])}")
