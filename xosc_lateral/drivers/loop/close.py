@@ -242,11 +242,8 @@ def _that_helps(setting: Setting, found: Identified, progress: Progress) -> tupl
 
 
 def _most_harmful(selection: Selection, scored: HeldOut) -> Term | None:
-    """The accepted term with which held-out mean or spread by its own quantity differ most from what is measured.
-
-    Of those that are not sure to gain likelihood there, and by more than half samples differ: an error grows by chance
-    as well.
-    """
+    """The accepted term, not sure to gain, whose own held-out mean or spread is worst predicted, beyond what halves
+    differ."""
     worst: tuple[float, Term | None] = (1.0, None)
     for one, key, effects in _accepted(selection):
         if one.gain is not None and one.gain.interval[0] > 0.0:

@@ -92,11 +92,8 @@ class _Scored:
         return self.dictionary.timed(self.best), upper_tail(float(self.scores[self.best]), self.maxima)
 
     def contenders(self) -> list[int]:
-        """Best entry of each of the best sets of columns, and of each single column in the best of them.
-
-        A product of a column and what is nearly constant wherever it acts is that column: refined, the cheaper one
-        wins.
-        """
+        """Best entry of the best sets of columns, and of each column of the best: of a product with what hardly varies,
+        one factor."""
         scores, columns = self.scores, [candidate.columns for candidate in self.dictionary.candidates]
         order = np.argsort(-scores, kind="stable")
         best: dict[tuple[str, ...], int] = {}
@@ -121,14 +118,10 @@ class ColumnSearch:
     def outcome(self) -> Outcome | None:
         """Best candidate; None: there is no candidate.
 
-        The p-value is that of a score test [1]_: data and null are whitened alike, by what is left *without* the
+        The p-value is that of a score test (Rao 1948): data and null are whitened alike, by what is left *without* the
         candidate. To whiten again with it in would give a slow column credit for the memory that it has just explained
         away, which no rotation gets: on drives without an effect such p-values fall below 0.005 seven times as often as
         they should.
-
-        References
-        ----------
-        .. [1] C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948.
         """
         refused = {term.columns for term in of_kind(self.fitted, self.kind)}  # one column, one finding
         there = len(refused)
@@ -145,11 +138,7 @@ class ColumnSearch:
         return Outcome(None, min(refused), 1.0) if len(refused) > there else None
 
     def probability_of(self, columns: tuple[str, ...]) -> float:
-        """p-value of the best candidate of given columns, against the same null as in `outcome`.
-
-        The fit is one without a term of these columns. Where it has a product with one of them, that product is known
-        as it is, not with every shape of its factors: nothing would be left to test.
-        """
+        """p-value of the best candidate of given columns by the null of `outcome`, in a fit without a term of them."""
         scored = self._scored(self.kind.problem(self.fitted), spared=columns)
         if scored is None:
             return 1.0
@@ -181,11 +170,8 @@ class ColumnSearch:
         draws: int = NULL_DRAWS,
         spared: tuple[str, ...] = (),
     ) -> _Scored | None:
-        """Score what is neither barred nor refused; None: nothing is left.
-
-        Known is what the model has already, and the whole cross-basis of its columns, but for one set that is `spared`:
-        nothing may be blamed on their likes.
-        """
+        """Score what is neither barred nor refused beside the model and the cross-basis of its columns, but for those
+        `spared`."""
         kind, search = self.kind, self.search
         if dictionary is None:
             dictionary = build_dictionary(search.quantities, problem.whitener)
@@ -270,13 +256,9 @@ class ColumnSearch:
 def grows(before: Fitted, after: Fitted) -> bool:
     """Whether the movement that is left is larger with a term than without it, beyond chance.
 
-    Generalised and ordinary least squares agree on a quantity that moves the driver [1]_. What was sized on a few odd
-    seconds alone, as those after a lane change or around a jump of the camera, does not lie in between the rest of the
-    time: taken out, it puts in more than was there, and an autoregression close to a unit root lets it.
-
-    References
-    ----------
-    .. [1] J. Hausman, "Specification tests in econometrics", Econometrica 46, 1978.
+    Generalised and ordinary least squares agree on a quantity that moves the driver (Hausman 1978). What was sized on a
+    few odd seconds alone, as those after a lane change or around a jump of the camera, does not lie in between the rest
+    of the time: taken out, it puts in more than was there, and an autoregression close to a unit root lets it.
     """
     rows = np.flatnonzero(before.coarse.valid)
     saved = np.square(before.movement * before.scale)[rows] - np.square(after.movement * after.scale)[rows]

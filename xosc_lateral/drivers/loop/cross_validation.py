@@ -69,8 +69,6 @@ def held_out_gain(fitted: Fitted, rest: Fitted, coarse: Coarse, held: BoolArray)
     autoregression fitted beside a term differs by what the term takes out of the movement, and is judged by *every*
     held-out row, also where the term does nothing: on the motorway recording it cost 0.3 to 0.5 nat a vehicle, as much
     as the neighbour on the right gains. The held-out rows' own levels of place and spread are taken from themselves.
-
-    `fitted` and `rest`: without the held-out rows; `coarse`: with the held-out rows valid; `held`, shape (n,).
     """
     return _log_likelihood(fitted, fitted, coarse, held) - _log_likelihood(rest, fitted, coarse, held)
 

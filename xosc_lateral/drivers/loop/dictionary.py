@@ -132,10 +132,7 @@ def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:
 
 
 def respond_by_second(values: Reals, response_s: float, drive: IndexArray) -> FloatArray:
-    """Means over each second of a first-order lag of gain 1, settled where a drive starts; like `values`, (n, k).
-
-    Exact for values that stay the same for the second. `drive`: of each row, shape (n,), increasing.
-    """
+    """Means over each second of a first-order lag of gain 1, settled where a drive starts; shape (n, k)."""
     from scipy.signal import lfilter
 
     keep = float(np.exp(-1.0 / response_s))
@@ -156,22 +153,8 @@ def score_entries(
     draws: int = NULL_DRAWS,
     of_mean: bool = True,
 ) -> tuple[FloatArray, FloatArray]:
-    """Squared score of every entry less its cost, -inf if barred, and the largest of each of the null's residuals.
-
-    Parameters
-    ----------
-    residual : array, shape (seconds,)
-        Whitened, valid seconds only.
-    known : array, shape (seconds, k)
-        Orthonormal; partialled out of residual and entries.
-    barred : bool array, shape (entries,)
-    drive : int array, shape (seconds,)
-        Drive that each row is of.
-    draws : int
-        Of the null; without any, no maxima.
-    of_mean : bool
-        Entries shift the mean, so that loudness where they act is no evidence; of a spread it is all there is.
-    """
+    """Squared score of every entry less its cost, -inf if barred, and the largest of each of the null's residuals;
+    beside `known`, orthonormal columns. Loudness where entries act is evidence of a spread, not of a mean."""
     left = beside(known, residual)
     left = left / max(float(np.sqrt(np.mean(left**2))), 1e-300)
     if len(dictionary) == 0 or barred.all():
@@ -200,10 +183,8 @@ def score_entries(
 def _beside_loud_stretches(
     scores: FloatArray, dictionary: Dictionary, left: FloatArray, basis: SingleArray
 ) -> FloatArray:
-    """Scores of the best entries beside the squares of the very rows that they rest on, where these are larger [2]_.
-
-    The null deals residuals anew, and loses that they are larger where the column is: in bends, say.
-    """
+    """Scores of the best entries beside the squares of the very rows that they rest on [2]_: the null loses where they
+    are large."""
     order = np.argsort(-scores)[:ROBUST]
     order = order[np.isfinite(scores[order])]
     rows = dictionary.rows[order].astype(np.float64)
@@ -235,21 +216,8 @@ def beside_parts(
     spans: Callable[[str], FloatArray],
     within: float,
 ) -> FloatArray:
-    """Scores of products beside all that either column does alone, where that is less: they have to give more.
-
-    Of those alone that may be within a distance of the best. A number that goes with an angle is a vector's component,
-    one quantity and no product of two.
-
-    Parameters
-    ----------
-    scores : array, shape (entries,)
-        As `score_entries` gives them.
-    residual, known
-        As `score_entries` got them.
-    spans : callable
-        Column -> rows that it may explain alone, shape (seconds, k).
-    within : float
-    """
+    """Scores of products, where that is less, beside all that either column does alone (`spans`); not of a vector's
+    components."""
     left = beside(known, residual)
     left = left / max(float(np.sqrt(np.mean(left**2))), 1e-300)
     members: dict[tuple[str, ...], list[int]] = {}
@@ -277,14 +245,9 @@ def draw_null(residual: FloatArray, drive: IndexArray, rng: np.random.Generator,
 
     Few long drives: rotated by at least `LEAST_SHIFT_S`, cut into blocks, and these dealt in random order. Rotations
     alone are few: a column that changes within a minute sees no more than fifty of them in a drive of fifty minutes.
-    Many short drives: the sign of each whole drive drawn anew (a wild cluster bootstrap [1]_). Drives are independent,
-    and what an autoregression fitted to runs of a minute leaves in a drive's slow movement and first rows stays beside
-    the columns of that very drive; rotation would spread it evenly.
-
-    References
-    ----------
-    .. [1] A. C. Cameron, J. B. Gelbach, D. L. Miller, "Bootstrap-based improvements for inference with clustered
-       errors", Review of Economics and Statistics 90, 2008.
+    Many short drives: the sign of each whole drive drawn anew (a wild cluster bootstrap; Cameron, Gelbach, Miller
+    2008). Drives are independent, and what an autoregression fitted to runs of a minute leaves in a drive's slow
+    movement and first rows stays beside the columns of that very drive; rotation would spread it evenly.
     """
     seconds = len(residual)
     names, own = np.unique(drive, return_inverse=True)

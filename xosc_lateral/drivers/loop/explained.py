@@ -53,21 +53,8 @@ class Explained:
 def explained_share(
     starts: Sequence[Fitted], finals: Sequence[Fitted], quantities: Quantities, coarse: Coarse, blocks: IntArray
 ) -> Explained | None:
-    """Compare what each fold's effects and its free response predict of the rows that it was not fitted on.
-
-    Parameters
-    ----------
-    starts, finals : sequence of Fitted
-        Of each fold, without its rows: without the effects, and with those that it chose.
-    quantities : Quantities
-        Of all columns that may act.
-    coarse : Coarse
-        With all rows.
-    blocks : int array, shape (n,)
-        Of each second; block b is held out of fold b modulo the number of folds.
-
-    None where nothing can be held out, or no column can act.
-    """
+    """What each fold's effects, and its free response, predict of rows that it was not fitted on; None if nothing can
+    be held out."""
     courses = _courses(quantities)
     if len(finals) < 2 or not courses.shape[1]:
         return None

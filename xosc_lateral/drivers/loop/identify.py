@@ -76,11 +76,8 @@ def identify(
     roles: Mapping[str, str] = MappingProxyType({}),
     progress: Progress = lambda share, what: None,
 ) -> Identified:
-    """Select terms, and keep those that predict blocks on which they were neither selected nor sized.
-
-    `initial` terms are in the model already, `excluded` columns are not tested; `roles` are what columns are declared
-    to be, see `columns.roles_of`.
-    """
+    """Select terms beside the `initial` ones, and keep those that predict blocks on which they were neither selected
+    nor sized."""
     from threadpoolctl import threadpool_limits
 
     usable = usable_columns(coarse.timeline, excluded, roles)
@@ -134,10 +131,7 @@ def usable_columns(
 
 
 def initial_terms(base: DriverProfile, timeline: Timeline) -> tuple[Term, ...]:
-    """The base's own effects as far as the table has their columns: they are refitted, not found anew.
-
-    The loop knows responses by one first-order lag, so that several in a row become one that is as late.
-    """
+    """The base's own effects as far as the table has their columns, refitted, several lags in a row as one as late."""
     there = {"lane_width", *timeline.context}
     terms: list[Term] = []
     for effect in base.effects:

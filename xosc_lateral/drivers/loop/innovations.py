@@ -35,10 +35,8 @@ def _whitener(movement: FloatArray, valid: BoolArray, drive: IntArray, scale: Fl
 def innovations(
     moved: FloatArray, responses: FloatArray, valid: BoolArray, drive: IntArray, scale: FloatArray
 ) -> FloatArray:
-    """White rows of variance about 1, shape (n,), young runs by their own size; 0 where invalid.
-
-    `moved`, shape (n,): offset less levels [m]; `responses`, shape (n,): what columns did to it [m].
-    """
+    """White rows of variance about 1, shape (n,), young runs by their own size, of offsets less levels and responses
+    [m]."""
     if np.any(responses):
         responses = smoothed_as_seen(moved, responses, valid, drive, scale)
     left = np.where(valid, moved - responses, 0.0)
@@ -50,11 +48,8 @@ def innovations(
 def smoothed_as_seen(
     moved: FloatArray, responses: FloatArray, valid: BoolArray, drive: IntArray, scale: FloatArray
 ) -> FloatArray:
-    """Responses, shape (n,), through the filter of five seconds and gain one that leaves least of them. [m]
-
-    Least squares in the innovations of the movement with the responses in: a car and a provider of tracks smooth them,
-    and taken out with their edges they would put these *in*, where next to nothing moves.
-    """
+    """Responses through the five-second filter of gain one that leaves least of them: providers smooth them, edges and
+    all. [m]"""
     whitener = _whitener(np.where(valid, moved / scale, 0.0), valid, drive, scale)
     seconds = np.arange(len(responses))
     shifted = [responses[np.clip(seconds - shift, 0, len(seconds) - 1)] for shift in SMOOTHING_S]

@@ -58,10 +58,7 @@ def slow_rows(fitted: Fitted) -> tuple[FloatArray, Whitener]:
 
 
 def low_frequencies(values: FloatArray, coarse: Coarse, valid: BoolArray, shortest_s: float) -> FloatArray:
-    """Cosine transform of each drive that lasts, without the mean and what is quicker, shape (frequencies, k).
-
-    `values` of shape (n, k); the drives one after the other. Of white rows all are independent and of one variance.
-    """
+    """Cosine transform of each drive that lasts, without the mean and what is quicker, shape (frequencies, k)."""
     from scipy.fft import dct
 
     found = []
@@ -74,10 +71,7 @@ def low_frequencies(values: FloatArray, coarse: Coarse, valid: BoolArray, shorte
 
 
 def smooth_probabilities(rows: FloatArray, columns: FloatArray, orders: Sequence[int]) -> dict[int, float]:
-    """p-value of the first so many columns, shape (frequencies, k), by an F test at low frequencies alone.
-
-    What is left there says how much chance does, a long-run variance by cosines [1]_: rows need not be white beyond.
-    """
+    """p-value of the first so many columns by F tests at low frequencies alone, which tell what chance does [1]_."""
     from scipy.stats import f
 
     found = {}
@@ -100,10 +94,7 @@ def step_moments(coarse: Coarse) -> NDArray[np.intp]:
 
 
 def mean_probability(rows: FloatArray, waves: FloatArray, jumps: FloatArray, rng: np.random.Generator) -> float:
-    """p-value of the best of all smooths and steps at low frequencies: the least p of F tests, against white rows.
-
-    `rows`, shape (frequencies,); `waves` and `jumps`, shape (frequencies, k), may have no columns.
-    """
+    """p-value of the best of all smooths and steps at low frequencies: the least p of F tests, against white rows."""
     from scipy.stats import f
 
     bases = [orthonormal(waves[:, :order]) for order in ORDERS if order <= waves.shape[1]]

@@ -52,18 +52,15 @@ class Omnibus:
 
 
 def weights_of(delays: tuple[float, ...]) -> FloatArray:
-    """Of whole seconds, from the first delay to the last, in kernels that rise to each delay from the one before and
-    fall to the next, each of gain 1; shape (delays, seconds). [-]"""
+    """Of whole seconds in kernels of gain 1 that rise to each delay from the one before and fall to the next, shape
+    (delays, n)."""
     seconds = np.arange(delays[0], delays[-1] + 1.0)
     weights = np.stack([np.interp(seconds, delays, unit) for unit in np.eye(len(delays))])
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
 
 def tents(values: FloatArray, delays: tuple[float, ...], drive: IndexArray) -> FloatArray:
-    """Values by the second [any unit], shape (n,), through the kernels of `weights_of`; shape (n, delays).
-
-    Before the first and after the last row of a drive its outermost row holds.
-    """
+    """Values by the second, shape (n,), through the kernels of `weights_of`, outermost rows held; shape (n, delays)."""
     first, last = np.searchsorted(drive, drive, side="left"), np.searchsorted(drive, drive, side="right") - 1
     rows, reach = np.arange(len(values)), np.arange(int(delays[0]), int(delays[-1]) + 1)
     shifted = np.stack([values[np.clip(rows - late, first, last)] for late in reach], axis=1)
@@ -77,11 +74,8 @@ def smooth_covariance(number: int) -> FloatArray:
 
 
 def amid_runs(valid: BoolArray) -> BoolArray:
-    """Rows whose delays stay within their own run, shape (n,).
-
-    Runs begin and end with a lane change, say, and so do courses of what changes with it; what a car does just then is
-    its end, and no response.
-    """
+    """Rows whose delays stay within their run, shape (n,): what a car does where a run ends in a lane change is no
+    response."""
     before = positions_in_run(valid)
     after = positions_in_run(valid[::-1])[::-1]
     return np.asarray((before >= DELAYS[-1]) & (after >= -DELAYS[0]))
@@ -110,10 +104,8 @@ def check_remainder(
     *,
     only: tuple[str, ...] = (),
 ) -> Omnibus:
-    """Whether any column predicts what a fit leaves better than the same innovations in another order.
-
-    But for those `taken`; `only`: of the null all columns, of the innovations as they are this one.
-    """
+    """Whether any column not `taken`, or `only` one, predicts what a fit leaves better than the innovations in another
+    order."""
     whitener, coarse = fitted.whitener, fitted.coarse
     amid = amid_runs(whitener.valid)
     if amid.sum() < MIN_SUPPORT_S:
@@ -138,10 +130,7 @@ def check_remainder(
 
 
 def _beside_loud_rows(basis: FloatArray, rows: FloatArray) -> float:
-    """Squares that an orthonormal basis explains, or, if that is less, beside the squares of the rows it rests on [2]_.
-
-    The null keeps how large innovations are, not where.
-    """
+    """Squares that an orthonormal basis explains, or less, beside the squares of the rows it rests on [2]_."""
     scores = basis.T @ rows
     left = rows - basis @ scores
     weighed = basis * (left / max(float(np.sqrt(np.mean(left**2))), 1e-300))[:, None]

@@ -32,8 +32,7 @@ ROUNDS = 4  # Turns of sizes, autoregression and scale; they settle in three.
 
 
 def design_of(coarse: Coarse, terms: Sequence[Term]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Columns of the mean and of the log scale, term by term, shape (n, k) and (n, j), and the log scale that terms
-    know as a whole, shape (n,). [-]"""
+    """Columns of the mean and of the log scale, shape (n, k) and (n, j), and the log scale known as a whole."""
     columns = joined([term.mean_columns(coarse) for term in terms], len(coarse))
     scales = joined([term.scale_columns(coarse) for term in terms], len(coarse))
     known = [scale for term in terms if (scale := term.known_scale(coarse)) is not None]
@@ -82,17 +81,8 @@ def fit_model(coarse: Coarse, terms: Sequence[Term]) -> Fitted:
 def clustered_least_squares(
     design: FloatArray, observed: FloatArray, cluster: IntArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Sizes, and a sandwich for their covariance, clustered [1]_.
-
-    Loud seconds come together, and a column may come with them; and what whitening leaves of the memory counts too.
-
-    `design`, shape (n, k), and `observed`, shape (n,): whitened; `cluster`, shape (n,): of each row. Sizes have shape
-    (k,), their covariance (k, k).
-
-    References
-    ----------
-    .. [1] K.-Y. Liang, S. L. Zeger, "Longitudinal data analysis using generalized linear models", Biometrika 73, 1986.
-    """
+    """Sizes, shape (k,), and a sandwich for their covariance, clustered (Liang, Zeger 1986): loud seconds come
+    together."""
     if design.shape[1] == 0:
         return np.zeros(0), np.zeros((0, 0))
     inverse = np.linalg.pinv(design.T @ design)

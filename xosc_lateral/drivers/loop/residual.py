@@ -110,10 +110,7 @@ def simulated_runs(
     runs: int | None = None,
     held: BoolArray | None = None,
 ) -> FloatArray:
-    """Free runs [m] of a profile under the drives' context, shape (runs, n); 0 outside the drives.
-
-    With `held`, shape (n,), drives that have no such row are left out.
-    """
+    """Free runs of a profile under the drives' context, shape (runs, n) [m]; without drives that have no row `held`."""
     if runs is None:
         runs = FEW_RUNS if len(timeline.names) >= MANY_DRIVES else N_RUNS
     result = np.zeros((runs, len(timeline)))
@@ -151,11 +148,8 @@ def error_between(first: Mapping[str, FloatArray], second: Mapping[str, FloatArr
 def half_samples(
     statistics: SummaryStatistics, offset: FloatArray, blocks: IntArray, rng: np.random.Generator, draws: int = DRAWS
 ) -> list[dict[str, FloatArray]]:
-    """Random halves of the blocks less all of them: their variance is that of all of them about the truth [2]_.
-
-    `offset`, shape (n,) [m]: measured, less the effects on the mean that are known: where the car should be is no
-    chance. `blocks`, shape (n,): what is drawn, as a whole.
-    """
+    """Random halves of the blocks less all of them, which vary as all about the truth [2]_; of offsets less the mean's
+    effects."""
     valid = statistics.timeline.valid
     numbers, whole = np.unique(blocks[valid]), statistics.describe(offset, valid)
     found = []
@@ -191,11 +185,8 @@ class GroupError:
 
 @dataclass(frozen=True, eq=False)
 class LackOfFit:
-    """What is left after the loop, beside the sampling error of what is measured, in [m].
-
-    `floors`: standard error of every statistic; `floor`: mean distance of half samples; `unexplained`: part of the
-    error after that it does not cover; `p_value`: share of half samples that are as far off as the refined profile.
-    """
+    """What is left after the loop beside the sampling error of what is measured [m], and the share of half samples as
+    far off."""
 
     floors: Mapping[str, FloatArray]
     groups: tuple[GroupError, ...]

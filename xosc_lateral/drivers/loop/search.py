@@ -53,10 +53,7 @@ class Search:
         return cls(coarse, {column.name: column for column in columns}, quantities, seed, levels, progress)
 
     def once(self, kind: object, fitted: object, make: Callable[[], Any]) -> Any:
-        """What is worked out for one kind of term beside one fit, as it was or else now; the last few are kept.
-
-        For one thread: a search that is replaced, by that of a fold, begins with a memory of its own.
-        """
+        """What is worked out once for one kind of term beside one fit; the last few are kept, for one thread."""
         key = (kind, id(fitted))
         if key not in self._kept:
             self._kept[key] = (fitted, make())  # the fit is kept with it: no other has its id meanwhile

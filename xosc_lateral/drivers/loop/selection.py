@@ -24,11 +24,7 @@ def in_stages(kinds: tuple[type[Term], ...]) -> tuple[tuple[type[Term], ...], ..
 
 
 def shared_among(kinds: tuple[type[Term], ...]) -> dict[str, float]:
-    """Part of the error budget of every component, by the terms' own weights; those of one component share a part.
-
-    Where nothing can be asked of a component, its part is not spent: a table on which something acts is searched again
-    beside it, at the same levels.
-    """
+    """Part of the error budget of every component, by the terms' own weights; those of one component share a part."""
     weights = {kind.component: kind.weight for kind in kinds}
     return {component: BUDGET * weight / sum(weights.values()) for component, weight in weights.items()}
 
@@ -53,14 +49,11 @@ class Gain:
 
     @property
     def stands(self) -> bool:
-        """Whether the held-out blocks leave a significant term standing: no loss by a standard error [1]_.
+        """Whether the held-out blocks leave a significant term standing: no loss by a standard error (Breiman et al.
+        1984).
 
         They are a veto, not a second proof: beside a gain of 12 nat over all blocks chance alone gives 6 either way,
         and what a fold gets wrong of lag, shape and size is lost on top. What no fold found again does not stand.
-
-        References
-        ----------
-        .. [1] L. Breiman, J. Friedman, R. Olshen, C. Stone, "Classification and Regression Trees", 1984, section 3.4.3.
         """
         return self.mean + self.error > 0.0
 

@@ -45,22 +45,9 @@ def upper_tail(
     """Probability, `MINIMUM_P` to 1, that chance gives `score` or more. [-]
 
     What many independent draws reach has their share. Beyond, the null's tail falls as an exponential, whose scale is
-    known from no more than the draws in it: integrated over what it may be, the tail is a power [1]_, which an
-    exponential of the mean excess would put too low by a factor of 2 at 1e-3, of 4 at 1e-4, for 25 draws.
-
-    Parameters
-    ----------
-    score : float
-    null : array, shape (n,)
-        Scores under the null. Draws that resemble each other, as those of neighbouring rotations do, are neighbours.
-    tail_share : float
-        Share of the null that its tail is fitted on.
-    least_excess : float
-        The tail's scale is no smaller, in the scores' unit.
-
-    References
-    ----------
-    .. [1] J. Aitchison, I. R. Dunsmore, "Statistical Prediction Analysis", Cambridge 1975, chapter 2.
+    known from no more than the draws in it: integrated over what it may be, the tail is a power (Aitchison, Dunsmore
+    1975), which an exponential of the mean excess would put too low by a factor of 2 at 1e-3, of 4 at 1e-4, for 25
+    draws.
     """
     if len(null) == 0:
         return 1.0
@@ -75,15 +62,7 @@ def upper_tail(
 
 
 def effective_number(draws: FloatArray) -> float:
-    """Independent draws that tell as much about a mean as these do, by their autocorrelation [1]_; 1 to n.
-
-    `draws`, shape (n,): in an order in which those that resemble each other are neighbours.
-
-    References
-    ----------
-    .. [1] C. J. Geyer, "Practical Markov chain Monte Carlo", Statistical Science 7, 1992: sums of two neighbouring lags
-       up to the first that is not positive.
-    """
+    """Independent draws that tell as much about a mean as these do, by their autocorrelation (Geyer 1992); 1 to n."""
     n = len(draws)
     left = draws - draws.mean()
     power = float(left @ left)

@@ -46,11 +46,7 @@ def quick_squares(fitted: Fitted) -> Squares:
 
 
 def fine_squares(fitted: Fitted) -> Squares:
-    """Squared innovations of the 0.2 s grid, averaged to 1 Hz; drives are each compared with themselves.
-
-    Responses to columns are taken out as far as the innovations show them: where the provider of the tracks smoothed
-    them away, they would be put in, and look like noise.
-    """
+    """Squared innovations at 5 Hz, averaged to 1 Hz, responses taken out as far as the innovations show them."""
     coarse, timeline = fitted.coarse, fitted.coarse.timeline
     n = len(timeline)
     valid = timeline.valid & np.repeat(coarse.valid, COARSE)[:n] if len(coarse) * COARSE >= n else timeline.valid
@@ -93,10 +89,8 @@ def of_squares(coarse: Coarse, squares: Squares, columns: FloatArray) -> Problem
 
 
 def log_sizes(squares: Squares, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Log-linear regression [1]_ of a standard deviation on columns, shape (n, k), from mean squares per second.
-
-    Returns shape (k,): natural logarithm per unit.
-    """
+    """Log-linear regression [1]_ of a standard deviation on columns, shape (n, k), and standard errors, shape (k,)
+    each."""
     design = columns[squares.valid] - columns[squares.valid].mean(axis=0)
     inverse = np.linalg.pinv(2.0 * design.T @ design)
     sizes = np.zeros(columns.shape[1])

@@ -96,19 +96,10 @@ class MeanTerm(SearchedTerm):
 def widening(fitted: Fitted, effect: ColumnEffect, part: slice) -> float:
     """Factor on the standard errors of an effect on the mean, at least 1.
 
-    How far the profile-likelihood interval [1]_ of the change over the driving range reaches from the estimate with
-    lag and time constant free, or the shape of its column, or the distances over which its product fades, over how far
-    it reaches with all of them known. The likelihood is that of independent rows, scaled to the variance that stretches
-    of a minute show [2]_.
-
-    `effect`: with coefficients; `part`: its columns of the mean.
-
-    References
-    ----------
-    .. [1] D. Venzon, S. Moolgavkar, "A method for computing profile-likelihood-based confidence intervals", Applied
-       Statistics 37, 1988.
-    .. [2] R. E. Chandler, S. Bate, "Inference for clustered data using the independence loglikelihood", Biometrika 94,
-       2007.
+    How far the profile-likelihood interval (Venzon, Moolgavkar 1988) of the change over the driving range reaches from
+    the estimate with lag and time constant free, or the shape of its column, or the distances over which its product
+    fades, over how far it reaches with all of them known. The likelihood is that of independent rows, scaled to the
+    variance that stretches of a minute show (Chandler, Bate 2007).
     """
     low, high = driving_range(fitted.coarse, effect)
     contrast = high - low

@@ -172,11 +172,8 @@ class RegimesTerm(Term):
 def probability_of_persistence(
     squares: FloatArray, valid: BoolArray, known: FloatArray, rng: np.random.Generator
 ) -> float:
-    """Probability that loudness which lasts for no longer than `CLUSTER_S` shows as much persistence.
-
-    `squares`, shape (n,): of white rows, one per second, mean 0; 0 where invalid; `known`, shape (n, k): what is known
-    to go with the size; taken out of the squares.
-    """
+    """Probability that loudness of at most `CLUSTER_S`, without what is `known` to go with it, shows as much
+    persistence."""
     if known.shape[1]:
         basis = np.linalg.qr((known - known[valid].mean(axis=0)) * valid[:, None])[0]
         squares = beside(basis, squares)

@@ -88,10 +88,8 @@ def what_columns_do(search: Search, fitted: Fitted) -> FloatArray:
 
 
 def what_a_column_may_do(search: Search, fitted: Fitted) -> tuple[FloatArray, float]:
-    """What the best of the other columns may do to the movement's size, shape (n, k), and its p-value.
-
-    Beside it hidden changes of the size have to stand: regimes, a smooth of time.
-    """
+    """What the best other column may do to the movement's size, shape (n, k), and its p-value: hidden changes stand
+    beside it."""
     return ColumnSearch(search, SpreadTerm, fitted).likely_response(MAY_ACT)
 
 
@@ -140,11 +138,7 @@ class FineNoiseTerm(SearchedTerm):
 
     @classmethod
     def problem(cls, fitted: Fitted) -> Problem:
-        """Squared innovations at 5 Hz.
-
-        An effect on the mean is followed with errors: they grow with it where its size is a little wrong, and with its
-        rate of change where its timing is.
-        """
+        """Squared innovations at 5 Hz, beside size and rate of effects on the mean, which are followed with errors."""
         coarse = fitted.coarse
         own = [coarse.response(term.effect, keep=True) for term in of_kind(fitted, cls)]
         moved = [coarse.response(term.effect, keep=True) for term in of_kind(fitted, MeanTerm)]

@@ -90,12 +90,7 @@ class StepTerm(_MeanByTime):
 
     @classmethod
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
-        """Step or smooth, whichever is likelier, each parameter at Schwarz's price [1]_.
-
-        References
-        ----------
-        .. [1] G. Schwarz, "Estimating the dimension of a model", Annals of Statistics 6, 1978.
-        """
+        """Step or smooth, whichever is likelier, each parameter at Schwarz's price (Annals of Statistics 6, 1978)."""
         coarse = fitted.coarse
         if not coarse.lasts or any(isinstance(term, _MeanByTime) for term in fitted.terms):
             return None
@@ -321,10 +316,8 @@ def penalised_cosines(sizes: FloatArray, covariance: FloatArray) -> tuple[FloatA
 
 
 def penalised(sizes: FloatArray, covariance: FloatArray, prior: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Sizes, shape (k,), given how they vary beforehand but for a scale, shape (k, k), and their covariance.
-
-    The prior's scale is the one under which the sizes are likeliest (restricted maximum likelihood).
-    """
+    """Sizes, shape (k,), given how they vary beforehand but for a scale, that of restricted maximum likelihood, and
+    covariance."""
     largest = float(np.max(np.square(sizes) / np.diag(prior), initial=1e-300))
     best, found = -np.inf, np.zeros_like(prior)
     for scale in largest * np.geomspace(1e-6, 10.0, 60):
