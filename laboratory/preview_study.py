@@ -26,11 +26,10 @@ from laboratory.outcome_lines import append_outcome, read_outcomes
 from tests.kit.simulated import preview_driver
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.drivers.loop.close import close_loop
-from xosc_lateral.drivers.loop.dictionary import beside, orthonormal
+from xosc_lateral.drivers.loop.dictionary import Search, beside, orthonormal
 from xosc_lateral.drivers.loop.identify import usable_columns
-from xosc_lateral.drivers.loop.innovations import CLIP
+from xosc_lateral.drivers.loop.model import CLIP
 from xosc_lateral.drivers.loop.regression import fit_model
-from xosc_lateral.drivers.loop.search import Search
 from xosc_lateral.drivers.loop.selection import ERROR_BUDGET, Accepted, select
 from xosc_lateral.drivers.loop.terms.course import RESPONSE_S, CourseTerm
 from xosc_lateral.drivers.model.effects import Acts, Linear

@@ -188,11 +188,13 @@ def unbiased(
             return process
         lags += again.lags[-1] / BIAS_DRAWS
         log_variance += 2.0 * float(np.log(again.deviations[-1])) / BIAS_DRAWS
-    own = 2.0 * float(np.log(process.deviations[-1]))
+    log_variance_fitted = 2.0 * float(np.log(process.deviations[-1]))
     for share in (1.0, 0.5, 0.25):
         better = process.lags[-1] + share * (process.lags[-1] - lags)
         if np.abs(_reflections(better)).max() < MAX_REFLECTION:
-            return _stepped_down(better, float(np.exp(own + share * (own - log_variance))))
+            return _stepped_down(
+                better, float(np.exp(log_variance_fitted + share * (log_variance_fitted - log_variance)))
+            )
     return process
 
 

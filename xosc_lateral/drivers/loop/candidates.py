@@ -99,11 +99,11 @@ def candidates_of(columns: Sequence[Column], context: Mapping[str, FloatArray], 
             for pair in _pairs(first, second, factors)
         ],
     }
-    found = []
+    candidates = []
     for family, effects in families.items():
         members = [(effect, contrast) for effect in effects for contrast in _contrasts(effect, context)]
-        found += [Candidate(effect, family, 2.0 * float(np.log(len(members))), one) for effect, one in members]
-    return found
+        candidates += [Candidate(effect, family, 2.0 * float(np.log(len(members))), one) for effect, one in members]
+    return candidates
 
 
 def _contrasts(effect: ColumnEffect, context: Mapping[str, FloatArray]) -> list[tuple[float, ...]]:
@@ -198,10 +198,10 @@ def _factors(column: Column, values: FloatArray) -> list[Factor]:
 
 
 def _pairs(first: Column, second: Column, factors: Mapping[str, list[Factor]]) -> Iterator[tuple[Factor, Factor]]:
-    for one, other in product(factors[first.name], factors[second.name]):
+    for factor, other in product(factors[first.name], factors[second.name]):
         if Values.ANGLE in (first.values, second.values):  # a vector's component: speed counts from its own zero
-            one, other = (Factor(column=f.column) if f.form is Form.VALUE else f for f in (one, other))
-        yield one, other
+            factor, other = (Factor(column=f.column) if f.form is Form.VALUE else f for f in (factor, other))
+        yield factor, other
 
 
 def _quantiles(seen: FloatArray, shares: Sequence[float]) -> FloatArray:

@@ -13,8 +13,8 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.loop.autocorrelation import Problem
 from xosc_lateral.drivers.loop.dictionary import (
     CROSS_BASIS,
-    NULL_DRAWS,
     Dictionary,
+    Search,
     beside_parts,
     build_dictionary,
     orthonormal,
@@ -24,8 +24,7 @@ from xosc_lateral.drivers.loop.model import Fitted, Outcome
 from xosc_lateral.drivers.loop.omnibus import courses
 from xosc_lateral.drivers.loop.refinement import Refined, Refinement
 from xosc_lateral.drivers.loop.regression import fit_model
-from xosc_lateral.drivers.loop.search import Search
-from xosc_lateral.drivers.loop.significance import LoopSeed, upper_tail
+from xosc_lateral.drivers.loop.significance import NULL_DRAWS, LoopSeed, upper_tail
 from xosc_lateral.drivers.loop.terms.column import ColumnTerm, of_kind
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect
 from xosc_lateral.drivers.model.seeds import generator
@@ -127,9 +126,9 @@ class ColumnSearch:
         there = len(refused)
         scored = self._scored_once()
         while scored is not None:
-            found, p_value = scored.likeliest()
+            likeliest, p_value = scored.likeliest()
             if not self.kind.passes(self.search, p_value, self.fitted):  # refined, it would not be accepted either
-                return Outcome(None, found.columns, p_value)
+                return Outcome(None, likeliest.columns, p_value)
             term, after = self._term(scored, refused)
             if not grows(self.fitted, after) and after.log_likelihood >= self.fitted.log_likelihood - ROUNDING:
                 return Outcome(term, term.columns, p_value, after)
@@ -142,8 +141,8 @@ class ColumnSearch:
         scored = self._scored(self.kind.problem(self.fitted), spared=columns)
         if scored is None:
             return 1.0
-        own = [i for i, candidate in enumerate(scored.dictionary.candidates) if candidate.columns == columns]
-        return upper_tail(float(scored.scores[own].max()), scored.maxima) if own else 1.0
+        members = [i for i, candidate in enumerate(scored.dictionary.candidates) if candidate.columns == columns]
+        return upper_tail(float(scored.scores[members].max()), scored.maxima) if members else 1.0
 
     def likely_response(self, level: float) -> tuple[FloatArray, float]:
         """Response of the best candidate and its p-value, shape (n, 1) where that is at most `level`; else (n, 0)."""
@@ -158,8 +157,8 @@ class ColumnSearch:
             taken = {term.columns for term in of_kind(self.fitted, self.kind)}
             return self._scored(self.kind.problem(self.fitted), refused=taken)
 
-        found: _Scored | None = self.search.once(self.kind, self.fitted, make)
-        return found
+        scored: _Scored | None = self.search.once(self.kind, self.fitted, make)
+        return scored
 
     def _scored(
         self,

@@ -96,14 +96,14 @@ def roles_of(timeline: Timeline, names: Iterable[str], declared: Mapping[str, st
             raise FormatError(f"role of {column}: {word!r} is none of {', '.join(Role)}")
         if column not in names:
             raise FormatError(f"role of {column}: the table has no such column")
-    found = {}
+    roles = {}
     for column in names:
         role = Role(declared[column]) if column in declared else proposed_role(column)
         source = "declared" if column in declared else "name" if role is not Role.UNKNOWN else ""
         if not source.startswith("d") and not role.is_exogenous and is_clock(timeline, column):
             role, source = Role.TIME, source if role is Role.TIME else "data"
-        found[column] = Assigned(column, role, source)
-    return found
+        roles[column] = Assigned(column, role, source)
+    return roles
 
 
 def is_clock(timeline: Timeline, column: str) -> bool:
@@ -149,15 +149,15 @@ class Column:
 
 def known_columns(timeline: Timeline) -> tuple[list[Column], dict[str, str]]:
     """Columns worth looking at, `lane_width` among them, in alphabetical order, and why the others aren't."""
-    found, unused = [], {}
+    columns, unused = [], {}
     context = {"lane_width": timeline.lane_width, **timeline.context}
     for name in sorted(context):
         column = read_column(name, context[name][timeline.valid], timeline.periods.get(name, 0.0))
         if isinstance(column, str):
             unused[name] = column
         else:
-            found.append(column)
-    return found, unused
+            columns.append(column)
+    return columns, unused
 
 
 def read_column(name: str, seen: FloatArray, period: float) -> Column | str:

@@ -63,11 +63,11 @@ def compare_spectrum_shapes(profile: DriverProfile, timeline: Timeline, seed: np
 
     runs = simulated_runs(profile, timeline, child(seed, LoopSeed.SPECTRUM), runs=N_RUNS)
     real = _shapes(timeline.offset, timeline)
-    own = np.concatenate([_shapes(run, timeline) for run in runs])
+    sampled = np.concatenate([_shapes(run, timeline) for run in runs])
     if len(real) < 2 * len(TIMES_S) + 4:
         return SpectrumShape(TIMES_S, np.ones(len(TIMES_S)), 1.0)
-    difference = own.mean(axis=0) - real.mean(axis=0)
-    covariance = np.cov(real.T) / len(real) + np.cov(own.T) / len(own)
+    difference = sampled.mean(axis=0) - real.mean(axis=0)
+    covariance = np.cov(real.T) / len(real) + np.cov(sampled.T) / len(sampled)
     k, n = len(difference), len(real)
     statistic = float(difference @ np.linalg.pinv(covariance) @ difference)
     p_value = float(f.sf(statistic * (n - k) / (k * (n - 1)), k, n - k))
@@ -117,9 +117,9 @@ def test_population(fitted: Fitted, known: FloatArray) -> DriverVariance | None:
     offset = fitted.movement * whitener.scale + (fitted.levels - known)[whitener.drive]
     halves = []
     for index in range(len(fitted.levels)):
-        own = offset[whitener.valid & (whitener.drive == index)]
-        if len(own) >= 2 * MIN_SECONDS:
-            halves.append((own[: len(own) // 2], own[len(own) // 2 :]))
+        series = offset[whitener.valid & (whitener.drive == index)]
+        if len(series) >= 2 * MIN_SECONDS:
+            halves.append((series[: len(series) // 2], series[len(series) // 2 :]))
     if len(halves) < MIN_DRIVES:
         return None
     shift, p_shift = _scatter(np.array([[half.mean() for half in pair] for pair in halves]))

@@ -219,8 +219,8 @@ def _quantities(fitted: Fitted, columns: list[Column]) -> dict[str, FloatArray]:
             angle = 2.0 * np.pi / column.period * quantities.pop(column.name)
             quantities |= {f"sin({column.name})": np.sin(angle), f"cos({column.name})": np.cos(angle)}
     for key, (term, effects) in fitted.estimates.items():
-        if (own := term.quantity(coarse, effects)) is not None:
-            quantities[f"effect: {key}"] = own
+        if (quantity := term.quantity(coarse, effects)) is not None:
+            quantities[f"effect: {key}"] = quantity
     return quantities
 
 
@@ -257,8 +257,10 @@ def score_runs(
             sampled = (snippet_metrics(runs[split % len(before)][rows[~half]]) for runs in (before, after))
             gathered.append([metric_distances(real[half], metrics) for metrics in (*sampled, real[~half])])
     far = [mean_distances(list(several)) for several in zip(*gathered, strict=True)]
-    own, other, floor = far or (None, None, None)
-    return Scorecard(own, other, floor, real, snippet_metrics(before[0][rows]), snippet_metrics(after[0][rows]))
+    before_distances, other, floor = far or (None, None, None)
+    return Scorecard(
+        before_distances, other, floor, real, snippet_metrics(before[0][rows]), snippet_metrics(after[0][rows])
+    )
 
 
 def _starts(timeline: Timeline) -> IntArray:

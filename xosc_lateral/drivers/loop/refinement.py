@@ -38,8 +38,10 @@ LAG_LIMIT = 5.0  # Longest lag either way. [s]
 def explains_as_much(chosen: FloatArray, other: FloatArray, observed: FloatArray, cluster: IntArray) -> bool:
     """Whether squared residuals of two white regressions, nested or not, differ by no more than they scatter by
     cluster."""
-    one, two = (np.square(observed - own @ np.linalg.lstsq(own, observed, rcond=None)[0]) for own in (chosen, other))
-    sums = np.bincount(np.unique(cluster, return_inverse=True)[1], two - one)
+    first, second = (
+        np.square(observed - own @ np.linalg.lstsq(own, observed, rcond=None)[0]) for own in (chosen, other)
+    )
+    sums = np.bincount(np.unique(cluster, return_inverse=True)[1], second - first)
     return len(sums) < 2 or float(sums.sum()) <= CLEARLY * float(np.sqrt(len(sums)) * np.std(sums, ddof=1))
 
 
@@ -83,8 +85,8 @@ class Refinement:
 
     def as_good(self, chosen: ColumnEffect, other: ColumnEffect) -> bool:
         """Whether another effect would explain as much, as far as the rows can tell."""
-        one, two = (self._rows(self._response(effect)).astype(np.float64) for effect in (chosen, other))
-        return explains_as_much(one, two, self._left, self._coarse.cluster[self._problem.whitener.valid])
+        first, second = (self._rows(self._response(effect)).astype(np.float64) for effect in (chosen, other))
+        return explains_as_much(first, second, self._left, self._coarse.cluster[self._problem.whitener.valid])
 
     def _rows(self, responses: FloatArray) -> FloatArray:
         """White, beside what is known; in single precision, which tells responses apart as well in half the time."""

@@ -17,8 +17,7 @@ import numpy as np
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.drivers.fitting.answers import cluster_sums
 from xosc_lateral.drivers.loop.autocorrelation import Whitener, fit_autoregression, start_factors, unbiased
-from xosc_lateral.drivers.loop.innovations import CLIP, MAXIMUM_ORDER, ORDER, own_levels
-from xosc_lateral.drivers.loop.model import Fitted, Term, joined
+from xosc_lateral.drivers.loop.model import CLIP, MAXIMUM_ORDER, ORDER, Fitted, Term, joined, own_levels
 from xosc_lateral.drivers.loop.timeline import CLUSTER_S, Coarse, means_by_drive
 
 # White noise that the model of a drive has beside what it shows: no table knows the lane better (in the motorway

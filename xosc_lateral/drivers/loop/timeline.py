@@ -169,8 +169,8 @@ def start_anew(
     response: FloatArray, values: NDArray[np.floating[Any]], keep: float, drive: NDArray[np.intp]
 ) -> FloatArray:
     """A first-order lag over drives in a row, settled anew where each starts: what is constant in drives stays so."""
-    _, starts, own = np.unique(drive, return_index=True, return_inverse=True)
-    first = starts[own]
+    _, starts, drive_number = np.unique(drive, return_index=True, return_inverse=True)
+    first = starts[drive_number]
     left = keep ** (np.arange(len(values)) - first).astype(values.dtype)
     return np.asarray(response - (response - values)[first] * (left[:, None] if values.ndim == 2 else left))
 

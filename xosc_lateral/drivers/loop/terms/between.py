@@ -17,10 +17,9 @@ import numpy as np
 from msgspec import structs
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
-from xosc_lateral.drivers.loop.dictionary import NULL_DRAWS, beside
+from xosc_lateral.drivers.loop.dictionary import Search, beside
 from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage
-from xosc_lateral.drivers.loop.search import Search
-from xosc_lateral.drivers.loop.significance import MANY_DRIVES, LoopSeed, as_one_degree, upper_tail
+from xosc_lateral.drivers.loop.significance import MANY_DRIVES, NULL_DRAWS, LoopSeed, as_one_degree, upper_tail
 from xosc_lateral.drivers.loop.terms.column import ColumnTerm, of_kind
 from xosc_lateral.drivers.loop.timeline import missing_throughout
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect, Linear
@@ -92,8 +91,8 @@ class BetweenTerm(ColumnTerm):
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """Weighted least squares over drives, all such terms jointly."""
         sizes, errors = _Places.of(fitted).sizes()
-        own = [term is self for term in of_kind(fitted, BetweenTerm)]
-        return (self.sized(fitted.coarse, Acts.LOCATION, sizes[own], errors[own]),)
+        is_self = [term is self for term in of_kind(fitted, BetweenTerm)]
+        return (self.sized(fitted.coarse, Acts.LOCATION, sizes[is_self], errors[is_self]),)
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Change between drives; it has no lag."""

@@ -106,19 +106,19 @@ def widening(fitted: Fitted, effect: ColumnEffect, part: slice) -> float:
     white = fitted.whitener.rows
     others, _ = np.linalg.qr(white(np.delete(fitted.columns, np.r_[part], axis=1)))
     left = beside(others, white(fitted.coarse.offset))
-    own = beside(others, white(fitted.columns[:, part]))
-    estimated = _profile(own, left, contrast)
-    found = [estimated]
+    rows_known = beside(others, white(fitted.columns[:, part]))
+    estimated = _profile(rows_known, left, contrast)
+    profiles = [estimated]
     for response in _timed(fitted, effect):
         rows = beside(others, white(response.reshape(len(response), -1)))
         width = len(contrast)
-        found += [_profile(rows[:, at : at + width], left, contrast) for at in range(0, rows.shape[1], width)]
+        profiles += [_profile(rows[:, at : at + width], left, contrast) for at in range(0, rows.shape[1], width)]
     for shape in _shapes(fitted.coarse, effect):
         low, high = driving_range(fitted.coarse, shape)
         rows = beside(others, white(fitted.coarse.response(shape)))
-        alike = np.sign(float(np.sum(own * rows)))  # nearness falls where distance rises
-        found.append(_profile(rows, left, alike * (high - low)))
-    gain, size, variance = np.asarray(found).T
+        alike = np.sign(float(np.sum(rows_known * rows)))  # nearness falls where distance rises
+        profiles.append(_profile(rows, left, alike * (high - low)))
+    gain, size, variance = np.asarray(profiles).T
     noise = float(left @ left - gain.max()) / max(1, int(fitted.coarse.valid.sum()))
     clustered = float(contrast @ fitted.covariance[part, part] @ contrast)
     room = CHI_SQUARE * clustered / max(noise * estimated[2], 1e-300) - (gain.max() - gain) / noise
