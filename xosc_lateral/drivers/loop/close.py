@@ -10,12 +10,7 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.drivers.drives.drive import Drive
-from xosc_lateral.drivers.loop.core_model import (
-    DriverVariance,
-    SpectrumShape,
-    compare_spectrum_shapes,
-    test_population,
-)
+from xosc_lateral.drivers.loop.core_model import DriverVariance, SpectrumShape, compare_spectrum_shapes, test_population
 from xosc_lateral.drivers.loop.cross_validation import Progress, folds_of, held_out_words
 from xosc_lateral.drivers.loop.held_out import (
     HeldOut,
