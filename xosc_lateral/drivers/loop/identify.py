@@ -83,7 +83,7 @@ def identify(
     # products of small matrices gain nothing from threads, and lose a factor of ten to them where all cores are busy
     with threadpool_limits(1, user_api="blas"):
         search = Search.over(coarse, usable.columns, seed, ERROR_BUDGET, lambda what: progress(0.1, what))
-        selection = _beside_time(search, select(search, initial))
+        selection = name_time_beside(search, select(search, initial))
         if not selection.accepted:
             return Identified(usable, selection, search.quantities)
         accepted = [one.term for one in selection.accepted]
@@ -95,7 +95,7 @@ def identify(
         return _worst_first(Identified(usable, selection, search.quantities, nested))
 
 
-def _beside_time(search: Search, selection: Selection) -> Selection:
+def name_time_beside(search: Search, selection: Selection) -> Selection:
     """Columns that changed as a change with time would, which explains about as much: either may be why."""
     for accepted_term in selection.accepted:
         if not isinstance(accepted_term.term, MeanTerm | SpreadTerm) or not search.coarse.lasts:
