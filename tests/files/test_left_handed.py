@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from xosc_lateral.files.openscenario.left_handed import mirrored, mirrored_shape
+from xosc_lateral.files.openscenario.positions import mirrored, mirrored_shape
 from xosc_lateral.world.scenario.place import Place, Unsupported
 from xosc_lateral.world.scenario.position import (
     Clothoid,

@@ -12,11 +12,14 @@ ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP")
 
 
 class Interrupted(BaseException):
-    """A signal ended the run; `number`: which. Not a KeyboardInterrupt, which typer swallows."""
+    """A signal ended the run. Not a KeyboardInterrupt, which typer swallows.
+
+    `number`: which; `finished`: how many of the outputs that were planned are there, -1 where none were planned.
+    """
 
     def __init__(self, number: int) -> None:
         super().__init__(number)
-        self.number = number
+        self.number, self.finished = number, -1
 
 
 _waits = False

@@ -121,12 +121,7 @@ def _refuse_together(settings: Mapping[str, Any]) -> None:
 
 
 def _convert_one(
-    source: Path,
-    output: str | None,
-    options: dict[str, Any],
-    variants: int,
-    report: str | None,
-    osi: str | None,
+    source: Path, output: str | None, options: dict[str, Any], variants: int, report: str | None, osi: str | None,
     reply: Written,
 ) -> None:
     from xosc_lateral.files.osi import osi_wanted
@@ -173,21 +168,18 @@ def _convert_batch(inputs: Sequence[str], output: str | None, options: Mapping[s
 
     if output is None or output == "-":
         raise typer.BadParameter("several scenarios need a folder for their outputs: -o FOLDER", param_hint="-o")
-    finished = 0
 
     def show(row: Mapping[str, Any]) -> None:
-        nonlocal finished
-        finished += row["state"] != "failed"
         if reply.as_json:
             say_json({"kind": "output", **row})
 
     try:
         result = convert_many(list(inputs), output, on_outcome=show, **options)
     except Interrupted as signal:
-        typer.echo(
-            f"xosc-lateral: interrupted; {finished} outputs in {output} are finished, and the same command continues",
-            err=True,
-        )
+        if signal.finished < 0:
+            raise
+        what = f"{signal.finished} outputs in {output} are finished, and the same command continues"
+        typer.echo(f"xosc-lateral: interrupted; {what}", err=True)
         raise typer.Exit(128 + signal.number) from None
     reply.say_words(str(result), {"kind": "summary", **result.totals()}, err=False)
     if result.cut_off and (reply.quiet or reply.as_json):
@@ -200,10 +192,7 @@ def _convert_batch(inputs: Sequence[str], output: str | None, options: Mapping[s
 def verify(
     outputs: Annotated[list[Path], typer.Argument(metavar="OUTPUT...",
         help="Converted scenarios, or folders with a manifest.", show_default=False)],
-    *,
-    library: Library = None,
-    allow: Allow = None,
-    road_path: RoadPath = None,
+    *, library: Library = None, allow: Allow = None, road_path: RoadPath = None,
     fast: Annotated[bool, typer.Option("--fast", help="Compare hashes alone; make nothing again.")] = False,
     jobs: Annotated[int, typer.Option(help="Number of processes; -1: one per core.")] = 1,
     reply: Printing,
@@ -228,10 +217,7 @@ def reproduce(
     output: Annotated[Path, typer.Argument(metavar="OUTPUT", help="Converted scenario, or a folder with a manifest.",
         show_default=False)],
     new: Annotated[str, typer.Option("--output", "-o", help="File or folder to write to.", show_default=False)],
-    *,
-    library: Library = None,
-    allow: Allow = None,
-    road_path: RoadPath = None,
+    *, library: Library = None, allow: Allow = None, road_path: RoadPath = None,
     jobs: Annotated[int, typer.Option(help="Of a folder: number of processes; -1: one per core.")] = 1,
     reply: Written,
 ) -> None:

@@ -20,16 +20,13 @@ USUAL_MARKERS = (32767.0, 32768.0, 65535.0, 2147483647.0, 4294967295.0)
 """Greatest whole numbers of two and four bytes: besides 999, 9999, ... what loggers write where there is no value."""
 
 LEAST_MARKERS = 3  # a usual marker that is there so often, and is far from all else, is taken for one [rows]
-
 CONDITION = re.compile(r"\s*(.+?)\s*(==|!=|>=|<=|>|<)\s*(.+?)\s*")
 COMPARED = {
     "==": operator.eq, "!=": operator.ne, ">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt,
 }  # fmt: skip
 
 _COMMA_NUMBER = r"\s*[+-]?(?:\d{1,3}(?:\.\d{3})+|\d*)(?:,\d+)?(?:[eE][+-]?\d+)?\s*"
-
 DAY = 86_400.0  # [s]
-
 FOLD_LENGTHS = (1.0, 3601.0)
 """Clocks that are put back at the end of summer time go back by an hour, less what was not recorded there. [s]"""
 

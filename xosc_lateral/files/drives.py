@@ -31,7 +31,6 @@ from xosc_lateral.files.mapping import ColumnSource, MappingLike, TableMapping, 
 from xosc_lateral.files.tables import read_table
 
 LABELS = ("drive", "driver")  # columns that say which drive a row is of, and whose
-
 WHEEL_WIDTH = 2.5
 """Lanes of roads driven at 40 km/h and more are wider but for the left one at roadworks; from the wheels of a car
 (1.5 to 1.6 m apart) one of 3.0 to 3.75 m has 1.4 to 2.25 m. [m]"""
@@ -188,7 +187,6 @@ def _require_columns(columns: Mapping[str, FloatArray], path: Path) -> None:
 
 
 def _rows_of_drives(table: pd.DataFrame, path: Path) -> Iterator[tuple[str, NDArray[np.intp]]]:
-    """Name and rows of each drive."""
     if "drive" not in table.columns:
         yield file_label(path), np.arange(len(table))
         return

@@ -102,9 +102,7 @@ def real_path(path: Path, folders: dict[Path, str]) -> str:
 
 # ---- whether a file is one that this package wrote: each format says so in its own place
 SIDECAR_SUFFIX = ".json"  # beside ``out.csv`` lies ``out.csv.json``: a comment inside a CSV would stop most readers
-
 PACKAGE = b"xosc-lateral"
-
 _HEAD = 65_536  # the mark of a file of ours stands this near to its beginning [byte]
 
 

@@ -29,7 +29,6 @@ def harmless(text: str) -> str:
 
 
 METADATA_KEY = b"xosc-lateral"  # key of the provenance in a Parquet file's schema metadata
-
 Encoder: TypeAlias = "Callable[[Callable[[], pd.DataFrame], Callable[[], str]], bytes]"
 """A table's bytes, from what gives it as a frame and what gives it as CSV; only one of both is asked for."""
 
@@ -113,7 +112,6 @@ def states_csv(motion: NominalMotion, network: RoadNetwork) -> str:
 
 
 def _lines(motion: EntityMotion, network: RoadNetwork) -> Iterator[str]:
-    """One per row, empty where the entity does not exist."""
     columns = [values.tolist() for values in _columns(motion, network, _quoted).values()]
     for row, activity in zip(zip(*columns, strict=True), motion.activity.tolist(), strict=True):
         yield _NUMBERS % row if activity & Activity.ACTIVE else ""
@@ -144,6 +142,5 @@ def _columns(motion: EntityMotion, network: RoadNetwork, text: Callable[[str], s
 
 
 def _quoted(text: str) -> str:
-    """As a CSV field."""
     text = harmless(text)
     return '"' + text.replace('"', '""') + '"' if any(c in text for c in ',"\r\n') else text

@@ -28,7 +28,6 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.limits import FILE_SIZE, PACKING_RATIO, UNPACKED_SIZE, UNPACKED_UNASKED, Limit
 
 LOG = getLogger(__name__)
-
 IN_MEMORY = 64_000_000  # files up to this are read once and parsed from memory [byte]
 
 _KINDS = (
@@ -40,7 +39,6 @@ _KINDS = (
 )
 
 REMEMBERED = 1000  # hashes of so many files that were parsed are kept; a command states what it has just read
-
 _LAST_READ: dict[str, str] = {}  # path -> SHA-256 of the bytes that were parsed, the oldest first
 _GUARDED: ContextVar[set[tuple[int, int]] | None] = ContextVar("inputs", default=None)
 
@@ -234,8 +232,8 @@ def parsed_hashes(paths: Iterable[Path]) -> dict[str, str]:
     """`parsed_hash` of each file by its name; files of one name by as much of their paths as differs."""
     names = {path: path.name for path in paths}
     for depth in range(2, max((len(path.parts) for path in names), default=0) + 1):
-        given = list(names.values())
-        names |= {path: "/".join(path.parts[-depth:]) for path, name in names.items() if given.count(name) > 1}
+        taken = list(names.values())
+        names |= {path: "/".join(path.parts[-depth:]) for path, name in names.items() if taken.count(name) > 1}
     return {name: parsed_hash(path) for path, name in names.items()}
 
 

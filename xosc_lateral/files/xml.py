@@ -17,7 +17,6 @@ from xosc_lateral.files.source import check_regular, guard_input, open_source, r
 from xosc_lateral.files.tables import unpacked_text
 
 MAX_CACHED_BYTES = 1_000_000  # larger files are read anew each time: catalogs are small, and 16 trees are kept
-
 _BLANKS, _DECLARATION = re.compile(rb"\s*"), re.compile(rb"<\?xml\s[^<>\r\n]*\?>")
 
 _DSL = re.compile(
@@ -79,10 +78,10 @@ def _declared_late(data: bytes) -> bytes:
         at = data.find(b"-->", at + 4) + 3
         if at < 3:
             return data
-    found = _DECLARATION.match(data, at)
-    if found is None or at == begin:
+    declaration = _DECLARATION.match(data, at)
+    if declaration is None or at == begin:
         return data
-    return data[:at] + b" " * (found.end() - at) + data[found.end() :]
+    return data[:at] + b" " * (declaration.end() - at) + data[declaration.end() :]
 
 
 def read_xml(path: Path) -> tuple[etree._Element, bytes]:

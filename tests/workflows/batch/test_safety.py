@@ -18,6 +18,7 @@ import pytest
 import xosc_lateral as xl
 from tests.kit.fake_converter import convert
 from tests.workflows.batch.test_batch import ROOT, make_inputs, run
+from xosc_lateral.base.signals import Interrupted
 from xosc_lateral.files.atomic import files_of_run, replace_atomically
 from xosc_lateral.workflows.batch.batch import STATE, BatchStoppedError, JobState, convert_many
 from xosc_lateral.workflows.batch.jobs import plan_batch
@@ -163,6 +164,18 @@ def test_a_signal_is_one_line_with_the_number_of_finished_outputs(tmp_path: Path
     assert not list(out.glob(".*.tmp*"))
     states = [outcome.state for outcome in convert_many(plan_batch([inputs], out), workers=0, converter=convert)]
     assert states.count(JobState.UP_TO_DATE) == there and len(states) == 88
+
+
+def test_a_run_that_is_stopped_at_once_counts_what_was_there(tmp_path: Path) -> None:
+    inputs, out = make_inputs(tmp_path / "in", 5), tmp_path / "out"
+    run(inputs, out)
+
+    def stop(row: object) -> None:
+        raise Interrupted(signal.SIGTERM)
+
+    with pytest.raises(Interrupted) as stopped:
+        xl.convert_many(inputs, out, on_outcome=stop, workers=0, force=True)
+    assert stopped.value.finished == 5
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])

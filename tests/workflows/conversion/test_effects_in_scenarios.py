@@ -16,8 +16,7 @@ from xosc_lateral.world.motion.nominal import NominalMotion, PlayedAction
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario import Action, Place
 from xosc_lateral.world.scenario.enums import VehicleCategory
-from xosc_lateral.world.scenario.environment import Environment, Weather
-from xosc_lateral.world.scenario.global_actions import EnvironmentAction
+from xosc_lateral.world.scenario.global_actions import Environment, EnvironmentAction, Weather
 from xosc_lateral.world.surroundings.context import STEERING
 
 PROFILE = Neighbours.PROFILE

@@ -14,6 +14,7 @@ from tests.kit.effects import EXAMPLES
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.cli import main
 from xosc_lateral.drivers.fitting.models.two_level import fit_two_level
+from xosc_lateral.drivers.model.core.autoregressive.parameters import Volatility
 from xosc_lateral.drivers.model.effects import Acts, Factor, Form, HiddenEffect, Linear, Nearness, Product, Threshold
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import sample_offsets
@@ -220,3 +221,41 @@ def test_the_cmake_file_builds_it(tmp_path: Path) -> None:
     for words in (("-S", tmp_path / "c", "-B", tmp_path / "b"), ("--build", tmp_path / "b")):
         subprocess.run([program, *words], check=True, capture_output=True)
     assert subprocess.run([tmp_path / "b" / "example"], check=True, capture_output=True).stdout.count(b"\n") == 601
+
+
+@pytest.mark.parametrize("name", ["gcc", "clang"])
+def test_ten_thousand_odd_inputs_are_taken_or_refused_under_sanitizers(name: str, tmp_path: Path) -> None:
+    program = (Path(__file__).resolve().parents[2] / "kit" / "odd_inputs.c").read_text(encoding="utf-8")
+    for number, profile in enumerate((read_profile("motorway"), replace(two_level(), effects=(*EXAMPLES, *MORE)))):
+        source = export_c(profile, tmp_path / str(number))[1]
+        (source.parent / "odd.c").write_text(program.replace("DRIVER", source.stem), encoding="utf-8")
+        built = build([source, source.parent / "odd.c"], source.parent / "odd", *SANITIZED, name=name)
+        done = subprocess.run([built], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, (done.returncode, done.stderr)
+        taken, refused = map(int, done.stdout.split())
+        assert taken > 3000 and refused > 1000
+
+
+def test_drivers_that_differ_much_and_vary_within_minutes_are_as_in_the_batch_call(tmp_path: Path) -> None:
+    base = read_profile("motorway")
+    volatility = Volatility(between=0.1, within=0.2, correlation_time=5.0, slow=0.15)
+    model = replace(base.model, between_drivers=0.2, coarse_volatility=volatility, fine_volatility=volatility)
+    profile = replace(base, model=model)
+    driver = CompiledDriver(profile, tmp_path)
+    means = []
+    for seed in range(20):  # some drivers' means lie beyond where movement bends back
+        assert compared(driver, profile, 60, seed) < TOLERANCE
+        means.append(driver.step(60.0, row_of(varying(driver.columns, 1, 1), 0))[0])
+    assert np.ptp(means) > 1.5
+
+
+def test_columns_of_any_name_have_fields_in_c(tmp_path: Path) -> None:
+    def of(column: str) -> Linear:
+        return Linear(column=column, acts=Acts.LOCATION, coefficients=(0.1,), errors=(0.1,), reference=(0.0,))
+
+    names = ("double", "2nd lead", "Größe", "position", 'a"b\\', "*/")
+    profile = replace(read_profile("rural"), effects=tuple(map(of, names)), name='Ä */ "')
+    driver = CompiledDriver(profile, tmp_path / "c")
+    assert compared(driver, profile, 50, 1) < TOLERANCE
+    with pytest.raises(DriverProfileError, match="'a b' and 'a-b' are both x_a_b in C"):
+        export_c(replace(profile, effects=(of("a b"), of("a-b"))), tmp_path / "d")

@@ -1,7 +1,11 @@
-"""A driver as an FMU: valid, and the offsets that `sample` gives."""
+"""A driver as an FMU, in C and in Python: valid, and the offsets that `sample` gives."""
 
 from __future__ import annotations
 
+import shutil
+import subprocess
+import sys
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -9,21 +13,36 @@ import pandas as pd
 import pytest
 
 import xosc_lateral as xl
+from tests.kit.compiled import SANITIZED, build, compiler, varying
 from xosc_lateral.cli import main
+from xosc_lateral.workflows.live.c_numbers import inputs_of
 
-fmpy = pytest.importorskip("fmpy", reason="the extra fmu is not installed")
-pytest.importorskip("pythonfmu")
-pytest.importorskip("pythonfmu3")
+fmpy = pytest.importorskip("fmpy", reason="no fmpy here")
 pytestmark = pytest.mark.filterwarnings("ignore")  # of foreign packages
 
 VERSIONS = ("2.0", "3.0")
 
 
-@pytest.fixture(scope="module", params=VERSIONS)
-def unit(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("fmu") / f"driver{request.param[0]}.fmu"
-    assert main(["export", "fmu", "-p", "motorway", "--fmi", request.param, "-o", str(path)]) == 0
+def exported(version: str, path: Path, *words: str, profile: str = "motorway") -> Path:
+    assert main(["export", "fmu", "-p", profile, "--fmi", version, "-o", str(path), "-q", *words]) == 0
     return path
+
+
+@pytest.fixture(scope="module", params=[(version, python) for version in VERSIONS for python in (False, True)],
+                ids=lambda how: f"{how[0]}-{'Python' if how[1] else 'C'}")  # fmt: skip
+def unit(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    version, python = request.param
+    folder = tmp_path_factory.mktemp("python" if python else "fmu")
+    if python:
+        pytest.importorskip("pythonfmu")
+        pytest.importorskip("pythonfmu3")
+    else:
+        compiler()
+    return exported(version, folder / f"driver{version[0]}.fmu", *(["--python"] if python else []))
+
+
+def calls_python(unit: Path) -> bool:
+    return unit.parent.name.startswith("python")
 
 
 def test_it_is_valid_and_has_units(unit: Path) -> None:
@@ -34,15 +53,18 @@ def test_it_is_valid_and_has_units(unit: Path) -> None:
     units = {one.name: one.unit for one in described.modelVariables if one.causality in ("input", "output")}
     assert units["offset"] == "m" and units["rate"] == "m/s" and units["heading"] == "rad"
     assert units["speed"] == "m/s" and units["left_distance"] == "m" and units["is_truck"] == "-"
-    assert {one.name for one in described.modelVariables if one.causality == "parameter"} >= {"seed", "profile"}
+    assert {one.name for one in described.modelVariables if one.causality == "parameter"} >= {"seed"}
     means = described.coSimulation
     assert means.canGetAndSetFMUstate and means.canSerializeFMUstate
 
 
 @pytest.mark.parametrize("profile", ["", "motorway-vehicle-3"])
 def test_simulated_it_is_what_is_sampled(unit: Path, profile: str) -> None:
+    if profile and not calls_python(unit):
+        pytest.skip("a unit in C has one profile")
     seconds = 12.0
-    values = {"seed": 4, "profile": profile, "is_truck": 1.0, "lane_index": 1.0, "speed": 27.0, "lane_width": 3.6}
+    values = {"seed": 4, "is_truck": 1.0, "lane_index": 1.0, "speed": 27.0, "lane_width": 3.6}
+    values |= {"profile": profile} if profile else {}
     inside = xl.read_profile(profile or "motorway")
     rows = round(seconds / 0.2) + 1
     columns = {"speed": 27.0, "lane_width": 3.6, "is_truck": 1.0, "lane_index": 1.0}
@@ -80,7 +102,11 @@ def test_a_state_brings_it_back(tmp_path: Path, unit: Path) -> None:
 
     on(0, 7)
     state = one.getFMUstate() if is_2 else one.getFMUState()
+    saved = (one.serializeFMUstate if is_2 else one.serializeFMUState)(state)
     after = on(7, 30)
+    (one.setFMUstate if is_2 else one.setFMUState)(state)
+    assert on(7, 30) == after
+    state = (one.deSerializeFMUstate if is_2 else one.deserializeFMUState)(saved)
     (one.setFMUstate if is_2 else one.setFMUState)(state)
     assert on(7, 30) == after
     one.terminate()
@@ -94,7 +120,7 @@ def test_what_a_driver_can_not_do_is_refused_with_a_reason_and_the_next_step_goe
 
     described = fmpy.read_model_description(str(unit))
     is_2 = described.fmiVersion.startswith("2")
-    assert "Needs a host with Python" in described.description
+    assert ("Needs a host with Python" in described.description) == calls_python(unit)
     one = instantiate_fmu(extract(str(unit), str(tmp_path)), described, "CoSimulation", debug_logging=not is_2)
     number = {variable.name: [variable.valueReference] for variable in described.modelVariables}
     write = one.setReal if is_2 else one.setFloat64
@@ -117,8 +143,164 @@ def test_what_a_driver_can_not_do_is_refused_with_a_reason_and_the_next_step_goe
     assert step(30_000.0) == ""
     for name, value, usual in (("speed", -10.0, 30.0), ("speed", 1e9, 30.0), ("lane_width", -1.0, 3.6)):
         write(number[name], [value])
-        assert name.replace("_", " ") in step(30_000.1)
+        assert name.replace("_", " ") in step(30_000.1).replace("_", " ")
         write(number[name], [usual])
     assert step(30_000.1) == ""
     one.terminate()
     one.freeInstance()
+
+
+def run(unit: Path, context: dict[str, np.ndarray], step: float, seed: int = 3, **more: np.ndarray) -> np.ndarray:
+    """Outputs at every step, of inputs that are there at its end."""
+    from fmpy import extract, instantiate_fmu
+
+    described = fmpy.read_model_description(str(unit))
+    is_2 = described.fmiVersion.startswith("2")
+    instance = instantiate_fmu(extract(str(unit)), described, "CoSimulation")
+    number = {variable.name: [variable.valueReference] for variable in described.modelVariables}
+    write, read = (instance.setReal, instance.getReal) if is_2 else (instance.setFloat64, instance.getFloat64)
+
+    def see(row: int) -> None:
+        for name, values in {**context, **more}.items():
+            (instance.setBoolean if name == "following" else write)(number[name], [values[row].item()])
+
+    if is_2:
+        instance.setupExperiment(startTime=0.0)
+        instance.enterInitializationMode()
+    else:
+        instance.enterInitializationMode(startTime=0.0)
+    (instance.setInteger if is_2 else instance.setInt32)(number["seed"], [seed])
+    see(0)
+    instance.exitInitializationMode()
+    outputs = [number[name][0] for name in ("offset", "rate", "heading")]
+    rows = [list(read(outputs))]
+    for k in range(1, len(context["speed"])):
+        see(k)
+        instance.doStep(currentCommunicationPoint=step * (k - 1), communicationStepSize=step)
+        rows.append(list(read(outputs)))
+    instance.terminate()
+    instance.freeInstance()
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_under_a_context_that_changes_it_is_what_is_sampled_a_preview_later(version: str, tmp_path: Path) -> None:
+    compiler()
+    profile = xl.read_profile("motorway-refined")
+    unit = exported(version, tmp_path / "driver.fmu", profile=profile.name)
+    context = varying(inputs_of(profile), 300, 3) | {"lane_index": np.ones(300)}
+    for name, values in context.items():  # a unit has no NaN: nobody is far away
+        context[name] = np.where(np.isnan(values), np.inf, values) if name.endswith("_distance") else values
+    seen = {name: np.minimum(values, 1000.0) for name, values in context.items()}
+    late = np.maximum(np.arange(300) - round(xl.OffsetStream(profile, 0, rate=100.0).preview / 0.2), 0)
+    columns = {name: values[late] for name, values in context.items()}
+    table = pd.DataFrame({"drive": "one", "time": 0.2 * np.arange(300), "offset": 0.0, **columns})
+    sampled = xl.sample(profile, context=table, seed=3).to_frame()  # without the rows about a change of lanes
+    rows = np.round(sampled.time.to_numpy() / 0.2).astype(int)
+    assert len(rows) > 200
+    np.testing.assert_allclose(run(unit, seen, 0.2)[rows, 0], sampled.offset, atol=1e-9, rtol=0.0)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_slow_driving_and_maneuvers_are_as_of_the_unit_that_calls_python(version: str, tmp_path: Path) -> None:
+    compiler()
+    pytest.importorskip("pythonfmu")
+    pytest.importorskip("pythonfmu3")
+    time = 0.05 * np.arange(1600)
+    context = {"speed": np.clip(20.0 + 25.0 * np.sin(time / 9.0), 0.0, None), "lane_width": np.full(1600, 3.5)}
+    more = {"following": (time % 20.0 > 6.0) | (time < 14.0), "position": 1.5 * np.sin(time)}
+    units = [
+        exported(version, tmp_path / name, *words, profile="motorway-vehicle-2")
+        for name, words in (("c.fmu", ()), ("python.fmu", ("--python",)))
+    ]
+    in_c, in_python = (run(unit, context, 0.05, **more) for unit in units)
+    np.testing.assert_allclose(in_c, in_python, atol=1e-9, rtol=0.0)
+
+
+WITHOUT_US = """
+import sys
+for name in ("xosc_lateral", "pythonfmu", "pythonfmu3"):
+    sys.modules[name] = None
+import fmpy
+from fmpy.validation import validate_fmu
+assert validate_fmu(sys.argv[1]) == []
+run = fmpy.simulate_fmu(sys.argv[1], stop_time=3.0, step_size=0.1, output_interval=0.1, output=["offset"])
+print(run["offset"].std())
+"""
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_it_runs_where_this_package_is_not(version: str, tmp_path: Path) -> None:
+    unit = exported(version, tmp_path / "driver.fmu", "--compiler", compiler("cc"))
+    words = [sys.executable, "-I", "-W", "ignore", "-c", WITHOUT_US, str(unit)]
+    done = subprocess.run(words, capture_output=True, text=True, check=False, cwd=tmp_path, env={"PATH": ""})
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout) > 0.0
+
+
+@pytest.mark.parametrize("name", ["gcc", "clang"])
+def test_sources_compile_without_a_warning_and_several_units_link_into_one_program(name: str, tmp_path: Path) -> None:
+    sources = []
+    for version, profile in (("2.0", "motorway"), ("3.0", "motorway-refined"), ("3.0", "rural")):
+        unit = exported(version, tmp_path / f"{profile}.fmu", "--compiler", compiler(name), profile=profile)
+        with zipfile.ZipFile(unit) as archive:
+            archive.extractall(tmp_path / profile)
+        sources += sorted((tmp_path / profile / "sources").glob("*.c"))
+    build(sources, tmp_path / "all.so", "-shared", "-fPIC", *SANITIZED, name=name)
+
+
+def test_a_unit_is_the_same_bytes_each_time_and_without_a_compiler_has_its_source(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compiler()
+    first, again = (exported("3.0", tmp_path / name).read_bytes() for name in ("a.fmu", "b.fmu"))
+    assert first == again
+    monkeypatch.setattr("xosc_lateral.workflows.live.fmu.HOST_COMPILERS", ("no such compiler",))
+    assert xl.export_fmu(xl.read_profile("motorway"), tmp_path / "bare.fmu") == ()
+    names = zipfile.ZipFile(tmp_path / "bare.fmu").namelist()
+    assert "sources/fmi.c" in names and not any(name.startswith("binaries") for name in names)
+
+
+def test_a_compiler_that_is_not_there_or_fails_is_told_in_a_line_and_nothing_is_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    failing, odd = tmp_path / "failing", tmp_path / "odd"
+    failing.write_text(
+        '#!/bin/sh\nif [ "$1" = -dumpmachine ]; then echo i686-linux; exit; fi\necho no licence >&2; exit 1\n'
+    )
+    odd.write_text("#!/bin/sh\necho avr\n")
+    for program in (failing, odd):
+        program.chmod(0o755)
+    for words, message in (
+        ("no-such-cc", "compiler 'no-such-cc': there is no such program"),
+        (str(failing), "no licence"),
+        (str(odd), "compiler for 'avr': FMI has no binaries for it"),
+    ):
+        assert main(["export", "fmu", "-o", str(tmp_path / "driver.fmu"), "--compiler", words]) == 1
+        printed = capsys.readouterr().err
+        assert message in printed and printed.count("\n") == 1
+    assert main(["export", "fmu", "-o", str(tmp_path / "driver.fmu"), "--python", "--compiler", "cc"]) == 2
+    assert not (tmp_path / "driver.fmu").exists()
+
+
+@pytest.mark.parametrize(
+    ("machine", "folders"),
+    [
+        ("x86_64-linux-gnu", ("linux64", "x86_64-linux", ".so")),
+        ("i686-w64-mingw32", ("win32", "x86-windows", ".dll")),
+        ("x86_64-w64-mingw32", ("win64", "x86_64-windows", ".dll")),
+        ("arm64-apple-darwin23.1.0", ("aarch64-darwin", "aarch64-darwin", ".dylib")),
+        ("aarch64-linux-gnu", ("aarch64-linux", "aarch64-linux", ".so")),
+    ],
+)
+def test_platforms_are_called_as_the_standard_has_them(machine: str, folders: tuple[str, str, str]) -> None:
+    from xosc_lateral.workflows.live.fmu import _platform
+
+    assert (_platform(machine, "2")[0], *_platform(machine, "3")) == folders
+
+
+def test_a_cross_compiler_makes_a_second_binary(tmp_path: Path) -> None:
+    cross = shutil.which("x86_64-w64-mingw32-gcc") or pytest.skip("no cross compiler here")
+    unit = exported("2.0", tmp_path / "driver.fmu", "--compiler", compiler(), "--compiler", cross)
+    names = zipfile.ZipFile(unit).namelist()
+    assert {"binaries/linux64/driver_motorway.so", "binaries/win64/driver_motorway.dll"} <= set(names)

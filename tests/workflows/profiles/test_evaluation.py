@@ -218,9 +218,10 @@ def test_each_pair_of_profiles_has_a_verdict_and_none_is_alike_that_differs(caps
     lines = capsys.readouterr().out.splitlines()
     pairs = [re.split(r" {2,}", line) for line in lines if re.match(r"\S+, \S+  ", line)]
     assert len(pairs) == 6
-    for *_, verdict in pairs:
-        assert verdict.startswith("differ" if float(verdict.rpartition("= ")[2]) <= 0.05 else "not told apart")
-    differing = {frozenset(names.split(", ")) for names, *_, verdict in pairs if verdict.startswith("differ")}
+    words = r"(differ in (mean offset|slow movement|fast movement), p [=<] \S+|not told apart; .* would be)"
+    assert all(re.fullmatch(words, verdict) for _, verdict, *_ in pairs)
+    differing = {frozenset(names.split(", ")) for names, verdict, *_ in pairs if verdict.startswith("differ")}
+    assert all(float(verdict.split()[-1]) <= 0.05 for _, verdict, *_ in pairs if verdict.startswith("differ"))
     for line in (line for line in lines if line.startswith("alike: ")):
         assert not any(pair <= set(line.removeprefix("alike: ").split(", ")) for pair in differing)
 

@@ -106,6 +106,24 @@ def test_where_the_next_road_runs_the_other_way_the_lane_changes_its_sign(tmp_pa
     assert (np.abs(motion.offset) < 1e-9).all()
 
 
+@pytest.mark.parametrize("contact", ["start", "end"])
+@pytest.mark.parametrize("lane", [-2, 2])
+def test_without_links_the_nearest_lane_of_the_next_road_is_taken(tmp_path: Path, contact: str, lane: int) -> None:
+    none = dict.fromkeys((2, 1, -1, -2), (None, None))
+    bare, way = section(lanes(2, 1, links=none), lanes(-1, -2, links=none)), 1.0 if lane < 0 else -1.0
+    border, entry = 200.0 if lane < 0 else 0.0, 1 if contact == "start" else -1
+    second = line(border if entry > 0 else border + 200.0 * way, heading=0.0 if way == entry else pi, length=200.0)
+    link = (SUCCESSOR if lane < 0 else PREDECESSOR).format("2", contact)
+    roads = map_of(
+        road("1", line(length=200.0), 200.0, link=link, sections=bare), road("2", second, 200.0, sections=bare)
+    )
+    start = {"Ego": teleport(on_lane(lane, 100.0, offset=0.4 * way)) + speed(20.0)}
+    motion = entity(Stage(tmp_path, roads).play(start=start, last=9.0))
+    np.testing.assert_allclose(motion.x, 100.0 + way * 20.0 * motion.time, atol=1e-6)
+    assert motion.lane[-1] == -2 * entry
+    np.testing.assert_allclose(np.abs(motion.y[motion.time > 5.1]), 1.5 * WIDTH, atol=1e-9)
+
+
 def test_a_lane_change_over_such_a_border_goes_on(tmp_path: Path) -> None:
     played = Stage(tmp_path, MIRRORED).play(maneuvers(event(lane_change(to_lane(-1)))), start=ego(-2, 150.0))
     motion = entity(played)

@@ -213,6 +213,10 @@ def test_both_arrive_at_once_without_a_final_speed(tmp_path: Path) -> None:
     ego, lead = entity(played), entity(played, "Lead")
     there = row(lead, float(np.interp(400.0, lead.x, lead.time)))
     assert ego.x[there] == pytest.approx(400.0, abs=1.0)
+    # 330 m in 19 s with one acceleration all the time
+    braking = 2.0 * (330.0 / 19.0 - 20.0) / 19.0
+    on_the_way = (ego.time > 1.2) & (ego.time < 18.0)
+    np.testing.assert_allclose(ego.speed[on_the_way], 20.0 + braking * (ego.time[on_the_way] - 1.0), atol=0.05)
 
 
 def test_a_standing_master_is_waited_for(tmp_path: Path) -> None:

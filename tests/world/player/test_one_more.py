@@ -9,15 +9,14 @@ from typing import Any
 import pytest
 
 from tests.kit.stage import Stage, by_entity, entity, event, maneuvers, private_action, row, start_of, when
+from xosc_lateral.files.openscenario import actions as action_readers
 from xosc_lateral.files.openscenario import conditions as condition_readers
-from xosc_lateral.files.openscenario import private_actions
 from xosc_lateral.files.openscenario.context import Context
 from xosc_lateral.files.openscenario.element import XmlElement
-from xosc_lateral.world.player.actions import registry as running_actions
+from xosc_lateral.world.player import storyboard_builder
 from xosc_lateral.world.player.actions.base import Domain, RunningPrivateAction
-from xosc_lateral.world.player.conditions import registry as running_conditions
-from xosc_lateral.world.player.conditions.base import EntityCheck
 from xosc_lateral.world.player.simulation import Simulation
+from xosc_lateral.world.player.storyboard import EntityCheck
 from xosc_lateral.world.scenario.place import Place
 
 
@@ -71,10 +70,10 @@ def prepare_beyond(content: BeyondCondition, simulation: Simulation) -> EntityCh
 @pytest.fixture
 def _known(monkeypatch: pytest.MonkeyPatch) -> None:
     """A line in the reader's table, and one in the table of the module that plays it."""
-    monkeypatch.setitem(private_actions.PRIVATE_ACTIONS, "HurryAction", read_hurry)
-    monkeypatch.setitem(running_actions.RUNNING, HurryAction, RunningHurry)
+    monkeypatch.setitem(action_readers.PRIVATE_ACTIONS, "HurryAction", read_hurry)
+    monkeypatch.setitem(storyboard_builder.RUNNING, HurryAction, RunningHurry)
     monkeypatch.setitem(condition_readers.ENTITY_CONDITIONS, "BeyondCondition", read_beyond)
-    monkeypatch.setitem(running_conditions.ENTITY_CHECKS, BeyondCondition, prepare_beyond)
+    monkeypatch.setitem(storyboard_builder.ENTITY_CHECKS, BeyondCondition, prepare_beyond)
 
 
 HURRY = private_action('<HurryAction acceleration="2" duration="3"/>')

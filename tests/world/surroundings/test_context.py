@@ -16,8 +16,7 @@ from xosc_lateral.world.motion.nominal import EntityMotion, PlayedAction
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario import Action, Entity, Place
 from xosc_lateral.world.scenario.enums import VehicleCategory
-from xosc_lateral.world.scenario.environment import Environment, TimeOfDay, Weather
-from xosc_lateral.world.scenario.global_actions import EnvironmentAction
+from xosc_lateral.world.scenario.global_actions import Environment, EnvironmentAction, TimeOfDay, Weather
 from xosc_lateral.world.surroundings.around import INFLUENCE_DISTANCE
 from xosc_lateral.world.surroundings.context import STEERING, entity_context
 

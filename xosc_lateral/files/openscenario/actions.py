@@ -1,14 +1,24 @@
-"""Actions of init and events: global, user-defined, private."""
+"""The storyboard: init, stories, events, and their actions: global, user-defined, private."""
 
 from __future__ import annotations
 
 from msgspec import Struct
+from msgspec.structs import replace
 
+from xosc_lateral.files.openscenario.conditions import read_trigger
 from xosc_lateral.files.openscenario.context import Context, Reader, declared, read_struct
+from xosc_lateral.files.openscenario.declarations import local_scope
 from xosc_lateral.files.openscenario.element import XmlElement
-from xosc_lateral.files.openscenario.entities import read_environment
+from xosc_lateral.files.openscenario.entities import (
+    read_bounding_box,
+    read_controller,
+    read_environment,
+    read_performance,
+)
+from xosc_lateral.files.openscenario.positions import READERS as POSITION_READERS
 from xosc_lateral.files.openscenario.positions import read_position
-from xosc_lateral.files.openscenario.private_actions import PRIVATE_ACTIONS
+from xosc_lateral.world.scenario.entity import BoundingBox, Controller, Performance
+from xosc_lateral.world.scenario.enums import DynamicsShape
 from xosc_lateral.world.scenario.expressions import ExpressionError
 from xosc_lateral.world.scenario.global_actions import (
     AddEntityAction,
@@ -26,7 +36,39 @@ from xosc_lateral.world.scenario.global_actions import (
     VariableSetAction,
 )
 from xosc_lateral.world.scenario.place import Unsupported
-from xosc_lateral.world.scenario.storyboard import Action
+from xosc_lateral.world.scenario.private_actions import (
+    AcquirePositionAction,
+    ActivateControllerAction,
+    AnimationAction,
+    AssignControllerAction,
+    AssignRouteAction,
+    ConnectTrailerAction,
+    DisconnectTrailerAction,
+    FollowTrajectoryAction,
+    LaneChangeAction,
+    LaneOffsetAction,
+    LateralDistanceAction,
+    LightStateAction,
+    LongitudinalDistanceAction,
+    OverrideControllerValueAction,
+    SpeedAction,
+    SpeedProfileAction,
+    SynchronizeAction,
+    TeleportAction,
+    TransitionDynamics,
+    VisibilityAction,
+)
+from xosc_lateral.world.scenario.storyboard import (
+    Action,
+    Actors,
+    Event,
+    Init,
+    Maneuver,
+    ManeuverGroup,
+    Private,
+    Story,
+    Trigger,
+)
 
 # Elements that only group others; what they hold is the action.
 GROUPING = {
@@ -64,10 +106,10 @@ def read_actions(owner: XmlElement, name: str, context: Context) -> list[Action]
 
 
 def _contents(owner: XmlElement) -> list[XmlElement]:
-    found: list[XmlElement] = []
+    elements: list[XmlElement] = []
     for child in owner.children():
-        found.extend(_contents(child) if child.tag in GROUPING else [child])
-    return found
+        elements.extend(_contents(child) if child.tag in GROUPING else [child])
+    return elements
 
 
 def _environment(e: XmlElement, context: Context) -> EnvironmentAction:
@@ -113,4 +155,125 @@ GLOBAL_ACTIONS: dict[str, Reader] = {
     "VariableAction": _setting(VariableSetAction, VariableModifyAction),
     "TrafficAction": _traffic,
     "UserDefinedAction": _user_defined,
+}
+
+
+# ---- private actions: what their structs declare is read by that, the others by functions ----
+def _teleport(e: XmlElement, context: Context) -> TeleportAction:
+    # 1.0 files in the field put the position right into the action.
+    return TeleportAction(read_position(e.child("Position") or e, context), place=e.place())
+
+
+def _speed_profile(e: XmlElement, context: Context) -> SpeedProfileAction:
+    if e.child("SpeedProfileEntry") is None:
+        e.fail("a speed profile needs an entry")
+    reference = context.entity(e) if e.optional_text("entityRef") else None
+    return read_struct(SpeedProfileAction, e, context, entity_ref=reference)
+
+
+def _lane_offset(e: XmlElement, context: Context) -> LaneOffsetAction:
+    dynamics = e.required("LaneOffsetActionDynamics")
+    shape = dynamics.choice("dynamicsShape", DynamicsShape, DynamicsShape.STEP)
+    most = dynamics.optional_number("maxLateralAcc", finite=False)
+    action = read_struct(LaneOffsetAction, e, context, shape=shape, max_lateral_acc=most)
+    return replace(action, target=replace(action.target, value=-action.target.value)) if context.left_handed else action
+
+
+def _override(e: XmlElement, _: Context) -> OverrideControllerValueAction:
+    overrides = tuple((item.tag, item.boolean("active", False), item.optional_number("value")) for item in e.children())
+    return OverrideControllerValueAction(overrides, place=e.place())
+
+
+def _light_state(e: XmlElement, context: Context) -> LightStateAction:
+    kind, state = e.child("LightType"), e.child("LightState")
+    light = None if kind is None else kind.child()
+    name = "" if light is None else light.optional_text("vehicleLightType") or light.text("userDefinedLightType", "")
+    return read_struct(LightStateAction, e, context, light=name, mode="" if state is None else state.text("mode", ""))
+
+
+def _animation(e: XmlElement, context: Context) -> AnimationAction:
+    owner = e.child("AnimationType")
+    content = None if owner is None else owner.child()
+    return read_struct(AnimationAction, e, context, kind=content.tag if content else "")
+
+
+def read_transition(e: XmlElement, context: Context) -> TransitionDynamics:
+    """How a value goes to its target; a step needs no value."""
+    is_step = e.choice("dynamicsShape", DynamicsShape, DynamicsShape.STEP) is DynamicsShape.STEP
+    preset = {"value": 0.0} if is_step and e.optional_number("value", finite=False) is None else {}
+    return read_struct(TransitionDynamics, e, context, **preset)
+
+
+PRIVATE_ACTIONS: dict[str, Reader] = {
+    **declared(SpeedAction, LongitudinalDistanceAction, LaneChangeAction, LateralDistanceAction, SynchronizeAction),
+    **declared(FollowTrajectoryAction, AssignRouteAction, AcquirePositionAction, AssignControllerAction),
+    **declared(ActivateControllerAction, VisibilityAction, ConnectTrailerAction, DisconnectTrailerAction),
+    "TeleportAction": _teleport,
+    "SpeedProfileAction": _speed_profile,
+    "LaneOffsetAction": _lane_offset,
+    "OverrideControllerValueAction": _override,
+    "LightStateAction": _light_state,
+    "AnimationAction": _animation,
+}
+
+
+# ---- init, stories, maneuver groups, events ----
+def _read_init(element: XmlElement, context: Context) -> Init:
+    owner = element.child("Actions") or element
+    global_actions, user_defined, privates = [], [], []
+    for child in owner.children():
+        if child.tag == "GlobalAction":
+            global_actions.extend(read_actions(child, "", context))
+        elif child.tag == "UserDefinedAction":
+            user_defined.extend(read_actions(child, "", context))
+        elif child.tag == "Private":
+            entity = context.entity(child)
+            actions = [action for item in child.children("PrivateAction") for action in read_actions(item, "", context)]
+            privates.append(Private(entity, tuple(actions), child.place()))
+        else:
+            context.remark(child)
+    return Init(tuple(global_actions), tuple(user_defined), tuple(privates))
+
+
+def _read_story(element: XmlElement, context: Context) -> Story:
+    return read_struct(Story, element.within(local_scope(element)), context)
+
+
+def _read_group(element: XmlElement, context: Context) -> ManeuverGroup:
+    maneuvers = []
+    for child in element.children("Maneuver", "CatalogReference"):
+        if child.tag == "Maneuver":
+            maneuver = child.within(local_scope(child))
+        else:
+            maneuver = context.catalogs.entry(child)
+            if maneuver.tag != "Maneuver":
+                child.fail(f"catalog entry '{maneuver.raw('name')}' is a {maneuver.tag}, not a Maneuver")
+        maneuvers.append(read_struct(Maneuver, maneuver, context))
+    owner = element.child("Actors")
+    actors = Actors((), False, element.place()) if owner is None else read_struct(Actors, owner, context)
+    return read_struct(ManeuverGroup, element, context, maneuvers=tuple(maneuvers), actors=actors)
+
+
+def _read_event(element: XmlElement, context: Context) -> Event:
+    actions = []
+    for item in element.children("Action"):
+        contents = list(item.children("PrivateAction", "GlobalAction", "UserDefinedAction"))
+        if not contents and item.child() is not None:
+            item.fail("contains no PrivateAction, GlobalAction or UserDefinedAction")
+        for content in contents:
+            actions.extend(read_actions(content, item.text("name", ""), context))
+    return read_struct(Event, element, context, actions=tuple(actions))
+
+
+READERS: dict[object, Reader] = {
+    **POSITION_READERS,
+    BoundingBox: read_bounding_box,
+    Controller: read_controller,
+    Event: _read_event,
+    Init: _read_init,
+    ManeuverGroup: _read_group,
+    Performance: read_performance,
+    Story: _read_story,
+    TransitionDynamics: read_transition,
+    Trigger: read_trigger,
 }

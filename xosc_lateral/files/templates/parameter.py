@@ -138,9 +138,8 @@ class Settings:
         by_name = {parameter.name: parameter for parameter in parameters}
         for name in chosen:
             if name not in by_name:
-                raise XoscLateralError(
-                    f"unknown setting {name!r}{did_you_mean(name, by_name)}; there are {', '.join(sorted(by_name))}"
-                )
+                there = f"there are {', '.join(sorted(by_name)) or 'none'}"
+                raise XoscLateralError(f"unknown setting {name!r}{did_you_mean(name, by_name)}; {there}")
         self._values: dict[str, float | str] = {
             name: parameter.read(chosen[name]) if name in chosen else parameter.default
             for name, parameter in by_name.items()

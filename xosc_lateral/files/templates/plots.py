@@ -24,7 +24,6 @@ _TRUCK_SPEED = 22.0  # as in the scenario [m/s]
 
 
 def _cut_in(settings: Settings) -> Plot:
-    """A faster car passes the ego vehicle, cuts in before it and slows down."""
     settings.need_more("passing_speed", "ego_speed")
     ego_speed, passing_speed = settings.number("ego_speed"), settings.number("passing_speed")
     start_gap, duration = settings.number("start_gap"), settings.number("duration")
@@ -53,7 +52,6 @@ BRAKING_LEADER = (
 
 
 def _braking_leader(settings: Settings) -> Plot:
-    """The car ahead brakes and speeds up again; the ego vehicle follows suit, a car passes meanwhile."""
     settings.need_more("speed", "slow_speed")
     speed = settings.number("speed")
     gap = settings.number("headway") * speed
@@ -80,7 +78,6 @@ _LEAD = 120.0  # of the car in the other lane before the truck [m]
 
 
 def _overtake_truck(settings: Settings) -> Plot:
-    """The ego vehicle comes up to a truck, overtakes it and returns to its lane."""
     settings.need_more("ego_speed", "truck_speed")
     ego_speed, truck_speed = settings.number("ego_speed"), settings.number("truck_speed")
     start_gap = settings.number("start_gap")
@@ -104,7 +101,6 @@ CURVES = (
 
 
 def _curves(settings: Settings) -> Plot:
-    """Free driving through as many bends to either side as the duration takes; nothing happens but the road."""
     speed = settings.number("speed")
     reach = 200.0 + speed * settings.number("duration") + 150.0
     bend = Bend(settings.number("radius"), settings.number("arc"), settings.number("clothoid"))
@@ -137,7 +133,6 @@ _EGO_FRONT, _TRUCK_REAR = 1.45 + 0.5 * 4.8, 0.5 * 7.9 - 2.6  # from the referenc
 
 
 def _jam_end(settings: Settings) -> Plot:
-    """The ego vehicle comes up to the end of a jam and brakes down behind it."""
     speed, jam_speed = settings.number("speed"), settings.number("jam_speed")
     follow = 2.0 * speed
     ego = 30.0 + follow
@@ -181,7 +176,6 @@ _START_PLACES = {
 
 
 def _dense_traffic(settings: Settings) -> Plot:
-    """Ten vehicles on three lanes; two of them change lanes, one platoon slows down and recovers."""
     speeds = [settings.number(f"{lane}_lane_speed") for lane in ("slow", "middle", "fast")]
     gap, slow_down = settings.number("headway"), settings.number("slow_down")
     ego = 40.0 + 2.6 * gap * max(speeds)  # room for those that start behind the ego vehicle

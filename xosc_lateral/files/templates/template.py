@@ -76,7 +76,6 @@ class Template:
 
 
 def _filled(root: ET.Element, plot: Plot, settings: Settings) -> str:
-    """The scenario with what the settings say."""
     _set(root, "FileHeader", revMinor=settings.text("version").split(".")[1])
     for declared in root.iterfind("ParameterDeclarations/ParameterDeclaration"):
         declared.set("value", f"{settings.number(declared.get('name', '')):g}")
@@ -101,7 +100,6 @@ def _filled(root: ET.Element, plot: Plot, settings: Settings) -> str:
 
 
 def _set(root: ET.Element, path: str, **values: float | str) -> None:
-    """Attributes of the first element at a path."""
     element = root.find(path)
     assert element is not None, f"the shipped scenario has {path}"
     for name, value in values.items():
@@ -141,11 +139,8 @@ def document(root: ET.Element) -> str:
 
 
 ROAD = 1  # id of the only road
-
 SHOULDER = 3.0  # hard shoulder [m]; RAA 2008 (guidelines for motorways), cross-section RQ 31
-
 MEDIAN = 2.0  # paved margin beside the fast lane, and the grass beyond the shoulder [m]
-
 CROSSFALL = 0.025  # least crossfall for drainage, towards the outer edge [-]; RAA 2008
 
 
@@ -194,8 +189,38 @@ class Motorway:
         """The road as an OpenDRIVE document, the same bytes each time."""
         from scenariogeneration import xodr
 
+        def lane(kind: Any, width: float, mark: Any = None) -> Any:
+            made = xodr.Lane(kind, a=width)
+            made.add_roadmark(xodr.RoadMark(xodr.RoadMarkType.none) if mark is None else mark)
+            return made
+
+        plan = xodr.PlanView(0, 0, 0)
+        for part in self.alignment:
+            if isinstance(part, Straight):
+                plan.add_geometry(xodr.Line(part.length))
+                continue
+            curvature = 1.0 / part.radius
+            plan.add_geometry(xodr.Spiral(0.0, curvature, part.clothoid))
+            plan.add_geometry(xodr.Arc(curvature, part.arc))
+            plan.add_geometry(xodr.Spiral(curvature, 0.0, part.clothoid))
+        solid = xodr.RoadMark(xodr.RoadMarkType.solid, width=0.3)
+        broken = xodr.RoadMark(xodr.RoadMarkType.broken, width=0.15, length=6.0, space=12.0)
+        centre = xodr.Lane(xodr.LaneType.none)
+        centre.add_roadmark(solid)
+        section = xodr.LaneSection(0, centre)
+        add_outside, add_inside = section.add_right_lane, section.add_left_lane
+        if self.left_hand:
+            add_outside, add_inside = add_inside, add_outside
+        for number in range(self.lanes):
+            mark = solid if number == self.lanes - 1 else broken
+            add_outside(lane(xodr.LaneType.driving, self.lane_width, mark))
+        add_outside(lane(xodr.LaneType.shoulder, SHOULDER))
+        add_outside(lane(xodr.LaneType.border, MEDIAN))
+        add_inside(lane(xodr.LaneType.median, MEDIAN))
+        lanes = xodr.Lanes()
+        lanes.add_lanesection(section)
         rule = xodr.TrafficRule.LHT if self.left_hand else xodr.TrafficRule.RHT
-        road = xodr.Road(ROAD, _plan_view(self.alignment), self._lanes(), name=name, rule=rule)
+        road = xodr.Road(ROAD, plan, lanes, name=name, rule=rule)
         road.add_type(xodr.RoadType.motorway, 0)
         road.add_elevation(0, 0, self.grade, 0, 0)
         for s, start, slope in self._crossfall():
@@ -208,31 +233,6 @@ class Motorway:
         assert header is not None, "scenariogeneration writes a header"
         header.set("date", FIXED_DATE.isoformat())
         return document(root)
-
-    def _lanes(self) -> Any:
-        from scenariogeneration import xodr
-
-        solid = xodr.RoadMark(xodr.RoadMarkType.solid, width=0.3)
-        broken = xodr.RoadMark(xodr.RoadMarkType.broken, width=0.15, length=6.0, space=12.0)
-        centre = xodr.Lane(xodr.LaneType.none)
-        centre.add_roadmark(solid)
-        section = xodr.LaneSection(0, centre)
-        for number in range(self.lanes):
-            lane = xodr.Lane(xodr.LaneType.driving, a=self.lane_width)
-            lane.add_roadmark(solid if number == self.lanes - 1 else broken)
-            self._add(section, lane, outside=True)
-        for kind, width in ((xodr.LaneType.shoulder, SHOULDER), (xodr.LaneType.border, MEDIAN)):
-            self._add(section, _unmarked(kind, width), outside=True)
-        self._add(section, _unmarked(xodr.LaneType.median, MEDIAN), outside=False)
-        lanes = xodr.Lanes()
-        lanes.add_lanesection(section)
-        return lanes
-
-    def _add(self, section: Any, lane: Any, *, outside: bool) -> None:
-        if self.left_hand == outside:
-            section.add_left_lane(lane)
-        else:
-            section.add_right_lane(lane)
 
     def _crossfall(self) -> list[tuple[float, float, float]]:
         """Superelevation as (s, angle, change per metre), positive to lower the right side: in bends to the inside."""
@@ -250,26 +250,3 @@ class Motorway:
                 profile[s + part.length] = (outwards, 0.0)
             s += part.length
         return [(s, start, slope) for s, (start, slope) in profile.items()]
-
-
-def _unmarked(kind: Any, width: float) -> Any:
-    from scenariogeneration import xodr
-
-    lane = xodr.Lane(kind, a=width)
-    lane.add_roadmark(xodr.RoadMark(xodr.RoadMarkType.none))
-    return lane
-
-
-def _plan_view(alignment: tuple[Straight | Bend, ...]) -> Any:
-    from scenariogeneration import xodr
-
-    plan = xodr.PlanView(0, 0, 0)
-    for part in alignment:
-        if isinstance(part, Straight):
-            plan.add_geometry(xodr.Line(part.length))
-            continue
-        curvature = 1.0 / part.radius
-        plan.add_geometry(xodr.Spiral(0.0, curvature, part.clothoid))
-        plan.add_geometry(xodr.Arc(curvature, part.arc))
-        plan.add_geometry(xodr.Spiral(curvature, 0.0, part.clothoid))
-    return plan

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, Unpack
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.limits import JOB_MEMORY, JOB_TIMEOUT
+from xosc_lateral.base.signals import Interrupted
 from xosc_lateral.files.output_paths import claim, output_folder
 from xosc_lateral.workflows.batch.batch import JobOutcome, JobState
 from xosc_lateral.workflows.batch.batch import convert_many as outcomes_of
@@ -99,7 +100,11 @@ def convert_many(
     outcomes = outcomes_of(
         batch, workers=workers, cluster=cluster, keep_old=keep_old, limits=limits, notify=_notifier(show)
     )
-    summary = follow(outcomes, len(batch), Display(show), report=on_outcome and partial(_report_row, on_outcome))
+    try:
+        summary = follow(outcomes, len(batch), Display(show), report=on_outcome and partial(_report_row, on_outcome))
+    except Interrupted as signal:
+        signal.finished = sum(job.output.is_file() for job in batch.jobs)
+        raise
     index = None if report is None else write_batch_index(batch, Path(report))
     return BatchResult(batch, summary, index)
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 
+from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.model.profile import DriverProfile
@@ -30,7 +31,7 @@ def export_c(profile: DriverProfile, folder: str | Path) -> list[Path]:
 
     Raises `DriverProfileError` if the profile has an effect or a core model of a plug-in.
     """
-    texts = c_sources(profile) | {name: _filled(name, profile) for name in ("CMakeLists.txt", "example.c")}
+    texts = c_sources(profile) | {name: filled(name, profile) for name in ("CMakeLists.txt", "example.c")}
     written = [Path(folder) / name for name in texts]
     Path(folder).mkdir(parents=True, exist_ok=True)
     for path, text in zip(written, texts.values(), strict=True):
@@ -38,29 +39,44 @@ def export_c(profile: DriverProfile, folder: str | Path) -> list[Path]:
     return written
 
 
+def _fields(profile: DriverProfile) -> dict[str, str]:
+    """What columns are called in C: other names than the usual begin with x_, and so are no words of C.
+
+    Raises `DriverProfileError` where two have the same.
+    """
+    columns: dict[str, str] = {}
+    for column in inputs_of(profile):
+        field = column if column in CONTEXT_UNITS else "x_" + re.sub(r"[^0-9A-Za-z]", "_", column)
+        if field in columns:
+            raise DriverProfileError(f"profile {profile.name}: {columns[field]!r} and {column!r} are both {field} in C")
+        columns[field] = column
+    return {column: field for field, column in columns.items()}
+
+
 def c_sources(profile: DriverProfile) -> dict[str, str]:
     """Header, source and numbers of a driver, by file name."""
-    name = identifier(profile)
+    name, fields = identifier(profile), _fields(profile)
     sizes, numbers = numbers_of(profile)
     words = {
-        "WHAT": f"Driver {profile.name} of xosc-lateral {__version__}, in C99.",
+        "WHAT": f"Driver {re.sub(r'[^ -.0-~]', '_', profile.name)} of xosc-lateral {__version__}, in C99.",
         "SIZES": "\n".join(f"#define DRIVER_{key} {value}" for key, value in sizes.items()),
         "MEMORY": str(_memory(sizes)),
         "PREVIEW": repr(round(sizes["LOOKS"] * profile.model.step, 9)),
-        "INPUTS": "\n".join(_input(column) for column in inputs_of(profile)),
+        "INPUTS": "\n".join(_input(column, field) for column, field in fields.items()),
         "KNOWN": "\n".join(
-            f"#define DRIVER_KNOWS_{column} UINT64_C({1 << k})" for k, column in enumerate(inputs_of(profile))
+            f"#define DRIVER_KNOWS_{field} UINT64_C({1 << k})" for k, field in enumerate(fields.values())
         ),
-        "ALL_KNOWN": str((1 << len(inputs_of(profile))) - 1),
+        "ALL_KNOWN": str((1 << len(fields)) - 1),
     }
     return {
-        f"{name}.h": _filled("driver.h", profile, words),
-        f"{name}.c": _filled("driver.c", profile),
+        f"{name}.h": filled("driver.h", profile, words),
+        f"{name}.c": filled("driver.c", profile),
         f"{name}_profile.h": _named("\n".join(numbers) + "\n", profile),
     }
 
 
-def _filled(template: str, profile: DriverProfile, words: Mapping[str, str] | None = None) -> str:
+def filled(template: str, profile: DriverProfile, words: Mapping[str, str] | None = None) -> str:
+    """A template with words in place of those between @, and names of the profile's own."""
     text = files("xosc_lateral").joinpath("resources", "driver_c", template).read_text(encoding="utf-8")
     for word, value in (words or {}).items():
         text = text.replace(f"@{word}@", value)
@@ -71,9 +87,8 @@ def _named(text: str, profile: DriverProfile) -> str:
     return re.sub(r"\bDRIVER(?=_|\.h|\b)", identifier(profile), text)
 
 
-def _input(column: str) -> str:
-    unit = CONTEXT_UNITS.get(column, "as in the profile")
-    return f"    double {column}; /* [{unit}] */"
+def _input(column: str, field: str) -> str:
+    return f"    double {field}; /* [{CONTEXT_UNITS.get(column, 'as in the profile')}] */"
 
 
 def _memory(sizes: Mapping[str, int]) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from decimal import Decimal, localcontext
 from functools import cache, reduce
@@ -101,7 +102,7 @@ def numbers_of(profile: DriverProfile) -> tuple[dict[str, int], list[str]]:
     }
     sizes |= core_sizes | {"HIDDEN": max(1, len(hidden))}
     return sizes, [
-        f"/* Numbers of the profile {profile.name}, written by xosc-lateral {__version__}. */",
+        f"/* Numbers of the profile, written by xosc-lateral {__version__}. */",
         *(f"#define {name} {_number(value)}" for name, value in constants.items()),
         f"#define DRIVER_TWO_LEVEL {int(isinstance(profile.model, TwoLevelModel))}",
         *ziggurats(),
@@ -136,8 +137,13 @@ def _inputs(profile: DriverProfile) -> list[str]:
         "enum { FAULT_NONE, "
         + ", ".join(f"FAULT_{name}" for name in FAULTS)
         + f", FAULT_COLUMNS, FAULTS = FAULT_COLUMNS + {len(columns)} }};",
-        "static const char *const faults[] = {" + ",\n    ".join(f'"{text}"' for text in texts) + "};",
+        "static const char *const faults[] = {" + ",\n    ".join(map(_text, texts)) + "};",
     ]
+
+
+def _text(text: str) -> str:
+    escaped = re.sub(r"[\x00-\x1f]", " ", text).replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{escaped}"'
 
 
 def _number(value: object) -> str:

@@ -1,273 +1,242 @@
-"""A driver as a functional mock-up unit, FMI 2.0 or 3.0 for co-simulation, through pythonfmu and pythonfmu3.
-
-The unit holds its profile and a script of a few lines; what it does is here, in the package, which whoever simulates it
-has beside a Python of the same version.
-"""
+"""A driver as a functional mock-up unit, FMI 2.0 or 3.0 for co-simulation: C source, and binaries where it compiles."""
 
 from __future__ import annotations
 
-import sys
+import io
+import re
+import shlex
+import shutil
+import subprocess
 import tempfile
-from collections.abc import Mapping
-from importlib import import_module
+import zipfile
+from collections.abc import Mapping, Sequence
+from hashlib import sha256
 from pathlib import Path
-from typing import Any
-
-import numpy as np
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from xosc_lateral.base.errors import SimulationError
-from xosc_lateral.base.segment import CONTEXT_UNITS
+from xosc_lateral.base.limits import DISTANCES
 from xosc_lateral.base.version import __version__
-from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.drivers.model.seeds import child
+from xosc_lateral.drivers.model.profile import DriverProfile, sampling_hash
 from xosc_lateral.files.atomic import write_atomically
-from xosc_lateral.files.profiles import profile_hash, read_profile, write_profile
-from xosc_lateral.workflows.live.traffic import Moment, Traffic
+from xosc_lateral.workflows.live.c_driver import c_sources, filled, identifier
+from xosc_lateral.workflows.live.c_numbers import inputs_of
+from xosc_lateral.workflows.live.fmu_variables import ABSENT_DISTANCE, Variable, add_units, variables_of
+from xosc_lateral.workflows.live.python_fmu import export_python_fmu
 
-ABSENT_DISTANCE = 1000.0
-"""Distances from here on mean that nobody is there: files of FMI have no infinity that every tool reads. [m]"""
+HOST_COMPILERS = ("cc", "gcc", "clang")
+"""What is looked for where no compiler is named; the first that is there."""
 
-UNITS: dict[str, dict[str, float]] = {
-    "m": {"m": 1}, "m/s": {"m": 1, "s": -1}, "m/s2": {"m": 1, "s": -2}, "1/m": {"m": -1}, "rad": {"rad": 1},
-    "%": {"factor": 0.01}, "h": {"s": 1, "factor": 3600.0}, "mm/h": {"m": 1, "s": -1, "factor": 1e-3 / 3600.0},
-    "deg": {"rad": 1, "factor": float(np.pi / 180.0)}, "lx": {"cd": 1, "m": -2}, "-": {},
-}  # fmt: skip
-"""Units of inputs and outputs in base units."""
+COMPILER_TIMEOUT = 120.0
+"""A driver compiles in a second. [s]"""
 
-OUTPUTS = {"offset": "m", "rate": "m/s", "heading": "rad"}
-"""What the driver says; positive to the LEFT of travel."""
-
-NEEDS = (
-    f"Needs a host with Python {sys.version_info.major}.{sys.version_info.minor} in its process, and xosc-lateral in "
-    "that; others can't load it (undefined symbol: _Py_NoneStruct)"
-)
-"""Of a unit that calls Python: without one in the process, no code of it runs that could say so."""
-
-SCRIPT = '''"""A driver of xosc-lateral."""
-from {package} import {base}
-
-try:
-    from xosc_lateral.workflows.live.fmu import unit_methods
-except ImportError as error:
-    raise ImportError(
-        "this FMU needs the package xosc-lateral {version} beside it, in the Python that loads it: "
-        f"pip install 'xosc-lateral[fmu]' ({{error}})"
-    ) from None
+STATE = {"2": ("FMUstate", "DeSerializeFMUstate"), "3": ("FMUState", "DeserializeFMUState")}
+"""What versions of FMI call the state, and reading it back."""
 
 
-class LateralDriver({base}):
-    """One driver: inputs are what he sees, outputs where he is in his lane."""
+def export_fmu(
+    profile: DriverProfile, path: str | Path, *, fmi: str = "2.0", python: bool = False, compilers: Sequence[str] = ()
+) -> tuple[str, ...]:
+    """Write a unit; the platforms that it has binaries for.
 
-    def do_step(self, current_time, step_size):
-        return self.go_on(current_time, step_size)
+    Parameters
+    ----------
+    profile : DriverProfile
+    path : path
+        ``.fmu``, which is replaced.
+    fmi : str
+        ``2.0`` or ``3.0``.
+    python : bool
+        A unit that calls this package, which the simulating process has to have beside its Python (extra `fmu`).
+    compilers : sequence of str
+        Of C99, cross compilers too; without, the host's where there is one. C source is in every unit.
 
-
-for name, method in unit_methods("{fmi}", __file__).items():
-    setattr(LateralDriver, name, method)
-'''
-
-
-class _OneDriver(Traffic):
-    """A single vehicle, whose driver is the one that `sample` gives for the seed."""
-
-    def seed_of(self, name: str) -> np.random.SeedSequence:
-        return child(np.random.SeedSequence(self.seed), 0)
-
-
-def export_fmu(profile: DriverProfile, path: str | Path, *, fmi: str = "2.0") -> None:
-    """Write a unit.
-
-    `path`: ``.fmu``, which is replaced. `fmi`: ``2.0`` or ``3.0``. Raises `SimulationError`: without the extra `fmu`.
+    Raises `SimulationError`: a compiler is not there or fails, or the extra `fmu` is missing; `DriverProfileError`: the
+    profile has an effect or a core model of a plug-in.
     """
-    try:
-        package = "pythonfmu3" if fmi == "3.0" else "pythonfmu"
-        builder = import_module(f"{package}.builder").FmuBuilder
-    except ImportError as error:
-        raise SimulationError("writing an FMU needs pythonfmu: pip install 'xosc-lateral[fmu]'") from error
+    if python:
+        export_python_fmu(profile, path, fmi=fmi)
+        return ()
+    version, name = fmi[0], identifier(profile)
+    sources = _sources(profile, version)
+    members = {f"sources/{file}": text.encode() for file, text in sources.items()}
+    platforms = []
+    for compiler in compilers or [host for host in HOST_COMPILERS if shutil.which(host)][:1]:
+        platform, suffix, binary = _compiled(compiler, sources, version)
+        members[f"binaries/{platform}/{name}{suffix}"] = binary
+        platforms.append(platform)
+    described = _description_2 if version == "2" else _description_3
+    members["modelDescription.xml"] = _xml(described(profile, _token(sources)))
+    if version == "3":
+        members["sources/buildDescription.xml"] = _xml(_build_description(name))
+    write_atomically(path, _packed(members))
+    return tuple(platforms)
+
+
+def _sources(profile: DriverProfile, version: str) -> dict[str, str]:
+    sources = c_sources(profile)
+    state, deserialize = STATE[version]
+    distances = [
+        0 if not column.endswith("_distance") else 1 if column in DISTANCES else 2 for column in inputs_of(profile)
+    ]
+    words = {
+        "FMI": version,
+        "STATE": state,
+        "DESERIALIZE": deserialize,
+        "ABSENT": repr(ABSENT_DISTANCE),
+        "DISTANCES": ", ".join(map(str, [*distances, 0, 0])),
+    }
+    return {**sources, "fmi.c": filled("fmi.c", profile, words | {"TOKEN": _token(sources)})}
+
+
+def _token(sources: Mapping[str, str]) -> str:
+    """By which a description and its binaries know each other."""
+    texts = "".join(text for name, text in sources.items() if name != "fmi.c")
+    return f"{{{sha256(texts.encode()).hexdigest()[:32]}}}"
+
+
+def _compiled(compiler: str, sources: Mapping[str, str], version: str) -> tuple[str, str, bytes]:
+    """Platform in the words of the version of FMI, suffix, and the shared library."""
+    words = shlex.split(compiler)
+    if not words or shutil.which(words[0]) is None:
+        raise SimulationError(f"compiler {compiler!r}: there is no such program")
+    platform, suffix = _platform(_run([*words, "-dumpmachine"], Path()).decode().strip(), version)
     with tempfile.TemporaryDirectory() as folder:
-        # units in one process share Python's modules: each has a name of its own
-        script = Path(folder) / f"lateral_driver_fmi{fmi[0]}_{profile_hash(profile)[:12]}.py"
-        filled = SCRIPT.format(version=__version__, fmi=fmi, base=f"Fmi{fmi[0]}Slave", package=package)
-        script.write_text(filled, encoding="utf-8")
-        write_profile(profile, Path(folder) / "profile.json")
-        built = Path(folder) / "built"
-        built.mkdir()
-        before = list(sys.path)
-        try:
-            state = "canGetAndSetFMUState" if fmi == "3.0" else "canGetAndSetFMUstate"
-            serial = "canSerializeFMUState" if fmi == "3.0" else "canSerializeFMUstate"
-            builder.build_FMU(
-                script, dest=built, project_files={Path(folder) / "profile.json"},
-                **{state: "true", serial: "true", "needsExecutionTool": "true"},
-            )  # fmt: skip
-        finally:
-            sys.path[:] = before
-            sys.modules.pop(script.stem, None)
-        write_atomically(path, next(built.glob("*.fmu")).read_bytes())
+        for name, text in sources.items():
+            (Path(folder) / name).write_text(text, encoding="utf-8")
+        flags = ["-std=c99", "-O2", "-ffp-contract=off", "-shared", f"-DFMI{version}_OVERRIDE_FUNCTION_PREFIX"]
+        flags += [] if suffix == ".dll" else ["-fPIC", "-fvisibility=hidden"]
+        files = [name for name in sources if name.endswith(".c")]
+        _run([*words, *flags, *files, "-o", f"unit{suffix}", "-lm"], Path(folder))
+        return platform, suffix, (Path(folder) / f"unit{suffix}").read_bytes()
 
 
-def unit_methods(fmi: str, script: str) -> dict[str, Any]:
-    """What the class in a unit's script does, by name, for that version of FMI.
-
-    The class itself has to be in the script, made from the base class that is imported there: the loaders of pythonfmu
-    look for it so.
-    """
-    package = import_module("pythonfmu3" if fmi == "3.0" else "pythonfmu")
-    base, causality, variability = (
-        getattr(package, f"Fmi{fmi[0]}{word}") for word in ("Slave", "Causality", "Variability")
-    )
-    Boolean, String, Unit = package.Boolean, package.String, getattr(package, "Unit", None) if fmi == "3.0" else None
-    if fmi == "3.0":
-        real, integer, status = package.Float64, package.Int32, package.Fmi3Status
-    else:
-        real, integer, status = package.Real, package.Integer, import_module("pythonfmu.enums").Fmi2Status
-    own = read_profile(Path(script).with_name("profile.json"))
-    columns = ("speed", "lane_width", *sorted(set(own.columns) - {"speed", "lane_width"}))
-
-    description = f"Driver {own.name} of xosc-lateral {__version__}: lateral offset in the lane, positive left. {NEEDS}"
-
-    def begin(self: Any, **settings: Any) -> None:
-        base.__init__(self, **settings)
-        # the next unit's loader looks for its own files: those of this one may be gone by then
-        sys.modules.pop(type(self).__module__, None)
-        self.description, self.author = description, "xosc-lateral"
-        self.profile, self.seed = "", 0
-        self.following, self.position = True, 0.0
-        self.offset = self.rate = self.heading = 0.0
-        self._traffic, self._has_begun = None, False
-        for name in columns:
-            setattr(self, name, _start(name, own))
-        fixed = {"causality": causality.parameter, "variability": variability.fixed}
-        self.register_variable(integer("seed", **fixed, description="Same seed, same driver: as of `sample`."))
-        self.register_variable(
-            String("profile", **fixed, description="Path or name of another profile; empty: the one within.")
-        )
-        given = {"causality": causality.input, "variability": variability.continuous}
-        if Unit is not None:
-            self.register_units([Unit(name, **base_units) for name, base_units in UNITS.items()])
-            self.time = 0.0
-            clock = {"causality": causality.independent, "variability": variability.continuous}
-            self.register_variable(real("time", **clock))
-        self._units = {name: CONTEXT_UNITS.get(name, "-") for name in columns} | {"position": "m"} | OUTPUTS
-        for name in (*columns, "position"):
-            self.register_variable(number(name, self, **given, description=_WORDS.get(name, name)))
-        self.register_variable(
-            Boolean("following", causality=causality.input, variability=variability.discrete,
-                    description="It follows the road; while not, `position` is where it is.")
-        )  # fmt: skip
-        for name in OUTPUTS:
-            shown = {"causality": causality.output, "variability": variability.continuous}
-            self.register_variable(number(name, self, **shown, description=_WORDS[name]))
-
-    def number(name: str, self: Any, **how: Any) -> Any:
-        return real(name, unit=self._units[name], **how) if Unit is not None else real(name, **how)
-
-    def to_xml(self: Any, *words: Any, **options: Any) -> Any:
-        """The model description; FMI 2's with units and initial unknowns, which pythonfmu leaves out."""
-        root = base.to_xml(self, *words, **options)
-        if Unit is None:
-            _complete(root, self._units)
-        return root
-
-    def exit_initialization_mode(self: Any) -> None:
-        self.start_at(0.0)
-        self._has_begun = False
-
-    def start_at(self: Any, time: float) -> None:
-        chosen = read_profile(self.profile) if self.profile else own
-        self._traffic = _OneDriver(chosen, seed=int(self.seed))
-        self.look(time)
-
-    def look(self: Any, time: float) -> None:
-        assert self._traffic is not None
-        context = {
-            name: np.array([_seen(name, getattr(self, name))]) for name in columns if name not in _APART
-        }  # fmt: skip
-        where = self.position if not self.following else self.offset
-        truck = np.array([bool(getattr(self, "is_truck", 0.0))])
-        moment = Moment(
-            ("vehicle",), np.array([self.speed]), np.array([self.lane_width]), np.array([where]),
-            np.array([bool(self.following)]), np.ones(1, dtype=np.bool_), truck, context=context,
-        )  # fmt: skip
-        moves = self._traffic.step(time, moment)
-        self.offset, self.rate, self.heading = (float(values[0]) for values in moves[:3])
-
-    def go_on(self: Any, current_time: float, step_size: float) -> Any:
-        """Where the driver is at the end of the step."""
-        done = True
-        try:
-            if self._traffic is None:
-                raise SimulationError("a step before the end of initialization mode")
-            if self.speed < 0.0:
-                raise SimulationError(f"speed {self.speed:g} m/s: a driver who follows the road drives forwards")
-            if not self._has_begun and current_time != 0.0:  # not every loader says before when it all begins
-                self.start_at(current_time)
-            self._has_begun = True
-            self.look(current_time + step_size)
-        except SimulationError as error:
-            self.log(str(error), status.error)
-            if Unit is None:  # whoever switched logging off would hear of a step that failed, and not why
-                print(f"xosc-lateral: {error}", file=sys.stderr, flush=True)
-            done = False
-        return package.Fmi3StepResult(status=status.ok if done else status.error) if Unit is not None else done
-
-    def _get_fmu_state(self: Any) -> dict[str, Any]:
-        names = (*columns, "position", "following", *OUTPUTS, "seed", "profile")
-        traffic = None if self._traffic is None else self._traffic.to_dict()
-        values = {name: getattr(self, name) for name in names}
-        return {"values": values, "traffic": traffic, "has_begun": self._has_begun}
-
-    def _set_fmu_state(self: Any, state: Mapping[str, Any]) -> None:
-        for name, value in state["values"].items():
-            setattr(self, name, value)
-        self._traffic, self._has_begun = None, state["has_begun"]
-        if state["traffic"] is not None:
-            self._traffic = _OneDriver(read_profile(self.profile) if self.profile else own)
-            self._traffic.restore(state["traffic"])
-
-    return {
-        "__init__": begin, "to_xml": to_xml, "go_on": go_on,
-        "exit_initialization_mode": exit_initialization_mode,
-        "start_at": start_at, "look": look, "_get_fmu_state": _get_fmu_state, "_set_fmu_state": _set_fmu_state,
-    }  # fmt: skip
+def _run(words: Sequence[str], folder: Path) -> bytes:
+    try:
+        return subprocess.run(words, cwd=folder, capture_output=True, check=True, timeout=COMPILER_TIMEOUT).stdout
+    except (OSError, subprocess.SubprocessError) as error:
+        reason = (getattr(error, "stderr", b"") or b"").decode(errors="replace").strip() or str(error)
+        raise SimulationError(f"compiler {words[0]!r}: {reason.splitlines()[0]}") from error
 
 
-_APART = ("speed", "lane_width", "is_truck")
-
-_WORDS = {
-    "offset": "From the lane's centre, positive left", "rate": "Change of the offset per time",
-    "heading": "Relative to the lane, positive left", "position": "Where the vehicle is while it does not follow",
-    "lane_index": "0: rightmost", "curvature": "Positive: to the left",
-    **{
-        f"{side}_distance": f"Free space; {ABSENT_DISTANCE:g} or more: nobody"
-        for side in ("lead", "left", "right", "oncoming")
-    },
-}  # fmt: skip
-
-
-def _start(name: str, profile: DriverProfile) -> float:
-    if name.endswith("_distance"):
-        return ABSENT_DISTANCE
-    return {"speed": 30.0, "lane_width": profile.lane_width, "lane_count": 2.0, "friction": 1.0}.get(name, 0.0)
+def _platform(machine: str, version: str) -> tuple[str, str]:
+    """A compiler's target, such as ``x86_64-linux-gnu``, as the folder of FMI and the suffix of libraries."""
+    architecture = machine.split("-")[0].replace("amd64", "x86_64").replace("arm64", "aarch64")
+    architecture = "x86" if re.fullmatch(r"i\d86", architecture) else architecture
+    systems = {"mingw": ("windows", ".dll"), "windows": ("windows", ".dll"), "darwin": ("darwin", ".dylib"),
+               "linux": ("linux", ".so")}  # fmt: skip
+    system, suffix = next((value for key, value in systems.items() if key in machine), ("", ""))
+    if not system:
+        raise SimulationError(f"compiler for {machine!r}: FMI has no binaries for it; use the unit's C source")
+    bits = {"x86_64": "64", "x86": "32"}.get(architecture)
+    if version == "2" and bits:
+        return {"windows": "win"}.get(system, system) + bits, suffix
+    return f"{architecture}-{system}", suffix
 
 
-def _seen(name: str, value: float) -> float:
-    return float("inf") if name.endswith("_distance") and value >= ABSENT_DISTANCE else float(value)
+def _root(profile: DriverProfile, fmi: str, **token: str) -> Element:
+    words = {
+        "fmiVersion": fmi,
+        "modelName": identifier(profile),
+        "description": f"Driver {profile.name} of xosc-lateral {__version__}: lateral offset in the lane, positive "
+        f"left. C99; profile {sampling_hash(profile)[:16]}",
+        "author": "xosc-lateral",
+        "generationTool": f"xosc-lateral {__version__}",
+        "variableNamingConvention": "flat",
+    }
+    return Element("fmiModelDescription", words | token)
 
 
-def _complete(root: Any, units: Mapping[str, str]) -> None:
-    """Units, and outputs as initial unknowns, into a model description of FMI 2."""
-    from xml.etree.ElementTree import Element, SubElement
+def _abilities(profile: DriverProfile, state: str) -> dict[str, str]:
+    able = ("canHandleVariableCommunicationStepSize", f"canGetAndSet{state}", f"canSerialize{state}")
+    return {"modelIdentifier": identifier(profile), **dict.fromkeys(able, "true")}
 
-    definitions = Element("UnitDefinitions")
-    for name in sorted(set(units.values())):
-        one = SubElement(definitions, "Unit", name=name)
-        SubElement(one, "BaseUnit", {key: f"{value:.16g}" for key, value in UNITS[name].items()})
-    root.insert(1, definitions)
-    initial = SubElement(root.find("ModelStructure"), "InitialUnknowns")
-    for index, variable in enumerate(root.iter("ScalarVariable"), start=1):
-        number = variable.find("Real")
-        if number is not None:
-            number.set("unit", units[variable.get("name")])
-        if variable.get("causality") == "output":
-            SubElement(initial, "Unknown", index=str(index))
+
+def _common(root: Element, profile: DriverProfile) -> None:
+    """Units, log and experiment, which both versions have at this place."""
+    add_units(root, {variable.unit for variable in variables_of(profile) if variable.unit is not None})
+    SubElement(SubElement(root, "LogCategories"), "Category", name="logStatusError")
+    SubElement(root, "DefaultExperiment", startTime="0", stepSize="0.01")
+
+
+def _value(variable: Variable) -> dict[str, str]:
+    """Unit and start."""
+    words = {} if variable.unit is None else {"unit": variable.unit}
+    if variable.start is not None:
+        words["start"] = str(variable.start).lower() if isinstance(variable.start, bool) else f"{variable.start:.17g}"
+    return words
+
+
+def _kind(variable: Variable) -> int:
+    """0: real, 1: truth value, 2: whole number."""
+    return 0 if variable.unit is not None else 1 if isinstance(variable.start, bool) else 2
+
+
+def _variability(variable: Variable) -> str:
+    return ("continuous", "discrete", "fixed")[_kind(variable)]
+
+
+def _description_2(profile: DriverProfile, token: str) -> Element:
+    root = _root(profile, "2.0", guid=token)
+    simulation = SubElement(root, "CoSimulation", _abilities(profile, STATE["2"][0]))
+    listed = SubElement(simulation, "SourceFiles")
+    for name in (f"{identifier(profile)}.c", "fmi.c"):
+        SubElement(listed, "File", name=name)
+    _common(root, profile)
+    variables, structure = SubElement(root, "ModelVariables"), SubElement(root, "ModelStructure")
+    outputs, unknown = SubElement(structure, "Outputs"), SubElement(structure, "InitialUnknowns")
+    for reference, variable in enumerate(variables_of(profile)):
+        words = {"name": variable.name, "valueReference": str(reference), "causality": variable.causality}
+        words |= {"variability": _variability(variable), "description": variable.words}
+        scalar = SubElement(variables, "ScalarVariable", words)
+        SubElement(scalar, ("Real", "Boolean", "Integer")[_kind(variable)], _value(variable))
+        if variable.causality == "output":
+            for part in (outputs, unknown):
+                SubElement(part, "Unknown", index=str(reference + 1))
+    return root
+
+
+def _description_3(profile: DriverProfile, token: str) -> Element:
+    root = _root(profile, "3.0", instantiationToken=token)
+    SubElement(root, "CoSimulation", _abilities(profile, STATE["3"][0]))
+    _common(root, profile)
+    variables, structure = SubElement(root, "ModelVariables"), SubElement(root, "ModelStructure")
+    outputs, unknown = [], []
+    for reference, variable in enumerate(variables_of(profile)):
+        words = {"name": variable.name, "valueReference": str(reference), "causality": variable.causality}
+        words |= {"variability": _variability(variable), "description": variable.words}
+        SubElement(variables, ("Float64", "Boolean", "Int32")[_kind(variable)], words | _value(variable))
+        if variable.causality == "output":
+            outputs.append(Element("Output", valueReference=str(reference)))
+            unknown.append(Element("InitialUnknown", valueReference=str(reference)))
+    clock = {"name": "time", "valueReference": str(len(variables)), "causality": "independent"}
+    SubElement(variables, "Float64", clock | {"variability": "continuous", "description": "Simulation time"})
+    structure.extend([*outputs, *unknown])
+    return root
+
+
+def _build_description(name: str) -> Element:
+    root = Element("fmiBuildDescription", fmiVersion="3.0")
+    files = SubElement(SubElement(root, "BuildConfiguration", modelIdentifier=name), "SourceFileSet", language="C99")
+    for file in (f"{name}.c", "fmi.c"):
+        SubElement(files, "SourceFile", name=file)
+    SubElement(
+        files, "PreprocessorDefinition", name="FMI3_OVERRIDE_FUNCTION_PREFIX", optional="true",
+        description="For shared libraries: functions without a prefix",
+    )  # fmt: skip
+    return root
+
+
+def _xml(root: Element) -> bytes:
+    indent(root)
+    text: bytes = tostring(root, encoding="utf-8", xml_declaration=True)
+    return text + b"\n"
+
+
+def _packed(members: Mapping[str, bytes]) -> bytes:
+    """A zip file, the same for the same members."""
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in sorted(members):
+            archive.writestr(zipfile.ZipInfo(name), members[name], zipfile.ZIP_DEFLATED)
+    return packed.getvalue()

@@ -288,7 +288,8 @@ class Traffic:
             values = unsealed(state, FORMAT)
             for traffic in (trial, restored):
                 traffic._go_on_from(values)
-            trial._try()
+            with np.errstate(over="raise"):
+                trial._try()
         except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
             if isinstance(error, XoscLateralError):
                 raise SimulationError(str(error)) from error

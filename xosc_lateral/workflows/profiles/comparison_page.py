@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import combinations
 from typing import Any
 
@@ -25,7 +26,7 @@ MAXIMUM_DRAWN = 12  # So many profiles are drawn at most; the distances are of a
 
 
 def comparison_text(compared: Compared) -> str:
-    """A table of the profiles, and one of their pairs: distance, what chance alone may bring, verdict."""
+    """A table of the profiles, and one of their pairs: verdict, distance, what they differ by."""
     lines = [*_table([_row(each) for each in compared.profiles]), f"{FIGURES_NOTE}.", "", *_table(_pairs(compared))]
     lines.append(f"{_distance_note(compared)}.")
     lines += [f"alike: {', '.join(group)}" for group in compared.groups if len(group) > 1]
@@ -49,14 +50,14 @@ FIGURES_NOTE = (
 
 
 def _distance_note(compared: Compared) -> str:
-    """What a distance means, in metres, and what is by chance."""
+    """What a distance means, in metres, and what the rest of the table is."""
     scale = dict(zip(METRICS, compared.scale.tolist(), strict=True))
     return (
         f"distance: of the ten metrics of {SNIPPET:g} s snippets, on average; 1.00 is as far as single snippets "
-        f"differ: {scale['mean']:.2f} m in their mean, {scale['std']:.2f} m in their standard deviation. Mean offset "
-        f"and the second's movement over the first's, slow (beyond {SLOW_S:g} s) and fast (from {FAST_S:g} s): "
-        "95 % intervals by the drives of the fits, and in brackets the least that as much driving would show in "
-        f"4 of 5 cases. Told apart is what has a p below {LEVEL:g}, all three considered"
+        f"differ: {scale['mean']:.2f} m in their mean, {scale['std']:.2f} m in their standard deviation. Mean offset: "
+        f"the second's less the first's; movement, slow (beyond {SLOW_S:g} s) and fast (from {FAST_S:g} s): the "
+        f"second's over the first's; 95 % intervals by the drives of the fits. Told apart is what has a p below "
+        f"{LEVEL:g}, all three considered; of others, what as much driving would show in 4 of 5 cases"
     )
 
 
@@ -67,20 +68,28 @@ def _pairs(compared: Compared) -> list[dict[str, str]]:
     for a, b in sorted(combinations(range(len(names)), 2), key=lambda pair: -distance[pair]):
         parts = differences[names[a], names[b]]
         words = {part.quantity: _difference_words(part) for part in parts}
-        verdict = "differ" if surest(parts) <= LEVEL else "not told apart"
         rows.append(
-            {"profiles": f"{names[a]}, {names[b]}", "distance": f"{distance[a, b]:.2f}"}
+            {"profiles": f"{names[a]}, {names[b]}", "verdict": _verdict(parts), "distance": f"{distance[a, b]:.2f}"}
             | {quantity: words.get(quantity, "not known") for quantity in QUANTITIES}
-            | {"verdict": f"{verdict}, p = {surest(parts):.1g}"}
         )
     return rows
+
+
+def _verdict(parts: Sequence[Difference]) -> str:
+    """What tells two profiles apart; else what would, in as much driving as there was."""
+    p_value = surest(parts)
+    if p_value <= LEVEL:
+        surely = "p < 1e-06" if p_value < 1e-6 else f"p = {p_value:.1g}"
+        return f"differ in {min(parts, key=lambda part: part.p_value).quantity}, {surely}"
+    least = (f"{np.exp(part.least):.1f} times" if part.is_factor else f"{part.least:.2f} m" for part in parts)
+    return f"not told apart; {', '.join(least)} would be"
 
 
 def _difference_words(part: Difference) -> str:
     low, high = part.interval
     if part.is_factor:
-        return f"{np.exp(part.size):.2f} ({np.exp(low):.2f} to {np.exp(high):.2f}) [{np.exp(part.least):.2f}]"
-    return f"{part.size:+.2f} ({low:+.2f} to {high:+.2f}) m [{part.least:.2f}]"
+        return f"{np.exp(part.size):.2f} ({np.exp(low):.2f} to {np.exp(high):.2f})"
+    return f"{part.size:+.2f} +- {0.5 * (high - low):.2f} m"
 
 
 def _row(each: ComparedProfile) -> dict[str, str]:
@@ -97,12 +106,12 @@ def _row(each: ComparedProfile) -> dict[str, str]:
     }
 
 
-def _effects(one: ComparedProfile) -> list[str]:
-    found = []
-    for values in one.profile.to_dict()["effects"]:
+def _effects(each: ComparedProfile) -> list[str]:
+    words = []
+    for values in each.profile.to_dict()["effects"]:
         columns = values.get("column") or "*".join(factor["column"] for factor in values.get("factors", ()))
-        found.append(f"{columns} ({values['kind']})" if columns else str(values["kind"]))
-    return found
+        words.append(f"{columns} ({values['kind']})" if columns else str(values["kind"]))
+    return words
 
 
 def comparison_record(compared: Compared) -> dict[str, Any]:
@@ -110,13 +119,13 @@ def comparison_record(compared: Compared) -> dict[str, Any]:
     return {
         "profiles": [
             {
-                "id": one.profile.name,
-                "sha256": profile_hash(one.profile),
-                "model": one.profile.model.kind,
-                **figures_record(one.summary, one.keeping),
-                "effects": _effects(one),
+                "id": each.profile.name,
+                "sha256": profile_hash(each.profile),
+                "model": each.profile.model.kind,
+                **figures_record(each.summary, each.keeping),
+                "effects": _effects(each),
             }
-            for one in compared.profiles
+            for each in compared.profiles
         ],
         "distance": _rounded_rows(compared.distance),
         "metrics": {name: _rounded_rows(compared.metrics[:, :, k]) for k, name in enumerate(METRICS)},
@@ -149,12 +158,12 @@ def comparison_figure(compared: Compared) -> Figure:
     figure = Figure(1, 3, height=180.0, legend=True)
     place, power, paths = figure.panels
     shown = compared.profiles[:MAXIMUM_DRAWN]
-    for number, one in enumerate(shown):
-        color, name, step = color_of(number), one.profile.name, one.profile.model.step
-        heights, edges = np.histogram(one.runs, np.linspace(-1.0, 1.0, 81), density=True)
+    for number, each in enumerate(shown):
+        color, name, step = color_of(number), each.profile.name, each.profile.model.step
+        heights, edges = np.histogram(each.runs, np.linspace(-1.0, 1.0, 81), density=True)
         place.line(0.5 * (edges[1:] + edges[:-1]), heights, color, label=name)
-        power.line(one.spectrum.frequency, one.spectrum.density, color, label=name)
-        run = one.runs[0][: round(SHOWN_S / step)] + SPACING * (len(shown) - number)
+        power.line(each.spectrum.frequency, each.spectrum.density, color, label=name)
+        run = each.runs[0][: round(SHOWN_S / step)] + SPACING * (len(shown) - number)
         paths.line(step * np.arange(len(run)), run, color, label=name)
     power.x.log = power.y.log = True
     place.title, place.x.label, place.y.label = "Distribution", "offset [m], positive to the left", "density [1/m]"
@@ -163,27 +172,30 @@ def comparison_figure(compared: Compared) -> Figure:
     return figure
 
 
+def _nowrap(row: dict[str, str]) -> dict[str, str]:
+    """Intervals as a page has them, each on one line."""
+    return {name: text.replace(" +- ", "\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}") for name, text in row.items()}
+
+
 def comparison_page(compared: Compared) -> str:
     """HTML page: a figure and two tables; same values, same bytes."""
     names = compared.names
     page = Page(f"{len(names)} driver profiles compared")
     alike = "; ".join(", ".join(group) for group in compared.groups if len(group) > 1)
-    page.lead(
-        "Every profile is sampled in steady traffic on a straight road, at its own lane width. "
-        + (f"These profiles are not distinguishable: {alike}." if alike else "All of them differ from each other.")
-    )
-    page.section("Summary")
-    page.table(
-        [{name: text.replace("+-", "±") for name, text in _row(each).items()} for each in compared.profiles],
-        FIGURES_NOTE.replace("+-", "±"),
-    )
+    pairs = _pairs(compared)
+    told = sum(row["verdict"].startswith("differ") for row in pairs)
+    page.lead(f"{told} of {len(pairs)} pairs are told apart{f'; alike: {alike}' if alike else ''}.")
+    page.section("Which differ")
+    page.table([_nowrap(row) for row in pairs])
+    note = _distance_note(compared)
+    page.text(f"{note[0].upper()}{note[1:]}.")
     more = f"; {len(names) - MAXIMUM_DRAWN} more are left out of the figure" if len(names) > MAXIMUM_DRAWN else ""
     page.figure(
         comparison_figure(compared),
         f"Distribution of the offset, power spectral density and a sample path of each profile{more}.",
         "Densities, spectra and sample paths of the profiles",
     )
-    page.section("Which differ")
-    page.table(_pairs(compared), _distance_note(compared))
-    hashes = {one.profile.name: profile_hash(one.profile)[:12] for one in compared.profiles}
+    page.section("Summary")
+    page.table([_nowrap(_row(each)) for each in compared.profiles], FIGURES_NOTE.replace("+-", "±"))
+    hashes = {each.profile.name: profile_hash(each.profile)[:12] for each in compared.profiles}
     return page.html({"seed": compared.seed, **hashes})

@@ -18,6 +18,9 @@ PRIOR = "rural"
 def read_drives(drives: DrivesLike, columns: MappingLike | None = None) -> list[Drive]:
     """Read and clean drive tables.
 
+    Raises `FormatError`: A column is missing, or its values can't be in the unit meant; `NotEnoughDataError`: A table
+    without two rows of time, offset and lane width.
+
     Parameters
     ----------
     drives : path, DataFrame, Drive, or sequence of them
@@ -25,13 +28,6 @@ def read_drives(drives: DrivesLike, columns: MappingLike | None = None) -> list[
         `drive` when there are several; every other numeric column is context.
     columns : mapping of str to str, TableMapping, or path, optional
         Standard name -> foreign header, with a unit if need be: ``{"speed": "v_kmh:km/h"}``.
-
-    Raises
-    ------
-    FormatError
-        A column is missing, or its values can't be in the unit meant.
-    NotEnoughDataError
-        A table without two rows of time, offset and lane width.
     """
     return given_drives(drives, columns).drives
 
@@ -53,6 +49,8 @@ def fit(
     library: Paths = (),
 ) -> DriverProfile:
     """Fit a driver profile.
+
+    Raises `FormatError`, `NotEnoughDataError`, `DriverProfileError`.
 
     Parameters
     ----------
@@ -85,10 +83,6 @@ def fit(
         driver. None: none.
     library : path or paths
         Folders with further profiles.
-
-    Raises
-    ------
-    FormatError, NotEnoughDataError, DriverProfileError
     """
     from msgspec.structs import replace
 

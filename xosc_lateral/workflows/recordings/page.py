@@ -100,7 +100,6 @@ def page_of(
 
 
 def _scene(plans: Sequence[VehiclePlan], network: RoadNetwork, duration: float) -> str:
-    """The player's: recorded paths over planned motions."""
     time = np.arange(0.0, duration + 1e-9, FRAME)
     motions, results = list[EntityMotion](), list[EntityResult]()
     for plan in plans:

@@ -18,12 +18,9 @@ LONGEST_GAP = 1.0  # rows farther apart than this are not of one passage, as in 
 FARTHEST = 1e8  # no map projection gives such a position: the Earth's circumference is 4e7 m [m]
 SHORTEST_STEP = 1e-4  # rows that follow sooner are of the same moment: no sensor has 10 kHz [s]
 MINIMUM_PASSAGE = 2.0  # passages below this are left out: a speed and its change can't be told in less [s]
-LEAP = 1.5
-"""Farther than it can have driven by this much (half a narrow lane): an identifier that has gone to another vehicle.
-[m]"""
+LEAP = 1.5  # farther than it can have driven (half a narrow lane): an identifier that has gone to another vehicle [m]
 BACKWARDS = 0.5  # who falls back so far drives backwards; less is an error of standing vehicles' positions [m]
-MOVING_SPEED = 0.25
-"""Below this a vehicle stands, and the direction of its movement is that of errors: half a walking pace. [m/s]"""
+MOVING_SPEED = 0.25  # below, a vehicle stands, and its direction is that of errors: half a walking pace [m/s]
 VELOCITY_WINDOW = 2.0  # rows whose positions a velocity is fitted to: 0.2 m of noise at 10 Hz are 0.08 m/s in it [s]
 HEADING_WINDOW = 2.0  # way over which a heading is averaged, so that positions' noise does not turn a slow vehicle [m]
 
@@ -106,9 +103,9 @@ def place_tracks(tracks: Sequence[Track], network: RoadNetwork, start: float, en
         rows = np.flatnonzero(inside & (track.time >= start - 1e-9) & (track.time <= end + 1e-9))
         if len(rows):
             rows = rows[np.r_[True, np.diff(track.time[rows]) > SHORTEST_STEP]]
-            found = _place(track, rows, network, left_out)
-            if found is not None:
-                vehicles.append(replace(found, time=found.time - start))
+            vehicle = _place(track, rows, network, left_out)
+            if vehicle is not None:
+                vehicles.append(replace(vehicle, time=vehicle.time - start))
     if not vehicles:
         why = f": {left_out[0]}" if left_out else ""
         raise NotEnoughDataError(f"no vehicle can be reconstructed between {start:g} and {end:g} s{why}")
@@ -120,14 +117,14 @@ def _place(track: Track, rows: NDArray[np.intp], network: RoadNetwork, left_out:
     velocity = np.stack([_slope(time, x), _slope(time, y)])
     heading = _steady_heading(time, x, y, velocity, track.heading[rows], network)
     x, y = x - track.ahead * np.cos(heading), y - track.ahead * np.sin(heading)
-    found = network.world_to_lane(x, y, heading=heading)
-    on_lane = (found.distance <= BESIDE) & (found.lane != 0)
+    place_on_road = network.world_to_lane(x, y, heading=heading)
+    on_lane = (place_on_road.distance <= BESIDE) & (place_on_road.lane != 0)
     if not on_lane.any():
         left_out.append(f"{track.name}: on no driving lane")
         return None
     lane_heading = np.zeros(len(x))
     there = np.flatnonzero(on_lane)
-    place = found.road[there], found.lane[there], found.s[there]
+    place = place_on_road.road[there], place_on_road.lane[there], place_on_road.s[there]
     lane_heading[there] = network.lane_to_world(*place).heading
     width = np.full(len(x), np.nan)
     width[there] = network.lane_width(*place)
@@ -136,18 +133,18 @@ def _place(track: Track, rows: NDArray[np.intp], network: RoadNetwork, left_out:
     passages = _passages(time, x, y, np.flatnonzero(on_lane & ~elsewhere))
     reasons = {"off the lanes": int((~on_lane).sum()), "across a lane or backwards": int(elsewhere.sum())}
     if not passages:
-        said = "".join(f", {rows} of {len(time)} rows {why}" for why, rows in reasons.items() if rows)
-        left_out.append(f"{track.name}: no {MINIMUM_PASSAGE:g} s along a driving lane without a gap{said}")
+        counts = "".join(f", {rows} of {len(time)} rows {why}" for why, rows in reasons.items() if rows)
+        left_out.append(f"{track.name}: no {MINIMUM_PASSAGE:g} s along a driving lane without a gap{counts}")
         return None
     best = max(passages, key=lambda part: time[part[-1]] - time[part[0]])
     lost = len(time) - len(best)
     if lost:
         reasons["beyond them, a gap or a leap"] = lost - sum(reasons.values())
-        said = ", ".join(f"{rows} {why}" for why, rows in reasons.items() if rows > 0)
-        left_out.append(f"{track.name}: {lost} of {len(time)} rows: {said}")
+        counts = ", ".join(f"{rows} {why}" for why, rows in reasons.items() if rows > 0)
+        left_out.append(f"{track.name}: {lost} of {len(time)} rows: {counts}")
     size = track.length, track.width, track.height, track.middle
-    road, lane = (each.astype(np.int64)[best] for each in (found.road, found.lane))
-    where = road, lane, found.s[best], (way * found.offset)[best]
+    road, lane = (each.astype(np.int64)[best] for each in (place_on_road.road, place_on_road.lane))
+    where = road, lane, place_on_road.s[best], (way * place_on_road.offset)[best]
     return RecordedVehicle(
         track.name, track.kind, *size, time[best], x[best], y[best], *where, width[best], way[best].astype(np.int64)
     )
@@ -200,13 +197,11 @@ def _steady_heading(
 
 
 def _across(velocity: FloatArray, lane_heading: FloatArray) -> NDArray[np.bool_]:
-    """Rows at which it moves across its lane more than along it, as a person on foot does."""
     turn = np.arctan2(velocity[1], velocity[0]) - lane_heading
     return np.asarray((np.abs(np.sin(turn)) > np.abs(np.cos(turn))) & (np.hypot(*velocity) >= MOVING_SPEED))
 
 
 def _backwards(x: FloatArray, y: FloatArray, heading: FloatArray) -> NDArray[np.bool_]:
-    """Rows at which it is behind where it has been."""
     steps = np.diff(x) * np.cos(heading[1:]) + np.diff(y) * np.sin(heading[1:])
     driven = np.cumsum(np.r_[0.0, steps])
     return np.asarray(driven < np.maximum.accumulate(driven) - BACKWARDS)

@@ -18,7 +18,6 @@ from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.enums import Priority
 
 DATE = "2024-01-01T00:00:00"  # the format asks for a date: the same recording gives the same bytes
-
 MODELS = {"car": "car", "van": "van", "truck": "truck", "bus": "bus", "trailer": "trailer"}
 MODELS |= {"motorcycle": "motorbike", "motorbike": "motorbike", "bicycle": "bicycle"}
 """Recorded class -> vehicle category, the same in all versions; others are cars."""
@@ -60,29 +59,22 @@ def reconstructed_scenario(
     act = sub(story, "Act", name="Traffic")
     values = dict[str, str]()
     for plan in plans:
-        one = _Vehicle(plan, network, version, act, values)
-        one.add_entity(entities, is_host=plan.name == host)
+        vehicle = _Vehicle(plan, network, version, act, values)
+        vehicle.add_entity(entities, is_host=plan.name == host)
         if plan.appears is None:
-            one.add_init(actions)
-        event = one.drive()
+            vehicle.add_init(actions)
+        event = vehicle.drive()
         if exact:
-            one.follow_recorded_path(event)
+            vehicle.follow_recorded_path(event)
         else:
-            one.maneuver_as_planned(event, *(relative or {}).get(plan.name, ({}, {})))
-        one.leave()
+            vehicle.maneuver_as_planned(event, *(relative or {}).get(plan.name, ({}, {})))
+        vehicle.leave()
     build.time_trigger(act, "StartTrigger", 0.0, version)
 
     root = etree.Element("OpenSCENARIO")
-    major, minor = map(str, version)
-    sub(
-        root,
-        "FileHeader",
-        revMajor=major,
-        revMinor=minor,
-        date=DATE,
-        description=plain_text(description),
-        author="xosc-lateral",
-    )
+    header = sub(root, "FileHeader", revMajor=str(version[0]), revMinor=str(version[1]), date=DATE)
+    header.set("description", plain_text(description))
+    header.set("author", "xosc-lateral")
     parameters = sub(root, "ParameterDeclarations")
     for name, value in values.items():
         sub(parameters, "ParameterDeclaration", name=name, parameterType="double", value=value)
@@ -113,7 +105,6 @@ class _Vehicle:
         self._maneuver = build.maneuver(act, f"{plan.name}_maneuver", plan.name)
 
     def _value(self, name: str, value: float, digits: int) -> str:
-        """A number of its own."""
         self._values[name] = decimal(value, digits)
         return f"${name}"
 
@@ -126,7 +117,6 @@ class _Vehicle:
         return f"${{{decimal(to, digits)} + ${name}}}"
 
     def _event(self, what: str) -> etree._Element:
-        """Its trigger comes after its actions."""
         return build.event(self._maneuver, f"{self._plan.name}_{what}", Priority.PARALLEL, self._version)
 
     def _begin(self, event: etree._Element, moment: float) -> etree._Element:
@@ -134,19 +124,18 @@ class _Vehicle:
 
     def add_entity(self, entities: etree._Element, *, is_host: bool) -> None:
         """As large as it was measured."""
-        one, kind = self._plan.vehicle, MODELS.get(self._plan.vehicle.kind, "car")
-        holder = sub(entities, "ScenarioObject", name=self._plan.name)
-        vehicle = sub(holder, "Vehicle", name=kind, vehicleCategory=kind)
-        width, length, height = (decimal(size, 3) for size in (one.width, one.length, one.height))
-        sub(vehicle, "BoundingBox/Center", x=decimal(one.centre, 3), y="0", z=decimal(0.5 * one.height, 3))
+        recorded, kind = self._plan.vehicle, MODELS.get(self._plan.vehicle.kind, "car")
+        vehicle = sub(sub(entities, "ScenarioObject", name=self._plan.name), "Vehicle", name=kind, vehicleCategory=kind)
+        width, length, height = (decimal(size, 3) for size in (recorded.width, recorded.length, recorded.height))
+        sub(vehicle, "BoundingBox/Center", x=decimal(recorded.centre, 3), y="0", z=decimal(0.5 * recorded.height, 3))
         sub(vehicle[0], "Dimensions", width=width, length=length, height=height)
         sub(vehicle, "Performance", **LIMITS)
         axles = sub(vehicle, "Axles")
-        track, front = decimal(0.85 * one.width, 3), decimal(2.0 * one.centre, 3)
+        track, front = decimal(0.85 * recorded.width, 3), decimal(2.0 * recorded.centre, 3)
         for tag, steering, x in (("FrontAxle", "0.5", front), ("RearAxle", "0", "0")):
             sub(axles, tag, maxSteering=steering, wheelDiameter="0.7", trackWidth=track, positionX=x, positionZ="0.35")
         properties = sub(vehicle, "Properties")
-        sub(properties, "Property", name="recorded_as", value=plain_text(one.name))
+        sub(properties, "Property", name="recorded_as", value=plain_text(recorded.name))
         if is_host:  # CARLA's ScenarioRunner hands the vehicle of this type to the system under test
             sub(properties, "Property", name="type", value="ego_vehicle")
 
@@ -201,8 +190,8 @@ class _Vehicle:
             if first:
                 self._begin_by_distance(event, braking[first])
         transitions = zip(self._plan.lateral.transitions, self._plan.targets, strict=True)
-        for number, (one, target) in enumerate(transitions):
-            self._transition(one, target, number, changes.get(number))
+        for number, (transition, target) in enumerate(transitions):
+            self._transition(transition, target, number, changes.get(number))
 
     def _speeds(self, event: etree._Element, first: int, last: int) -> None:
         """Corners `first` to `last` of the speed profile: an action, or, in versions without profiles, one a piece."""
@@ -232,19 +221,14 @@ class _Vehicle:
                 self._begin(piece, float(time[k - 1]))
 
     def _begin_by_distance(self, event: etree._Element, trigger: RelativeTrigger) -> None:
-        """Once a distance along the road passes a declared value, and not before a time."""
         group = self._begin(event, trigger.not_before)[0]
-        system = {"coordinateSystem": "road"} if self._version >= (1, 1) else {}
-        sub(
-            build.entity_condition(group, f"distance to {trigger.other}", self._plan.name),
-            "RelativeDistanceCondition",
-            entityRef=trigger.other,
-            relativeDistanceType="longitudinal",
-            freespace="false",
-            rule="greaterThan" if trigger.grows else "lessThan",
-            value=self._value(f"{event.get('name')}_distance", trigger.distance, 3),
-            **system,
-        )
+        owner = build.entity_condition(group, f"distance to {trigger.other}", self._plan.name)
+        rule = "greaterThan" if trigger.grows else "lessThan"
+        kind = {"relativeDistanceType": "longitudinal", "freespace": "false", "rule": rule}
+        condition = sub(owner, "RelativeDistanceCondition", entityRef=trigger.other, **kind)
+        condition.set("value", self._value(f"{event.get('name')}_distance", trigger.distance, 3))
+        if self._version >= (1, 1):
+            condition.set("coordinateSystem", "road")
 
     def follow_recorded_path(self, event: etree._Element) -> None:
         """The recorded places themselves, at their times."""
@@ -264,27 +248,32 @@ class _Vehicle:
         sub(follow, "TrajectoryFollowingMode", followingMode="position")
         self._begin(event, begin)
 
-    def _transition(self, one: Transition, target: int, number: int, relative: RelativeTrigger | None) -> None:
-        word = "change" if one.lanes else "aborted" if one.aborted else "offset"
+    def _transition(self, transition: Transition, target: int, number: int, relative: RelativeTrigger | None) -> None:
+        word = "change" if transition.lanes else "aborted" if transition.aborted else "offset"
         event = self._event(f"{word}{number + 1}")
         name = event.get("name")
         lateral = sub(build.private_action(event, f"{name}_action"), "LateralAction")
-        offset_t = self._plan.direction * one.offset
-        if one.lanes:
+        offset_t = self._plan.direction * transition.offset
+        if transition.lanes:
             aside = {"targetLaneOffset": decimal(offset_t, 4)} if abs(offset_t) > 1e-3 else {}
             action = sub(lateral, "LaneChangeAction", **aside)
-            duration = self._value(f"{name}_duration", one.duration, 3)
-            dynamics = {"dynamicsShape": one.shape.value, "dynamicsDimension": "time", "value": duration}
+            duration = self._value(f"{name}_duration", transition.duration, 3)
+            dynamics = {"dynamicsShape": transition.shape.value, "dynamicsDimension": "time", "value": duration}
             sub(action, "LaneChangeActionDynamics", **dynamics)
             sub(action, "LaneChangeTarget/AbsoluteTargetLane", value=str(target))
         else:
             action = sub(lateral, "LaneOffsetAction", continuous="false")
-            limit = peak_acceleration(one.shape, one.change, one.duration)
-            sub(action, "LaneOffsetActionDynamics", dynamicsShape=one.shape.value, maxLateralAcc=decimal(limit, 9))
+            limit = peak_acceleration(transition.shape, transition.change, transition.duration)
+            sub(
+                action,
+                "LaneOffsetActionDynamics",
+                dynamicsShape=transition.shape.value,
+                maxLateralAcc=decimal(limit, 9),
+            )
             wanted = self._value(f"{name}_offset", offset_t, 4)
             sub(action, "LaneOffsetTarget/AbsoluteTargetLaneOffset", value=wanted)
         if relative is not None:
             self._begin_by_distance(event, relative)
             return
-        (condition,) = self._begin(event, one.start).iter("SimulationTimeCondition")
-        condition.set("value", self._value(f"{name}_start", one.start, 3))
+        (condition,) = self._begin(event, transition.start).iter("SimulationTimeCondition")
+        condition.set("value", self._value(f"{name}_start", transition.start, 3))

@@ -23,65 +23,35 @@ def _version(text: str) -> str:
 class ReconstructSettings:
     """What is reconstructed, and how: keywords of `reconstruct`, and options of the command line.
 
-    Parameters
-    ----------
-    begin, end : float, optional
-        Part of the recording. [s]
-    vehicles : collection of str, optional
-        These alone.
-    around, window : str, float
-        A vehicle and those who come near it, for so long in the middle of its passage. [s]
-    host : str, optional
-        The vehicle under test, which `convert` leaves to the system that drives it; by default the recording's own
-        host; "none": there is none.
-    error : float
-        Positions along the road are within this; smaller: more corners in the speeds. [m]
-    version : str
-        Of OpenSCENARIO, "1.0" to "1.3".
-    relative : bool
-        Lane changes and braking begin at a distance to another vehicle, where the recording bears it out.
-    exact : bool
-        Recorded paths as trajectories, instead of maneuvers.
-    fit : bool
-        A driver profile of its own for every vehicle that drove long enough.
-    library : path or paths
-        Folders with further profiles to choose from.
+    `begin`, `end`: part of the recording. [s] `vehicles`: these alone. `around`, `window`: a vehicle and those who come
+    near it, for so long in the middle of its passage. [s] `host`: the vehicle under test, which `convert` leaves to the
+    system that drives it; by default the recording's own, "none": there is none. `error`: positions along the road are
+    within this; smaller: more corners in the speeds. [m] `version`: of OpenSCENARIO, "1.0" to "1.3". `relative`: lane
+    changes and braking begin at a distance to another vehicle, where the recording bears it out. `exact`: recorded
+    paths as trajectories, instead of maneuvers. `fit`: a driver profile of its own for every vehicle that drove long
+    enough. `library`: folders with further profiles to choose from.
     """
 
-    # What is said of one option stays together.
     # fmt: off
-    begin: float | None = option(
-        None, float, "--from", kind=float | None, show_default=False, help="Begin there [s].",
-    )
+    begin: float | None = option(None, float, "--from", kind=float | None, show_default=False, help="Begin there [s].")
     end: float | None = option(None, float, "--to", kind=float | None, show_default=False, help="End there [s].")
     vehicles: frozenset[str] | None = option(
-        None, say.names, kind=list[str] | None, metavar="ID", help="This vehicle alone; may be repeated.",
-    )
+        None, say.names, kind=list[str] | None, metavar="ID", help="This vehicle alone; may be repeated.")
     around: str | None = option(
-        None, str, kind=str | None, metavar="ID", show_default=False,
-        help="This vehicle and those who come near it.",
-    )
+        None, str, kind=str | None, metavar="ID", show_default=False, help="This vehicle and those who come near it.")
     window: float = option(
-        60.0, float, kind=float, min=1, max=3600, help="Length of the part that --around takes [s].",
-    )
+        60.0, float, kind=float, min=1, max=3600, help="Length of the part that --around takes [s].")
     host: str | None = option(
         None, str, kind=str | None, metavar="ID", show_default=False,
-        help="The vehicle under test; default: the host of an OSI trace; none: no vehicle.",
-    )
+        help="The vehicle under test; default: the host of an OSI trace; none: no vehicle.")
     error: float = option(
         0.5, float, kind=float, min=0.01,
-        help="Positions along the road are within this [m]: the smaller, the more corners.",
-    )
+        help="Positions along the road are within this [m]: the smaller, the more corners.")
     version: str = option("1.2", _version, kind=str, metavar="1.0..1.3", help="Version of OpenSCENARIO to write.")
     relative: bool = option(
-        False, bool, "--relative", kind=bool, help="Cut-ins and braking begin at a distance to another vehicle.",
-    )
-    exact: bool = option(
-        False, bool, "--exact", kind=bool, help="Recorded paths as trajectories, no maneuvers.",
-    )
-    fit: bool = option(
-        False, bool, "--fit", kind=bool, help="Fit a profile to everybody who drove long enough.",
-    )
+        False, bool, "--relative", kind=bool, help="Cut-ins and braking begin at a distance to another vehicle.")
+    exact: bool = option(False, bool, "--exact", kind=bool, help="Recorded paths as trajectories, no maneuvers.")
+    fit: bool = option(False, bool, "--fit", kind=bool, help="Fit a profile to everybody who drove long enough.")
     library: tuple[Path, ...] = option((), say.paths)
     # fmt: on
 

@@ -4,15 +4,44 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from xosc_lateral.world.player.actions.base import RunningAction
-from xosc_lateral.world.player.actions.registry import prepare_action
-from xosc_lateral.world.player.conditions.registry import prepare_trigger
+from xosc_lateral.world.player.actions import (
+    at_once,
+    follow_trajectory,
+    lateral,
+    lateral_distance,
+    longitudinal,
+    speed_profile,
+    synchronize,
+)
+from xosc_lateral.world.player.actions.base import Maker, RunningAction
+from xosc_lateral.world.player.conditions import distance, motion, value
+from xosc_lateral.world.player.conditions.value import StateWatch
 from xosc_lateral.world.player.positions.on_road import reference_of
 from xosc_lateral.world.player.simulation import Simulation
-from xosc_lateral.world.player.storyboard import EventElement, StoryboardElement
-from xosc_lateral.world.player.trigger import RunningTrigger
-from xosc_lateral.world.scenario import Act, Action, Event, Init, ManeuverGroup, Private, Storyboard, Trigger
-from xosc_lateral.world.scenario.enums import StoryboardElementType
+from xosc_lateral.world.player.state import EntityState
+from xosc_lateral.world.player.storyboard import (
+    Check,
+    EntityCheck,
+    EntityChecks,
+    EventElement,
+    RunningCondition,
+    RunningTrigger,
+    StoryboardElement,
+    ValueChecks,
+)
+from xosc_lateral.world.scenario import (
+    Act,
+    Action,
+    Condition,
+    Event,
+    Init,
+    ManeuverGroup,
+    Private,
+    Storyboard,
+    Trigger,
+    Unsupported,
+)
+from xosc_lateral.world.scenario.enums import StoryboardElementType, TriggeringEntitiesRule
 from xosc_lateral.world.scenario.private_actions import TeleportAction
 
 
@@ -122,3 +151,64 @@ def _actions(action: Action, group: ManeuverGroup, simulation: Simulation) -> It
         simulation.note(f"maneuver group '{group.name}' has no actors: its private actions are not played", place)
     for name in group.actors.entity_refs:
         yield prepare_action(action, simulation.actor(name, group.actors.place), simulation)
+
+
+# ---- all actions that can be played, as each family's module has them ----
+RUNNING: dict[type, Maker] = {
+    **follow_trajectory.RUNNING,
+    **at_once.RUNNING,
+    **lateral.RUNNING,
+    **lateral_distance.RUNNING,
+    **longitudinal.RUNNING,
+    **speed_profile.RUNNING,
+    **synchronize.RUNNING,
+}
+
+
+def prepare_action(action: Action, actor: EntityState | None, simulation: Simulation) -> RunningAction:
+    """An action as an element of the storyboard, ready to be started."""
+    return RUNNING[type(action.content)](action, actor, simulation)
+
+
+# ---- all conditions that can be played ----
+ENTITY_CHECKS: EntityChecks = {
+    content: check for family in (distance, motion) for content, check in family.CHECKS.items()
+}
+VALUE_CHECKS: ValueChecks = dict(value.CHECKS)
+
+
+def prepare_trigger(trigger: Trigger, simulation: Simulation, *, when_empty: bool) -> RunningTrigger:
+    """A trigger ready to be evaluated frame by frame."""
+    groups = tuple(tuple(_prepare(condition, simulation) for condition in group.conditions) for group in trigger.groups)
+    return RunningTrigger(groups, when_empty=when_empty)
+
+
+def _prepare(condition: Condition, simulation: Simulation) -> RunningCondition:
+    check = _check(condition, simulation)
+    watch = check if isinstance(check, StateWatch) else None
+    return RunningCondition(check, condition.edge, condition.delay, watch)
+
+
+def _check(condition: Condition, simulation: Simulation) -> Check:
+    content = condition.content
+    if isinstance(content, Unsupported):
+        simulation.note(content.reason or f"{content.kind} can't be played: the condition stays false", content.place)
+        return lambda: False
+    if type(content) in VALUE_CHECKS:
+        return VALUE_CHECKS[type(content)](content, simulation)
+    check = ENTITY_CHECKS[type(content)](content, simulation)
+    triggering = condition.triggering_entities
+    names = () if triggering is None else triggering.entity_refs
+    states = tuple(simulation.entity(name, condition.place) for name in names)
+    if triggering is not None and triggering.rule is TriggeringEntitiesRule.ALL:
+        return lambda: _all(check, states)
+    if len(states) == 1:
+        only = states[0]
+        return lambda: only.active and check(only)
+    return lambda: any(state.active and check(state) for state in states)
+
+
+def _all(check: EntityCheck, states: tuple[EntityState, ...]) -> bool:
+    """Entities that don't exist are passed over; without any that does, nothing holds."""
+    active = [state for state in states if state.active]
+    return bool(active) and all(check(state) for state in active)

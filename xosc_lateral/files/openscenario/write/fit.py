@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from xosc_lateral.files.openscenario.element import elements, local_name
 from xosc_lateral.files.openscenario.provenance import mark, write_sealed
+from xosc_lateral.files.openscenario.read import is_town
 from xosc_lateral.files.openscenario.write.build import named
 from xosc_lateral.files.openscenario.write.carla import fit_carla
 from xosc_lateral.files.openscenario.write.draft import Draft, WrittenScenario
-from xosc_lateral.files.openscenario.write.esmini import fit_esmini
-from xosc_lateral.files.openscenario.write.file_references import rewrite_paths
 from xosc_lateral.files.openscenario.write.literal import fill_in, inline_catalogs
 from xosc_lateral.files.openscenario.write.losses import Losses
 from xosc_lateral.files.openscenario.write.target import Player
 from xosc_lateral.files.openscenario.write.versions import fit_version
+from xosc_lateral.world.scenario import Scenario
+from xosc_lateral.world.scenario.expressions import ExpressionError
 
 
 def fit(draft: Draft, converted: Sequence[str] | None) -> None:
@@ -65,3 +68,87 @@ def finish(
     mark(draft.root, provenance, summary)
     sha256, content, data = write_sealed(output, draft.vertices.document(draft.root), save=save)
     return WrittenScenario(output, sha256, content, tuple(converted), tuple(draft.removed), data, tuple(draft.notes))
+
+
+# ---- files that a scenario names, as seen from the folder that it is written to ----
+_REFERENCES = {"Directory": "path"} | dict.fromkeys(("LogicFile", "SceneGraphFile", "File", "DomeFile"), "filepath")
+"""Element -> the attribute that names a file; models have another one."""
+
+
+def rewrite_paths(draft: Draft, output: Path) -> None:
+    """Rewrite relative file references so that they lead from the output's folder to where they led before.
+
+    Nothing changes when the output lies beside the input, but for the road and a catalog that the reader found
+    elsewhere than written: their references are repaired.
+    """
+    scenario = draft.scenario
+    old, new = _absolute(scenario.path).parent, _absolute(output).parent
+    found_elsewhere = _catalogs_found_elsewhere(scenario)
+    for element in elements(draft.root):
+        tag = local_name(element)
+        attribute = _REFERENCES.get(tag, "model3d")
+        if not (written := element.get(attribute)):
+            continue
+        try:
+            text = draft.scope.fill(written).replace("\\", "/")
+        except ExpressionError:
+            continue
+        leads_to = target = Path(os.path.normpath(old / text))
+        if tag == "LogicFile" and scenario.road_file is not None:
+            if is_town(text):
+                continue
+            target = _absolute(scenario.road_file)
+        elif tag == "Directory" and len(found_elsewhere) == 1 and not leads_to.exists():
+            target = found_elsewhere.pop()
+        elif attribute == "model3d" and not leads_to.exists():
+            continue
+        stays = old == new or Path(text).is_absolute() or text[1:2] == ":"
+        if text and not (target == leads_to and stays):
+            element.set(attribute, Path(os.path.relpath(target, new)).as_posix())
+
+
+def _catalogs_found_elsewhere(scenario: Scenario) -> list[Path]:
+    """Folders of catalogs that lie in none of the scenario's catalog locations."""
+    known = [_absolute(path) for path in scenario.catalog_locations.values()]
+    known += [path.parent for path in known if path.suffix.lower() == ".xosc"]
+    folders = dict.fromkeys(_absolute(path).parent for path in scenario.input_files[1:])
+    return [folder for folder in folders if folder not in known]
+
+
+def _absolute(path: Path) -> Path:
+    """Absolute and without dots, links not followed: what a player would do with the reference."""
+    return Path(os.path.normpath(path.absolute()))
+
+
+# ---- what esmini (3.6.0) wants: the one place of its quirks ----
+# All outputs are written such that it plays them to the millimetre, since other players mind none of that: vertices
+# at least 0.1 m apart, which it would merge (`path_pieces`), and paths cut where a car stands; lane offsets as half
+# cosines whose duration follows from the lateral acceleration (`offset_chain`); triggers without an edge, which it
+# would miss in its first frame. It reads every version, and passes over the `Motion` of vertices, since their times
+# say the same.
+_STOPS_AT = {
+    ("Polyline", "Interpolation"),
+    ("RoutingAction", "PreferredLaneLayerAction"),
+    ("RoutingAction", "RandomRouteAction"),
+    ("EntityCondition", "RelativeAngleCondition"),
+    ("ScenarioObject", "ExternalObjectReference"),
+    ("Position", "GeoPosition"),
+}
+"""(tag above, tag): it ends with an error where it reads one."""
+
+
+def fit_esmini(losses: Losses) -> None:
+    """Take out what stops esmini.
+
+    Raises
+    ------
+    FormatError
+        In a condition, an entity, or a maneuver of a scenario that stays reactive.
+    """
+    for item in list(losses.root.iter("{*}*")):
+        parent = item.getparent()
+        if parent is None or (local_name(parent), local_name(item)) not in _STOPS_AT:
+            continue
+        if local_name(item) == "ExternalObjectReference":
+            losses.refuse(item, local_name(item), hint="")
+        losses.element(item, "esmini would stop there")

@@ -25,7 +25,6 @@ import re
 import zipfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,8 +56,7 @@ COLUMNS = (
     *("acceleration_signed", "dimension_length", "dimension_height", "interpolated"),
     *(f"classifications_{name}" for name in CLASSES),
 )
-PIECES = (0.5, 0.6)
-"""Frequencies below which movement across the road is kept, and above which none is: half a jump a period. [Hz]"""
+PIECES = (0.5, 0.6)  # movement across is kept below, and none of it above: half a jump of the cubics a period [Hz]
 ATTENUATION = 40.0  # of what is faster; a third of a millimetre of its 3 cm is left [dB]
 HIGHEST_FREQUENCY = 0.1  # of what these tracks show of driving [Hz]
 POSITION_RESOLUTION = 0.01  # that positions are given in [m]
@@ -74,20 +72,19 @@ LICENCE = (
 def import_dlr_ht(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cut: bool = False) -> Imported:
     """Read the trajectory CSV, the data set's zip or the wheel of `tasi` that holds it."""
     tracks = read_tracks(source)
-    found = find_lanes(tracks, settings)
-    forward, reference, s_road = found.forward, found.reference, found.s
-    placed, lanes, gap = found.placed, found.lanes, found.gap
-    s = np.where(forward, s_road, reference.length - s_road)
-    table = _context(tracks, placed, s, forward)
-    table["curvature"] = reference.curvature(s_road) * np.where(forward, 1.0, -1.0)
+    road = find_lanes(tracks, settings)
+    way = np.where(road.forward, 1.0, -1.0)
+    s = np.where(road.forward, road.s, road.reference.length - road.s)
+    table = _drive_table(tracks, road, s)
+    table["curvature"] = road.reference.curvature(road.s) * way
     # 0.1 mm, 0.1 per km: below any measurement, above what linear algebra does differently from machine to machine.
     table = table.round({"curvature": 7, **dict.fromkeys(table.columns.drop(["curvature", "drive", "time"]), 4)})
     table[VALID_BELOW], table[RESOLUTION] = HIGHEST_FREQUENCY, POSITION_RESOLUTION
-    reasons = {"no lane": placed.lane < 0, "lane change": placed.changing, "gap": gap}
+    reasons = {"no lane": road.lane < 0, "lane change": road.changing, "gap": road.gap}
     vehicle, time = tracks["vehicle"].to_numpy(), tracks["time"].to_numpy()
-    table["state"] = name_states(reasons, placed.lane, vehicle, time, STEP, settings)
-    table[RUN] = number_runs(table["state"].to_numpy(), placed.lane, vehicle, time)
-    described = [_describe(name, k, lane) for name, both in lanes.items() for k, lane in enumerate(both)]
+    table["state"] = name_states(reasons, road.lane, vehicle, time, STEP, settings)
+    table[RUN] = number_runs(table["state"].to_numpy(), road.lane, vehicle, time)
+    described = [_describe(name, k, lane) for name, both in road.lanes.items() for k, lane in enumerate(both)]
     about = {"format": "dlr-ht", "version": _version(source), "licence": LICENCE, "lanes": described}
     return finished(table, keep_cut=keep_cut, sources=[source], settings=asdict(settings), step=STEP, **about)
 
@@ -108,7 +105,6 @@ def read_tracks(source: Path) -> pd.DataFrame:
 
 
 def _trajectory_files(source: Path) -> list[io.BytesIO]:
-    """The trajectory CSV files in a CSV, a zip, or a zip in a wheel."""
     with open_source(source) as opened:
         if not zipfile.is_zipfile(opened.file):
             opened.file.seek(0)
@@ -154,24 +150,18 @@ def travels_north(tracks: pd.DataFrame) -> BoolArray:
     return np.asarray(mean.to_numpy() > 0.0)
 
 
-class _Placed(NamedTuple):
-    """Each row's place across the road, shape (n,)."""
-
-    lane: IntArray
-    offset: FloatArray
-    width: FloatArray
-    changing: BoolArray
-
-
 @dataclass(frozen=True, eq=False)
 class Carriageways:
     """The road's reference line, lane centres of both directions (right to left), and every row's place in them."""
 
     reference: ReferenceLine
-    forward: BoolArray
-    s: FloatArray
+    forward: BoolArray  # forward ... changing: of the rows, shape (n,)
+    s: FloatArray  # along the reference line [m]
     gap: BoolArray
-    placed: _Placed
+    lane: IntArray  # from the right; -1: none
+    offset: FloatArray  # [m]
+    width: FloatArray  # of the lane [m]
+    changing: BoolArray
     lanes: dict[str, list[LaneCentreLine]]
 
 
@@ -184,16 +174,15 @@ def find_lanes(tracks: pd.DataFrame, settings: CutSettings = DEFAULT_CUTS) -> Ca
     s = np.where(forward, s_road, reference.length - s_road)
     d = np.where(forward, d_road, -d_road)
     vehicle, height = tracks["vehicle"].to_numpy(), tracks["dimension_height"].to_numpy()
-    gap = long_gaps(tracks["interpolated"].to_numpy(), vehicle, STEP, settings.max_gap)
-    n = len(tracks)
-    placed = _Placed(np.full(n, -1), np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=np.bool_))
+    gap, n = long_gaps(tracks["interpolated"].to_numpy(), vehicle, STEP, settings.max_gap), len(tracks)
+    places = np.full(n, -1), np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=np.bool_)
     lanes: dict[str, list[LaneCentreLine]] = {}
-    for name, mine in (("northbound", forward), ("southbound", ~forward)):
-        rows = np.flatnonzero(mine)
-        part, lanes[name] = _place_in_lanes(s[rows], d[rows], height[rows], vehicle[rows], gap[rows], settings)
-        placed.lane[rows], placed.offset[rows] = part.lane, part.offset
-        placed.width[rows], placed.changing[rows] = part.width, part.changing
-    return Carriageways(reference, forward, s_road, gap, placed, lanes)
+    for name, part in (("northbound", forward), ("southbound", ~forward)):
+        rows = np.flatnonzero(part)
+        lanes[name], *placed = _place_in_lanes(s[rows], d[rows], height[rows], vehicle[rows], gap[rows], settings)
+        for column, values in zip(places, placed, strict=True):
+            column[rows] = values
+    return Carriageways(reference, forward, s_road, gap, *places, lanes)
 
 
 def _slow(d: FloatArray, tracks: pd.DataFrame) -> FloatArray:
@@ -206,41 +195,31 @@ def _slow(d: FloatArray, tracks: pd.DataFrame) -> FloatArray:
 
 def _place_in_lanes(
     s: FloatArray, d: FloatArray, height: FloatArray, vehicle: IntArray, gap: BoolArray, settings: CutSettings
-) -> tuple[_Placed, list[LaneCentreLine]]:
-    """Lane centres of one carriageway, and every row's lane and offset. Rounds, since each needs the other."""
+) -> tuple[list[LaneCentreLine], IntArray, FloatArray, float, BoolArray]:
+    """Lane centres of one carriageway, and every row's lane, offset, width and lane change: each needs the others."""
     levels = _levels(d)
-    centre = np.repeat(levels[:, None], len(s), axis=1)
+    centre, lanes = np.repeat(levels[:, None], len(s), axis=1), list[LaneCentreLine]()
     bend, width = np.full(len(d), levels.mean()), float(np.diff(levels).mean())
-    lanes: list[LaneCentreLine] = []
-    for _ in range(3):
-        lane, offset, changing = _place(d, centre, bend, width, vehicle, settings)
+    for remaining in (3, 2, 1, 0):
+        lane = _nearest_lane(d, centre, width)
+        offset = np.where(lane >= 0, d - centre[np.clip(lane, 0, None), np.arange(len(d))], np.nan)
+        changing = lane_changes(d - bend, offset, lane, vehicle, STEP, settings)
+        if not remaining:
+            break
         lanes = []
         for index in range(LANES):
             rows = np.flatnonzero((lane == index) & ~changing & ~gap)
             passage = np.cumsum(np.r_[True, (np.diff(rows) != 1) | (np.diff(vehicle[rows]) != 0)])
             second = _each(passage, round(1.0 / STEP))
             lanes.append(fit_lane_centre(s[rows][second], d[rows][second], height[rows][second], passage[second]))
-        centre = np.array([one.at(s, height) for one in lanes])
+        centre = np.array([line.at(s, height) for line in lanes])
         # Past a lane's known part its last value stands in, so that no lane change is lost sight of there.
-        bend = np.mean([one.at(np.clip(s, one.start, one.end), height) for one in lanes], axis=0)
-        width = _lane_width(lanes)
-    lane, offset, changing = _place(d, centre, bend, width, vehicle, settings)
-    return _Placed(lane, offset, np.full(len(s), width), changing), lanes
-
-
-def _place(
-    d: FloatArray, centre: FloatArray, bend: FloatArray, width: float, vehicle: IntArray, settings: CutSettings
-) -> tuple[IntArray, FloatArray, BoolArray]:
-    """Lane, offset (NaN in no lane) and whether a lane change is on."""
-    lane = _nearest_lane(d, centre, width)
-    offset = np.where(lane >= 0, d - centre[np.clip(lane, 0, None), np.arange(len(d))], np.nan)
-    return lane, offset, lane_changes(d - bend, offset, lane, vehicle, STEP, settings)
-
-
-def _lane_width(lanes: list[LaneCentreLine]) -> float:
-    """Median distance of neighbouring lane centres, where both are known."""
-    s = np.arange(max(lane.start for lane in lanes), min(lane.end for lane in lanes), 10.0)
-    return float(np.median(np.diff([lane.at(s, np.full(len(s), lane.height)) for lane in lanes], axis=0)))
+        bend = np.mean([line.at(np.clip(s, line.start, line.end), height) for line in lanes], axis=0)
+        # median distance of neighbouring centres, where both are known
+        known = np.arange(max(line.start for line in lanes), min(line.end for line in lanes), 10.0)
+        apart = np.diff([line.at(known, np.full(len(known), line.height)) for line in lanes], axis=0)
+        width = float(np.median(apart))
+    return lanes, lane, offset, width, changing
 
 
 def _levels(d: FloatArray) -> FloatArray:
@@ -270,28 +249,26 @@ def _each(passage: IntArray, every: int) -> BoolArray:
     return np.asarray(position % every == 0)
 
 
-def _context(tracks: pd.DataFrame, placed: _Placed, s: FloatArray, forward: BoolArray) -> pd.DataFrame:
-    """The drive table's columns, for every row of the tracks."""
+def _drive_table(tracks: pd.DataFrame, road: Carriageways, s: FloatArray) -> pd.DataFrame:
     kind = vehicle_classes(tracks)
-    frame = np.round(tracks["time"].to_numpy() / STEP).astype(np.int64) * 2 + forward
     near = find_neighbours(
-        frame,
-        placed.lane,
+        np.round(tracks["time"].to_numpy() / STEP).astype(np.int64) * 2 + road.forward,
+        road.lane,
         s,
         tracks["dimension_length"].to_numpy(),
         kind == "truck",
-        lane_on_left=placed.lane < LANES - 1,
-        lane_on_right=placed.lane > 0,
+        lane_on_left=road.lane < LANES - 1,
+        lane_on_right=road.lane > 0,
     )
     return pd.DataFrame(
         {
             "drive": "ht-" + tracks["id"].astype(str),
             "time": np.round(tracks["time"].to_numpy(), 3),
-            "offset": placed.offset,
-            "lane_width": placed.width,
+            "offset": road.offset,
+            "lane_width": road.width,
             "speed": tracks["velocity_magnitude"].to_numpy(),
             "acceleration": tracks["acceleration_signed"].to_numpy(),
-            "lane_index": placed.lane,
+            "lane_index": road.lane,
             "lane_count": LANES,
             **near,
             "vehicle_class": kind,
@@ -318,9 +295,6 @@ def _describe(carriageway: str, index: int, lane: LaneCentreLine) -> dict[str, o
 
 
 def _version(source: Path) -> str:
-    """Version of the data set, as the name of the folder or zip gives it."""
-    names = [str(source)]
-    if zipfile.is_zipfile(source):
-        names += zipfile.ZipFile(source).namelist()
-    found = [match for name in names if (match := re.search(r"Highway-Traffic-dataset_v(\d+)-(\d+)-(\d+)", name))]
-    return ".".join(found[0].groups()) if found else "unknown"
+    names = [str(source), *(zipfile.ZipFile(source).namelist() if zipfile.is_zipfile(source) else ())]
+    matches = (re.search(r"Highway-Traffic-dataset_v(\d+)-(\d+)-(\d+)", name) for name in names)
+    return next((".".join(match.groups()) for match in matches if match), "unknown")

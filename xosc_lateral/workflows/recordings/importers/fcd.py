@@ -34,8 +34,7 @@ from xosc_lateral.files.sumo import (
     usual_length,
     wrong_element,
 )
-from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
-from xosc_lateral.workflows.recordings.gate import is_right_to_left
+from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS, is_right_to_left
 from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph, neighbour_columns
@@ -82,7 +81,6 @@ def import_fcd(
 
 
 def _rows(vehicles: Iterator[tuple[float, Any]], source: Path) -> Iterator[tuple[Any, ...]]:
-    """See `ROW`."""
     for time, element in vehicles:
         if element.get("posLat") is None:
             what = "no posLat: it is written with the sublane model and --fcd-output.attributes all"
@@ -97,7 +95,6 @@ def _rows(vehicles: Iterator[tuple[float, Any]], source: Path) -> Iterator[tuple
 def _drive_table(
     rows: pd.DataFrame, net: SumoNet, types: dict[str, tuple[float, str]], left_hand: bool, source: Path
 ) -> pd.DataFrame:
-    """The drive table with its column `state`."""
     vehicle, names = rows["name"].factorize()
     time, side, speed = (rows[name].to_numpy() for name in ("time", "side", "speed"))
     kinds = [types.get(kind.partition("@")[0], (usual_length(kind), kind)) for kind in rows["kind"]]

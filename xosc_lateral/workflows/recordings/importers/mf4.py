@@ -47,14 +47,9 @@ POSITIONS = (("offset", "lane_width"), ("distance_left", "distance_right"))
 LICENCE = "your own recording"
 
 _NO_MDF = "not an MDF file that asammdf can read"
-
 LISTED = 40  # channel names in a message, at most
-
-MAX_CHANNEL_DISTANCE = 0.2
-"""Median distance of two channels of one name, as a share of the standard deviation, that is not one of rates. [-]"""
-
-SPARSE_STEPS = 2.5
-"""A channel of few samples has a gap where more than two in a row are missing: of its own median steps. [-]"""
+MAX_CHANNEL_DISTANCE = 0.2  # median distance of two channels of one name that is not one of rates, by the spread [-]
+SPARSE_STEPS = 2.5  # a channel of few samples has a gap where more than two in a row lack: of its median steps [-]
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +152,6 @@ def _names(log: Any) -> list[str]:
 
 @contextmanager
 def _opened(source: Path) -> Iterator[Any]:
-    """The log; `FormatError` when asammdf is not there or can't read it."""
     try:
         from asammdf import MDF
     except ImportError as error:
@@ -255,7 +249,6 @@ def _of_one_name(
 
 
 def _alike(log: Any, wanted: str) -> str:
-    """What it may have been meant for."""
     names = _names(log)
     by_lower = {name.lower(): name for name in reversed(names)}
     close = [by_lower[lower] for lower in get_close_matches(wanted.lower(), by_lower, n=5, cutoff=0.6)]
@@ -270,7 +263,6 @@ def _is_quantity(name: str, unit: str) -> bool:
 
 
 def _table(signals: dict[str, Channel], source: Path, drive: str, step: float) -> pd.DataFrame:
-    """Rows at an even step with their `state`."""
     position = [name for pair in POSITIONS for name in pair if name in signals]
     start = max(float(signals[name].time[0]) for name in position)
     end = min(float(signals[name].time[-1]) for name in position)

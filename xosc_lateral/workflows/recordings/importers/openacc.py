@@ -41,25 +41,15 @@ LICENCE = (
     "No tracks are passed on with a profile, only fitted parameters."
 )
 LANE_WIDTH = 3.5  # assumed: usual on rural roads; the campaign gives none [m]
-
-HIGHEST_FREQUENCY = 1.5
-"""Runs at 5 Hz keep what is slower; the noise there (2e-8 m2/Hz at most) is a tenth of the movement. [Hz]"""
-
+HIGHEST_FREQUENCY = 1.5  # runs at 5 Hz keep what is slower; noise there (2e-8 m2/Hz) is a tenth of the movement [Hz]
 POSITION_RESOLUTION = 1e-3  # noise of the positions [m]
 GRID_STEP = 1.0  # points of the centre line are so far apart [m]
-
-SMOOTHING, ROUNDS = 12.0, 5
-"""Standard deviation of the Gaussian by which the centre line follows the mean path [m], and how often."""
-
+SMOOTHING, ROUNDS = 12.0, 5  # Gaussian by which the centre line follows the mean path [m], and how often
 RETURN_DISTANCE = 5.0  # a lap is over where a car is as near to where it began [m] ...
-
-MINIMUM_LAP = 500.0
-"""... and has come so far since. [m]"""
-
+MINIMUM_LAP = 500.0  # ... and has come so far since [m]
 MINIMUM_SPEED = 5.0  # slower rows (standing start, end of a test) say nothing about the lane's centre [m/s]
 LANE_SHARE = 0.5  # of the lane's width: rows further from its centre are elsewhere [-]
 MAXIMUM_STEP = 0.25  # rows further apart in time are no longer one run [s]
-
 FROZEN_TIME = 10.0
 """A speed of a moving car that stands to the last digit for so long is none that was measured: in some recordings of
 the campaigns it does for minutes, the engine's too; measured ones here repeat for 1.6 s at most. [s]"""
@@ -91,7 +81,7 @@ def import_openacc(
 
 @dataclass(frozen=True, eq=False)
 class _Car:
-    """One car in one file, arrays of shape (n,)."""
+    """One car in one file, arrays of shape (n,); `lead`: gap to the car ahead, NaN: there is none. [m]"""
 
     name: str
     time: FloatArray
@@ -99,7 +89,6 @@ class _Car:
     y: FloatArray
     speed: FloatArray
     lead: FloatArray
-    """Gap to the car ahead; NaN: there is none. [m]"""
 
     @property
     def turn(self) -> float:
@@ -111,23 +100,21 @@ class _Car:
 def _cars(path: Path) -> list[_Car]:
     frame, first = _read(path)
     numbers = sorted(int(name[1:]) for name in frame.columns if re.fullmatch(r"E\d+", name))
-    wanted = [f"{name}{k}" for k in numbers for name in ("E", "N", "Speed")]
-    missing = [name for name in ("Time", *wanted) if name not in frame]
+    needed = ["Time", *(f"{name}{k}" for k in numbers for name in ("E", "N", "Speed"))]
+    missing = [name for name in needed if name not in frame]
     if missing or not numbers:
         what = f"no column {missing[0] if missing else 'E1'}; is this a file of OpenACC's AstaZero campaign?"
         raise FormatError(what, path=path, line=first)
     gaps = [f"IVS{k}" for k in numbers if f"IVS{k}" in frame]
-    values = {name: _numbers(frame[name], path, first) for name in ("Time", *wanted, *gaps)}
-    nobody = np.full(len(frame), np.nan)
-    stem = path.name.split(".")[0]
+    values = {name: _numbers(frame[name], path, first) for name in (*needed, *gaps)}
     cars = []
     for k in numbers:
-        speed = values[f"Speed{k}"]
+        x, y, speed = (values[f"{name}{k}"] for name in ("E", "N", "Speed"))
         if np.isfinite(speed).any() and np.nanmax(speed) > MINIMUM_SPEED:
-            ahead = values.get(f"IVS{k - 1}", nobody)
-            there = np.isfinite(values[f"E{k}"]) & np.isfinite(values[f"N{k}"]) & np.isfinite(speed)
-            columns = (values["Time"], values[f"E{k}"], values[f"N{k}"], speed, ahead)
-            cars.append(_Car(f"{stem}:{k}", *(column[there] for column in columns)))
+            lead = values.get(f"IVS{k - 1}", np.full(len(frame), np.nan))
+            there = np.isfinite(x) & np.isfinite(y) & np.isfinite(speed)
+            columns = (values["Time"], x, y, speed, lead)
+            cars.append(_Car(f"{path.name.split('.')[0]}:{k}", *(column[there] for column in columns)))
     return cars
 
 
@@ -158,19 +145,6 @@ class _Loop:
     """A closed line with points about `GRID_STEP` apart, shape (n, 2). [m]"""
 
     points: FloatArray
-
-    @property
-    def length(self) -> float:
-        """[m]"""
-        return float(self._sizes.sum())
-
-    @property
-    def _steps(self) -> FloatArray:
-        return np.asarray(np.roll(self.points, -1, axis=0) - self.points)
-
-    @property
-    def _sizes(self) -> FloatArray:
-        return np.asarray(np.hypot(*self._steps.T))
 
     def normals(self) -> FloatArray:
         """To the left at each point, shape (n, 2). [-]"""
@@ -205,21 +179,18 @@ class _Loop:
         """Periodic cubic interpolation (Catmull-Rom) of columns, shape (n, 2) each."""
         low = np.floor(index).astype(np.int64)
         share = (index - low)[:, None]
-        found = []
+        values = []
         for column in columns:
             a, b, c, d = (column[(low + k) % len(column)] for k in (-1, 0, 1, 2))
-            found.append(
-                b + 0.5 * share * (c - a + share * (2 * a - 5 * b + 4 * c - d + share * (3 * (b - c) + d - a)))
-            )
-        return found
+            cubic = c - a + share * (2 * a - 5 * b + 4 * c - d + share * (3 * (b - c) + d - a))
+            values.append(b + 0.5 * share * cubic)
+        return values
 
 
-PLACING_STEPS = 4
-"""Steps of the search for the point of a line that lies abreast: each leaves less than a tenth of the last. [-]"""
+PLACING_STEPS = 4  # of the search for the point of a line abreast: each leaves less than a tenth of the last [-]
 
 
 def _centre_line(cars: Sequence[_Car]) -> _Loop:
-    """The mean path of all passes."""
     loop = _even(_smooth(_first_lap(cars)))
     x, y = (np.concatenate([getattr(car, name)[_moves(car)] for car in cars]) for name in ("x", "y"))
     for _ in range(ROUNDS):
@@ -240,36 +211,37 @@ def _moves(car: _Car) -> BoolArray:
 
 def _first_lap(cars: Sequence[_Car]) -> FloatArray:
     """The first closed lap of the car that goes furthest, shape (n, 2), points `GRID_STEP` apart, its ends met. [m]"""
-    car = max(cars, key=lambda one: float(np.hypot(np.diff(one.x), np.diff(one.y)).sum()))
+    car = max(cars, key=lambda car: float(np.hypot(np.diff(car.x), np.diff(car.y)).sum()))
     moves = _moves(car)
     path = np.stack([car.x[moves], car.y[moves]], axis=1)
-    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+    way = _way(path)
     for begin in range(0, len(path), max(1, len(path) // 100)):  # the very first metres may lie beside the loop
-        gone = way - way[begin]
         back = np.hypot(*(path - path[begin]).T)
-        returned = np.flatnonzero((gone > MINIMUM_LAP) & (back < RETURN_DISTANCE))
+        returned = np.flatnonzero((way - way[begin] > MINIMUM_LAP) & (back < RETURN_DISTANCE))
         if len(returned):
             end = returned[0] + int(np.argmin(back[returned[0] : returned[0] + 50]))
-            return _resampled(path[begin:end])
+            closed, even = _closed(path[begin:end])
+            return np.stack([np.interp(even, _way(closed), closed[:, k]) for k in range(2)], axis=1)
     raise NotEnoughDataError(f"{car.name} drives {way[-1]:.0f} m and never comes back to where it was: no closed loop")
 
 
-def _resampled(path: FloatArray) -> FloatArray:
-    """A closed line at even steps of about `GRID_STEP`, what is missing between its ends spread over all of it."""
+def _way(path: FloatArray) -> FloatArray:
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+
+
+def _closed(path: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """A line with its beginning at its end, and ways along it at even steps of about `GRID_STEP`."""
     closed = np.concatenate([path, path[:1]])
-    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
-    even = np.linspace(0.0, way[-1], round(way[-1] / GRID_STEP) + 1)[:-1]
-    return np.stack([np.interp(even, way, closed[:, k]) for k in range(2)], axis=1)
+    length = _way(closed)[-1]
+    return closed, np.linspace(0.0, length, round(length / GRID_STEP) + 1)[:-1]
 
 
 def _even(points: FloatArray) -> _Loop:
     """With points at even steps again: arc lengths by cubics, so that corners don't get between points."""
     from scipy.interpolate import CubicSpline
 
-    closed = np.concatenate([points, points[:1]])
-    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
-    even = np.linspace(0.0, way[-1], round(way[-1] / GRID_STEP) + 1)[:-1]
-    return _Loop(np.asarray(CubicSpline(way, closed, bc_type="periodic")(even)))
+    closed, even = _closed(points)
+    return _Loop(np.asarray(CubicSpline(_way(closed), closed, bc_type="periodic")(even)))
 
 
 def _smooth(values: FloatArray) -> FloatArray:
@@ -297,21 +269,18 @@ def _placed(cars: Sequence[_Car], loop: _Loop, lane_width: float) -> list[pd.Dat
         inside = np.abs(offset) <= LANE_SHARE * lane_width
         state = np.where(inside, KEPT_ROWS, "outside the lane")
         new = np.r_[True, (np.diff(car.time) > MAXIMUM_STEP) | (np.diff(inside.astype(np.int8)) != 0)]
-        frames.append(
-            pd.DataFrame(
-                {
-                    "drive": car.name,
-                    "time": car.time.round(6),
-                    "offset": offset.round(5),
-                    "lane_width": lane_width,
-                    "speed": car.speed.round(4),
-                    "curvature": bends[np.floor(index).astype(np.int64) % len(bends)].round(7),
-                    "lead_distance": np.where(car.lead > 0.0, car.lead, np.nan).round(3),
-                    VALID_BELOW: HIGHEST_FREQUENCY,
-                    RESOLUTION: POSITION_RESOLUTION,
-                    RUN: np.cumsum(new),
-                    "state": np.where(standing_speed(car.time, car.speed), "speed frozen", state),
-                }
-            )
-        )
+        columns = {
+            "drive": car.name,
+            "time": car.time.round(6),
+            "offset": offset.round(5),
+            "lane_width": lane_width,
+            "speed": car.speed.round(4),
+            "curvature": bends[np.floor(index).astype(np.int64) % len(bends)].round(7),
+            "lead_distance": np.where(car.lead > 0.0, car.lead, np.nan).round(3),
+            VALID_BELOW: HIGHEST_FREQUENCY,
+            RESOLUTION: POSITION_RESOLUTION,
+            RUN: np.cumsum(new),
+            "state": np.where(standing_speed(car.time, car.speed), "speed frozen", state),
+        }
+        frames.append(pd.DataFrame(columns))
     return frames

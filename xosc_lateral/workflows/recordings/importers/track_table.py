@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +15,11 @@ from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.columns import chosen_rows, listed, numbers_of, require_row_step, seconds_of_stamps
-from xosc_lateral.files.mapping import UNITS, MappingLike, TableMapping, as_mapping, parse_map
+from xosc_lateral.files.mapping import UNITS, ColumnSource, MappingLike, TableMapping, as_mapping, parse_map
 from xosc_lateral.files.output_tables import COLUMNS
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import foreign_errors, read_table, unpacked_text
-from xosc_lateral.workflows.recordings.gate import MOVING_SPEED, require_headings
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
+from xosc_lateral.workflows.recordings.cuts import MOVING_SPEED, require_headings
 
 HEADERS: Mapping[str, tuple[str, ...]] = {
     "vehicle": ("vehicle", "id", "track_id", "trackid", "vehicle_id", "object_id", "track", "drive"),
@@ -72,9 +67,7 @@ class Tracks:
     """How far x and y lie behind the vehicle's middle; None: they are the middle. [m]"""
 
 
-MAX_SPEED_RATIO = 1.39
-"""A speed off by more is in another unit: the nearest, knots, are 1.94 times as many, and this is its root. [-]"""
-
+MAX_SPEED_RATIO = 1.39  # a speed off by more is in another unit: root of the nearest, knots, 1.94 times as many [-]
 SPEED_WINDOW = 0.4  # positions are differenced over this where no speed was recorded [s]
 
 
@@ -115,50 +108,53 @@ def tracks_of(
     is_log: bool = False,
 ) -> Tracks:
     """Tracks of a table that is read; see `read_tracks`. `is_log`: it is one of esmini, whose units are known."""
+    saved = TableMapping() if saved is None else saved
     is_played = set(map(str, table.columns)) >= STATE_COLUMNS
     if is_played:  # a table of states, as `play` and `live` write it
         table = table.rename(columns={"name": "vehicle", "h": "heading"})
-    found = _columns(table, path, as_mapping(None) if saved is None else saved, columns)
-    order = found.sort_values(["vehicle", "time"], kind="stable", ignore_index=True)
-    order = order.drop_duplicates(["vehicle", "time"], ignore_index=True)
-    codes, names = order["vehicle"].factorize()
-    time = order["time"].to_numpy(dtype=np.float64)
+    rows = _columns(table, path, saved, columns).sort_values(["vehicle", "time"], kind="stable", ignore_index=True)
+    rows = rows.drop_duplicates(["vehicle", "time"], ignore_index=True)
+    codes, names = rows["vehicle"].factorize()
+    vehicle = codes.astype(np.int64)
+    time, x, y = (rows[name].to_numpy(dtype=np.float64) for name in ("time", "x", "y"))
     same = codes[1:] == codes[:-1]
     if not same.any():
         raise NotEnoughDataError(f"{path}: no vehicle has two rows")
     step = float(np.median(np.diff(time)[same]))
     require_row_step(step, path)
-    vehicle = codes.astype(np.int64)
-    x, y = order["x"].to_numpy(dtype=np.float64), order["y"].to_numpy(dtype=np.float64)
+
+    def stated(name: str, otherwise: FloatArray) -> FloatArray:
+        values = rows[name].to_numpy(dtype=np.float64) if name in rows else otherwise
+        return np.where(np.isfinite(values), values, otherwise)
+
     way, driven = travel_heading(x, y, vehicle, time, step), ground_speed(x, y, vehicle, time, step)
-    heading, speed = _given_columns(order, "heading", way), np.abs(_given_columns(order, "speed", driven))
+    heading, speed = stated("heading", way), np.abs(stated("speed", driven))
     if not is_played and not is_log:  # a player's vehicles may drive backwards; its units are known
         require_headings(heading, way, driven, path)
         _require_speed(speed, driven, path)
-    kind = order["vehicle_class"].astype(str).str.lower().to_numpy(dtype=str) if "vehicle_class" in order else None
-    kinds = np.full(len(order), "") if kind is None else kind
-    length = _given_columns(order, "length", np.array([USUAL_LENGTH.get(one, 4.6) for one in kinds]))
-    ahead = BEHIND_MIDDLE["centre" if saved is None else saved.reference] * length
-    x, y = x + ahead * np.cos(heading), y + ahead * np.sin(heading)
+    kinds = np.full(len(rows), "")
+    if "vehicle_class" in rows:
+        kinds = rows["vehicle_class"].astype(str).str.lower().to_numpy(dtype=str)
+    length = stated("length", np.array([USUAL_LENGTH.get(kind, 4.6) for kind in kinds]))
+    ahead = BEHIND_MIDDLE[saved.reference] * length
     return Tracks(
-        tuple(f"{name}" for name in names),
+        tuple(map(str, names)),
         vehicle,
         time - float(time.min()),
         step,
-        x,
-        y,
+        x + ahead * np.cos(heading),
+        y + ahead * np.sin(heading),
         heading,
         speed,
         length,
         kinds,
-        order["width"].to_numpy(dtype=np.float64) if "width" in order else None,
+        rows["width"].to_numpy(dtype=np.float64) if "width" in rows else None,
         is_reference=is_played,
-        rear=_given_columns(order, "rear", np.zeros(len(order))) if "rear" in order else None,
+        rear=stated("rear", np.zeros(len(rows))) if "rear" in rows else None,
     )
 
 
 def _require_speed(speed: FloatArray, driven: FloatArray, path: Path) -> None:
-    """Refuse speeds as recorded that are not those of x and y. [m/s]"""
     moving = (driven > MOVING_SPEED) & (speed > 0.0)
     ratio = float(np.median(speed[moving] / driven[moving])) if moving.any() else 1.0
     if 1.0 / MAX_SPEED_RATIO <= ratio <= MAX_SPEED_RATIO:
@@ -170,49 +166,40 @@ def _require_speed(speed: FloatArray, driven: FloatArray, path: Path) -> None:
     raise FormatError(f"is {ratio:.3g} times as fast as x and y move; {cause}", path=path, element="column 'speed'")
 
 
-def _given_columns(table: pd.DataFrame, name: str, otherwise: FloatArray) -> FloatArray:
-    if name not in table:
-        return otherwise
-    values = table[name].to_numpy(dtype=np.float64)
-    return np.where(np.isfinite(values), values, otherwise)
-
-
 def _columns(table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequence[str]) -> pd.DataFrame:
-    """The columns that are needed, under their own names, in our units."""
     mapping = {**saved.columns, **parse_map(words)}
     if unknown := mapping.keys() - HEADERS.keys():
         raise FormatError(f"--map {min(unknown)}: tracks have {', '.join(HEADERS)}", path=path)
     by_lower = {str(name).strip().lower(): name for name in reversed(list(table.columns))}
-    found: dict[str, pd.Series] = {}
+    columns: dict[str, pd.Series] = {}
     table = chosen_rows(table, saved.missing, saved.rows, path)
     for name, headers in HEADERS.items():
-        source = mapping.get(name)
-        header = next((by_lower[one] for one in headers if one in by_lower), None) if source is None else source.column
-        if header is None or header not in table.columns:
-            if source is not None or name in ("vehicle", "time", "x", "y"):
+        usual = next((by_lower[header] for header in headers if header in by_lower), None)
+        source = mapping.get(name) or (None if usual is None else ColumnSource(usual))
+        if source is None or source.column not in table.columns:
+            if name in mapping or name in ("vehicle", "time", "x", "y"):
                 there = f"there are {listed(table.columns)} (translate with --map {name}=COLUMN)"
-                raise FormatError(f"no column {header or name!r}; {there}", path=path, line=1)
+                raise FormatError(
+                    f"no column {repr(name) if source is None else source.column}; {there}", path=path, line=1
+                )
             continue
-        column = table[header]
+        column = table[source.column]
         if name == "vehicle":
-            found[name] = column
+            columns[name] = column
         elif name == "vehicle_class":
-            found[name] = saved.class_names(column, path)
+            columns[name] = saved.class_names(column, path)
         else:
-            by = 1.0 if source is None else source.factor
             stamps = None
             if name == "time" and not pd.api.types.is_numeric_dtype(column):
-                stamps = seconds_of_stamps(column, path, saved.time_zone, found["vehicle"])
-            numbers = numbers_of(column, path, name) * by if stamps is None else stamps
-            found[name] = pd.Series(numbers, index=column.index)
-    made = pd.DataFrame(found).replace([np.inf, -np.inf], np.nan)
+                stamps = seconds_of_stamps(column, path, saved.time_zone, columns["vehicle"])
+            numbers = numbers_of(column, path, name) * source.factor if stamps is None else stamps
+            columns[name] = pd.Series(numbers, index=column.index)
+    made = pd.DataFrame(columns).replace([np.inf, -np.inf], np.nan)
     return made.dropna(subset=["vehicle", "time", "x", "y"])
 
 
 FIRST = b"esmini "  # begins the lines before the table, which name the player's version
-
 HEAD = "Index [-]"
-
 MOST_LINES = 50  # before the table's head; a player writes seven
 
 _LOGGED = {

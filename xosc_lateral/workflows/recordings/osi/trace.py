@@ -13,8 +13,7 @@ from xosc_lateral.files.osi import SUFFIXES, osi
 from xosc_lateral.files.source import check_regular, open_source
 from xosc_lateral.files.tables import foreign_errors
 
-TRUTHS = ("GROUND_TRUTH", "SENSOR_VIEW")
-"""Kinds of messages that hold the true world; a sensor view as its global ground truth."""
+TRUTHS = ("GROUND_TRUTH", "SENSOR_VIEW")  # messages of the true world; a sensor view has it as its global ground truth
 
 
 class Trace:
@@ -43,7 +42,6 @@ class Trace:
         self._reader.close()
 
     def __iter__(self) -> Iterator[Any]:
-        """Every `GroundTruth`, in the order of the file."""
         number = 0
         while (result := self._reader.read_message()) is not None:
             number += 1
@@ -58,16 +56,19 @@ class Trace:
         if not reader.open(self.path):
             raise FormatError("not an MCAP file, or one that was not closed", path=self.path)
         names = {kind: name for name, kind in osi("osi_utilities").MessageType.__members__.items()}
-        found = {one.topic: names[one.message_type] for one in reader.list_channel_specifications()}
-        others = [topic for topic in reader.get_available_topics() if topic not in found]
-        said = ", ".join([f"{topic} ({kind})" for topic, kind in found.items()] + others) or "none"
-        chosen = _chosen(found, channel)
+        topics = {
+            channel_there.topic: names[channel_there.message_type]
+            for channel_there in reader.list_channel_specifications()
+        }
+        others = [topic for topic in reader.get_available_topics() if topic not in topics]
+        listed = ", ".join([f"{topic} ({kind})" for topic, kind in topics.items()] + others) or "none"
+        chosen = _chosen(topics, channel)
         if chosen is None:
             reader.close()
             what = "ground truth or a sensor view" + ("" if channel is None else f" named {channel!r}")
-            raise FormatError(f"no channel with {what}; there are: {said}", path=self.path)
-        if len(found) + len(others) > 1:
-            self.notes.append(f"{self.path.name}: read channel {chosen} of {said}")
+            raise FormatError(f"no channel with {what}; there are: {listed}", path=self.path)
+        if len(topics) + len(others) > 1:
+            self.notes.append(f"{self.path.name}: read channel {chosen} of {listed}")
         reader.set_topics([chosen])
         return reader
 
@@ -111,7 +112,6 @@ def _refuse_channel(path: Path, channel: str | None) -> None:
 
 
 def _chosen(kinds: dict[str, str], channel: str | None) -> str | None:
-    """Topic to read among those of each kind."""
     truths = [topic for wanted in TRUTHS for topic, kind in kinds.items() if kind == wanted]
     if channel is None:
         return truths[0] if truths else None

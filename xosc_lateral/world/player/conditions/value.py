@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from xosc_lateral.world.player.conditions.base import ValueCheck, ValueChecks
 from xosc_lateral.world.player.simulation import Simulation
+from xosc_lateral.world.player.storyboard import StoryboardElement, ValueCheck, ValueChecks, Watch
 from xosc_lateral.world.player.values import Values, holds
 from xosc_lateral.world.scenario.conditions import (
     ParameterCondition,
     SimulationTimeCondition,
+    StoryboardElementStateCondition,
     TimeOfDayCondition,
     TrafficSignalCondition,
     TrafficSignalControllerCondition,
     UserDefinedValueCondition,
     VariableCondition,
 )
+from xosc_lateral.world.scenario.enums import StoryboardElementState as State
 
 
 def prepare_simulation_time(content: SimulationTimeCondition, simulation: Simulation) -> ValueCheck:
@@ -75,6 +77,62 @@ def prepare_user_defined(content: UserDefinedValueCondition, simulation: Simulat
     return lambda: False
 
 
+# ---- StoryboardElementStateCondition ----
+class StateWatch(Watch):
+    """Changes of one element since the last look.
+
+    Any change since then that matches counts, also one that was passed through; without changes the last state goes on
+    to count, but not its transition, which lasts for one look only.
+    """
+
+    def __init__(self, content: StoryboardElementStateCondition, simulation: Simulation) -> None:
+        self._content = content
+        self._simulation = simulation
+        self._changes: list[tuple[State, State | None]] = []
+        self._last: State | None = None
+
+    def find(self, root: StoryboardElement) -> None:
+        """Look for the element: the first whose path ends in the reference."""
+        kind, reference = self._content.element_type, self._content.element_ref
+        for element in root.walk():
+            if (
+                element.kind is kind
+                and len(reference) >= len(element.name)
+                and "::".join(element.path).endswith(reference)
+            ):
+                element.watchers.append(self._note)
+                return
+        what = f"no {kind.value} '{reference}' in the storyboard: the condition stays false"
+        self._simulation.note(what, self._content.place)
+
+    def _note(self, state: State, transition: State | None) -> None:
+        self._changes.append((state, transition))
+        self.is_settled = False
+        if self.wake is not None:
+            self.wake()
+
+    def forget(self) -> None:
+        """Leave changes that nobody has looked at aside."""
+        self._changes.clear()
+
+    def __call__(self) -> bool:
+        """Whether the element is, or was since the last look, in the wanted state."""
+        wanted = self._content.state
+        self.is_settled = not self._changes
+        if not self._changes:
+            return self._last is wanted
+        changes, self._changes = self._changes, []
+        self._last = changes[-1][0]
+        return any(wanted in change for change in changes)
+
+
+def prepare_storyboard_element_state(content: StoryboardElementStateCondition, simulation: Simulation) -> ValueCheck:
+    """A watch; it finds its element once the storyboard stands."""
+    watch = StateWatch(content, simulation)
+    simulation.when_built.append(watch.find)
+    return watch
+
+
 CHECKS: ValueChecks = {
     SimulationTimeCondition: prepare_simulation_time,
     TimeOfDayCondition: prepare_time_of_day,
@@ -83,4 +141,5 @@ CHECKS: ValueChecks = {
     TrafficSignalCondition: prepare_signal,
     TrafficSignalControllerCondition: prepare_controller,
     UserDefinedValueCondition: prepare_user_defined,
+    StoryboardElementStateCondition: prepare_storyboard_element_state,
 }

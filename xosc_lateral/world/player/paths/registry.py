@@ -11,8 +11,7 @@ from msgspec.structs import replace
 
 from xosc_lateral.base.errors import FormatError, PlaybackError, UnsupportedElementError
 from xosc_lateral.world.player.paths.base import Path
-from xosc_lateral.world.player.paths.clothoid import ClothoidPath, TimedClothoid
-from xosc_lateral.world.player.paths.nurbs import Control, NurbsPath, clamped_knots
+from xosc_lateral.world.player.paths.curves import ClothoidPath, Control, NurbsPath, TimedClothoid, clamped_knots
 from xosc_lateral.world.player.paths.polyline import Corner, PolylinePath, fill_times, has_gaps_in_time, merge_close
 from xosc_lateral.world.player.positions.on_road import reference_of
 from xosc_lateral.world.player.simulation import Simulation
@@ -221,8 +220,8 @@ def duration(shape: Shape) -> float:
 
 def _given_angles(position: Position) -> tuple[float | None, float | None, float | None]:
     """Heading, pitch and roll as written, absolute or relative; None: the path's own."""
-    given = position if isinstance(position, WorldPosition) else getattr(position, "orientation", None)
-    return (None, None, None) if given is None else (given.h, given.p, given.r)
+    orientation = position if isinstance(position, WorldPosition) else getattr(position, "orientation", None)
+    return (None, None, None) if orientation is None else (orientation.h, orientation.p, orientation.r)
 
 
 def _gives_height(position: Position) -> bool:
