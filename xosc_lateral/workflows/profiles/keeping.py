@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -89,15 +89,7 @@ class ProfileUses(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them."""
-        outputs = [
-            {
-                "output": str(use.output),
-                "entities": list(use.entities),
-                "sha256": use.sha256,
-                "is_current": use.is_current,
-            }
-            for use in self.uses
-        ]
+        outputs = [{**asdict(use), "output": str(use.output), "entities": list(use.entities)} for use in self.uses]
         return {"id": self.name, "outputs": outputs}
 
 
