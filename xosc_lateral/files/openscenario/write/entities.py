@@ -117,8 +117,8 @@ def add_kept_actions(
 ) -> None:
     """Add an act with one event for each action that is not replaced, in the order of the run; none for no actions.
 
-    Each run of actions with the same actor has a maneuver group, so that the order holds across actors, too. `poses`: of an
-    AddEntityAction, by index in `played`: where the entity appears on its written path.
+    Each run of actions with the same actor has a maneuver group, so that the order holds across actors, too.
+    `poses`: of an AddEntityAction, by index in `played`: where the entity appears on its written path.
     """
     if not played:
         return
