@@ -12,7 +12,7 @@ TYPE_CHECKING = False  # importing `typing` for it would take longer than all th
 _HOME = {
     "convert": "workflows.conversion.convert",
     "convert_many": "workflows.batch.call",
-    "reconstruct": "workflows.recordings.call",
+    "reconstruct": "workflows.recordings.reconstruct",
     "verify": "workflows.batch.verify",
     "reproduce": "workflows.batch.verify",
     "play": "workflows.playing.call",
@@ -23,7 +23,7 @@ _HOME = {
     "close_loop": "workflows.profiles.loop",
     "detect": "workflows.detection.call",
     "read_drives": "workflows.profiles.fit",
-    "import_drives": "workflows.recordings.call",
+    "import_drives": "workflows.recordings.importers",
     "read_profile": "workflows.profiles.profiles",
     "write_profile": "workflows.profiles.profiles",
     "list_profiles": "workflows.profiles.profiles",
@@ -53,7 +53,7 @@ _HOME = {
     "Evaluation": "workflows.profiles.evaluate",
     "ClosedLoop": "workflows.profiles.loop",
     "Detection": "workflows.detection.detection",
-    "ImportedDrives": "workflows.recordings.call",
+    "ImportedDrives": "workflows.recordings.importers",
     "XoscLateralError": "base.errors",
     "FormatError": "base.errors",
     "PlaybackError": "base.errors",
@@ -149,7 +149,8 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.profiles.loop import ClosedLoop, close_loop
     from xosc_lateral.workflows.profiles.profiles import compare_profiles, list_profiles, read_profile, write_profile
     from xosc_lateral.workflows.profiles.sample import Offsets, sample
-    from xosc_lateral.workflows.recordings.call import ImportedDrives, import_drives, reconstruct
+    from xosc_lateral.workflows.recordings.importers import ImportedDrives, import_drives
+    from xosc_lateral.workflows.recordings.reconstruct import reconstruct
     from xosc_lateral.workflows.recordings.reconstruction import Reconstruction
 
 

@@ -38,7 +38,6 @@ from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, read_ma
 from xosc_lateral.workflows.batch.verify import reproduce, verify
 from xosc_lateral.workflows.conversion.convert import convert_scenario
 from xosc_lateral.workflows.conversion.settings import ConvertSettings, OutputMode
-from xosc_lateral.workflows.conversion.text import facts
 from xosc_lateral.workflows.profiles.cards import card_text
 from xosc_lateral.workflows.result import given_drives, given_profile, naming
 
@@ -122,7 +121,7 @@ def _use_driver(path: Path) -> None:
     """What sampling alone does not reach: words about the profile, context and neighbours of a scenario."""
     settings = ConvertSettings(profile=str(path), time_limit=3.0, step=0.05, ego=frozenset())
     made = convert_scenario(path.with_name("a.xosc"), path.with_name("out.xosc"), settings)
-    json.dumps(facts(made), allow_nan=False)
+    json.dumps(made.to_dict(), allow_nan=False)
     card_text(given_profile(path))
 
 

@@ -75,6 +75,12 @@ SCENARIOS = {
 }
 
 
+@pytest.mark.parametrize("name", ["backwards", "stop and go"])
+def test_who_drives_backwards_is_noted_and_nobody_else(tmp_path: Path, name: str) -> None:
+    notes = written(tree(tmp_path, **SCENARIOS[name]), None, "carla")[0].notes
+    assert any("drives backwards" in str(note) for note in notes) == (name == "backwards")
+
+
 @pytest.mark.parametrize("minor", [0, 3])
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_no_rule_of_the_parser_is_broken(tmp_path: Path, name: str, minor: int) -> None:

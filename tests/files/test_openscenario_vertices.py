@@ -7,7 +7,7 @@ import pytest
 from lxml import etree
 
 from xosc_lateral.files.openscenario.write import build
-from xosc_lateral.files.openscenario.write.vertices import BLOCK, TimedVertices, Vertices
+from xosc_lateral.files.openscenario.write.build import BLOCK, TimedVertices, Vertices
 
 SOURCE = b"<?xml version='1.0' encoding='UTF-8'?>\n<Root>\n   <A/>\n   <B/>\n</Root>\n"
 

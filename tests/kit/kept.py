@@ -114,7 +114,7 @@ def played(seed: int) -> dict[str, Any]:
 
 
 def outputs(seed: int) -> dict[str, str]:
-    """Of a made scenario whose vehicles swerve: hash of what is written for each target, or why nothing is."""
+    """Of a made scenario whose vehicles swerve: hash of what is written and noted for a target, or why nothing is."""
     hashes = {}
     with made_file(seed) as path:
         scenario, motion = read_scenario(path), play_scenario(path).motion
@@ -126,17 +126,16 @@ def outputs(seed: int) -> dict[str, str]:
             for what, paths in (("all", swerving), ("one", ego)):
                 try:
                     if what == "all":
-                        data = write_trajectory_scenario(
-                            scenario, motion, paths, path.with_name("o.xosc"), **words
-                        ).data
+                        result = write_trajectory_scenario(scenario, motion, paths, path.with_name("o.xosc"), **words)
                     else:
-                        data = write_lane_offset_scenario(
+                        result = write_lane_offset_scenario(
                             scenario, motion, (), path.with_name("o.xosc"), trajectories=paths, **words
-                        ).data
+                        )
                 except FormatError as error:
                     hashes[f"{version} {what}"] = error.what
                 else:
-                    hashes[f"{version} {what}"] = hashlib.sha256(data).hexdigest()[:20]
+                    noted = "\n".join(map(str, result.notes)).encode()
+                    hashes[f"{version} {what}"] = hashlib.sha256(result.data + noted).hexdigest()[:20]
     return hashes
 
 

@@ -48,7 +48,7 @@ def shown_progress(title: str, quiet: bool) -> Iterator[Callable[[float, str], N
 
             yield show
     except (KeyboardInterrupt, Interrupted):
-        typer.echo(f"xosc-lateral: stopped while {phase}; nothing is written yet", err=True)
+        typer.echo(f"xosc-lateral: stopped at: {phase}; nothing is written yet", err=True)
         raise
 
 
@@ -58,8 +58,7 @@ def shown_progress(title: str, quiet: bool) -> Iterator[Callable[[float, str], N
     "close-loop drives.csv.gz -p motorway -o refined.json --report loop/",
 )
 def close_loop(
-    tables: Tables,
-    *,
+    tables: Tables, *,
     output: Annotated[str, typer.Option("--output", "-o", metavar="REFINED.json", help="Profile to write.")],
     report: Annotated[Path, typer.Option(metavar="DIR", help="Folder for report.json and report.html.")],
     profile: Annotated[str | None, typer.Option("--profile", "-p", metavar="NAME|PATH",
@@ -69,9 +68,7 @@ def close_loop(
         help="Context column to ignore; may be repeated.")] = None,
     role: Annotated[list[str] | None, typer.Option(metavar="COLUMN=ROLE",
         help="What a column is: road, weather, traffic, time, own, driver or unknown; may be repeated.")] = None,
-    mapped: Mapped,
-    library: Library = None,
-    reply: Written,
+    mapped: Mapped, library: Library = None, reply: Written,
 ) -> None:
     """Find what a profile fails to reproduce, trace it to effects, add them, and score the result on held-out data."""
     from xosc_lateral import close_loop, write_profile

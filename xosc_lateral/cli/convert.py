@@ -121,12 +121,7 @@ def _refuse_together(settings: Mapping[str, Any]) -> None:
 
 
 def _convert_one(
-    source: Path,
-    output: str | None,
-    options: dict[str, Any],
-    variants: int,
-    report: str | None,
-    osi: str | None,
+    source: Path, output: str | None, options: dict[str, Any], variants: int, report: str | None, osi: str | None,
     reply: Written,
 ) -> None:
     from xosc_lateral.files.osi import osi_wanted
@@ -197,10 +192,7 @@ def _convert_batch(inputs: Sequence[str], output: str | None, options: Mapping[s
 def verify(
     outputs: Annotated[list[Path], typer.Argument(metavar="OUTPUT...",
         help="Converted scenarios, or folders with a manifest.", show_default=False)],
-    *,
-    library: Library = None,
-    allow: Allow = None,
-    road_path: RoadPath = None,
+    *, library: Library = None, allow: Allow = None, road_path: RoadPath = None,
     fast: Annotated[bool, typer.Option("--fast", help="Compare hashes alone; make nothing again.")] = False,
     jobs: Annotated[int, typer.Option(help="Number of processes; -1: one per core.")] = 1,
     reply: Printing,
@@ -225,10 +217,7 @@ def reproduce(
     output: Annotated[Path, typer.Argument(metavar="OUTPUT", help="Converted scenario, or a folder with a manifest.",
         show_default=False)],
     new: Annotated[str, typer.Option("--output", "-o", help="File or folder to write to.", show_default=False)],
-    *,
-    library: Library = None,
-    allow: Allow = None,
-    road_path: RoadPath = None,
+    *, library: Library = None, allow: Allow = None, road_path: RoadPath = None,
     jobs: Annotated[int, typer.Option(help="Of a folder: number of processes; -1: one per core.")] = 1,
     reply: Written,
 ) -> None:

@@ -47,12 +47,8 @@ def detect(
     seed: Seed = 0,
     road: Annotated[Path | None, typer.Option("--road", help="OpenDRIVE file of a recording without one.",
         show_default=False)] = None,
-    mapped: Mapped,
-    library: Library = None,
-    allow: Allow = None,
-    road_path: RoadPath = None,
-    time_limit: TimeLimit = None,
-    reply: Written,
+    mapped: Mapped, library: Library = None, allow: Allow = None, road_path: RoadPath = None,
+    time_limit: TimeLimit = None, reply: Written,
 ) -> None:
     """Count false alarms in lane keeping, cut-ins seen and the time before the marking, source by source."""
     from xosc_lateral import detect

@@ -42,8 +42,7 @@ def _known_model(text: str) -> str:
     "fit smoothed.csv -o mine.json --valid-below 0.3",
 )
 def fit(
-    tables: Tables,
-    *,
+    tables: Tables, *,
     output: Annotated[str, typer.Option("--output", "-o", metavar="PROFILE.json",
         help="Profile to write: file, folder/, or -.")],
     model: Annotated[str, typer.Option(parser=_known_model, metavar="[two-level|autoregressive|PLUG-IN]",
@@ -68,9 +67,7 @@ def fit(
             metavar="PROFILE|none",
             help="Whose fast movement it has above the band that the tables show; rural: only where they state one.",
         ),
-    ] = "rural",
-    library: Library = None,
-    reply: Written,
+    ] = "rural", library: Library = None, reply: Written,
 ) -> None:
     """Fit a driver profile to measured drives."""
     from xosc_lateral import fit, write_profile
@@ -106,8 +103,7 @@ Table = list[Path] | None
     "sample -p mine.json --like drives.parquet --snippet 10 -o snippets.parquet",
 )
 def sample(
-    *,
-    profile: Profile,
+    *, profile: Profile,
     output: Annotated[str, typer.Option("--output", "-o", metavar="OUT",
         help="Table: .csv, .csv.gz, .parquet, folder/, - .")],
     seed: Seed = 0,
@@ -120,10 +116,7 @@ def sample(
     speed: Annotated[float, typer.Option(help="Speed of the free run. [m/s]", min=0, max=150)] = 30.0,
     lane_width: Annotated[float | None, typer.Option(help="Lane width of the free run [m]; default: the profile's.",
         min=1, max=10)] = None,
-    with_: With = None,
-    mapped: Mapped,
-    library: Library = None,
-    reply: Written,
+    with_: With = None, mapped: Mapped, library: Library = None, reply: Written,
 ) -> None:
     """Sample offsets from a profile (one of --like, --context, --duration)."""
     from xosc_lateral import sample
@@ -149,15 +142,11 @@ def sample(
 
 @command(app, "evaluate", VERBS["evaluate"], "evaluate drives.csv.gz -p mine.json --report evaluation.html")
 def evaluate(
-    tables: Tables,
-    *,
-    profile: Profile,
+    tables: Tables, *, profile: Profile,
     report: Annotated[str | None, typer.Option(metavar="PAGE.html", help="Write a report with figures.")] = None,
     seed: Seed = 0,
     classify: Annotated[bool, typer.Option(help="Also train classifiers (extra `classifier`).")] = True,
-    mapped: Mapped,
-    library: Library = None,
-    reply: Written,
+    mapped: Mapped, library: Library = None, reply: Written,
 ) -> None:
     """Score a profile on measured drives, beside other real drivers: metrics, spectrum, classifiers."""
     from xosc_lateral import evaluate

@@ -96,8 +96,7 @@ app.add_typer(group, name="import", short_help=VERBS["import"], no_args_is_help=
 
 @command(group, "dlr-ht", "DLR Highway Traffic.", "import dlr-ht tasi-0.15.4-py3-none-any.whl -o drives.parquet")
 def dlr_ht(
-    source: Source,
-    *,
+    source: Source, *,
     max_gap: Annotated[float, typer.Option(help="Longest gap between two cameras that is kept [s].", min=0,
         max=60)] = 1.0,
     table: _CutTable,
@@ -142,13 +141,11 @@ def mf4(
     "import tracks tracks.csv --road road.xodr -o drives.parquet --map vehicle=obj",
 )
 def tracks(
-    source: Source,
-    *,
+    source: Source, *,
     road: Annotated[Path, typer.Option("--road", metavar="FILE.xodr", help="Road on which the tracks lie.")],
     columns: Annotated[list[str] | None, typer.Option("--map", metavar="NAME=COLUMN[:UNIT]",
         help="vehicle, time, x, y, heading, speed, length, vehicle_class, e.g. heading=psi:deg.")] = None,
-    mapping_file: MappingFile = None,
-    table: _CutTable,
+    mapping_file: MappingFile = None, table: _CutTable,
 ) -> None:
     """A table of tracks (x, y and heading of any recording) on a known road: lanes, offsets, neighbours."""
     table.fill("tracks", source, road=road, columns=columns or (), mapping=mapping_file, keep_cut=table.keep_cut)
@@ -186,8 +183,7 @@ def openacc(
 @command(group, "commonroad", "CommonRoad scenarios.", "import commonroad DEU_A9-1_1_T-1.xml -o drives.parquet")
 def commonroad(
     sources: Annotated[list[Path], typer.Argument(metavar="SOURCE...", help="Scenarios (.xml).", show_default=False)],
-    *,
-    table: _CutTable,
+    *, table: _CutTable,
 ) -> None:
     """CommonRoad scenarios (extra `commonroad`): recorded obstacles between the bounds of their lanelets."""
     table.fill("commonroad", *sources, keep_cut=table.keep_cut)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Force, Library, Osi, Profile, Quiet, Seed, Written, command, pairs, warn
+from xosc_lateral.cli.words import Force, Library, Osi, Profile, Quiet, Seed, Verbose, Written, command, pairs, warn
 
 if TYPE_CHECKING:
     from xosc_lateral.workflows.live.call import LiveRun
@@ -74,9 +74,7 @@ def esmini(
     duration: Annotated[float, typer.Option(help="Ends here, if not before. [s]", min=0.01, max=86_400)] = 3600.0,
     step: Annotated[float, typer.Option(help="Length of a step. [s]", min=0.001, max=0.2)] = 0.01,
     window: Annotated[bool, typer.Option("--window", help="Open esmini's window.")] = False,
-    *,
-    driven: Driven,
-    reply: Written,
+    *, driven: Driven, reply: Written,
 ) -> None:
     """Play a scenario in esmini with drivers in its vehicles; its triggers and maneuvers stay as written."""
     from xosc_lateral.workflows.live.call import live_esmini
@@ -97,9 +95,7 @@ def sumo(
         typer.Option(help="Switch the sublane model on [m]; default: as configured.", min=0.01, max=5.0)] = None,
     fcd_output: Annotated[Path | None, typer.Option(metavar="FCD.xml",
         help="SUMO's own output of where everybody was.")] = None,
-    *,
-    driven: Driven,
-    reply: Written,
+    *, driven: Driven, reply: Written,
 ) -> None:
     """Run a SUMO simulation with the sublane model and drivers in its vehicles; lane changes stay SUMO's."""
     from xosc_lateral.workflows.live.call import live_sumo
@@ -114,8 +110,7 @@ def sumo(
     "live stdio -p motorway --seed 1 --road motorway.xodr",
 )
 def stdio(
-    profile: Profile = "motorway",
-    seed: Seed = 0,
+    profile: Profile = "motorway", seed: Seed = 0,
     road: Annotated[Path | None, typer.Option(help="OpenDRIVE file that vehicles' places are on.")] = None,
     library: Library = None,
 ) -> None:
@@ -149,16 +144,11 @@ def fmu(
     output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.fmu", help="The unit.")],
     profile: Profile = "motorway",
     fmi: Annotated[Fmi, typer.Option(help="Version of FMI.")] = Fmi.TWO,
-    compiler: Annotated[
-        list[str] | None,
-        typer.Option(metavar="CC", help="C compiler to make a binary with; may be repeated. Default: the host's."),
-    ] = None,
+    compiler: Annotated[list[str] | None, typer.Option(metavar="CC",
+        help="C compiler to make a binary with; may be repeated. Default: the host's.")] = None,
     python: Annotated[
         bool, typer.Option("--python", help="Call this package instead, where it is simulated (extra fmu).")
-    ] = False,
-    library: Library = None,
-    force: Force = False,
-    quiet: Quiet = False,
+    ] = False, library: Library = None, force: Force = False, quiet: Quiet = False, verbose: Verbose = False,
 ) -> None:
     """Write a driver as a functional mock-up unit for co-simulation: C source, with binaries where a compiler is."""
     from xosc_lateral.files.output_paths import claim
@@ -178,15 +168,13 @@ def fmu(
 @command(export, "c", "C99 source for a test bench.", "export c -p motorway -o driver/")
 def c_source(
     output: Annotated[Path, typer.Option("--output", "-o", metavar="FOLDER/", help="Folder of the files.")],
-    profile: Profile = "motorway",
-    library: Library = None,
-    quiet: Quiet = False,
+    profile: Profile = "motorway", library: Library = None, force: Force = False, quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Write a driver as C99 without dependencies: header, source, numbers, a CMake file and an example loop."""
-    from xosc_lateral.files.output_paths import output_folder
     from xosc_lateral.workflows.live.c_driver import export_c
     from xosc_lateral.workflows.result import given_profile
 
-    written = export_c(given_profile(profile, library or ()), output_folder(output))
+    written = export_c(given_profile(profile, library or ()), output, force=force)
     if not quiet:
         typer.echo(f"wrote {', '.join(str(path) for path in written)}", err=True)

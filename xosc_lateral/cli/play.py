@@ -19,6 +19,7 @@ from xosc_lateral.cli.words import (
     Road,
     RoadPath,
     TimeLimit,
+    Verbose,
     Written,
     command,
     pairs,
@@ -40,16 +41,12 @@ Scenario = Annotated[Path, typer.Argument(help="Maneuver-based scenario (.xosc).
     "play cut-in.xosc -o - | head",
 )
 def play(
-    scenario: Scenario,
-    *,
+    scenario: Scenario, *,
     output: Annotated[str | None, typer.Option("--output", "-o", help="Table: .csv, .csv.gz, .parquet, folder/, - .",
         show_default=False)] = None,
     osi: Osi = None,
     step: Annotated[float, typer.Option(help="Length of a frame [s].", min=0.001, max=1.0)] = 0.02,
-    time_limit: TimeLimit = None,
-    parameter: Parameters = None,
-    allow: Allow = None,
-    road: Road = None,
+    time_limit: TimeLimit = None, parameter: Parameters = None, allow: Allow = None, road: Road = None,
     road_path: RoadPath = None,
     strict: Annotated[bool, typer.Option("--strict",
         help="A missing vehicle catalog, or a run cut off, is an error.")] = False,
@@ -92,11 +89,7 @@ def play(
 
 @command(app, "segments", VERBS["segments"], "segments cut-in.xosc", "segments cut-in.xosc --json")
 def segments(
-    scenario: Scenario,
-    *,
-    time_limit: TimeLimit = None,
-    parameter: Parameters = None,
-    allow: Allow = None,
+    scenario: Scenario, *, time_limit: TimeLimit = None, parameter: Parameters = None, allow: Allow = None,
     reply: Printing,
 ) -> None:
     """List each entity's road-following segments, and the reason for everything else."""
@@ -116,13 +109,10 @@ def view(
     scenario: Annotated[Path, typer.Argument(help="Any scenario (.xosc), converted or not.", show_default=False)],
     output: Annotated[str | None, typer.Option("--output", "-o",
         help="Page to write; default: NAME_view.html beside it.")] = None,
-    parameter: Parameters = None,
-    allow: Allow = None,
-    time_limit: TimeLimit = None,
+    parameter: Parameters = None, allow: Allow = None, time_limit: TimeLimit = None,
     open_page: Annotated[bool | None, typer.Option("--open/--no-open",
         help="Open the page in the browser. Default: from a terminal.")] = None,
-    force: Force = False,
-    quiet: Quiet = False,
+    force: Force = False, quiet: Quiet = False, verbose: Verbose = False,
 ) -> None:
     """Play any scenario in the browser, on one self-contained page; adds no lateral movement."""
     from xosc_lateral import play
@@ -143,8 +133,7 @@ app.add_typer(group, name="template", short_help=VERBS["template"])
 @command(group, "list", "Templates, or one template's settings.", "template list cut-in")
 def list_(
     name: Annotated[str | None, typer.Argument(help="Show this template's settings.", show_default=False)] = None,
-    *,
-    reply: Printing,
+    *, reply: Printing,
 ) -> None:
     """List the templates, or one template's settings with units, defaults and ranges."""
     from xosc_lateral import list_templates

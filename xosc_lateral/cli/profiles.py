@@ -30,8 +30,7 @@ app.add_typer(group, name="profiles", short_help=VERBS["profiles"])
 
 @command(group, "list", "List profiles.", "profiles list --tag truck --where country=DE")
 def list_(
-    *,
-    library: Library = None,
+    *, library: Library = None,
     tags: Annotated[list[str] | None, typer.Option("--tag", metavar="TAG",
         help="Only profiles with this tag; may be repeated.")] = None,
     where: Annotated[list[str] | None, typer.Option(metavar="FIELD=VALUE",
@@ -46,13 +45,7 @@ def list_(
 
 
 @command(group, "show", "Show one profile's card.", "profiles show motorway --report card.html")
-def show(
-    name: Name,
-    *,
-    library: Library = None,
-    report: Page = None,
-    reply: Written,
-) -> None:
+def show(name: Name, *, library: Library = None, report: Page = None, reply: Written) -> None:
     """A profile's card: what it does, where it comes from, how realistic it is."""
     from xosc_lateral import read_profile
     from xosc_lateral.workflows.conversion.proof import proofs_of
@@ -73,14 +66,7 @@ def show(
 @command(
     group, "compare", "Compare several profiles.", "profiles compare motorway motorway-vehicle-1 --report compared.html"
 )
-def compare(
-    names: Names,
-    *,
-    library: Library = None,
-    seed: Seed = 0,
-    report: Page = None,
-    reply: Written,
-) -> None:
+def compare(names: Names, *, library: Library = None, seed: Seed = 0, report: Page = None, reply: Written) -> None:
     """Compare profiles, and show which are not distinguishable."""
     from xosc_lateral import compare_profiles
 
@@ -113,8 +99,7 @@ def derive(
     vehicle: Annotated[str | None, typer.Option("--class", metavar="truck",
         help="What the base knows of trucks.")] = None,
     called: Annotated[str, typer.Option("--name", help="Id of the new profile.")] = "",
-    library: Library = None,
-    reply: Written,
+    library: Library = None, reply: Written,
 ) -> None:
     """A driver from stated figures, sampled until he has them within 2 %; what can't be had together is refused.
 
@@ -140,13 +125,10 @@ def derive(
     group, "add", "Add a profile to a library.", "profiles add mine.json --library team/ --tag truck --set country=DE"
 )
 def add(
-    name: Name,
-    *,
+    name: Name, *,
     library: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder of the library; created if missing.")],
     called: Annotated[str | None, typer.Option("--name", help="Id in the library; default: its own.")] = None,
-    tags: Tags = None,
-    fields: Fields = None,
-    reply: Written,
+    tags: Tags = None, fields: Fields = None, reply: Written,
 ) -> None:
     """Put a profile into a library's folder, with tags and metadata."""
     from xosc_lateral.workflows.profiles.profiles import add_profile
@@ -157,13 +139,9 @@ def add(
 
 @command(group, "tag", "Change tags and metadata.", "profiles tag mine --library team/ --tag night --remove day")
 def tag(
-    name: Name,
-    *,
-    library: Library = None,
-    tags: Tags = None,
+    name: Name, *, library: Library = None, tags: Tags = None,
     remove: Annotated[list[str] | None, typer.Option(metavar="TAG", help="Tag to remove; may be repeated.")] = None,
-    fields: Fields = None,
-    reply: Printing,
+    fields: Fields = None, reply: Printing,
 ) -> None:
     """Change tags and metadata of a profile of your own, in its file."""
     from xosc_lateral.files.profiles import facts_of
@@ -187,9 +165,7 @@ def remove(names: Names, *, library: Library = None, reply: Printing) -> None:
 def rename(
     name: Name,
     new: Annotated[str, typer.Argument(metavar="NEW", help="Its new id.", show_default=False)],
-    *,
-    library: Library = None,
-    reply: Written,
+    *, library: Library = None, reply: Written,
 ) -> None:
     """Change a profile's id, in its file and as the file's name. Its hash changes with it."""
     from xosc_lateral.workflows.profiles.keeping import rename_profile
@@ -202,9 +178,7 @@ def rename(
 def uses(
     name: Annotated[str, typer.Argument(metavar="ID", help="Profile, in the library or no longer.")],
     outputs: Annotated[list[Path], typer.Argument(metavar="FOLDER...", help="Of batches, or their manifests.")],
-    *,
-    library: Library = None,
-    reply: Printing,
+    *, library: Library = None, reply: Printing,
 ) -> None:
     """Which outputs of batches have offsets of a profile, of which vehicles, and whether it is the same now."""
     from xosc_lateral.workflows.profiles.keeping import find_uses
@@ -216,12 +190,10 @@ def uses(
     group, "export", "Copy profiles, to pass them on.", "profiles export motorway motorway-vehicle-1 -o for-a-friend/"
 )
 def export(
-    names: Names,
-    *,
+    names: Names, *,
     output: Annotated[str, typer.Option("--output", "-o", help="One profile: file or -; several: folder/.",
         show_default=False)],
-    library: Library = None,
-    reply: Written,
+    library: Library = None, reply: Written,
 ) -> None:
     """Write profiles to a file or a folder, to pass them on."""
     from xosc_lateral import read_profile, write_profile

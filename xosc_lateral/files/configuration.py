@@ -38,8 +38,8 @@ def configuration() -> tuple[Path | None, Mapping[str, list[str]]]:
 
 def configured_libraries() -> list[Path]:
     """Folders of profiles that the configuration names. Raises `FormatError`: see `configuration`."""
-    path, found = configuration()
-    library = found.get("library", [])
+    path, settings = configuration()
+    library = settings.get("library", [])
     try:
         folders = [path.parent / Path(name).expanduser() for name in library] if path is not None else []
     except RuntimeError as error:
@@ -52,11 +52,11 @@ def configured_libraries() -> list[Path]:
 
 @lru_cache(maxsize=8)
 def _read(path: Path, *_state: int) -> Mapping[str, list[str]]:
-    found = {}
+    settings = {}
     for key, value in read_toml(path, "not TOML").items():
         if key not in KEYS:
             raise FormatError(f"unknown key {key!r}; there are {', '.join(KEYS)}", path=path)
-        found[key] = [value] if isinstance(value, str) else value
-        if not isinstance(found[key], list) or not all(isinstance(name, str) for name in found[key]):
+        settings[key] = [value] if isinstance(value, str) else value
+        if not isinstance(settings[key], list) or not all(isinstance(name, str) for name in settings[key]):
             raise FormatError(f"{key} = {value!r}: expected a list of texts", path=path)
-    return found
+    return settings

@@ -173,16 +173,16 @@ MappingLike: TypeAlias = "TableMapping | Mapping[str, str] | Mapping[str, Column
 """A mapping, words or sources by name as of ``--map``, or the file of one."""
 
 
-def as_mapping(given: MappingLike | None) -> TableMapping:
+def as_mapping(mapping: MappingLike | None) -> TableMapping:
     """Whatever stands for a mapping."""
-    if given is None:
+    if mapping is None:
         return TableMapping()
-    if isinstance(given, TableMapping):
-        return given
-    if isinstance(given, str | Path):
-        return read_mapping(Path(given))
-    words = {name: entry for name, entry in given.items() if isinstance(entry, str)}
-    sources = {name: entry for name, entry in given.items() if isinstance(entry, ColumnSource)}
+    if isinstance(mapping, TableMapping):
+        return mapping
+    if isinstance(mapping, str | Path):
+        return read_mapping(Path(mapping))
+    words = {name: entry for name, entry in mapping.items() if isinstance(entry, str)}
+    sources = {name: entry for name, entry in mapping.items() if isinstance(entry, ColumnSource)}
     return TableMapping(sources).with_words(words)
 
 

@@ -45,9 +45,9 @@ def find_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -
     if len(text) > LONGEST_NAME:
         raise DriverProfileError(f"{text[:20]!r}...: no profile has a name of {len(text)} characters")
     for folder in (*library_folders(folders), SHIPPED):
-        found = folder / f"{text}{SUFFIX}"
-        if found.is_file():
-            return found
+        candidate = folder / f"{text}{SUFFIX}"
+        if candidate.is_file():
+            return candidate
         for other in () if text.isascii() else sorted(folder.glob(f"*{SUFFIX}")):
             if composed(other.stem) == composed(text):
                 return other
@@ -66,8 +66,8 @@ def list_profiles(folders: Iterable[str | Path] = ()) -> list[Path]:
     Raises `FormatError` if a folder isn't one.
     """
     searched = _each_once((*library_folders(folders), SHIPPED))
-    found = [path for folder in searched for path in sorted(folder.glob(f"*{SUFFIX}"))]
-    return found + [path for _, path in sorted(_from_plugins().items())]
+    paths = [path for folder in searched for path in sorted(folder.glob(f"*{SUFFIX}"))]
+    return paths + [path for _, path in sorted(_from_plugins().items())]
 
 
 def library_folders(folders: Iterable[str | Path] = ()) -> tuple[Path, ...]:
@@ -77,28 +77,28 @@ def library_folders(folders: Iterable[str | Path] = ()) -> tuple[Path, ...]:
     ``XDG_CONFIG_HOME`` (else ``~/.config``; on Windows ``APPDATA``) with ``library = ["FOLDER", ...]``.
     """
     from_environment = [Path(name) for name in os.environ.get(LIBRARY_VARIABLE, "").split(os.pathsep) if name]
-    found = [*map(Path, folders), *from_environment, *configured_libraries()]
-    for folder in found:
+    places = [*map(Path, folders), *from_environment, *configured_libraries()]
+    for folder in places:
         if not folder.is_dir():
             raise FormatError("no such folder", path=folder)
-    return _each_once(found)
+    return _each_once(places)
 
 
 def _each_once(folders: Iterable[Path]) -> tuple[Path, ...]:
     """A folder that is named twice, however it is spelled, counts where it comes first."""
-    found: dict[Path, Path] = {}
+    unique: dict[Path, Path] = {}
     for folder in folders:
-        found.setdefault(folder.resolve(), folder)
-    return tuple(found.values())
+        unique.setdefault(folder.resolve(), folder)
+    return tuple(unique.values())
 
 
 def _from_plugins() -> dict[str, Path]:
     """Profiles that other packages offer: entry points that are a folder, or a function that gives one."""
-    found: dict[str, Path] = {}
+    paths: dict[str, Path] = {}
     for offered in plugins(GROUP).values():
         folder = Path(offered() if callable(offered) else offered)
-        found |= {path.stem: path for path in sorted(folder.glob(f"*{SUFFIX}"))}
-    return found
+        paths |= {path.stem: path for path in sorted(folder.glob(f"*{SUFFIX}"))}
+    return paths
 
 
 SCHEMA = Path(__file__).resolve().parents[1] / "resources" / "driver_profile.schema.json"  # of a profile file
@@ -138,27 +138,17 @@ def profile_bytes(profile: DriverProfile) -> bytes:
     return (canonical_json(profile.to_dict()) + "\n").encode("utf-8")
 
 
+_HASHES: dict[int, tuple[DriverProfile, str]] = {}  # by identity: a profile never changes, and can't all be hashed
+
+
 def profile_hash(profile: DriverProfile) -> str:
     """SHA-256 of the profile file's bytes, in hexadecimal: what outputs name their profile by."""
-    return _hash_of(_Identity(profile))
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class _Identity:
-    """A profile as a key: by identity, for it never changes and its parts can't all be hashed."""
-
-    profile: DriverProfile
-
-    def __hash__(self) -> int:
-        return id(self.profile)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Identity) and other.profile is self.profile
-
-
-@lru_cache(maxsize=32)  # a batch names the same few profiles in thousands of outputs
-def _hash_of(key: _Identity) -> str:
-    return hashlib.sha256(profile_bytes(key.profile)).hexdigest()
+    known = _HASHES.get(id(profile))
+    if known is None:
+        if len(_HASHES) >= 32:  # a batch names the same few profiles in thousands of outputs
+            _HASHES.pop(next(iter(_HASHES)))
+        known = _HASHES[id(profile)] = profile, hashlib.sha256(profile_bytes(profile)).hexdigest()
+    return known[1]
 
 
 def profile_record(profile: DriverProfile) -> dict[str, Any]:
@@ -184,9 +174,9 @@ def describe_profile(profile: DriverProfile) -> str:
         text += f"\nvalid: {valid}"
     if "offset_mean_m" in known.fit:
         text += f"\n{_measured(known.fit, known.hours)}"
-    if one := known.fit.get("one_marking"):
+    if share := known.fit.get("one_marking"):
         text += (
-            f"\n{100 * one:.1f} % of the rows follow one lane marking, because the other was misjudged; "
+            f"\n{100 * share:.1f} % of the rows follow one lane marking, because the other was misjudged; "
             f"{100 * known.fit['no_marking']:.1f} % are left out, because both were"
         )
     return text if profile.sensor is None else f"{text}\n{profile.sensor.in_words()}"
@@ -254,13 +244,13 @@ def matching(entries: Iterable[Entry], tags: Collection[str], where: Mapping[str
     for field in where:
         if field not in (*FIELDS, "id", "model"):
             raise XoscLateralError(f"profiles have no field {field!r}; there are id, model, {', '.join(FIELDS)}")
-    wanted, found = {tag.casefold() for tag in tags}, []
+    wanted, matches = {tag.casefold() for tag in tags}, []
     for entry in entries:
         if entry.profile is not None and wanted <= {tag.casefold() for tag in entry.profile.metadata.tags}:
             facts = facts_of(entry.profile)
             if all(facts[field].casefold() == value.casefold() for field, value in where.items()):
-                found.append(entry)
-    return found
+                matches.append(entry)
+    return matches
 
 
 def facts_of(profile: DriverProfile) -> dict[str, str]:

@@ -232,8 +232,8 @@ def parsed_hashes(paths: Iterable[Path]) -> dict[str, str]:
     """`parsed_hash` of each file by its name; files of one name by as much of their paths as differs."""
     names = {path: path.name for path in paths}
     for depth in range(2, max((len(path.parts) for path in names), default=0) + 1):
-        given = list(names.values())
-        names |= {path: "/".join(path.parts[-depth:]) for path, name in names.items() if given.count(name) > 1}
+        taken = list(names.values())
+        names |= {path: "/".join(path.parts[-depth:]) for path, name in names.items() if taken.count(name) > 1}
     return {name: parsed_hash(path) for path, name in names.items()}
 
 

@@ -106,15 +106,15 @@ def is_left_handed(path: Path) -> bool:
 
 def read_vehicle_types(path: Path | None) -> dict[str, tuple[float, str]]:
     """Length [m] and class of the vehicle types in a route or additional file; of none, nothing."""
-    found = {}
+    types = {}
     for event, element in elements(path, ("vType",)) if path is not None else ():
         if event == "start" and element.get("id"):
             kind = element.get("vClass", "passenger")
             length = usual_length(kind) if element.get("length") is None else number_of(element, "length", path)
-            found[str(element.get("id"))] = length, kind
-    if path is not None and not found:
+            types[str(element.get("id"))] = length, kind
+    if path is not None and not types:
         raise FormatError("no vType: not a file of SUMO's vehicle types", path=path)
-    return found
+    return types
 
 
 def usual_length(name: str) -> float:

@@ -137,13 +137,13 @@ def _encoding(text: IO[bytes]) -> str:
 
 def _in_utf8(text: IO[bytes], path: Path, encoding: str | None = None) -> IO[bytes]:
     """The text in UTF-8. Raises `FormatError`: it is not in the encoding that is given or found."""
-    given = encoding or _encoding(text)
-    if given.lower().replace("_", "-") in ("utf-8", "utf8", "utf-8-sig"):
+    code = encoding or _encoding(text)
+    if code.lower().replace("_", "-") in ("utf-8", "utf8", "utf-8-sig"):
         return text
     try:
-        return io.BytesIO(text.read().decode(given).encode())
+        return io.BytesIO(text.read().decode(code).encode())
     except (UnicodeDecodeError, LookupError) as error:
-        what = f'not in UTF-8 nor in {given}: {error}; `encoding = "..."` in the file of --mapping names it'
+        what = f'not in UTF-8 nor in {code}: {error}; `encoding = "..."` in the file of --mapping names it'
         raise FormatError(what, path=path) from error
 
 

@@ -78,10 +78,10 @@ def _declared_late(data: bytes) -> bytes:
         at = data.find(b"-->", at + 4) + 3
         if at < 3:
             return data
-    found = _DECLARATION.match(data, at)
-    if found is None or at == begin:
+    declaration = _DECLARATION.match(data, at)
+    if declaration is None or at == begin:
         return data
-    return data[:at] + b" " * (found.end() - at) + data[found.end() :]
+    return data[:at] + b" " * (declaration.end() - at) + data[declaration.end() :]
 
 
 def read_xml(path: Path) -> tuple[etree._Element, bytes]:

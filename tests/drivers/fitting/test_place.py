@@ -11,8 +11,8 @@ from tests.kit.runs import made_run, smooth_runs
 from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
 from xosc_lateral.drivers.drives.cuts import CutRules
 from xosc_lateral.drivers.drives.drive import Drive, Run
-from xosc_lateral.drivers.fitting.answers import SCALE
 from xosc_lateral.drivers.fitting.fitting import fit_population, fit_profile
+from xosc_lateral.drivers.fitting.neighbours import SCALE
 from xosc_lateral.drivers.fitting.place import LEAST_DRIVES, _shrunk, fit_place, without_place
 from xosc_lateral.drivers.model.core.autoregressive.coarse import split_bands
 from xosc_lateral.drivers.model.effects import Acts, Linear

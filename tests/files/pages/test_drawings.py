@@ -14,7 +14,6 @@ from tests.kit.enriched import converted, made_enriched
 from tests.kit.places import hand_written
 from xosc_lateral.files.pages.chart import BLUE
 from xosc_lateral.files.pages.figure import Figure
-from xosc_lateral.workflows.conversion.text import as_text, facts
 from xosc_lateral.workflows.playing.figures import thumbnail
 from xosc_lateral.workflows.playing.scene import lane_surfaces, markings
 from xosc_lateral.world.motion.nominal import Activity
@@ -186,7 +185,7 @@ def test_rows_of_one_moment_come_in_the_order_of_the_scenario(enriched):
 
 
 def test_facts_are_json_and_add_up_to_the_scenario(enriched):
-    found = json.loads(json.dumps(facts(converted(enriched, "mind this")), allow_nan=False))
+    found = json.loads(json.dumps(converted(enriched, "mind this").to_dict(), allow_nan=False))
     assert [one["name"] for one in found["entities"]] == ["Ego", "Van", "Slow"]
     assert found["entities"][2]["why_not"] == "below 40 km/h throughout" and found["entities"][2]["segments"] == []
     (ego,) = found["entities"][0]["segments"]
@@ -199,7 +198,7 @@ def test_facts_are_json_and_add_up_to_the_scenario(enriched):
 def test_a_conversion_says_of_every_entity_what_was_done_or_why_not(enriched):
     conversion = converted(enriched, "mind this")
     conversion.report = Path("page.html")
-    lines = as_text(conversion).splitlines()
+    lines = str(conversion).splitlines()
     assert lines[0] == "out.xosc" and lines[-1] == "report: page.html"
     assert "  Slow: as in the scenario (below 40 km/h throughout)" in lines
     assert "  warning: mind this" in lines

@@ -547,7 +547,7 @@ def test_another_format_is_one_function_and_one_line(
     from xosc_lateral.workflows.recordings import importers
 
     monkeypatch.setitem(importers.IMPORTERS, "three-rows", f"{__name__}:import_three_rows")
-    monkeypatch.setattr(importers, "import_module", lambda name: sys.modules[name])
+    monkeypatch.setattr(importers, "import_module", lambda name, _package: sys.modules[name])
     source = tmp_path / "log.bin"
     source.write_text("anything")
     assert xl.import_drives("three-rows", source).to_frame()["offset"].tolist() == [0.0, 0.1, 0.2]

@@ -26,7 +26,7 @@ from tests.kit.recordings import (
 )
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main
-from xosc_lateral.workflows.recordings.call import import_drives
+from xosc_lateral.workflows.recordings.importers import import_drives
 from xosc_lateral.workflows.recordings.recordings import read_recording
 
 

@@ -19,8 +19,8 @@ from xosc_lateral.world.player.distances import (
     spot_of,
     straight_distance,
 )
+from xosc_lateral.world.player.drive import align_trailers, connect, disconnect, pull_trailers
 from xosc_lateral.world.player.state import EntityState, free
-from xosc_lateral.world.player.trailers import align_trailers, connect, disconnect, pull_trailers
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.enums import CoordinateSystem, RelativeDistanceType
 

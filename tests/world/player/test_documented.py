@@ -12,8 +12,14 @@ import pytest
 
 from xosc_lateral.files.openscenario.actions import PRIVATE_ACTIONS
 from xosc_lateral.files.openscenario.conditions import ENTITY_CONDITIONS, VALUE_CONDITIONS
-from xosc_lateral.world.player.actions.global_actions import environment, recorded, traffic, unsupported
-from xosc_lateral.world.player.actions.private_actions import RunningForTime, controller
+from xosc_lateral.world.player.actions.at_once import (
+    RunningForTime,
+    controller,
+    environment,
+    recorded,
+    traffic,
+    unsupported,
+)
 from xosc_lateral.world.player.conditions.value import prepare_user_defined
 from xosc_lateral.world.player.positions.resolve import POSITIONS
 from xosc_lateral.world.player.storyboard_builder import ENTITY_CHECKS, RUNNING, VALUE_CHECKS

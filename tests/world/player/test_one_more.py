@@ -15,8 +15,8 @@ from xosc_lateral.files.openscenario.context import Context
 from xosc_lateral.files.openscenario.element import XmlElement
 from xosc_lateral.world.player import storyboard_builder
 from xosc_lateral.world.player.actions.base import Domain, RunningPrivateAction
-from xosc_lateral.world.player.conditions.base import EntityCheck
 from xosc_lateral.world.player.simulation import Simulation
+from xosc_lateral.world.player.storyboard import EntityCheck
 from xosc_lateral.world.scenario.place import Place
 
 

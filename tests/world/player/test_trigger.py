@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-from xosc_lateral.world.player.trigger import RunningCondition, RunningTrigger, Watch
+from xosc_lateral.world.player.storyboard import RunningCondition, RunningTrigger, Watch
 from xosc_lateral.world.scenario.enums import ConditionEdge
 
 NONE, RISING, FALLING, EITHER = (

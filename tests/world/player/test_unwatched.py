@@ -11,8 +11,8 @@ import xosc_lateral as xl
 from laboratory.many_cars import write
 from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.world.motion.nominal import NominalMotion
-from xosc_lateral.world.player import unwatched
-from xosc_lateral.world.player.unwatched import Unwatched
+from xosc_lateral.world.player import simulation
+from xosc_lateral.world.player.simulation import Unwatched
 
 COLUMNS = ("x", "y", "z", "heading", "speed", "road", "lane", "s", "offset", "heading_relative", "activity")
 
@@ -29,7 +29,7 @@ def the_same(path: Path, monkeypatch: pytest.MonkeyPatch, *, end: float) -> Nomi
     monkeypatch.setattr(Unwatched, "rest", counted)
     motion = play_scenario(path, time_limit=end).motion
     assert max(ahead) > 0
-    monkeypatch.setattr(unwatched, "_follows_its_lane", lambda state: False)
+    monkeypatch.setattr(simulation, "_follows_its_lane", lambda state: False)
     for one, other in zip(motion.entities, play_scenario(path, time_limit=end).motion.entities, strict=True):
         for name in COLUMNS:
             np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=f"{one.name} {name}")

@@ -9,7 +9,7 @@ import pytest
 
 from tests.kit.places import hand_written
 from xosc_lateral.world.road import LaneLink
-from xosc_lateral.world.road.moving import most_turning
+from xosc_lateral.world.road.links import most_turning
 
 
 def test_moving_along_crosses_a_junction_straight_on_unless_told_otherwise():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from xosc_lateral.world.road.places import turn_for_heading, turned_in_surface
+from xosc_lateral.world.road.road import turn_for_heading, turned_in_surface
 
 SLOPES = [(0.0, 0.0), (0.1, 0.0), (0.0, -0.1), (0.3, -0.2), (-0.2, 1.05)]
 TURNS = [0.0, 0.05, -1.2, 1.6, 3.0, -3.1]

@@ -9,7 +9,7 @@ import pytest
 from tests.kit.scenario_files import action, entity, made, private, speed_action, story, teleport
 from tests.kit.scenario_files import event as timed_event
 from xosc_lateral.world.scenario.controllers import Domains, DrivingControllers, kind_of
-from xosc_lateral.world.scenario.dependence import dependence
+from xosc_lateral.world.scenario.dependence import controlled_entities, dependence, vehicles_under_test
 from xosc_lateral.world.scenario.entity import Controller
 from xosc_lateral.world.scenario.place import Place
 from xosc_lateral.world.scenario.private_actions import (
@@ -17,7 +17,6 @@ from xosc_lateral.world.scenario.private_actions import (
     AssignControllerAction,
     OverrideControllerValueAction,
 )
-from xosc_lateral.world.scenario.under_test import controlled_entities, vehicles_under_test
 
 HERE = Place("made.xosc", 1, "Controller")
 ALONG, ACROSS, BOTH, NOTHING = Domains.LONGITUDINAL, Domains.LATERAL, Domains.BOTH, Domains.NONE

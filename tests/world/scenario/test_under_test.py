@@ -8,8 +8,7 @@ import pytest
 
 from tests.kit.scenario_files import action, entity, made, private, speed_action, teleport, vehicle
 from xosc_lateral.world.scenario import Scenario
-from xosc_lateral.world.scenario.dependence import dependence
-from xosc_lateral.world.scenario.under_test import vehicles_under_test
+from xosc_lateral.world.scenario.dependence import dependence, vehicles_under_test
 
 CONTROLLER = (
     '<ObjectController><Controller name="c"><Properties><Property name="{name}" value="{value}"/></Properties>'

@@ -173,9 +173,9 @@ def _in_order(columns: dict[str, FloatArray], name: str, path: Path) -> dict[str
 
     clock = "if the clock is in milliseconds: --map time=COLUMN:ms"
     latest, span = float(np.abs(time[[0, -1]]).max()), float(time[-1] - time[0])
-    for limit, found in ((TIME, latest), (DRIVE_SPAN, span)):
-        if found > limit.value:
-            refuse(f"{limit.refusal(found)}; {clock}")
+    for limit, duration in ((TIME, latest), (DRIVE_SPAN, span)):
+        if duration > limit.value:
+            refuse(f"{limit.refusal(duration)}; {clock}")
     repeated = np.concatenate([[False], np.diff(time) <= 0])
     offset, later = _position(columns)[0], np.flatnonzero(repeated)
     apart = int((np.abs(offset[later] - offset[later - 1]) > CONTRADICTION).sum())
@@ -243,17 +243,17 @@ CHANGES = 20
 
 def frozen_rows(time: FloatArray, offset: FloatArray, lane_width: FloatArray) -> BoolArray:
     """Rows, but the first, of stretches in which offset and lane width repeat to the last digit; shape (n,)."""
-    found = np.zeros(len(time), dtype=np.bool_)
+    frozen = np.zeros(len(time), dtype=np.bool_)
     same = (np.diff(offset) == 0.0) & (np.diff(lane_width) == 0.0)
     if (~same).sum() < CHANGES or (np.diff(offset) != 0.0).sum() < CHANGES:
-        return found
+        return frozen
     repeated = int(same.sum())
     for part in true_slices(same):
         count = part.stop - part.start
         usual = (repeated - count) / max(len(same) - count, 1)
         if time[part.stop] - time[part.start] >= FROZEN_TIME and len(same) * usual**count < CHANCE:
-            found[part.start + 1 : part.stop + 1] = True
-    return found
+            frozen[part.start + 1 : part.stop + 1] = True
+    return frozen
 
 
 def summary_of(drives: Sequence[Drive]) -> Mapping[str, float]:
@@ -263,16 +263,16 @@ def summary_of(drives: Sequence[Drive]) -> Mapping[str, float]:
     offset = np.concatenate([drive.offset for drive in drives])
     speed = np.concatenate([drive.speed for drive in drives if drive.speed is not None] or [np.zeros(0)])
     speed = speed[np.isfinite(speed)]
-    found = {
+    figures = {
         "offset_mean_m": float(offset.mean()),
         "offset_sd_m": float(offset.std()),
         "lane_width_m": float(np.median(np.concatenate([drive.lane_width for drive in drives]))),
         "driven_h": sum(float(drive.time[-1] - drive.time[0]) for drive in drives) / 3600.0,
     }
     if len(speed):
-        found |= {f"speed_{share}": float(np.quantile(speed, share / 100.0)) for share in (5, 95)}
+        figures |= {f"speed_{share}": float(np.quantile(speed, share / 100.0)) for share in (5, 95)}
     if drivers := {drive.driver for drive in drives if drive.driver}:
-        found["drivers"] = len(drivers)
+        figures["drivers"] = len(drivers)
     if frozen := sum(drive.frozen for drive in drives):
-        found["frozen"] = frozen / (frozen + len(offset))
-    return {name: round(value, 4) for name, value in found.items()}
+        figures["frozen"] = frozen / (frozen + len(offset))
+    return {name: round(value, 4) for name, value in figures.items()}

@@ -148,8 +148,8 @@ class BothMarkings:
         prior = self._prior()
         for _ in range(ROUNDS):
             offset, width = self._most_likely(prior, scaled)
-            found = (self.left - 0.5 * width + offset, self.right - 0.5 * width - offset)
-            before, scaled = scaled, (self.seen * found[0] / self.noise, self.seen * found[1] / self.noise)
+            half_widths = (self.left - 0.5 * width + offset, self.right - 0.5 * width - offset)
+            before, scaled = scaled, (self.seen * half_widths[0] / self.noise, self.seen * half_widths[1] / self.noise)
             if (
                 max(float(np.abs(new - old).max()) for new, old in zip(scaled, before, strict=True))
                 < REWEIGHTING_LIMITS
@@ -192,8 +192,8 @@ class BothMarkings:
         wanted = np.empty(bands.shape[1])
         wanted[::2] = right * self.right - left * self.left
         wanted[1::2] = 0.5 * (right * self.right + left * self.left)
-        found = solveh_banded(bands, wanted, lower=True)
-        return found[::2], found[1::2]
+        widths = solveh_banded(bands, wanted, lower=True)
+        return widths[::2], widths[1::2]
 
 
 def _trust(offset: FloatArray, width: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.numbers import NORMAL_95
+from xosc_lateral.base.rows import true_slices
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.drives.cuts import HALF_WIDTH
 from xosc_lateral.drivers.model.linear_filters import prepare
@@ -247,11 +248,8 @@ def lane_keeping(
 
 def _drifts(deviation: FloatArray, step: float) -> int:
     """How often one is `DRIFT` or more from the mean, on one side, for `DRIFT_LASTS` or longer."""
-    count = 0
-    for far in (deviation > DRIFT, deviation < -DRIFT):
-        edges = np.flatnonzero(np.diff(np.concatenate(([0], far.astype(np.int8), [0]))))
-        count += int(((edges[1::2] - edges[::2]) * step >= DRIFT_LASTS).sum())
-    return count
+    sides = (deviation > DRIFT, deviation < -DRIFT)
+    return sum((part.stop - part.start) * step >= DRIFT_LASTS for far in sides for part in true_slices(far))
 
 
 def _memory(within: FloatArray, step: float) -> float:

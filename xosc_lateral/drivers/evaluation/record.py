@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from math import isfinite
 from typing import Any
 
@@ -89,53 +90,43 @@ def _snippets_to_dict(scores: SnippetScores) -> dict[str, Any]:
     }
 
 
-def _condition_to_dict(each: ConditionScores) -> dict[str, Any]:
+def _condition_to_dict(scores: ConditionScores) -> dict[str, Any]:
+    areas = {"movement": scores.alone, "with_context": scores.jointly, "real_drivers": scores.floor}
     return {
-        "seconds": each.condition.seconds,
-        "start": "same" if each.condition.same_start else "free",
-        "band": f"below {each.condition.below:g} Hz" if each.condition.slow else "all",
-        "sampled": "driver and sensor" if each.with_sensor else "driver",
-        "count": each.count,
-        "families": {name: {**_beside_to_dict(value), "unit": value.unit} for name, value in each.families.items()},
-        "distances": {name: _beside_to_dict(value) for name, value in each.named.items()},
+        "seconds": scores.condition.seconds,
+        "start": "same" if scores.condition.same_start else "free",
+        "band": f"below {scores.condition.below:g} Hz" if scores.condition.slow else "all",
+        "sampled": "driver and sensor" if scores.with_sensor else "driver",
+        "count": scores.count,
+        "families": {name: {**_beside_to_dict(value), "unit": value.unit} for name, value in scores.families.items()},
+        "distances": {name: _beside_to_dict(value) for name, value in scores.named.items()},
         "indicators": {
             name: {"real": round(real, 5), "sampled": round(sampled, 5), "unit": unit}
-            for (name, (real, sampled)), unit in zip(each.means.items(), UNITS, strict=True)
+            for (name, (real, sampled)), unit in zip(scores.means.items(), UNITS, strict=True)
         },
-        "auc": None if each.alone is None else _areas_to_dict(each),
+        "auc": None
+        if scores.alone is None
+        else {name: None if area is None else _rounded(asdict(area)) for name, area in areas.items()},
     }
 
 
-def _beside_to_dict(each: Beside) -> dict[str, float | None]:
-    ratio = round(each.ratio, 3) if isfinite(each.ratio) else None
-    return {"value": round(each.value, 4), "floor": round(each.floor, 4), "ratio": ratio}
-
-
-def _areas_to_dict(each: ConditionScores) -> dict[str, Any]:
-    areas = {"movement": each.alone, "with_context": each.jointly, "real_drivers": each.floor}
-    return {
-        name: None
-        if area is None
-        else {"auc": round(area.auc, 4), "low": round(area.low, 4), "high": round(area.high, 4)}
-        for name, area in areas.items()
-    }
+def _beside_to_dict(number: Beside) -> dict[str, float | None]:
+    ratio = round(number.ratio, 3) if isfinite(number.ratio) else None
+    return {"value": round(number.value, 4), "floor": round(number.floor, 4), "ratio": ratio}
 
 
 def _variance_to_dict(parts: VarianceParts) -> dict[str, float]:
+    named = {"between_drivers": parts.between, "within_drivers": parts.within, "inside_snippets": parts.inside}
+    return _rounded(named, 6)
+
+
+def _margins_to_dict(margins: Margins) -> dict[str, float]:
     return {
-        "between_drivers": round(parts.between, 6),
-        "within_drivers": round(parts.within, 6),
-        "inside_snippets": round(parts.inside, 6),
+        "share_near_marking": round(margins.share_near, 5),
+        "excursions_per_hour": round(margins.excursions_per_hour, 2),
+        "largest_offset_m": round(margins.largest, 3),
     }
 
 
-def _margins_to_dict(each: Margins) -> dict[str, float]:
-    return {
-        "share_near_marking": round(each.share_near, 5),
-        "excursions_per_hour": round(each.excursions_per_hour, 2),
-        "largest_offset_m": round(each.largest, 3),
-    }
-
-
-def _rounded(values: Mapping[str, float]) -> dict[str, float]:
-    return {name: round(value, 4) for name, value in values.items()}
+def _rounded(values: Mapping[str, float], digits: int = 4) -> dict[str, float]:
+    return {name: round(value, digits) for name, value in values.items()}

@@ -159,7 +159,11 @@ def score_profile(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
     Raises `NotEnoughDataError` with fewer than `MIN_SNIPPETS` snippets of 10 s. `classify`: train the classifiers too.
     """
     step, below = profile.model.step, comparison_band(runs)
-    short = _has_enough_snippets(snippets_of(runs, SNIPPET, step))
+    short = snippets_of(runs, SNIPPET, step)
+    if len(short) < MIN_SNIPPETS:
+        raise NotEnoughDataError(
+            f"{len(short)} snippets of {SNIPPET:g} s are left after cutting; {MIN_SNIPPETS} are needed to compare"
+        )
     long = snippets_of(runs, LONG_SNIPPET, step)
     sampled = sample_snippets(profile, short, seed)
     free = sample_runs(profile, runs, seed + 1)
@@ -227,11 +231,3 @@ def _traces(runs: Sequence[Run], sampled: Sequence[FloatArray], step: float) -> 
         Trace(drive, step, np.array(runs[k].offset[rows]), np.array(sampled[k][rows]))
         for drive, k in list(longest.items())[:TRACES]
     )
-
-
-def _has_enough_snippets(snippets: Snippets) -> Snippets:
-    if len(snippets) < MIN_SNIPPETS:
-        raise NotEnoughDataError(
-            f"{len(snippets)} snippets of {SNIPPET:g} s are left after cutting; {MIN_SNIPPETS} are needed to compare"
-        )
-    return snippets

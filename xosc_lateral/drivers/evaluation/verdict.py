@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.rows import true_slices
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.filters import Detrend, periodograms
 from xosc_lateral.drivers.drives.resampling import PASS_BAND_EDGES
@@ -129,7 +130,6 @@ def alarms_per_hour(paths: Sequence[FloatArray], step: float, speed: float) -> f
     for path in paths:
         moves = np.diff(path) / step
         for fast in (moves > speed, moves < -speed):
-            edges = np.flatnonzero(np.diff(np.concatenate([[False], fast, [False]]).astype(np.int8)))
-            count += int((edges[1::2] - edges[::2] >= rows).sum())
+            count += sum(part.stop - part.start >= rows for part in true_slices(fast))
         seconds += len(moves) * step
     return 3600.0 * count / seconds if seconds else 0.0

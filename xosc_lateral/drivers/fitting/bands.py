@@ -152,7 +152,7 @@ def smoothed_above(profile: DriverProfile, reference: DriverProfile) -> float | 
     fast = fast_part_of(reference)
     driven = np.array([0.5 * sum(speed)])
     strength = sum(
-        float(found[0]) for effect in fast.effects if (found := effect.strength(STEP, {"speed": driven})) is not None
+        float(grown[0]) for effect in fast.effects if (grown := effect.strength(STEP, {"speed": driven})) is not None
     )
     low = density_of(profile)(at) < MINIMUM_POWER_SHARE * np.exp(2.0 * strength) * fast.density(at)
     if not len(at) or not low[-1]:

@@ -123,14 +123,16 @@ def _of_class(base: DriverProfile, vehicle: str | None) -> tuple[DriverProfile, 
     of_trucks = [effect for effect in base.effects if effect.columns == ("is_truck",)]
     if not of_trucks:
         raise DriverProfileError(f"{base.name} doesn't know how trucks differ: no effect of is_truck")
-    found = dict.fromkeys(Acts, 0.0)
+    changes = dict.fromkeys(Acts, 0.0)
     for effect in of_trucks:
         assert isinstance(effect, ColumnEffect)
         strength = effect.strength(base.model.step, {"is_truck": np.ones(2)})
-        found[effect.acts] += 0.0 if strength is None else float(strength[-1])
+        changes[effect.acts] += 0.0 if strength is None else float(strength[-1])
     rest = tuple(effect for effect in base.effects if effect not in of_trucks)
-    spread, rate, fine = (float(np.exp(found[acts])) for acts in (Acts.SPREAD, Acts.RATE, Acts.FINE))
-    return structs.replace(base, effects=rest), Adapted(shift=found[Acts.LOCATION], spread=spread, rate=rate, fine=fine)
+    spread, rate, fine = (float(np.exp(changes[acts])) for acts in (Acts.SPREAD, Acts.RATE, Acts.FINE))
+    return structs.replace(base, effects=rest), Adapted(
+        shift=changes[Acts.LOCATION], spread=spread, rate=rate, fine=fine
+    )
 
 
 class _Parts(NamedTuple):
@@ -217,14 +219,14 @@ def _solved(share: Callable[[float], float], wanted: float, low: float, high: fl
 
 def _missed(asked: Asked, reached: LaneKeeping, *, share: float = 1.0) -> list[str]:
     """Figures that are not reached within so much of the tolerance, in words."""
-    found = []
+    failures = []
     for name, value in asked.figures.items():
         had = getattr(reached, name)
         scale = reached.sdlp if name == "mean" else value
         known_to = 0.0 if share < 1.0 else 2.0 * reached.errors.get(name, 0.0)  # what runs as many can't tell
         if abs(had - value) > share * TOLERANCE * scale + known_to:
-            found.append(f"{name.replace('_', ' ')} {value:.4g} asked, {had:.4g} reached")
-    return found
+            failures.append(f"{name.replace('_', ' ')} {value:.4g} asked, {had:.4g} reached")
+    return failures
 
 
 def _corrected(want: Asked, asked: Asked, reached: LaneKeeping) -> Asked:
@@ -244,7 +246,7 @@ def _check_drivable(drives: FloatArray, profile: DriverProfile, speed: float) ->
             f"the vehicle's middle would be out of its lane of {profile.lane_width:.2f} m for {out:.1%} of the time"
         )
     strains = [strain(drive, profile.model.step, np.full(len(drive), speed)) for drive in drives]
-    worst = sorted(strains, key=lambda one: one.excess)[len(strains) // 2]
+    worst = sorted(strains, key=lambda strained: strained.excess)[len(strains) // 2]
     if worst.excess > 1.0:  # in every second hour
         raise DriverProfileError(
             f"no car could drive it: lateral acceleration above {worst.seldom:.2f} m/s2 for 0.1 % of the time, at most "

@@ -173,10 +173,10 @@ def _windows(runs: Sequence[Run]) -> tuple[FloatArray, FloatArray]:
     power, speed = [], []
     for run in runs:
         if len(run) >= size:
-            own = periodograms(run.offset, size, detrend=Detrend.ENDS)
-            power.append(own)
+            densities = periodograms(run.offset, size, detrend=Detrend.ENDS)
+            power.append(densities)
             driven = np.full(len(run), np.nan) if run.speed is None else run.speed
-            speed.append([driven[k * (size // 2) : k * (size // 2) + size].mean() for k in range(len(own))])
+            speed.append([driven[k * (size // 2) : k * (size // 2) + size].mean() for k in range(len(densities))])
     count = sum(map(len, power))
     if count < LEAST_WINDOWS:
         what = f"{count} stretches of {WINDOW:g} s without a cut; fast movement takes {LEAST_WINDOWS}"
@@ -207,8 +207,8 @@ LAG_COUNT = 5
 
 def _strengths(speed: FloatArray, law: Piecewise | None) -> FloatArray:
     """Of the law at speeds [m/s], shape (n,): logarithm of the factor on the amplitude. [-]"""
-    found = None if law is None else law.strength(STEP, {"speed": speed})
-    return np.zeros(len(speed)) if found is None else found
+    log_factor = None if law is None else law.strength(STEP, {"speed": speed})
+    return np.zeros(len(speed)) if log_factor is None else log_factor
 
 
 def _smooth_density(frequency: FloatArray, density: FloatArray, highest: float) -> Density:
@@ -301,16 +301,17 @@ def with_fast_part(profile: DriverProfile, fast: FastPart | None, below: float) 
     hertz = FREQUENCIES / (COARSE_EVERY * model.step)
     coarse = scaled_spectrum(model.coarse, np.sqrt(_roll_off(hertz, corner)))
     at = np.linspace(0.0, 0.5 / model.step, FINE_SETTINGS.n_knots)
-    own = _fine_power(model, at) * _roll_off(at, corner)
+    fine_power = _fine_power(model, at) * _roll_off(at, corner)
     if fast is not None:
         power = fast.density(np.maximum(at, at[1])) / (2.0 * model.step * profile.lane_width**2)
         share = (
             np.sin(0.5 * np.pi * np.clip((at / corner - RISE_SHARES[0]) / (RISE_SHARES[1] - RISE_SHARES[0]), 0.0, 1.0))
             ** 2
         )
-        own = own + share**2 * np.maximum(power - own - coarse_power(coarse, at * model.step), 0.0)
+        lacking = power - fine_power - coarse_power(coarse, at * model.step)
+        fine_power = fine_power + share**2 * np.maximum(lacking, 0.0)
     volatility = model.fine_volatility if fast is None or corner > BORDER else fast.volatility
-    fine = shaped(np.sqrt(own / NOISE_VARIANCE), FINE_SETTINGS)
+    fine = shaped(np.sqrt(fine_power / NOISE_VARIANCE), FINE_SETTINGS)
     made = replace(model, coarse=coarse, fine=fine, fine_volatility=volatility)
     kept = tuple(effect for effect in profile.effects if not _describes_fast_movement(effect))
     return replace(profile, model=rounded(made), effects=(*kept, *(() if fast is None else fast.effects)))

@@ -12,8 +12,8 @@ from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.drives.cuts import PAPER_RULES, CutRules, all_runs
 from xosc_lateral.drivers.drives.drive import Drive, Run
 from xosc_lateral.drivers.evaluation.sizes import sizes_of_runs
-from xosc_lateral.drivers.fitting.answers import answer_effects, measure_beside
 from xosc_lateral.drivers.fitting.bands import in_bands, split_by_band
+from xosc_lateral.drivers.fitting.neighbours import answer_effects, measure_beside
 from xosc_lateral.drivers.fitting.place import LEAST_DRIVES, fit_place, without_place
 from xosc_lateral.drivers.fitting.sensor.runs import driver_runs
 from xosc_lateral.drivers.model.core.base import CoreModel, ModelKind
@@ -80,9 +80,9 @@ def _marking_notes(drives: Sequence[Drive]) -> Mapping[str, float]:
     rows = sum(map(len, drives))
     if not mended:
         return {}
-    one = sum(count * shares.one_marking for count, shares in mended) / rows
-    none = sum(count * shares.no_marking for count, shares in mended) / rows
-    return {"one_marking": round(one, 4), "no_marking": round(none, 4)}
+    followed = sum(count * shares.one_marking for count, shares in mended) / rows
+    left_out = sum(count * shares.no_marking for count, shares in mended) / rows
+    return {"one_marking": round(followed, 4), "no_marking": round(left_out, 4)}
 
 
 def fit_population(

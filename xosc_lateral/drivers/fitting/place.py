@@ -18,7 +18,8 @@ from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.base.numbers import all_significant
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.resampling import STEP
-from xosc_lateral.drivers.fitting.answers import NEIGHBOURS, SCALE, cluster_robust_slopes, most_beside, neighbour_shapes
+from xosc_lateral.drivers.fitting.neighbours import NEIGHBOURS, SCALE, most_beside, neighbour_shapes
+from xosc_lateral.drivers.fitting.regression import clustered_least_squares
 from xosc_lateral.drivers.model.core.autoregressive.coarse import split_bands
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Levels, Linear, Piecewise, Proximity
 
@@ -82,10 +83,10 @@ def fit_place(runs: Sequence[Run], *, neighbours: bool | None = None) -> tuple[C
     if drives < LEAST_DRIVES or not (shapes or beside):
         return ()
     pieces = _pieces(runs, [*shapes, *beside])
-    found = _effects([*shapes, *beside], Acts.LOCATION, pieces.mean, pieces)
+    effects = _effects([*shapes, *beside], Acts.LOCATION, pieces.mean, pieces)
     for acts, response in ((Acts.SPREAD, pieces.spread), (Acts.FINE, pieces.fine)):
-        found += _effects(shapes, acts, response, pieces)
-    return tuple(found)
+        effects += _effects(shapes, acts, response, pieces)
+    return tuple(effects)
 
 
 def _why_no_neighbours(runs: Sequence[Run], drives: int) -> str:
@@ -107,9 +108,9 @@ def without_place(runs: Sequence[Run], effects: Sequence[ColumnEffect]) -> list[
 def _at_reference(run: Run, effects: Sequence[ColumnEffect]) -> Run:
     strength = {acts: np.zeros(len(run)) for acts in (Acts.LOCATION, Acts.SPREAD, Acts.FINE)}
     for effect in effects:
-        own = effect.strength(STEP, run.context)
-        if own is not None:
-            strength[effect.acts] += own
+        acting = effect.strength(STEP, run.context)
+        if acting is not None:
+            strength[effect.acts] += acting
     moved = run.offset - strength[Acts.LOCATION]
     level = float(moved.mean())
     slow, fast = split_bands(moved - level, STEP)
@@ -121,16 +122,16 @@ def _shapes(runs: Sequence[Run]) -> list[ColumnEffect]:
     shared = set.intersection(*(set(run.context) for run in runs)) if runs else set()
     columns = {name: np.concatenate([run.context[name] for run in runs]) for name in COLUMNS if name in shared}
     varying = {name for name, values in columns.items() if np.isfinite(values).all() and np.ptp(values) > 0.0}
-    found: list[ColumnEffect] = []
+    kept: list[ColumnEffect] = []
     if "is_truck" in varying:
-        found.append(Linear(acts=Acts.LOCATION, column="is_truck"))
+        kept.append(Linear(acts=Acts.LOCATION, column="is_truck"))
     if "lane_index" in varying:
-        found.append(Levels(acts=Acts.LOCATION, column="lane_index", levels=(RIGHTMOST,)))
+        kept.append(Levels(acts=Acts.LOCATION, column="lane_index", levels=(RIGHTMOST,)))
     if "speed" in varying:
         low, high = all_significant(np.quantile(columns["speed"], WITHIN), 3)
         if high > low:
-            found.append(Piecewise(acts=Acts.LOCATION, column="speed", knots=(low, high)))
-    return found
+            kept.append(Piecewise(acts=Acts.LOCATION, column="speed", knots=(low, high)))
+    return kept
 
 
 def _quantity(effect: ColumnEffect, run: Run) -> FloatArray:
@@ -185,13 +186,13 @@ def _regressed(observed: FloatArray, quantities: FloatArray, drive: IntArray) ->
     design = np.column_stack([np.ones(len(observed)), quantities])
     counts = np.bincount(drive).astype(np.float64)
     rest = observed - design @ np.linalg.lstsq(design, observed, rcond=None)[0]
-    own = np.bincount(drive, rest) / counts
-    within = float(((rest - own[drive]) ** 2).sum() / max(len(rest) - len(counts), 1))
+    means = np.bincount(drive, rest) / counts
+    within = float(((rest - means[drive]) ** 2).sum() / max(len(rest) - len(counts), 1))
     between = max(float(rest.var()) - within, 0.0)
     theta = (1.0 - np.sqrt(within / (within + counts * between + 1e-30)))[drive]
     columns = [column - theta * (np.bincount(drive, column) / counts)[drive] for column in (*design.T, observed)]
     x, y = np.column_stack(columns[:-1]), columns[-1]
-    slopes, covariance = cluster_robust_slopes(x, y, drive)
+    slopes, covariance = clustered_least_squares(x, y, drive)
     return slopes[1:], covariance[1:, 1:]
 
 
@@ -200,7 +201,7 @@ def _effect(shape: ColumnEffect, acts: Acts, slope: float, error: float, referen
     if isinstance(shape, Piecewise):  # flat, a straight line between the knots, flat; the reference is one place on it
         coefficients, errors, middle = (0.0, slope, -slope), (0.0, error, error), (0.0, reference, 0.0)
         return with_fields(shape, acts=acts, coefficients=coefficients, errors=errors, reference=middle)
-    nobody = isinstance(shape, Proximity)
+    fades = isinstance(shape, Proximity)
     return with_fields(
-        shape, acts=acts, coefficients=(slope,), errors=(error,), reference=(0.0 if nobody else reference,)
+        shape, acts=acts, coefficients=(slope,), errors=(error,), reference=(0.0 if fades else reference,)
     )

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
-from xosc_lateral.drivers.fitting.answers import cluster_sums
+from xosc_lateral.drivers.fitting.regression import clustered_least_squares, small_sample_factor
 from xosc_lateral.drivers.loop.autocorrelation import Whitener, fit_autoregression, start_factors, unbiased
 from xosc_lateral.drivers.loop.innovations import CLIP, MAXIMUM_ORDER, ORDER, own_levels
 from xosc_lateral.drivers.loop.model import Fitted, Term, joined
@@ -54,7 +54,7 @@ def fit_model(coarse: Coarse, terms: Sequence[Term]) -> Fitted:
             process = unbiased(process, valid, drive, ORDER, longest=MAXIMUM_ORDER)
         whitener = Whitener(process, valid, drive, scale)
         observed, design = whitener.rows(coarse.offset), whitener.rows(columns)
-        sizes, covariance = clustered_least_squares(design, observed, coarse.cluster)
+        sizes, covariance = _sizes_of(design, observed, coarse.cluster)
         rows = observed - design @ sizes
         levels = whitener.levels(coarse.offset - columns @ sizes)
         if scales.shape[1]:
@@ -79,28 +79,14 @@ def fit_model(coarse: Coarse, terms: Sequence[Term]) -> Fitted:
     )
 
 
-def clustered_least_squares(
-    design: FloatArray, observed: FloatArray, cluster: IntArray
-) -> tuple[FloatArray, FloatArray]:
-    """Sizes, and a sandwich for their covariance, clustered [1]_.
+def _sizes_of(design: FloatArray, observed: FloatArray, cluster: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Sizes, shape (k,), and their covariance, shape (k, k).
 
     Loud seconds come together, and a column may come with them; and what whitening leaves of the memory counts too.
-
-    `design`, shape (n, k), and `observed`, shape (n,): whitened; `cluster`, shape (n,): of each row. Sizes have shape
-    (k,), their covariance (k, k).
-
-    References
-    ----------
-    .. [1] K.-Y. Liang, S. L. Zeger, "Longitudinal data analysis using generalized linear models", Biometrika 73, 1986.
     """
-    if design.shape[1] == 0:
-        return np.zeros(0), np.zeros((0, 0))
-    inverse = np.linalg.pinv(design.T @ design)
-    sizes = inverse @ (design.T @ observed)
-    scores = cluster_sums(design * (observed - design @ sizes)[:, None], cluster)
-    clusters = int(np.count_nonzero(scores.any(axis=1)))
-    freedom = clusters / max(1, clusters - 1) * (len(observed) - 1) / max(1, len(observed) - design.shape[1])
-    return sizes, np.asarray(inverse @ (scores.T @ scores) @ inverse * freedom, dtype=np.float64)
+    sizes, covariance = clustered_least_squares(design, observed, cluster)
+    clusters = len(np.unique(cluster[design.any(axis=1)]))
+    return sizes, covariance * small_sample_factor(clusters, *design.shape)
 
 
 def clipped_squares(rows: FloatArray, valid: BoolArray) -> FloatArray:

@@ -134,23 +134,23 @@ def fit_warnings(profile: DriverProfile, sensor_noise: float | None = None) -> l
     return [*_beside_given(profile, sensor_noise), *_coarse_steps(profile), *_strained(profile)]
 
 
-def _beside_given(profile: DriverProfile, given: float | None) -> list[str]:
+def _beside_given(profile: DriverProfile, stated: float | None) -> list[str]:
     """Where the drives don't bear out a sensor error that was given."""
     sensor = profile.sensor
-    if given is None:
+    if stated is None:
         return []
     if sensor is None:
-        return [f"runs are too short to separate driver and sensor: the error of {given:g} m is not used"]
+        return [f"runs are too short to separate driver and sensor: the error of {stated:g} m is not used"]
     least = float(np.sqrt(uniform_variance(sensor.rounding)))
-    if given < least / AS_GIVEN:
+    if stated < least / AS_GIVEN:
         return [
-            f"a sensor error of {given:g} m is less than that of rounding to {sensor.rounding:.3g} m alone, "
+            f"a sensor error of {stated:g} m is less than that of rounding to {sensor.rounding:.3g} m alone, "
             f"{least:.2g} m: taken for rounding and nothing else"
         ]
-    found = float(np.sqrt(sensor.sensor_variance))
-    if least > found / AS_GIVEN or found / AS_GIVEN < given < AS_GIVEN * found:  # rounding of coarse steps is not even
+    noise = float(np.sqrt(sensor.sensor_variance))
+    if least > noise / AS_GIVEN or noise / AS_GIVEN < stated < AS_GIVEN * noise:  # rounding of coarse steps is not even
         return []
-    return [f"the drives contradict a sensor error of {given:g} m: {found:.2g} m is what explains them best beside it"]
+    return [f"the drives contradict a sensor error of {stated:g} m: {noise:.2g} m is what explains them best beside it"]
 
 
 def _coarse_steps(profile: DriverProfile) -> list[str]:
@@ -168,17 +168,17 @@ def _coarse_steps(profile: DriverProfile) -> list[str]:
 def _strained(profile: DriverProfile) -> list[str]:
     segment = Segment.even(FREE_RUN, profile.model.step, profile.lane_width, 30.0)
     speed = segment.speed
-    found = strain(sample_offsets(profile, segment, 1), profile.model.step, speed)
-    if found.excess > 1.0:
+    strained = strain(sample_offsets(profile, segment, 1), profile.model.step, speed)
+    if strained.excess > 1.0:
         return [
             f"movement of {profile.name} could not be driven at {speed[0]:g} m/s: lateral acceleration above "
-            f"{found.seldom:.2f} m/s2 for 0.1 % of the time (comfort limit {float(comfort(speed[:1])[0]):.2f}), "
-            f"at most {found.largest:.1f} m/s2, jerk at most {found.jerk:.1f} m/s3 "
+            f"{strained.seldom:.2f} m/s2 for 0.1 % of the time (comfort limit {float(comfort(speed[:1])[0]):.2f}), "
+            f"at most {strained.largest:.1f} m/s2, jerk at most {strained.jerk:.1f} m/s3 "
             f"(UN R79: {LIMIT:g} and {JERK_LIMIT:g}); convert will smooth it"
         ]
-    if found.seldom > TRAFFIC:
+    if strained.seldom > TRAFFIC:
         return [
-            f"lateral acceleration of {profile.name} is above {found.seldom:.2f} m/s2 for 0.1 % of the time, twice "
+            f"lateral acceleration of {profile.name} is above {strained.seldom:.2f} m/s2 for 0.1 % of the time, twice "
             "that of real motorway traffic or more: check the sensor that measured the drives"
         ]
     return []

@@ -87,8 +87,8 @@ class OffsetGroup:
         self._drives += new
         for k, which in enumerate(self._which):
             slopes = [drive.columned[which].coefficients for drive in new]
-            own = np.reshape(slopes, (len(new), self._slopes[k].shape[1]))
-            self._slopes[k] = np.concatenate([self._slopes[k], own])
+            theirs = np.reshape(slopes, (len(new), self._slopes[k].shape[1]))
+            self._slopes[k] = np.concatenate([self._slopes[k], theirs])
         self._state = np.concatenate([self._state, np.zeros(len(new), dtype=_DRIVER)])
         return new
 
@@ -141,7 +141,7 @@ class OffsetGroup:
 
     def _terms(self, context: Mapping[str, FloatArray]) -> EffectTerms:
         """What the effects of columns do to each driver at the sample that is next, shape (n,) each."""
-        found = []
+        terms = []
         for effect, response, slopes in zip(self._effects, self._responses, self._slopes, strict=True):
             names = (*effect.columns, *(f"{column}{FADES}" for column in effect.columns))
             values = effect.known({name: context[name] for name in names if name in context})
@@ -154,46 +154,48 @@ class OffsetGroup:
                     lags = state.settled.reshape(-1, known * values.shape[1])
                     state.settled = np.concatenate([lags, np.tile(new, (len(lags), 1))], axis=1).ravel()
             due = response.take(row[None, :]).reshape(values.shape)
-            found.append(terms_of(effect.acts, effect.weighed(due, slopes.T)))
-        return combine(found)
+            terms.append(terms_of(effect.acts, effect.weighed(due, slopes.T)))
+        return combine(terms)
 
-    def _next(self, who: IntArray, effects: EffectTerms, width: FloatArray) -> FloatArray:
+    def _next(self, drivers: IntArray, effects: EffectTerms, width: FloatArray) -> FloatArray:
         """The next sample of some drivers, shape (m,). [m]"""
         if self._rated:
-            return self._next_rated(who, effects, width)
-        self._draw(who)
+            return self._next_rated(drivers, effects, width)
+        self._draw(drivers)
         state = self._state
-        parts = state["drawn"][who, state["at"][who]].T
-        state["at"][who] += 1
-        state["left"][who] -= 1
-        state["row"][who] += 1
-        movement = Movement(state["mean"][who], parts[0], parts[1])
+        parts = state["drawn"][drivers, state["at"][drivers]].T
+        state["at"][drivers] += 1
+        state["left"][drivers] -= 1
+        state["row"][drivers] += 1
+        movement = Movement(state["mean"][drivers], parts[0], parts[1])
         hidden = EffectTerms(*parts[2:]) if self._hidden else EffectTerms()
         terms = combine([hidden, effects])
         factors = EffectTerms(terms.location, terms.spread, None, terms.fine)
         return offsets_of(self.profile, movement, factors, width)
 
-    def _next_rated(self, who: IntArray, effects: EffectTerms, width: FloatArray) -> FloatArray:
+    def _next_rated(self, drivers: IntArray, effects: EffectTerms, width: FloatArray) -> FloatArray:
         """The same where effects act on the rate of mean reversion: nothing can be drawn ahead."""
-        found, row = np.empty(len(who)), self._state["row"]
-        for k, index in enumerate(who):
-            drive, one = self._drives[index], slice(k, k + 1)
-            terms = combine([drive.hidden_terms_at(row[index : index + 1]), effects.rows(one)])
-            found[k] = drive.take(terms, width[one])[0]
-        row[who] += 1
-        return found
+        offsets, row = np.empty(len(drivers)), self._state["row"]
+        for k, index in enumerate(drivers):
+            drive, only = self._drives[index], slice(k, k + 1)
+            terms = combine([drive.hidden_terms_at(row[index : index + 1]), effects.rows(only)])
+            offsets[k] = drive.take(terms, width[only])[0]
+        row[drivers] += 1
+        return offsets
 
-    def _draw(self, who: IntArray) -> None:
+    def _draw(self, drivers: IntArray) -> None:
         """Have at least one row drawn of each; a few of those with few left, so that not all are due at once."""
         remaining = self._state["left"]
-        due = set(who[remaining[who] == 0].tolist())
-        spare = who[remaining[who] <= BLOCK]
+        due = set(drivers[remaining[drivers] == 0].tolist())
+        spare = drivers[remaining[drivers] <= BLOCK]
         few = spare[np.argsort(remaining[spare], kind="stable")[: 1 + 2 * len(self) // BLOCK]]
         for k in sorted(due | set(few.tolist())):
-            own, left = self._state[k], remaining[k]
-            own["drawn"][:left] = own["drawn"][own["at"] : own["at"] + left]
-            own["mean"], own["drawn"][left : left + BLOCK] = self._block(self._drives[k], int(own["row"] + left))
-            own["at"], own["left"] = 0, left + BLOCK
+            driver, left = self._state[k], remaining[k]
+            driver["drawn"][:left] = driver["drawn"][driver["at"] : driver["at"] + left]
+            driver["mean"], driver["drawn"][left : left + BLOCK] = self._block(
+                self._drives[k], int(driver["row"] + left)
+            )
+            driver["at"], driver["left"] = 0, left + BLOCK
 
     @staticmethod
     def _block(drive: DriveProcess, row: int) -> tuple[float, FloatArray]:
@@ -208,9 +210,9 @@ class OffsetGroup:
 
     def try_next(self) -> None:
         """Draw what comes after all that is drawn; a `ValueError` if a state from outside leads to no offsets."""
-        for k, (drive, own) in enumerate(zip(self._drives, self._state, strict=True)):
-            next_ = (0.0, own["drawn"]) if self._rated else self._block(drive, int(own["row"] + own["left"]))
-            for values in (own["mean"], own["samples"], own["drawn"], *next_):
+        for k, (drive, driver) in enumerate(zip(self._drives, self._state, strict=True)):
+            next_ = (0.0, driver["drawn"]) if self._rated else self._block(drive, int(driver["row"] + driver["left"]))
+            for values in (driver["mean"], driver["samples"], driver["drawn"], *next_):
                 if not np.abs(values).max() <= LIVE_RANGES["offset"].high:
                     raise ValueError(f"drives[{k}]: a number that no driver has")
 
@@ -236,10 +238,10 @@ class OffsetGroup:
         """Go on from a state; the group is empty and of the same profile and columns, the seeds are the drivers'."""
         for k, (drive, saved) in enumerate(zip(self._join(seeds), state["drives"], strict=True)):
             drive.restore(saved["process"], f"drives[{k}]")
-            own, rows = self._state[k], np.reshape(saved["drawn"], (-1, len(_PARTS)))
-            own["drawn"][: len(rows)], own["left"] = rows, len(rows)
-            own["mean"], own["row"], own["samples"] = float(saved["mean"]), int(saved["row"]), saved["samples"]
+            driver, rows = self._state[k], np.reshape(saved["drawn"], (-1, len(_PARTS)))
+            driver["drawn"][: len(rows)], driver["left"] = rows, len(rows)
+            driver["mean"], driver["row"], driver["samples"] = float(saved["mean"]), int(saved["row"]), saved["samples"]
         self._responses = [
-            self._response(k, read_as(ResponseState, own, f"responses[{k}]"))
-            for k, own in enumerate(state["responses"])
+            self._response(k, read_as(ResponseState, driver, f"responses[{k}]"))
+            for k, driver in enumerate(state["responses"])
         ]

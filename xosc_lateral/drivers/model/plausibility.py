@@ -25,10 +25,12 @@ TRIAL_SPEED = 30.0
 """Speed of the trial. [m/s]"""
 
 
-def check_offsets(offset: FloatArray, lane_width: FloatArray | float, who: str, time: FloatArray | None = None) -> None:
+def check_offsets(
+    offset: FloatArray, lane_width: FloatArray | float, subject: str, time: FloatArray | None = None
+) -> None:
     """Refuse offsets [m], shape (n,), that leave lane and neighbouring lane, or are no numbers.
 
-    Raises `DriverProfileError` with the first such offset: `who` says whose it is, `time` [s] of shape (n,) when.
+    Raises `DriverProfileError` with the first such offset: `subject` says whose it is, `time` [s] of shape (n,) when.
     """
     reach = OFFSET_LANES.value * np.maximum(lane_width, MINIMUM_LANE_WIDTH)
     far = np.flatnonzero(~(np.abs(offset) <= reach))  # also NaN
@@ -36,9 +38,8 @@ def check_offsets(offset: FloatArray, lane_width: FloatArray | float, who: str, 
         return
     first = int(far[0])
     when = "" if time is None else f" at {time[first]:g} s"
-    raise DriverProfileError(
-        f"{who}: an offset of {offset[first]:.4g} m{when}; {OFFSET_LANES.refusal(_lanes(offset, lane_width, first))}"
-    )
+    limit = OFFSET_LANES.refusal(_lanes(offset, lane_width, first))
+    raise DriverProfileError(f"{subject}: an offset of {offset[first]:.4g} m{when}; {limit}")
 
 
 def _lanes(offset: FloatArray, lane_width: FloatArray | float, row: int) -> float:
@@ -46,7 +47,7 @@ def _lanes(offset: FloatArray, lane_width: FloatArray | float, row: int) -> floa
     return float(abs(offset[row]) / max(width, MINIMUM_LANE_WIDTH))
 
 
-def check_context(context: Mapping[str, float], who: str) -> None:
+def check_context(context: Mapping[str, float], subject: str) -> None:
     """Refuse one moment's context that no road has. NaN is none, and fine; so is an infinite distance: nobody in sight.
 
     Raises `ValueError` with name, value and range.
@@ -55,7 +56,7 @@ def check_context(context: Mapping[str, float], who: str) -> None:
         if drives_nobody(name, np.asarray(value)):
             continue
         if (why := implausible(name, float(value))) is not None:
-            raise ValueError(f"{who}: {why}")
+            raise ValueError(f"{subject}: {why}")
 
 
 def implausible(name: str, value: float) -> str | None:
@@ -95,7 +96,7 @@ def check_profile(profile: DriverProfile) -> None:
 
     time = profile.model.step * np.arange(TRIAL, dtype=np.float64)
     width = np.full(TRIAL, profile.lane_width)
-    who = f"profile {profile.name} in half a minute of even traffic"
+    subject = f"profile {profile.name} in half a minute of even traffic"
     with np.errstate(all="ignore"):
         offset = sample_offsets(profile, Segment(time, width, np.full(TRIAL, TRIAL_SPEED)), 0)
-    check_offsets(offset, width, who, time)
+    check_offsets(offset, width, subject, time)

@@ -243,12 +243,12 @@ def file_type(model: str, effects: frozenset[str]) -> type[DriverProfile]:
 def profile_schema() -> dict[str, Any]:
     """JSON Schema of a profile file, generated from the types; plug-ins are not in it."""
     schema = msgspec.json.schema(file_type(CORE_MODELS[0].model.kind, frozenset()), schema_hook=schema_hook)
-    own = schema["$defs"]["DriverProfile"]
+    definition = schema["$defs"]["DriverProfile"]
     head = {"format": {"const": FORMAT}, "version": {"const": VERSION}}
-    own["properties"] = head | own["properties"]
-    own["required"] = [*head, *own["required"]]
-    own["title"] = f"Driver profile of xosc-lateral, version {VERSION}"
-    own["description"] = "Offsets are relative to the lane width, positive to the left of travel."
+    definition["properties"] = head | definition["properties"]
+    definition["required"] = [*head, *definition["required"]]
+    definition["title"] = f"Driver profile of xosc-lateral, version {VERSION}"
+    definition["description"] = "Offsets are relative to the lane width, positive to the left of travel."
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 

@@ -31,10 +31,10 @@ class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values, as a file holds them."""
         values: dict[str, Any] = plain(self)
-        for one in structs.fields(self) if self.later else ():
-            default = one.default if one.default_factory is msgspec.NODEFAULT else one.default_factory()
-            if one.name in self.later and getattr(self, one.name) == default:
-                del values[one.encode_name]
+        for field in structs.fields(self) if self.later else ():
+            default = field.default if field.default_factory is msgspec.NODEFAULT else field.default_factory()
+            if field.name in self.later and getattr(self, field.name) == default:
+                del values[field.encode_name]
         return values
 
 
@@ -125,8 +125,8 @@ def _listed(value: Any) -> Any:
 
 def _in_words(text: str, where: str, kind: object) -> str:
     """msgspec's message in our words: path, what is wrong with it."""
-    found = re.fullmatch(r"(.*?)(?: - at `(?:key in )?(\$[^`]*)`)?", text, re.DOTALL)
-    what, path = (found[1], found[2] or "$") if found else (text, "$")
+    match = re.fullmatch(r"(.*?)(?: - at `(?:key in )?(\$[^`]*)`)?", text, re.DOTALL)
+    what, path = (match[1], match[2] or "$") if match else (text, "$")
     path = (where + path.removeprefix("$")).lstrip(".")
     if path.endswith(".kind") and what.startswith("Invalid value"):
         what = what.replace("Invalid value", "unknown kind") + f"; known are {', '.join(sorted(_kinds(kind, path)))}"

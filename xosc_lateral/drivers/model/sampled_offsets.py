@@ -62,9 +62,9 @@ def sample_like(
     numbers = {drive.name: number for number, drive in enumerate(drives)}
     root = np.random.SeedSequence(seed)
     for snippet in cut_snippets(all_runs(drives, rules), seconds):
-        name, own = snippet.run.drive, child(root, numbers[snippet.run.drive], snippet.index)
+        name, seed_of_snippet = snippet.run.drive, child(root, numbers[snippet.run.drive], snippet.index)
         segment = segment_of(snippet.run, snippet.rows)
-        offset = recorded_offsets(profile, segment, own, sensor, float(snippet.offset[0]))
+        offset = recorded_offsets(profile, segment, seed_of_snippet, sensor, float(snippet.offset[0]))
         _check(offset, segment, profile, name)
         yield SampledOffsets(name, snippet.index, snippet.time, offset, snippet.offset, *_driven(segment))
 
@@ -101,8 +101,8 @@ def _driven(segment: Segment) -> tuple[FloatArray, FloatArray]:
 
 def _check(offset: FloatArray, segment: Segment, profile: DriverProfile, drive: str) -> None:
     inside = segment.inside
-    who = f"profile {profile.name} under the context of drive {drive}"
-    check_offsets(offset, segment.lane_width[inside], who, segment.time[inside])
+    subject = f"profile {profile.name} under the context of drive {drive}"
+    check_offsets(offset, segment.lane_width[inside], subject, segment.time[inside])
 
 
 def sample_free(

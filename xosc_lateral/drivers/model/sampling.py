@@ -40,8 +40,8 @@ class OffsetSampler:
 
     def __init__(self, profile: DriverProfile, seed: int | np.random.SeedSequence) -> None:
         self.profile = profile
-        own = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
-        self._process = DriveProcess(profile, own)
+        sequence = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
+        self._process = DriveProcess(profile, sequence)
 
     def sample(self, segment: Segment, *, start: float | None = None, responses: Responses | None = None) -> FloatArray:
         """Next offsets from the lane centre, positive to the LEFT of travel, one per row inside the segment. [m]
@@ -84,15 +84,15 @@ class OffsetSampler:
         return deepcopy(self)
 
     def _terms(self, segment: Segment, responses: Responses | None) -> EffectTerms:
-        found = [self._process.hidden_terms(segment.time[segment.inside])]
+        terms = [self._process.hidden_terms(segment.time[segment.inside])]
         if responses is None:
             responses = responses_to(segment, self.profile)
-        found += [
+        terms += [
             effect.acting(response)
             for effect, response in zip(self._process.columned, responses, strict=True)
             if response is not None
         ]
-        return combine(found)
+        return combine(terms)
 
 
 def responses_to(segment: Segment, profile: DriverProfile) -> Responses:

@@ -112,10 +112,10 @@ class OffsetStream:
         start: float | None = None,
         time: float = 0.0,
     ) -> None:
-        own = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
+        sequence = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
         factor = _steps_per_model_step(rate, profile.model.step)
-        seeded = SeedState(own.entropy, tuple(own.spawn_key))
-        self._begin_with(profile, own, StreamState(seed=seeded, factor=factor, start=start, time=time))
+        seeded = SeedState(sequence.entropy, tuple(sequence.spawn_key))
+        self._begin_with(profile, sequence, StreamState(seed=seeded, factor=factor, start=start, time=time))
 
     def _begin_with(self, profile: DriverProfile, seed: np.random.SeedSequence, state: StreamState) -> None:
         self.profile, self._state = profile, state
@@ -282,8 +282,8 @@ class OffsetStream:
         stream._begin_with(profile, seed, saved)
         if saved.known is not None:
             stream._know(saved.known)
-        for response, own in zip(stream._responses, saved.responses, strict=True):
-            response.restore(own)
+        for response, response_state in zip(stream._responses, saved.responses, strict=True):
+            response.restore(response_state)
         stream._process.restore(saved.process, "state.process")
         return stream
 

@@ -90,7 +90,7 @@ class Validity(Record, frozen=True):
 
     def departures(self, speed: FloatArray, lane_width: FloatArray) -> list[str]:
         """In which respects speeds [m/s] and lane widths [m], of any shape, lie outside of what was measured."""
-        found = []
+        lines = []
         for values, measured, margin, factor, unit in (
             (speed, self.speed, SPEED_MARGIN, 3.6, "km/h"),
             (lane_width, self.lane_width, WIDTH_MARGIN, 1.0, "m wide"),
@@ -102,5 +102,5 @@ class Validity(Record, frozen=True):
             if low < measured[0] - margin or high > measured[1] + margin:
                 digits = 0 if factor != 1.0 else 2
                 within = f"{factor * measured[0]:.{digits}f} to {factor * measured[1]:.{digits}f}"
-                found.append(f"{factor * low:.{digits}f} to {factor * high:.{digits}f} {unit} (measured: {within})")
-        return found
+                lines.append(f"{factor * low:.{digits}f} to {factor * high:.{digits}f} {unit} (measured: {within})")
+        return lines

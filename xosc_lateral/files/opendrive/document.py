@@ -119,6 +119,6 @@ def line_of(element: XmlElement) -> int | None:
 def describe(element: XmlElement) -> str:
     """Where an element is, as in ``road '3' geometry``."""
     road = next((above for above in element.iterancestors() if above.tag in ("road", "junction")), None)
-    own = next((element.get(key) for key in ("id", "s", "sOffset") if element.get(key) is not None), None)
-    name = element.tag if own is None else f"{element.tag} '{own}'"
+    identity = next((element.get(key) for key in ("id", "s", "sOffset") if element.get(key) is not None), None)
+    name = element.tag if identity is None else f"{element.tag} '{identity}'"
     return name if road is None else f"{road.tag} '{road.get('id')}' {name}"

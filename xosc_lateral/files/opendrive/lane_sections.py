@@ -143,11 +143,11 @@ def _read_lane(element: XmlElement, start: float, source: RoadFile) -> LaneRecor
 
 def _read_marks(element: XmlElement, lane: int, start: float, source: RoadFile) -> tuple[RoadMark, ...]:
     """Markings; each ends where the next begins, the last one at infinity until the section's end is known."""
-    found = sorted((start + source.number(e, "sOffset", 0.0), i, e) for i, e in enumerate(element.iterfind("roadMark")))
-    ends = [*(s for s, _, _ in found[1:]), float("inf")][: len(found)]
+    marks = sorted((start + source.number(e, "sOffset", 0.0), i, e) for i, e in enumerate(element.iterfind("roadMark")))
+    ends = [*(s for s, _, _ in marks[1:]), float("inf")][: len(marks)]
     return tuple(
         RoadMark(lane, s, end, e.get("type", "none"), e.get("color", "standard"), source.appearance(e, "width", 0.12))
-        for (s, _, e), end in zip(found, ends, strict=True)
+        for (s, _, e), end in zip(marks, ends, strict=True)
         if end > s
     )
 

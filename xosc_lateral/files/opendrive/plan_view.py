@@ -152,8 +152,8 @@ def _element(geometry: XmlElement, length: float, source: RoadFile) -> Reference
                 p_end = length if shape.get("pRange") == "arcLength" else 1.0
                 return CubicRecord(x, y, heading, length, u, v, p_end)
     known = "line, arc, spiral, poly3, paramPoly3"
-    found = ", ".join(str(child.tag) for child in geometry) or "nothing"
-    raise source.error(f"no shape that is known ({known}); found {found}", geometry)
+    children = ", ".join(str(child.tag) for child in geometry) or "nothing"
+    raise source.error(f"no shape that is known ({known}); found {children}", geometry)
 
 
 def _check_turn(curvature: float, length: float, shape: XmlElement, source: RoadFile) -> None:

@@ -125,8 +125,8 @@ def roads_xml(
         for number, (incoming, linked, lanes) in enumerate(connections):
             ends = {"incomingRoad": str(incoming), "linkedRoad": str(linked), "contactPoint": "start"}
             connection = sub(element, "connection", id=str(number), **ends)
-            for one, other in lanes:
-                sub(connection, "laneLink", **{"from": str(one), "to": str(other)})
+            for lane, other in lanes:
+                sub(connection, "laneLink", **{"from": str(lane), "to": str(other)})
     etree.indent(root, "  ")
     text = f"<?xml version='1.0' encoding='UTF-8'?>\n{etree.tostring(root, encoding='unicode')}\n"
     return text + template_mark(text)

@@ -1,14 +1,23 @@
-"""Actions of init and events: global, user-defined, private."""
+"""The storyboard: init, stories, events, and their actions: global, user-defined, private."""
 
 from __future__ import annotations
 
 from msgspec import Struct
 from msgspec.structs import replace
 
+from xosc_lateral.files.openscenario.conditions import read_trigger
 from xosc_lateral.files.openscenario.context import Context, Reader, declared, read_struct
+from xosc_lateral.files.openscenario.declarations import local_scope
 from xosc_lateral.files.openscenario.element import XmlElement
-from xosc_lateral.files.openscenario.entities import read_environment
+from xosc_lateral.files.openscenario.entities import (
+    read_bounding_box,
+    read_controller,
+    read_environment,
+    read_performance,
+)
+from xosc_lateral.files.openscenario.positions import READERS as POSITION_READERS
 from xosc_lateral.files.openscenario.positions import read_position
+from xosc_lateral.world.scenario.entity import BoundingBox, Controller, Performance
 from xosc_lateral.world.scenario.enums import DynamicsShape
 from xosc_lateral.world.scenario.expressions import ExpressionError
 from xosc_lateral.world.scenario.global_actions import (
@@ -49,7 +58,17 @@ from xosc_lateral.world.scenario.private_actions import (
     TransitionDynamics,
     VisibilityAction,
 )
-from xosc_lateral.world.scenario.storyboard import Action
+from xosc_lateral.world.scenario.storyboard import (
+    Action,
+    Actors,
+    Event,
+    Init,
+    Maneuver,
+    ManeuverGroup,
+    Private,
+    Story,
+    Trigger,
+)
 
 # Elements that only group others; what they hold is the action.
 GROUPING = {
@@ -87,10 +106,10 @@ def read_actions(owner: XmlElement, name: str, context: Context) -> list[Action]
 
 
 def _contents(owner: XmlElement) -> list[XmlElement]:
-    found: list[XmlElement] = []
+    elements: list[XmlElement] = []
     for child in owner.children():
-        found.extend(_contents(child) if child.tag in GROUPING else [child])
-    return found
+        elements.extend(_contents(child) if child.tag in GROUPING else [child])
+    return elements
 
 
 def _environment(e: XmlElement, context: Context) -> EnvironmentAction:
@@ -181,8 +200,8 @@ def _animation(e: XmlElement, context: Context) -> AnimationAction:
 def read_transition(e: XmlElement, context: Context) -> TransitionDynamics:
     """How a value goes to its target; a step needs no value."""
     is_step = e.choice("dynamicsShape", DynamicsShape, DynamicsShape.STEP) is DynamicsShape.STEP
-    given = {"value": 0.0} if is_step and e.optional_number("value", finite=False) is None else {}
-    return read_struct(TransitionDynamics, e, context, **given)
+    preset = {"value": 0.0} if is_step and e.optional_number("value", finite=False) is None else {}
+    return read_struct(TransitionDynamics, e, context, **preset)
 
 
 PRIVATE_ACTIONS: dict[str, Reader] = {
@@ -195,4 +214,66 @@ PRIVATE_ACTIONS: dict[str, Reader] = {
     "OverrideControllerValueAction": _override,
     "LightStateAction": _light_state,
     "AnimationAction": _animation,
+}
+
+
+# ---- init, stories, maneuver groups, events ----
+def _read_init(element: XmlElement, context: Context) -> Init:
+    owner = element.child("Actions") or element
+    global_actions, user_defined, privates = [], [], []
+    for child in owner.children():
+        if child.tag == "GlobalAction":
+            global_actions.extend(read_actions(child, "", context))
+        elif child.tag == "UserDefinedAction":
+            user_defined.extend(read_actions(child, "", context))
+        elif child.tag == "Private":
+            entity = context.entity(child)
+            actions = [action for item in child.children("PrivateAction") for action in read_actions(item, "", context)]
+            privates.append(Private(entity, tuple(actions), child.place()))
+        else:
+            context.remark(child)
+    return Init(tuple(global_actions), tuple(user_defined), tuple(privates))
+
+
+def _read_story(element: XmlElement, context: Context) -> Story:
+    return read_struct(Story, element.within(local_scope(element)), context)
+
+
+def _read_group(element: XmlElement, context: Context) -> ManeuverGroup:
+    maneuvers = []
+    for child in element.children("Maneuver", "CatalogReference"):
+        if child.tag == "Maneuver":
+            maneuver = child.within(local_scope(child))
+        else:
+            maneuver = context.catalogs.entry(child)
+            if maneuver.tag != "Maneuver":
+                child.fail(f"catalog entry '{maneuver.raw('name')}' is a {maneuver.tag}, not a Maneuver")
+        maneuvers.append(read_struct(Maneuver, maneuver, context))
+    owner = element.child("Actors")
+    actors = Actors((), False, element.place()) if owner is None else read_struct(Actors, owner, context)
+    return read_struct(ManeuverGroup, element, context, maneuvers=tuple(maneuvers), actors=actors)
+
+
+def _read_event(element: XmlElement, context: Context) -> Event:
+    actions = []
+    for item in element.children("Action"):
+        contents = list(item.children("PrivateAction", "GlobalAction", "UserDefinedAction"))
+        if not contents and item.child() is not None:
+            item.fail("contains no PrivateAction, GlobalAction or UserDefinedAction")
+        for content in contents:
+            actions.extend(read_actions(content, item.text("name", ""), context))
+    return read_struct(Event, element, context, actions=tuple(actions))
+
+
+READERS: dict[object, Reader] = {
+    **POSITION_READERS,
+    BoundingBox: read_bounding_box,
+    Controller: read_controller,
+    Event: _read_event,
+    Init: _read_init,
+    ManeuverGroup: _read_group,
+    Performance: read_performance,
+    Story: _read_story,
+    TransitionDynamics: read_transition,
+    Trigger: read_trigger,
 }

@@ -153,11 +153,11 @@ class Catalogs:
             reference.fail(f"catalog {path} changed while the scenario was being read")
         entries = document.root.findall("{*}Catalog/{*}*")
         # Names of entries are plain text: no scope is needed to find them.
-        found = next((XmlElement(xml, path, Scope({})) for xml in entries if xml.get("name") == name), None)
-        if found is None:
+        element = next((XmlElement(xml, path, Scope({})) for xml in entries if xml.get("name") == name), None)
+        if element is None:
             names = ", ".join(sorted(str(xml.get("name")) for xml in entries)[:8])
             reference.fail(f"catalog '{catalog}' has no entry '{name}' (it has {names})")
-        return found.within(entry_scope(found, reference))
+        return element.within(entry_scope(element, reference))
 
     def _file(self, catalog: str, reference: XmlElement) -> Path:
         if catalog not in self._files:
@@ -182,9 +182,9 @@ class Catalogs:
                 folders.append(folder)
             else:
                 refused = refused or self.boundary.refusal(written, place)
-        found = self._by_name_inside(folders, catalog)
-        if found is not None:
-            return found
+        inside = self._by_name_inside(folders, catalog)
+        if inside is not None:
+            return inside
         near = _near_by(self.boundary, f"{catalog}.xosc")
         if near is not None:
             self.remarks.append(Unsupported("CatalogReference", reference.place(), f"catalog taken from {near}"))
@@ -206,8 +206,8 @@ class Catalogs:
 def _near_by(boundary: Boundary, name: str) -> Path | None:
     """The only file of that name at most three levels below the scenario: some field files name stale folders."""
     patterns = (f"{levels}{escape(name)}" for levels in ("", "*/", "*/*/", "*/*/*/"))
-    found = [path for pattern in patterns for path in boundary.folder.glob(pattern) if path.is_file()]
-    return found[0] if len(found) == 1 and boundary.holds(found[0]) else None
+    files = [path for pattern in patterns for path in boundary.folder.glob(pattern) if path.is_file()]
+    return files[0] if len(files) == 1 and boundary.holds(files[0]) else None
 
 
 def _calls_itself(path: Path, name: str) -> bool:

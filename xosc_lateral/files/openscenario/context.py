@@ -103,15 +103,15 @@ class Context:
         self._depth += 1
         if self._depth > MAX_NESTING:
             element.fail(f"positions, routes and trajectories are nested more than {MAX_NESTING} deep")
-        found = reader(element, self)
+        content = reader(element, self)
         self._depth -= 1
-        return found
+        return content
 
 
 Reader = Callable[[XmlElement, Context], Any]
 
 
-def read_struct(kind: type[S], e: XmlElement, context: Context, /, **given: Any) -> S:
+def read_struct(kind: type[S], e: XmlElement, context: Context, /, **preset: Any) -> S:
     """A struct whose fields are read as they declare (see `Xml`), but for those that are given.
 
     Raises
@@ -121,10 +121,10 @@ def read_struct(kind: type[S], e: XmlElement, context: Context, /, **given: Any)
         itself refuses.
     """
     for name, reader in _readers(kind):
-        if name not in given:
-            given[name] = reader(e, context)
+        if name not in preset:
+            preset[name] = reader(e, context)
     try:
-        return kind(**given)
+        return kind(**preset)
     except ValueError as error:
         e.fail(str(error))
 
@@ -168,14 +168,14 @@ def _attribute(names: tuple[str, ...], kind: type[Any], xml: Xml, default: Any) 
     paths = [(above.split("/") if above else [], name) for above, _, name in (path.rpartition("/") for path in names)]
 
     def read(e: XmlElement, context: Context) -> Any:
-        found = None
+        value = None
         for above, name in paths:
             holder = _below(e, above)
-            if holder is not None and found in (None, ""):
-                found = _value(holder, name, kind, xml, context)
-        if found is None and default is UNSET:
+            if holder is not None and value in (None, ""):
+                value = _value(holder, name, kind, xml, context)
+        if value is None and default is UNSET:
             (holder or e.required(*above)).fail(f"attribute '{name}' is missing")
-        return default if found is None else found
+        return default if value is None else value
 
     return read
 
@@ -215,17 +215,17 @@ def _child(kinds: tuple[type[Any], ...], xml: Xml, default: Any) -> Reader:
 
     def read(e: XmlElement, context: Context) -> Any:
         owner = _below(e, above)
-        found = owner if tags == ("",) or owner is None else owner.child(*tags)
-        if found is None and default is not UNSET:
+        holder = owner if tags == ("",) or owner is None else owner.child(*tags)
+        if holder is None and default is not UNSET:
             return default
-        if found is None:
-            found = e.required(*tags)
-        own = context.readers.get(key)
-        if own is not None:
-            return own(found, context)
+        if holder is None:
+            holder = e.required(*tags)
+        reader = context.readers.get(key)
+        if reader is not None:
+            return reader(holder, context)
         if len(kinds) > 1:
-            found = found.required(*by_tag)
-        return read_struct(by_tag[found.tag] if len(kinds) > 1 else kinds[0], found, context)
+            holder = holder.required(*by_tag)
+        return read_struct(by_tag[holder.tag] if len(kinds) > 1 else kinds[0], holder, context)
 
     return read
 
@@ -237,7 +237,7 @@ def _children(kind: type[Any], xml: Xml) -> Reader:
     tags = xml.names or (kind.__name__,)
 
     def read(e: XmlElement, context: Context) -> Any:
-        own = context.readers.get(kind)
-        return tuple(own(x, context) if own else read_struct(kind, x, context) for x in e.children(*tags))
+        reader = context.readers.get(kind)
+        return tuple(reader(x, context) if reader else read_struct(kind, x, context) for x in e.children(*tags))
 
     return read

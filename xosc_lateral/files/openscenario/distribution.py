@@ -71,8 +71,8 @@ class LogicalScenario:
     def __post_init__(self) -> None:
         """Find what the scenario declares, and which of it is constrained."""
         self._declared = declared_values(self._scenario)
-        found = self._scenario.listed("ParameterDeclarations", "ParameterDeclaration")
-        self._constrained = [item for item in found if item.child("ConstraintGroup") is not None]
+        declared = self._scenario.listed("ParameterDeclarations", "ParameterDeclaration")
+        self._constrained = [item for item in declared if item.child("ConstraintGroup") is not None]
 
     def parameter_sets(self, seed: int = 0) -> Iterator[ParameterSet]:
         """Parameter sets that satisfy the scenario's constraint groups, in order, made when asked for.

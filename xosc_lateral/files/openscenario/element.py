@@ -65,10 +65,10 @@ class XmlElement:
 
     def required(self, *tags: str) -> XmlElement:
         """First child of one of these tags; an error without."""
-        found = self.child(*tags)
-        if found is None:
+        inner = self.child(*tags)
+        if inner is None:
             self.fail(f"{' or '.join(tags)} is missing")
-        return found
+        return inner
 
     def within(self, scope: Scope) -> XmlElement:
         """The same element in another scope."""
@@ -159,11 +159,11 @@ class XmlElement:
         """Attribute as an option code."""
         return self._required(name, self.optional_choice(name, kind), default)
 
-    def _required(self, name: str, found: V | None, default: V | None) -> V:
-        found = default if found is None else found
-        if found is None:
+    def _required(self, name: str, value: V | None, default: V | None) -> V:
+        value = default if value is None else value
+        if value is None:
             self.fail(f"attribute '{name}' is missing")
-        return found
+        return value
 
     # --- place --------------------------------------------------------------------------------------------------
 
@@ -173,9 +173,9 @@ class XmlElement:
 
     def label(self) -> str:
         """``Event 'brake'``, or ``SpeedAction of Event 'brake'`` for an element without a name."""
-        own = _name(self.xml)
-        if own:
-            return f"{self.tag} '{own}'"
+        named = _name(self.xml)
+        if named:
+            return f"{self.tag} '{named}'"
         for ancestor in self.xml.iterancestors():
             name = _name(ancestor)
             if name:

@@ -55,10 +55,10 @@ def _weather(element: XmlElement, context: Context) -> Weather:
     """`Precipitation/@intensity` was a share in version 1.0, and is read as mm/h from 1.1 on."""
     rain = element.child("Precipitation")
     intensity = None if rain is None else rain.optional_number("precipitationIntensity")
-    given = None if rain is None else rain.optional_number("intensity")
+    stated = None if rain is None else rain.optional_number("intensity")
     if context.version == (1, 0):
-        return read_struct(Weather, element, context, precipitation_intensity=intensity, precipitation_fraction=given)
-    intensity = given if intensity is None else intensity
+        return read_struct(Weather, element, context, precipitation_intensity=intensity, precipitation_fraction=stated)
+    intensity = stated if intensity is None else intensity
     return read_struct(Weather, element, context, precipitation_intensity=intensity, precipitation_fraction=None)
 
 
@@ -226,12 +226,12 @@ def read_performance(element: XmlElement, context: Context) -> Performance:
 
 def _controllers(item: XmlElement, context: Context) -> tuple[Controller, ...]:
     """Controllers of ObjectController elements (several from 1.3 on)."""
-    found = []
+    entries = []
     for owner in item.children("ObjectController"):
         controller = read_controller(owner, context)
         if controller is not None:
-            found.append(replace(controller, object_name=owner.optional_text("name")))
-    return tuple(found)
+            entries.append(replace(controller, object_name=owner.optional_text("name")))
+    return tuple(entries)
 
 
 def read_controller(owner: XmlElement, context: Context) -> Controller | None:
@@ -239,15 +239,15 @@ def read_controller(owner: XmlElement, context: Context) -> Controller | None:
     owner = owner.child("ObjectController") or owner
     inline, reference = owner.child("Controller"), owner.child("CatalogReference")
     if inline is not None:
-        found, place = inline.within(local_scope(inline)), inline.place()
+        controller, place = inline.within(local_scope(inline)), inline.place()
     elif reference is not None:
         entry, place = context.optional_entry(reference), reference.place()
         if entry is None:
             return Controller(reference.text("entryName"), place)
-        found = entry
+        controller = entry
     else:
         return None
-    return Controller(found.text("name", ""), place, read_properties(found))
+    return Controller(controller.text("name", ""), place, read_properties(controller))
 
 
 def read_properties(owner: XmlElement) -> dict[str, str]:

@@ -45,10 +45,10 @@ def provenance_of(root: etree._Element) -> Mapping[str, Any] | None:
         text = (comment.text or "").strip()
         if text.startswith(MARK):
             try:
-                found = json.loads(text[len(MARK) :])
+                facts = json.loads(text[len(MARK) :])
             except (ValueError, RecursionError):
                 return {}
-            return found if isinstance(found, dict) else {}
+            return facts if isinstance(facts, dict) else {}
     header = root.find("{*}FileHeader")
     return {} if header is not None and HEADER_MARK in (header.get("description") or "") else None
 
@@ -57,10 +57,10 @@ def facts_in(data: bytes) -> Mapping[str, Any] | None:
     """Provenance in the bytes of a file of ours, which need not be well-formed any more; None: there is none."""
     begin, end = _comment_in(data)
     try:
-        found = json.loads(data[begin + len(_COMMENT_START) : end - len(_COMMENT_END)]) if begin < end else None
+        facts = json.loads(data[begin + len(_COMMENT_START) : end - len(_COMMENT_END)]) if begin < end else None
     except (ValueError, RecursionError):
         return None
-    return found if isinstance(found, dict) else None
+    return facts if isinstance(facts, dict) else None
 
 
 def content_hash(data: bytes) -> str:
@@ -114,14 +114,14 @@ def write_sealed(path: Path, pieces: Iterable[bytes], *, save: bool) -> tuple[st
     if not save:
         memory = BytesIO()
         return write_to(memory), digest.hexdigest(), memory.getvalue()
-    found = []
+    lines = []
 
     def write(temporary: Path) -> None:
         with temporary.open("w+b") as file:
-            found.append(write_to(file))
+            lines.append(write_to(file))
 
     replace_atomically(path, write)
-    return found[0], digest.hexdigest(), b""
+    return lines[0], digest.hexdigest(), b""
 
 
 def _comment_in(data: bytes) -> tuple[int, int]:
@@ -133,10 +133,10 @@ def _comment_in(data: bytes) -> tuple[int, int]:
 
 def refuse_converted(root: etree._Element, path: object) -> None:
     """`FormatError` for a file that was converted before: its offsets would be counted twice."""
-    found = provenance_of(root)
-    if found is None:
+    facts = provenance_of(root)
+    if facts is None:
         return
-    inputs = found.get("inputs")
+    inputs = facts.get("inputs")
     # Seen from the scenario, which has no folder in its name then; a road or a catalog may lie beside it.
     beside = [name for name in inputs if "/" not in name and name.endswith(".xosc")] if isinstance(inputs, dict) else []
     hint = f"; convert {beside[0]} instead" if len(beside) == 1 else "; convert its source instead"

@@ -10,12 +10,12 @@ from lxml import etree
 from msgspec import Struct
 
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.files.openscenario.actions import READERS
 from xosc_lateral.files.openscenario.catalogs import Boundary, Catalogs, allowed_roots
 from xosc_lateral.files.openscenario.context import Context, read_struct
 from xosc_lateral.files.openscenario.declarations import read_declarations, read_variables
 from xosc_lateral.files.openscenario.element import XmlElement, local_name, means_true
 from xosc_lateral.files.openscenario.entities import read_entities
-from xosc_lateral.files.openscenario.storyboard import READERS
 from xosc_lateral.files.xml import document_of, read_document
 from xosc_lateral.world.scenario import (
     FileHeader,
@@ -40,16 +40,16 @@ BOOLEANS = frozenset(
 
 def remark_spellings(root: XmlElement) -> list[Unsupported]:
     """One remark for each attribute and word such as ``freespace="True"``, at its first place."""
-    found: dict[tuple[str, str], list[etree._Element]] = {}
+    elements: dict[tuple[str, str], list[etree._Element]] = {}
     for item in root.xml.iter("{*}*"):
         declares = item.get("parameterType") == "boolean"
         for name, value in item.attrib.items():
             word = str(value).strip()
             is_boolean = name in BOOLEANS or (declares and name == "value")
             if is_boolean and means_true(word) and word not in ("true", "1"):
-                found.setdefault((str(name), word), []).append(item)
+                elements.setdefault((str(name), word), []).append(item)
     remarks = []
-    for (name, word), items in found.items():
+    for (name, word), items in elements.items():
         place = XmlElement(items[0], root.path, root.scope).place()
         times = "" if len(items) == 1 else f" ({len(items)} times)"
         why = "the standard's word is 'true', and the reference player takes this one for false"
@@ -157,8 +157,8 @@ def read_scenario(
     road_file = roads.file if network else None
     if road_file is None and logic and written.strip():
         road_file = _road_file(logic, written, boundary, remarks, roads)
-    found = network.listed("TrafficSignals", "TrafficSignalController") if network else ()
-    controllers = tuple(read_struct(TrafficSignalController, one, context) for one in found)
+    listed_controllers = network.listed("TrafficSignals", "TrafficSignalController") if network else ()
+    controllers = tuple(read_struct(TrafficSignalController, each, context) for each in listed_controllers)
     entities = read_entities(root, context)
     storyboard = read_struct(Storyboard, root.required("Storyboard"), context)
     return Scenario(

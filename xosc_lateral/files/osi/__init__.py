@@ -21,11 +21,11 @@ def osi(module: str) -> Any:
     import logging
 
     try:
-        found = import_module(module)
+        imported = import_module(module)
     except ImportError as error:
         raise XoscLateralError("OSI traces need more packages: pip install 'xosc-lateral[osi]'") from error
     logging.getLogger("osi_utilities").addHandler(logging.NullHandler())  # what it logs, we raise
-    return found
+    return imported
 
 
 def osi_wanted(trace: Path | None) -> None:

@@ -104,10 +104,10 @@ def write_lanes(message: Any, ids: RoadIds) -> None:
         inner = name - 1 if name > 0 else name + 1
         edges = boundaries[road, k][inner], boundaries[road, k][name]
         left_edges, right_edges = edges if (name < 0) == forward else edges[::-1]
-        for one in left_edges:
-            about.left_lane_boundary_id.add().value = one
-        for one in right_edges:
-            about.right_lane_boundary_id.add().value = one
+        for edge in left_edges:
+            about.left_lane_boundary_id.add().value = edge
+        for edge in right_edges:
+            about.right_lane_boundary_id.add().value = edge
         _pair(about, ids, (road, k, name), lane)
 
 
@@ -130,11 +130,13 @@ def _next(ids: RoadIds, piece: Piece, lane: Lane, side: int) -> Iterator[int]:
     sections = ids.network.roads[road].sections
     if 0 <= k + side < len(sections):
         linked = lane.successors if side > 0 else lane.predecessors
-        found = [(road, k + side, other) for other in linked]
+        touching = [(road, k + side, other) for other in linked]
     else:
         links = ids.network.next_lanes(road, name, side)
-        found = [(x.road, 0 if x.direction > 0 else len(ids.network.roads[x.road].sections) - 1, x.lane) for x in links]
-    yield from (ids.lanes[one] for one in found if one in ids.lanes)
+        touching = [
+            (x.road, 0 if x.direction > 0 else len(ids.network.roads[x.road].sections) - 1, x.lane) for x in links
+        ]
+    yield from (ids.lanes[piece_there] for piece_there in touching if piece_there in ids.lanes)
 
 
 def _grid(section: LaneSection) -> FloatArray:
@@ -181,7 +183,9 @@ def _stretches(lane: Lane, section: LaneSection) -> Iterator[tuple[float, float,
     """A section's edge cut where its marking changes; None: no marking."""
     low, high = section.start, section.end - BEFORE_END
     marks = [(max(mark.s_start, low), min(mark.s_end, high), mark) for mark in lane.marks]
-    marks = sorted((one for one in marks if one[1] - one[0] > 10 * BEFORE_END), key=lambda one: one[:2])
+    marks = sorted(
+        (stretch for stretch in marks if stretch[1] - stretch[0] > 10 * BEFORE_END), key=lambda stretch: stretch[:2]
+    )
     at = low
     for start, end, mark in marks:
         if start - at > 10 * BEFORE_END:

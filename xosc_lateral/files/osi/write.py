@@ -139,8 +139,8 @@ def ground_truths(
         message.timestamp.seconds, message.timestamp.nanos = divmod(nanoseconds, NANOSECONDS)
         if row == 0:
             write_lanes(message, ids)
-        for one in objects:
-            one.add(message, row, ids)
+        for written in objects:
+            written.add(message, row, ids)
         yield message
 
 
@@ -190,8 +190,8 @@ def _kinematics(motion: EntityMotion, path: WorldTrajectory | None, network: Roa
     where = np.stack([motion.road, motion.lane, motion.s], axis=1).astype(np.float64)
     moved = (motion.road >= 0) & ((pose.x != motion.x) | (pose.y != motion.y))
     if moved.any():
-        found = network.path_to_lane(pose.x[moved], pose.y[moved], motion.road[moved], motion.s[moved])
-        where[moved] = np.stack([found.road, found.lane, found.s], axis=1)
+        place = network.path_to_lane(pose.x[moved], pose.y[moved], motion.road[moved], motion.s[moved])
+        where[moved] = np.stack([place.road, place.lane, place.s], axis=1)
     angles = np.stack([np.angle(np.exp(1j * yaw)), pitch, roll, rate], axis=1)
     return np.concatenate([centre, velocity, _rate(velocity, motion), angles, where], axis=1)
 
@@ -201,28 +201,32 @@ def _rate(values: FloatArray, motion: EntityMotion) -> FloatArray:
     is_there = (motion.activity & Activity.ACTIVE) != 0
     broken = (motion.activity & Activity.TELEPORTED) != 0
     broken[1:] |= is_there[1:] != is_there[:-1]
-    found = np.zeros_like(values)
+    rates = np.zeros_like(values)
     borders = [0, *(np.flatnonzero(broken[1:]) + 1).tolist(), len(values)]
     for first, last in pairwise(borders):
         if last - first > 1:
-            found[first:last] = np.gradient(values[first:last], motion.time[first:last], axis=0)
-    return found
+            rates[first:last] = np.gradient(values[first:last], motion.time[first:last], axis=0)
+    return rates
 
 
 def _lights(motion: NominalMotion, entity: EntityMotion) -> list[tuple[float, Any]]:
     """States of a vehicle's lights, in the order of time; what the scenario says nothing of stays unset."""
     kinds = osi("osi3.osi_object_pb2").MovingObject.VehicleClassification
-    state, found = kinds.LightState(), []
-    played = [one for one in motion.actions if one.actor == entity.name and isinstance(one.action, LightStateAction)]
-    for one in sorted(played, key=lambda one: one.start):
-        for name, lit in LIGHTS.get(one.action.light, ()):
+    state, states_over_time = kinds.LightState(), []
+    played = [
+        lit_action
+        for lit_action in motion.actions
+        if lit_action.actor == entity.name and isinstance(lit_action.action, LightStateAction)
+    ]
+    for lit_action in sorted(played, key=lambda lit_action: lit_action.start):
+        for name, lit in LIGHTS.get(lit_action.action.light, ()):
             off = f"{lit.partition('_STATE_')[0]}_STATE_OFF"
             states = kinds.LightState.DESCRIPTOR.fields_by_name[name].enum_type.values_by_name
-            setattr(state, name, states[off if one.action.mode == "off" else lit].number)
+            setattr(state, name, states[off if lit_action.action.mode == "off" else lit].number)
         kept = kinds.LightState()
         kept.CopyFrom(state)
-        found.append((one.start, kept))
-    return found
+        states_over_time.append((lit_action.start, kept))
+    return states_over_time
 
 
 def _template(entity: Entity, number: int) -> Any:

@@ -86,14 +86,15 @@ def plain_templates(folder: Path) -> Iterator[PlainTemplate]:
 
 def _declared(text: str, name: str, value: str) -> str:
     """The text with another value of a declared parameter; all else, comments and layout, stays."""
-    for found in _COMMENT_OR_DECLARATION.finditer(text):
-        attributes = {one["name"]: one["quoted"][1:-1] for one in _ATTRIBUTE.finditer(found[0])}
-        if found[0].startswith("<!--") or unescape(attributes.get("name", "")) != name:
+    for match in _COMMENT_OR_DECLARATION.finditer(text):
+        attributes = {part["name"]: part["quoted"][1:-1] for part in _ATTRIBUTE.finditer(match[0])}
+        if match[0].startswith("<!--") or unescape(attributes.get("name", "")) != name:
             continue
         replaced = _ATTRIBUTE.sub(
-            lambda one: one["name"] + one["equals"] + quoteattr(value) if one["name"] == "value" else one[0], found[0]
+            lambda part: part["name"] + part["equals"] + quoteattr(value) if part["name"] == "value" else part[0],
+            match[0],
         )
-        return text[: found.start()] + replaced + text[found.end() :]
+        return text[: match.start()] + replaced + text[match.end() :]
     raise AssertionError("it is among the parsed declarations")
 
 
@@ -102,13 +103,13 @@ AnyTemplate = Template | PlainTemplate
 
 def all_templates() -> tuple[AnyTemplate, ...]:
     """Templates with a builder, plain ones, and those of plug-ins (templates, or folders of plain ones)."""
-    found: dict[str, AnyTemplate] = {template.name: template for template in TEMPLATES}
+    templates: dict[str, AnyTemplate] = {template.name: template for template in TEMPLATES}
     for plain in plain_templates(shipped_folder("templates")):
-        found.setdefault(plain.name, plain)
+        templates.setdefault(plain.name, plain)
     for offered in plugins(GROUP).values():
-        for one in plain_templates(Path(offered)) if isinstance(offered, str | Path) else [offered]:
-            found.setdefault(one.name, one)
-    return tuple(found.values())
+        for template in plain_templates(Path(offered)) if isinstance(offered, str | Path) else [offered]:
+            templates.setdefault(template.name, template)
+    return tuple(templates.values())
 
 
 def find_template(name: str) -> AnyTemplate:
@@ -116,8 +117,8 @@ def find_template(name: str) -> AnyTemplate:
     for template in TEMPLATES:
         if template.name == name:
             return template
-    for one in all_templates():
-        if one.name == name:
-            return one
+    for candidate in all_templates():
+        if candidate.name == name:
+            return candidate
     known = [each.name for each in all_templates()]
     raise XoscLateralError(f"unknown template {name!r}{did_you_mean(name, known)}; there are {', '.join(known)}")

@@ -66,18 +66,8 @@ def chains_of(
 ) -> list[OffsetChain]:
     """Chains of one entity, each with the offsets that it has in the nominal run then, or else with its longest ones.
 
-    Parameters
-    ----------
-    entity : EntityResult
-    motion : NominalMotion
-        Its run.
-    network : RoadNetwork
-    items : collection of LateralAction
-        Its own.
-    tows : bool
-        It pulls a trailer, and is not put down beside the middle: the trailer would swing.
-    changes_speed : bool
-        Something may change its speed: it begins with a path by the distance driven.
+    Who `tows` a trailer is not put down beside the middle: the trailer would swing. Where something `changes_speed`, it
+    begins with a path by the distance driven.
     """
     longest = max(entity.segments, key=_length)
     added = next((item.path for item in items if item.adds and not _is_there_at_start(entity)), None)
@@ -93,8 +83,8 @@ def chains_of(
     chains = [] if is_steered else [OffsetChain(entity.name, added, ring, placed, side, path)]
     for item in items:
         if not item.adds and not item.steers:
-            found = max(_in_phase(entity, motion, item.path, items), key=_length, default=longest)
-            chains.append(OffsetChain(entity.name, item.path, _ring(found, from_middle=True)))
+            segment = max(_in_phase(entity, motion, item.path, items), key=_length, default=longest)
+            chains.append(OffsetChain(entity.name, item.path, _ring(segment, from_middle=True)))
     return [chain for chain in chains if chain.ring.moves]
 
 
@@ -136,24 +126,24 @@ def _path(
 
     On one road alone, up to shortly before its end, where the place of each vertex is certain.
     """
-    own, paths = entity.motion, {item.path for item in items}
+    vehicle, paths = entity.motion, {item.path for item in items}
     starts = [one.start for one in motion.actions if one.actor == entity.name and one.path in paths]
     until = min(starts, default=np.inf)
     segments = [segment for segment in entity.segments if segment.span.start < until]
-    last = int(np.searchsorted(own.time, min(until, float(own.time[-1]))))
+    last = int(np.searchsorted(vehicle.time, min(until, float(vehicle.time[-1]))))
     rows = slice(0, last)
-    is_here = ((own.activity[1:last] & (Activity.ACTIVE | Activity.TELEPORTED)) == Activity.ACTIVE).all()
-    if not segments or last < 2 or not is_here or len(set(own.road[rows].tolist())) != 1 or own.road[0] < 0:
+    is_here = ((vehicle.activity[1:last] & (Activity.ACTIVE | Activity.TELEPORTED)) == Activity.ACTIVE).all()
+    if not segments or last < 2 or not is_here or len(set(vehicle.road[rows].tolist())) != 1 or vehicle.road[0] < 0:
         return None
-    driven = distance_driven(own)
-    parts = [_sampled(segment, own, driven, is_last=segment is segments[-1]) for segment in segments]
+    driven = distance_driven(vehicle)
+    parts = [_sampled(segment, vehicle, driven, is_last=segment is segments[-1]) for segment in segments]
     side, _ = _middle(entity, network)
-    length = network.roads[int(own.road[0])].length
-    room = (length - float(own.s[0]) if side > 0.0 else float(own.s[0])) - ROAD_END
+    length = network.roads[int(vehicle.road[0])].length
+    room = (length - float(vehicle.s[0]) if side > 0.0 else float(vehicle.s[0])) - ROAD_END
     reach = min(room, float(parts[-1].distance[-1]))
     if reach < LEAST_PATH:
         return None
-    at = _vertices(own, network, driven, last, reach)
+    at = _vertices(vehicle, network, driven, last, reach)
     through = deviation_through(parts)
     begin = through(np.array([0.0, LEAST_GAP]))
     offset = through(at) - settle(at, LEAST_PATH, float(np.diff(begin)[0]) / LEAST_GAP, 0.0)
@@ -162,10 +152,10 @@ def _path(
     return OffsetPath(tuple(np.round(at, 3).tolist()), tuple(np.round(offset, RESOLUTION).tolist()))
 
 
-def _sampled(segment: SampledSegment, own: EntityMotion, driven: FloatArray, *, is_last: bool) -> SampledDeviation:
+def _sampled(segment: SampledSegment, vehicle: EntityMotion, driven: FloatArray, *, is_last: bool) -> SampledDeviation:
     """One segment by the distance driven, the last one with what was sampled beyond it, at the speed of its end."""
-    distance, offset = np.interp(segment.time, own.time, driven), segment.offset
-    speeds = own.speed[[segment.span.first, segment.span.last]]
+    distance, offset = np.interp(segment.time, vehicle.time, driven), segment.offset
+    speeds = vehicle.speed[[segment.span.first, segment.span.last]]
     if is_last:
         step = float(speeds[1]) * (segment.time[1] - segment.time[0])
         distance = np.append(distance, distance[-1] + step * np.arange(1, len(segment.beyond) + 1))
@@ -174,15 +164,19 @@ def _sampled(segment: SampledSegment, own: EntityMotion, driven: FloatArray, *, 
     return SampledDeviation(distance, offset, (float(settling[0]), float(settling[1])))
 
 
-def _vertices(own: EntityMotion, network: RoadNetwork, driven: FloatArray, last: int, reach: float) -> FloatArray:
+def _vertices(vehicle: EntityMotion, network: RoadNetwork, driven: FloatArray, last: int, reach: float) -> FloatArray:
     """Distances of vertices: every 0.1 s as it is driven nominally, closer in bends, never below 1 m. [m]"""
-    rows = np.arange(0, last, max(1, round(GRID / (own.time[1] - own.time[0]))))
-    bend = np.abs(network.lane_curvature(own.road[rows], own.lane[rows], own.s[rows]))
-    gap = np.minimum(GRID * np.abs(own.speed[rows]), np.sqrt(8.0 * CUT / np.maximum(bend, 1e-6)))
-    gap, found = np.clip(gap, LEAST_GAP, None), [0.0]
-    while found[-1] < reach:
-        found.append(found[-1] + float(np.interp(found[-1], driven[rows], gap)))
-    return np.append(found[:-1], reach) if reach - found[-2] > 0.5 * LEAST_GAP else np.append(found[:-2], reach)
+    rows = np.arange(0, last, max(1, round(GRID / (vehicle.time[1] - vehicle.time[0]))))
+    bend = np.abs(network.lane_curvature(vehicle.road[rows], vehicle.lane[rows], vehicle.s[rows]))
+    gap = np.minimum(GRID * np.abs(vehicle.speed[rows]), np.sqrt(8.0 * CUT / np.maximum(bend, 1e-6)))
+    gap, distances = np.clip(gap, LEAST_GAP, None), [0.0]
+    while distances[-1] < reach:
+        distances.append(distances[-1] + float(np.interp(distances[-1], driven[rows], gap)))
+    return (
+        np.append(distances[:-1], reach)
+        if reach - distances[-2] > 0.5 * LEAST_GAP
+        else np.append(distances[:-2], reach)
+    )
 
 
 def _middle(entity: EntityResult, network: RoadNetwork) -> tuple[float, float]:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from msgspec import structs
 
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.drivers.fitting.neighbours import basis_of
+from xosc_lateral.drivers.model.profile import SIDES
 from xosc_lateral.files.output_paths import claim, output_file
-from xosc_lateral.workflows.conversion.result import ConvertedScenario
+from xosc_lateral.workflows.conversion.result import WRITTEN_AS, ConvertedScenario
 from xosc_lateral.workflows.result import PathLike, Result, write_page
 from xosc_lateral.world.motion.nominal import Activity
 
@@ -29,9 +33,30 @@ class Conversion(ConvertedScenario, Result):
         return f"{where}: {len(self.enriched)} of {len(self.entities)} entities enriched{warned}"
 
     def __str__(self) -> str:
-        from xosc_lateral.workflows.conversion.text import as_text
-
-        return as_text(self)
+        lines = [f"{self.output or self.source}"]
+        lines.append(f"  {self.under_test}")
+        for entity in self.movement.entities:
+            if entity.is_enriched and entity.profile is not None:
+                mode = self.provenance.modes.get(entity.name, "")
+                lines.append(
+                    f"  {entity.name}: {len(entity.segments)} segments, {entity.segment_seconds:.1f} s, "
+                    f"offsets {entity.offset_spread:.2f} m (standard deviation), profile {entity.profile.name}, "
+                    f"as {WRITTEN_AS.get(mode, mode)}"
+                )
+            else:
+                lines.append(f"  {entity.name}: as in the scenario ({entity.why})")
+        alike: dict[str, list[str]] = {}
+        for entity in self.movement.entities:
+            if entity.is_enriched:
+                alike.setdefault(entity.beside(self.provenance.options["neighbours"]), []).append(entity.name)
+        lines += [f"  {', '.join(names)} {words}" for words, names in alike.items()]
+        if self.provenance.options["with_sensor"]:
+            lines.append("  offsets include the sensor error of the drives that the profiles were fitted to")
+        lines += [f"  note: {note.what}" for note in self.movement.motion.notes]
+        lines += [f"  warning: {warning}" for warning in self.warnings]
+        if self.report is not None:
+            lines.append(f"report: {self.report}")
+        return "\n".join(lines)
 
     def to_frame(self) -> pd.DataFrame:
         """One row per entity and step (of those that exist then): where it is, and how far from where it nominally was.
@@ -67,10 +92,53 @@ class Conversion(ConvertedScenario, Result):
         return rows.sort_values(["time", "entity"], kind="stable", ignore_index=True).drop(columns="entity")
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values, as ``--json`` prints them."""
-        from xosc_lateral.workflows.conversion.text import facts
-
-        return facts(self)
+        """Plain values, as ``--json`` prints them, rounded to what they are read for: a micrometre, a microsecond."""
+        enriched = self.movement
+        before, after = (None if gap is None else round(gap, 6) for gap in self.smallest_gap)
+        made = self.provenance.profiles.items()
+        profiles = {name: {"name": profile, "sha256": sha} for name, (profile, sha) in made}
+        return {
+            "source": str(self.source),
+            "output": None if self.output is None else str(self.output),
+            "report": None if self.report is None else str(self.report),
+            "sha256": self.sha256,
+            "end_time": round(enriched.motion.end_time, 6),
+            "ended_by": enriched.motion.ended_by,
+            "ego": list(self.provenance.ego),
+            "controllers": {
+                name: {"controllers": list(control.controllers), "drives": control.domains.words()}
+                for name, control in self.controllers.items()
+            },
+            "entities": [
+                {
+                    "name": entity.name,
+                    "profile": entity.profile.name if entity.is_enriched and entity.profile is not None else None,
+                    "why_not": entity.why,
+                    "neighbours": None
+                    if entity.profile is None
+                    else {side: basis_of(entity.profile, side).value for side in SIDES},
+                    "mode": self.provenance.modes.get(entity.name),
+                    "segments": [
+                        [round(segment.span.start, 6), round(segment.span.end, 6)] for segment in entity.segments
+                    ],
+                    "offset_spread": round(entity.offset_spread, 6),
+                    "neutral_context": list(entity.neutral),
+                }
+                for entity in enriched.entities
+            ],
+            "gap_before": before,
+            "gap_after": after,
+            "shifts": [
+                {
+                    name: round(value, 6) if isinstance(value, float) else value
+                    for name, value in structs.asdict(one).items()
+                }
+                for one in self.shifts
+            ],
+            "notes": [asdict(note) for note in enriched.motion.notes],
+            "warnings": list(self.warnings),
+            "provenance": asdict(self.provenance) | {"profiles": profiles},
+        }
 
     def plot(self) -> Figure | None:
         """Nominal beside enriched paths, across the road over along it; None when no entity is on a road."""

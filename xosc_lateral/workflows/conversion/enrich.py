@@ -62,48 +62,26 @@ def enrich(
 ) -> Enriched:
     """Enrich a played scenario.
 
-    Parameters
-    ----------
-    motion : NominalMotion
-    network : RoadNetwork
-        The one that it was played on.
-    drivers : mapping of entity name to DriverProfile or str
-        A profile, or the reason why the entity is not enriched; an entity that is absent is not enriched.
-    seed, variant : int
-        Together with `entropy` and the entity's name they seed each entity's own random numbers, so that adding an
-        entity changes no other's offsets.
-    entropy : mapping of entity name to sequence of int, optional
-        Further seed words of each entity.
-    context : mapping of str to (time, values), optional
-        Context that the scenario doesn't state, or that replaces what it states; the same for all entities. [s]
-    trailers : mapping of str to str, optional
-        Entity that is pulled -> entity that pulls it: it follows in the tractor's track.
-    attempts : int
-        Sample anew up to so many times while vehicles touch or leave their lane that nominally don't; the best is kept.
-    neighbours : Neighbours
-        `profile`: every vehicle answers to those beside it as its profile alone has it. `borrow`: neighbours give way
-        to each other by a population's law, too, where a profile's answer is not known (`give_way`). `none`: nobody
-        answers to anybody beside him.
-    with_sensor : bool
-        Add what the sensor added to the drives that each profile was fitted on. Nobody drives that: it is added after
-        drivers have given way and after what nobody could drive was smoothed.
-    uncertain : collection of str
-        Entities whose motion will be another one, since it depends on a vehicle under test or a controller: nobody
-        responds to where they nominally are, nor do they to others.
-    heeds_controllers : bool
-        Where a controller of the player steers, nothing is sampled.
-    through : collection of str
-        Entities whose movement goes on through lane changes and lane offsets (`movement_runs`); that of the others
-        leads from the segment before to the one behind.
-    lane_changes : LaneChanges
-        The way across of those lane changes and lane offsets.
-    at_least : float
-        Time for which each segment is sampled, should it last longer in another run. [s]
+    - `drivers`: per entity a profile, or the reason why it is not enriched; as one that is absent
+    - `seed`, `variant`, `entropy`: with the entity's name they seed its own random numbers: adding an entity changes no
+      other's offsets; `entropy` holds further words of each entity
+    - `context`: what the scenario doesn't state, or replaces: times [s] and values, the same for all entities
+    - `trailers`: entity that is pulled -> its tractor, in whose track it follows
+    - `attempts`: sample anew up to so many times while vehicles touch or leave their lane that nominally don't; the
+      best is kept
+    - `neighbours`: `borrow`: neighbours give way to each other by a population's law, too, where a profile's answer is
+      not known (`give_way`)
+    - `with_sensor`: add what the sensor added to the drives that each profile was fitted on. Nobody drives that: it is
+      added after drivers have given way and after what nobody could drive was smoothed
+    - `uncertain`: entities whose motion will be another one, since it depends on a vehicle under test or a controller:
+      nobody responds to where they nominally are, nor do they to others
+    - `heeds_controllers`: where a controller of the player steers, nothing is sampled
+    - `through`: entities whose movement goes on through lane changes and lane offsets (`movement_runs`); that of the
+      others leads from the segment before to the one behind
+    - `lane_changes`: the way across of those lane changes and lane offsets
+    - `at_least`: for which each segment is sampled, should it last longer in another run [s]
 
-    Raises
-    ------
-    DriverProfileError
-        When the sensor is asked for and a profile knows of none.
+    Raises `DriverProfileError`: the sensor is asked for and a profile knows of none.
     """
     trailers, words = trailers or {}, entropy or {}
     run = (_kept_run if _is_small(motion) else _Run)(
@@ -180,15 +158,15 @@ class _Drawn:
         )
         aside = [beside_written(self.motion, one) for one in self.crossings if self.lifelike and not one.stays]
         if rows is not None:
-            found = through(distance[rows])
+            offsets = through(distance[rows])
             for part, values in aside:
                 inside = (rows >= part.start) & (rows < part.stop)
-                found[inside] += values[rows[inside] - part.start]
-            return found
-        found = columns(len(distance), ([through(distance[part])] for part in blocks(len(distance))))[0]
+                offsets[inside] += values[rows[inside] - part.start]
+            return offsets
+        offsets = columns(len(distance), ([through(distance[part])] for part in blocks(len(distance))))[0]
         for part, values in aside:
-            found[part] += values
-        return found
+            offsets[part] += values
+        return offsets
 
 
 KEPT_ROWS = 100_000
@@ -197,17 +175,7 @@ for two minutes then keeps about 10 MB. [-]"""
 
 
 class _Run:
-    """What all variants of a run have in common.
-
-    Parameters
-    ----------
-    motion : NominalMotion
-    network : RoadNetwork
-    pulled, uncertain, through : set of str
-        Entities: trailers; those whose place is not certain; those whose movement goes on through lane changes.
-    neighbours : Neighbours
-    heeds_controllers : bool
-    """
+    """What all variants of a run have in common; for the arguments see `enrich`, `pulled` are its trailers."""
 
     def __init__(
         self,
@@ -270,8 +238,8 @@ def _draw(blank: _Drawn, driver: DriverProfile, seed: np.random.SeedSequence, wi
         offset = side * sampler.sample(segment, responses=responses)
         more = least - len(knots)
         beyond = side * sampler.copy().sample(going_on(segment, more)) if more > 0 else np.empty(0)
-        who = f"profile {driver.name} for {blank.motion.name!r}"
-        check_offsets(offset, segment.lane_width[segment.inside], who, segment.time[segment.inside])
+        subject = f"profile {driver.name} for {blank.motion.name!r}"
+        check_offsets(offset, segment.lane_width[segment.inside], subject, segment.time[segment.inside])
         error = stored(sensor_error(sensor, offset, SAMPLE_STEP, seed, part=len(samples)))
         samples.append(_Sample(spans, knots, stored(offset), error, beyond))
     return replace(blank, seen=blank.seen._replace(segments=()), samples=tuple(samples))
@@ -300,15 +268,17 @@ def _moved(sample: _Sample, rows: IntArray, move: FloatArray) -> _Sample:
     return sample._replace(offset=stored(sample.offset + np.interp(sample.knots, rows, move)))
 
 
-def _sampled(one: _Drawn, rows: IntArray) -> SampledVehicle:
+def _sampled(vehicle: _Drawn, rows: IntArray) -> SampledVehicle:
     """What its neighbours see of a vehicle on some rows: how it deviates, and where it could do so more."""
     deviation, can_move = np.zeros(len(rows)), np.zeros(len(rows), dtype=np.bool_)
-    if one.samples:
-        deviation = one.deviation(rows)
-        for sample in one.samples:
+    if vehicle.samples:
+        deviation = vehicle.deviation(rows)
+        for sample in vehicle.samples:
             for span in sample.spans:
                 can_move[(rows >= span.first) & (rows <= span.last)] = span.is_road_following
-    return SampledVehicle(one.motion, stored(deviation), stored(can_move), one.seen.responds, one.seen.alone)
+    return SampledVehicle(
+        vehicle.motion, stored(deviation), stored(can_move), vehicle.seen.responds, vehicle.seen.alone
+    )
 
 
 def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:

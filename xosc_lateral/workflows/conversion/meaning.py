@@ -108,8 +108,8 @@ class Meaning:
             yield scenario, self._played.motion
         else:
             yield scenario, play(scenario, self._played.network, step=self._step, time_limit=self.limit)
-        own = [float(one.speed[0]) for one in self._played.motion.entities if one.name in self._egos]
-        for speeds in _drives(max(own, default=0.0)) if self._egos else ():
+        initial = [float(one.speed[0]) for one in self._played.motion.entities if one.name in self._egos]
+        for speeds in _drives(max(initial, default=0.0)) if self._egos else ():
             driven = with_speeds(_ending_with(scenario, source), self._played.motion, self._egos, speeds)
             step = max(self._step, TRIAL_STEP)
             yield driven, play(driven, self._played.network, step=step, time_limit=self.limit)
@@ -120,13 +120,13 @@ class Meaning:
 
         source, network = self._played.scenario, self._played.network
         gone = {one.path for one in replaced_groups(source, trajectories)}
-        found, after = [], list(self._runs(scenario))
+        comparisons, after = [], list(self._runs(scenario))
         for number, ((driven, before), (_, run)) in enumerate(zip(self._before, after, strict=True)):
             kept = [one for one in before.actions if one.path[:3] not in gone and one.actor not in trajectories]
             own_end = number == 0 or not gone  # else stories that others wait for may be gone
             nominal = replace(before, actions=tuple(kept))
-            found.append(compare_runs(driven, network, nominal, run, ignored=trajectories, ends=own_end))
-        return found, after[0][1]
+            comparisons.append(compare_runs(driven, network, nominal, run, ignored=trajectories, ends=own_end))
+        return comparisons, after[0][1]
 
 
 def _ending_with(scenario: Scenario, source: Scenario) -> Scenario:
@@ -225,13 +225,7 @@ def keep_meaning(
 ) -> KeptChains:
     """Chains as large as leave what happens as it was.
 
-    Parameters
-    ----------
-    chains : sequence of OffsetChain
-    motion : NominalMotion
-        Without offsets: says which chain comes before a conflict.
-    attempt : callable
-        Writes with some chains and plays.
+    `motion`, without offsets, says which chain comes before a conflict; `attempt` writes with some chains and plays.
     """
     sizes: Sizes = {}
     trials = 1

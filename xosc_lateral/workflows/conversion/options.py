@@ -50,24 +50,24 @@ class Option:
     prefix: str = ""
     entry: Cell | None = None
 
-    def value(self, name: str, said: Any) -> Any:
+    def value(self, name: str, stated: Any) -> Any:
         """The field's value; `ValueError` with the option's name before it."""
         try:
-            return self.read(said)
+            return self.read(stated)
         except (TypeError, ValueError) as error:
             raise ValueError(f"{name} {error}") from error
 
     def of_row(self, name: str, before: Any, cells: Mapping[str, str], folder: Path) -> Any:
         """What a row of a table says, else what was said before."""
         try:
-            said = self.cell(cells[name], folder) if self.cell is not None and name in cells else None
+            stated = self.cell(cells[name], folder) if self.cell is not None and name in cells else None
         except ValueError as error:
             raise ValueError(f"{name} {error}") from error
         if self.entry is not None:
             keys = [key for key in cells if key.startswith(self.prefix)]
             entries = {key.removeprefix(self.prefix): self.entry(cells[key], folder) for key in keys}
-            said = {**before, **(said or {}), **entries}
-        return before if said is None else self.value(name, said)
+            stated = {**before, **(stated or {}), **entries}
+        return before if stated is None else self.value(name, stated)
 
 
 def option(
@@ -97,16 +97,16 @@ def options_of(settings: type) -> dict[str, Option]:
     return {item.name: item.metadata["option"] for item in settable(settings)}
 
 
-def values_of(settings: type, said: Mapping[str, Any]) -> dict[str, Any]:
+def values_of(settings: type, stated: Mapping[str, Any]) -> dict[str, Any]:
     """Values of fields from what a user says; None: nothing is said.
 
     Raises `TypeError`: there is no such option; `ValueError`: it can't have that value.
     """
     options = options_of(settings)
-    unknown = said.keys() - options.keys()
+    unknown = stated.keys() - options.keys()
     if unknown:
         raise TypeError(f"no option {min(unknown)!r}; there are {', '.join(options)}")
-    return {name: options[name].value(name, value) for name, value in said.items() if value is not None}
+    return {name: options[name].value(name, value) for name, value in stated.items() if value is not None}
 
 
 def spelled_out(settings: type) -> Callable[[Verb], Verb]:
@@ -114,7 +114,7 @@ def spelled_out(settings: type) -> Callable[[Verb], Verb]:
 
     def with_options(verb: Verb) -> Verb:
         signature = inspect.signature(verb)
-        own = [one for one in signature.parameters.values() if one.kind is not one.VAR_KEYWORD]
+        positional = [one for one in signature.parameters.values() if one.kind is not one.VAR_KEYWORD]
         named = [
             inspect.Parameter(
                 item.name,
@@ -124,7 +124,7 @@ def spelled_out(settings: type) -> Callable[[Verb], Verb]:
             )
             for item in settable(settings)
         ]
-        verb.__signature__ = signature.replace(parameters=[*own, *named])  # type: ignore[attr-defined]
+        verb.__signature__ = signature.replace(parameters=[*positional, *named])  # type: ignore[attr-defined]
         verb.__doc__ = _with_parameters(verb.__doc__ or "", settings)
         return verb
 
@@ -138,28 +138,28 @@ def _with_parameters(text: str, settings: type) -> str:
     return inspect.cleandoc(text).replace(f"options\n    `{settings.__name__}`.", parameters)
 
 
-def names(said: str | Collection[str]) -> frozenset[str]:
+def names(stated: str | Collection[str]) -> frozenset[str]:
     """Of entities; in a text they are separated by semicolons."""
-    listed = [name.strip() for name in said.split(";")] if isinstance(said, str) else said
+    listed = [name.strip() for name in stated.split(";")] if isinstance(stated, str) else stated
     return frozenset(name for name in listed if name)
 
 
-def egos(said: str | Collection[str]) -> frozenset[str]:
+def egos(stated: str | Collection[str]) -> frozenset[str]:
     """Vehicles under test; empty for "none"."""
-    found = names(said)
-    if NO_EGO in found and len(found) > 1:
-        raise ValueError(f"{', '.join(sorted(found))}: {NO_EGO!r} stands alone")
-    return found - {NO_EGO}
+    wanted = names(stated)
+    if NO_EGO in wanted and len(wanted) > 1:
+        raise ValueError(f"{', '.join(sorted(wanted))}: {NO_EGO!r} stands alone")
+    return wanted - {NO_EGO}
 
 
 def one_of(words: type[StrEnum]) -> Callable[[Any], StrEnum]:
     """One of some words; a list of one from the configuration, too."""
 
-    def read(said: Any) -> StrEnum:
+    def read(stated: Any) -> StrEnum:
         try:
-            return words(said[0] if isinstance(said, list) and len(said) == 1 else said)
+            return words(stated[0] if isinstance(stated, list) and len(stated) == 1 else stated)
         except ValueError as error:
-            raise ValueError(f"{said!r}, expected one of {', '.join(words)}") from error
+            raise ValueError(f"{stated!r}, expected one of {', '.join(words)}") from error
 
     return read
 
@@ -167,11 +167,11 @@ def one_of(words: type[StrEnum]) -> Callable[[Any], StrEnum]:
 def whole_number(smallest: int) -> Callable[[str | int], int]:
     """A whole number."""
 
-    def read(said: str | int) -> int:
+    def read(stated: str | int) -> int:
         try:
-            number = int(str(said).removesuffix(".0"))  # whole numbers with a missing one are often written as floats
+            number = int(str(stated).removesuffix(".0"))  # whole numbers with a missing one are often written as floats
         except ValueError as error:
-            raise ValueError(f"{said!r} is not a whole number") from error
+            raise ValueError(f"{stated!r} is not a whole number") from error
         if number < smallest:
             raise ValueError(f"{number}, at least {smallest}")
         return number
@@ -179,47 +179,47 @@ def whole_number(smallest: int) -> Callable[[str | int], int]:
     return read
 
 
-def seconds(said: str | float) -> float:
+def seconds(stated: str | float) -> float:
     """A length of time. [s]"""
-    number = float(said)
+    number = float(stated)
     if not 0.0 < number < math.inf:
-        raise ValueError(f"{said!r} s, expected more than 0")
+        raise ValueError(f"{stated!r} s, expected more than 0")
     return number
 
 
-def paths(said: Paths) -> tuple[Path, ...]:
+def paths(stated: Paths) -> tuple[Path, ...]:
     """One path or several."""
-    return (Path(said),) if isinstance(said, str | Path) else tuple(Path(path) for path in said)
+    return (Path(stated),) if isinstance(stated, str | Path) else tuple(Path(path) for path in stated)
 
 
-def profile(said: ProfileLike) -> str | DriverProfile:
+def profile(stated: ProfileLike) -> str | DriverProfile:
     """A profile, or its name or path."""
-    return str(said) if isinstance(said, Path) else said
+    return str(stated) if isinstance(stated, Path) else stated
 
 
-def profiles(said: Mapping[str, ProfileLike] | Collection[str]) -> dict[str, str | DriverProfile]:
+def profiles(stated: Mapping[str, ProfileLike] | Collection[str]) -> dict[str, str | DriverProfile]:
     """Entity -> profile."""
-    return {name: profile(value) for name, value in _pairs(said).items()}
+    return {name: profile(value) for name, value in _pairs(stated).items()}
 
 
-def texts(said: Mapping[str, object] | Collection[str]) -> dict[str, str]:
+def texts(stated: Mapping[str, object] | Collection[str]) -> dict[str, str]:
     """Name -> value."""
-    return {name: str(value) for name, value in _pairs(said).items()}
+    return {name: str(value) for name, value in _pairs(stated).items()}
 
 
-def _pairs(said: Mapping[str, Any] | Collection[str]) -> Mapping[str, Any]:
+def _pairs(stated: Mapping[str, Any] | Collection[str]) -> Mapping[str, Any]:
     """A mapping, or words ``NAME=VALUE``."""
-    if isinstance(said, Mapping):
-        return said
-    found: dict[str, str] = {}
-    for word in said:
+    if isinstance(stated, Mapping):
+        return stated
+    entries: dict[str, str] = {}
+    for word in stated:
         name, equals, value = word.partition("=")
         if not equals or not name:
             raise ValueError(f"{word!r}: expected NAME=VALUE")
-        if name in found:
+        if name in entries:
             raise ValueError(f"{name!r} is given twice")
-        found[name] = value
-    return found
+        entries[name] = value
+    return entries
 
 
 def as_it_is(text: str, _folder: Path) -> str:

@@ -9,8 +9,7 @@ import numpy as np
 
 from xosc_lateral.files.pages.page import KeyFigure, Page, Tone
 from xosc_lateral.workflows.conversion.consequences import followings_of
-from xosc_lateral.workflows.conversion.result import ConvertedScenario, Enriched, EntityResult
-from xosc_lateral.workflows.conversion.text import WRITTEN_AS, beside_text, under_test
+from xosc_lateral.workflows.conversion.result import WRITTEN_AS, ConvertedScenario, Enriched, EntityResult
 from xosc_lateral.workflows.playing import figures as figures
 from xosc_lateral.workflows.playing.figures import COMFORTABLE
 from xosc_lateral.workflows.playing.page import add_notes
@@ -54,7 +53,7 @@ def conversion_page(conversion: ConvertedScenario) -> str:
         f"The result is in `{(conversion.output or conversion.source).name}`."
     )
     page.key_figures(_key_figures(enriched, done))
-    page.lead(under_test(conversion))
+    page.lead(conversion.under_test)
     for warning in conversion.warnings:
         page.warning(warning)
     page.section(
@@ -96,7 +95,7 @@ def _provenance(conversion: ConvertedScenario) -> dict[str, object]:
         "under test": list(made.ego) or "none",
         "written as": [f"{name}: {WRITTEN_AS[mode]}" for name, mode in made.modes.items()],
         "neighbours": [
-            f"{one.name}: {beside_text(one.profile, made.options['neighbours'])}"
+            f"{one.name}: {one.beside(made.options['neighbours'])}"
             for one in conversion.movement.entities
             if one.is_enriched and one.profile is not None
         ],
@@ -174,13 +173,13 @@ def _add_dynamics(page: Page, enriched: Enriched, done: Sequence[EntityResult]) 
 
 def _add_lane_changes(page: Page, enriched: Enriched, done: Sequence[EntityResult]) -> None:
     """Those of vehicles on trajectories: the player draws the others."""
-    found = [(entity, one) for entity in done for one in entity.crossings if one.is_lane_change]
-    if not found:
+    changes = [(entity, one) for entity in done for one in entity.crossings if one.is_lane_change]
+    if not changes:
         return
     page.section("Lane changes")
-    more = f" The first {MOST_LANE_CHANGES} of {len(found)}." if len(found) > MOST_LANE_CHANGES else ""
+    more = f" The first {MOST_LANE_CHANGES} of {len(changes)}." if len(changes) > MOST_LANE_CHANGES else ""
     page.figure(
-        figures.lane_changes_over_time(enriched, found[:MOST_LANE_CHANGES]),
+        figures.lane_changes_over_time(enriched, changes[:MOST_LANE_CHANGES]),
         "Speed towards the new lane. Coloured: enriched, with the movement in the lane. Dashed: as written. Band: the "
         f"largest speed of 90 % of 323 lane changes of 6 to 13 s on one motorway.{more}",
         "Lateral speed over time of each lane change",

@@ -19,11 +19,18 @@ from xosc_lateral.workflows.conversion.meaning import meaning_of
 from xosc_lateral.workflows.conversion.result import LaneChanges
 from xosc_lateral.workflows.conversion.settings import ConvertSettings, OutputMode
 from xosc_lateral.world.scenario import Scenario
-from xosc_lateral.world.scenario.dependence import Dependence, actors_of, conditions_of, dependence
+from xosc_lateral.world.scenario.dependence import (
+    Control,
+    Dependence,
+    actors_of,
+    conditions_of,
+    controlled_entities,
+    dependence,
+    vehicles_under_test,
+)
 from xosc_lateral.world.scenario.enums import DynamicsShape
 from xosc_lateral.world.scenario.private_actions import LaneChangeAction
 from xosc_lateral.world.scenario.storyboard import Condition
-from xosc_lateral.world.scenario.under_test import Control, controlled_entities, vehicles_under_test
 
 LEAST_EXTENSION, LARGEST_EXTENSION = 1.3, 2.0
 """A vehicle under test may be later at what ends the run, or never come to it: others follow trajectories for so

@@ -67,15 +67,15 @@ def proofs_of(profile: DriverProfile, effects: Iterable[Effect] | None = None) -
     chosen = profile.effects if effects is None else tuple(effects)
     moving = [one for one in chosen if isinstance(one, ColumnEffect) and one.acts is Acts.LOCATION]
     converted: Converted = cache(partial(_deviations, profile))  # the same for every effect
-    return [found for effect in moving if (found := _proof(profile, effect, converted)) is not None]
+    return [proof for effect in moving if (proof := _proof(profile, effect, converted)) is not None]
 
 
 def _proof(profile: DriverProfile, effect: ColumnEffect, converted: Converted) -> Proof | None:
-    stretches = [(name, *one) for name in SCENARIOS for one in _stretches(name, effect)]
+    stretches = [(name, *stretch) for name in SCENARIOS for stretch in _stretches(name, effect)]
     if not stretches:
         return None
-    name, vehicle, rows, _ = max(stretches, key=lambda one: one[-1])
-    without = replace(profile, effects=tuple(one for one in profile.effects if one != effect))
+    name, vehicle, rows, _ = max(stretches, key=lambda stretch: stretch[-1])
+    without = replace(profile, effects=tuple(stretch for stretch in profile.effects if stretch != effect))
     shifts = (converted(name, vehicle) - _deviations(without, name, vehicle))[:, rows].mean(axis=1)
     driven = _played(name).motion.entities[vehicle]
     begin, end = driven.time[rows[[0, -1]]].tolist()
@@ -113,5 +113,5 @@ def _deviations(profile: DriverProfile, name: str, vehicle: int) -> FloatArray:
     """How far from the nominal path one vehicle drives in conversions, shape (seeds, rows). [m]"""
     played = _played(name)
     drivers = {played.motion.entities[vehicle].name: profile}
-    found = [enrich(played.motion, played.network, drivers, seed=k, neighbours=Neighbours.PROFILE) for k in SEEDS]
-    return np.array([one.entities[vehicle].deviation for one in found])
+    conversions = [enrich(played.motion, played.network, drivers, seed=k, neighbours=Neighbours.PROFILE) for k in SEEDS]
+    return np.array([one.entities[vehicle].deviation for one in conversions])

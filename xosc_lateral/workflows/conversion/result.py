@@ -12,15 +12,16 @@ import numpy as np
 from msgspec import Struct
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.drivers.fitting.neighbours import borrows, responses_in_words
 from xosc_lateral.drivers.model.drivability import Bound
-from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.drivers.model.profile import SIDES, DriverProfile
 from xosc_lateral.world.motion.crossings import Crossing
 from xosc_lateral.world.motion.gaps import Gap
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.world.motion.segments import SegmentSpan
 from xosc_lateral.world.motion.trajectory import WorldTrajectory, leaps
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario.under_test import Control
+from xosc_lateral.world.scenario.dependence import Control
 
 
 class Neighbours(StrEnum):
@@ -36,6 +37,10 @@ class LaneChanges(StrEnum):
 
     WRITTEN = "written"
     LIFELIKE = "lifelike"
+
+
+WRITTEN_AS = {"trajectory": "a trajectory", "lane-offset": "lane offsets"}
+"""Modes of vehicles in words."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -81,6 +86,14 @@ class EntityResult:
     def is_enriched(self) -> bool:
         """Whether offsets were sampled for it."""
         return bool(self.segments)
+
+    def beside(self, neighbours: str) -> str:
+        """How its driver responds to vehicles beside him, in a line."""
+        if self.profile is None or neighbours == Neighbours.NONE:
+            return "beside vehicles: does not move (--neighbours none)"
+        may_borrow = neighbours == Neighbours.BORROW
+        sides = [side for side in SIDES if may_borrow and borrows(self.profile, side)]
+        return responses_in_words(self.profile, sides)
 
     @property
     def segment_seconds(self) -> float:
@@ -188,32 +201,17 @@ def _jumps(entity: EntityResult) -> list[str]:
 
 
 class EventShift(Struct, frozen=True):
-    """One action of an event in both runs.
-
-    Parameters
-    ----------
-    event : str
-    entity : str or None
-        Its actor.
-    time, duration : float
-        Without offsets. [s]
-    start, end : float
-        How much later with offsets. [s]
-    unexplained_start, unexplained_end : float
-        What of that is not the way of a lateral action. [s]
-    lateral_speed : float
-        Of the entity with offsets when a lateral action begins, which ends it. [m/s]
-    """
+    """One action of an event in both runs, with and without offsets. [s]"""
 
     event: str
-    entity: str | None
-    time: float
-    duration: float
-    start: float
-    end: float
-    unexplained_start: float
+    entity: str | None  # its actor
+    time: float  # without offsets
+    duration: float  # without offsets
+    start: float  # how much later it starts with offsets
+    end: float  # how much later it ends
+    unexplained_start: float  # what of that is not the way of a lateral action
     unexplained_end: float
-    lateral_speed: float = 0.0
+    lateral_speed: float = 0.0  # of the entity with offsets when a lateral action begins, which ends it [m/s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -300,3 +298,14 @@ class ConvertedScenario:
         sides = (self.movement.gaps_before, self.movement.gaps_after)
         before, after = (min((gap.distance for gap in gaps), default=None) for gaps in sides)
         return before, after
+
+    @property
+    def under_test(self) -> str:
+        """Vehicles that are not the storyboard's: under test, or driven by controllers, in a line."""
+        lines = [f"under test, left as written: {', '.join(self.ego)}"] if self.ego else []
+        lines += [f"'{name}' is left to controller {control}" for name, control in self.controllers.items()]
+        if lines:
+            return "; ".join(lines)
+        return "no vehicle under test: " + (
+            "everything is replayed" if self.is_replay else "maneuvers that stay react to the run"
+        )

@@ -17,7 +17,7 @@ from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.rows import blocks, stored
 from xosc_lateral.base.segment import Segment
-from xosc_lateral.drivers.fitting.answers import basis_of
+from xosc_lateral.drivers.fitting.neighbours import basis_of
 from xosc_lateral.drivers.model.profile import COLUMNS, SIDES, Basis, DriverProfile
 from xosc_lateral.drivers.model.sampled_offsets import FUTURE, PAST
 from xosc_lateral.drivers.model.sampling import Responses, responses_to
@@ -158,12 +158,12 @@ def _filled(values: FloatArray, inside: slice) -> FloatArray:
 
 
 def _with_nobody_beside(segment: Segment) -> Segment:
-    nobody = {
+    emptied = {
         name: np.full_like(values, np.nan if name.endswith("distance") else 0.0)
         for name, values in segment.context.items()
         if name in NEIGHBOURS
     }
-    return replace(segment, context={**segment.context, **nobody})
+    return replace(segment, context={**segment.context, **emptied})
 
 
 def going_on(segment: Segment, rows: int) -> Segment:
@@ -187,15 +187,15 @@ def mirrored(segment: Segment) -> Segment:
 
 def mirrored_context(context: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     """Context columns with left and right exchanged; shapes and units as they are."""
-    found = {other_side(name): values for name, values in context.items()}
+    columns = {other_side(name): values for name, values in context.items()}
     for name in OTHER_SIGN:
-        if name in found:
-            found[name] = -found[name]
-    if "wind_direction" in found:
-        found["wind_direction"] = -found["wind_direction"] % 360.0
-    if "lane_index" in found and "lane_count" in found:
-        found["lane_index"] = found["lane_count"] - 1.0 - found["lane_index"]
-    return found
+        if name in columns:
+            columns[name] = -columns[name]
+    if "wind_direction" in columns:
+        columns["wind_direction"] = -columns["wind_direction"] % 360.0
+    if "lane_index" in columns and "lane_count" in columns:
+        columns["lane_index"] = columns["lane_count"] - 1.0 - columns["lane_index"]
+    return columns
 
 
 def other_side(name: str) -> str:

@@ -208,18 +208,18 @@ class ConvertSettings:
     @classmethod
     def of_record(cls, values: Mapping[str, Any], folder: Path) -> ConvertSettings:
         """Settings from what `record` gave; `ValueError` for a value that can't be."""
-        found: dict[str, Any] = {"step": float(values.get("step", STEP)), "names_may_lack": True}
-        if not LEAST_STEP <= found["step"] <= 1.0:
-            raise ValueError(f"step {found['step']} s is not within [{LEAST_STEP}, 1]")
-        for name, said in values.items():
-            one = OPTIONS.get(name)
-            if one is not None and said is not None:
-                if one.entry is not None:
-                    said = {key: one.entry(text, folder) for key, text in dict(said).items()}
-                elif one.cell is not None and isinstance(said, str):
-                    said = one.cell(said, folder)
-                found[name] = one.value(name, said)
-        return cls(**found)
+        settings: dict[str, Any] = {"step": float(values.get("step", STEP)), "names_may_lack": True}
+        if not LEAST_STEP <= settings["step"] <= 1.0:
+            raise ValueError(f"step {settings['step']} s is not within [{LEAST_STEP}, 1]")
+        for name, stated in values.items():
+            declared = OPTIONS.get(name)
+            if declared is not None and stated is not None:
+                if declared.entry is not None:
+                    stated = {key: declared.entry(text, folder) for key, text in dict(stated).items()}
+                elif declared.cell is not None and isinstance(stated, str):
+                    stated = declared.cell(stated, folder)
+                settings[name] = declared.value(name, stated)
+        return cls(**settings)
 
     @property
     def target(self) -> TargetPlayer:

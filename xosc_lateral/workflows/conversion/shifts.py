@@ -86,7 +86,7 @@ def compare_runs(
     then, now = _runs(before.actions), _runs(after.actions)
     shifts = _Shifts(scenario, network, before, after)
     changes: dict[str, Change] = {}
-    found = []
+    event_shifts = []
     for key, action in then.items():
         if action.start > before.end_time - EVENT_TOLERANCE:
             continue  # due in the last moments, it may come after the end just as well
@@ -96,7 +96,7 @@ def compare_runs(
                 changes.setdefault(what, Change(what, key[1], action.start, "no longer happens"))
             continue
         shift = shifts.of(key, action, now[key])
-        found.append(shift)
+        event_shifts.append(shift)
         for rest, moved, how in (
             (shift.unexplained_start, shift.start, "happens"),
             (shift.unexplained_end, shift.end, "is over"),
@@ -114,7 +114,7 @@ def compare_runs(
         if pair not in touching(before) and not set(pair) <= set(ignored):
             what = f"contact of '{pair[0]}' and '{pair[1]}' at {time:.1f} s"
             changes.setdefault(what, Change(what, pair[0], time, "is new"))
-    return Comparison(tuple(found), tuple(changes.values()))
+    return Comparison(tuple(event_shifts), tuple(changes.values()))
 
 
 def _later(moved: float) -> str:
@@ -130,14 +130,14 @@ def _named(key: Key, action: PlayedAction) -> str:
 
 def _runs(actions: Sequence[PlayedAction]) -> dict[Key, PlayedAction]:
     """Actions of the source's events, counted for those that run several times."""
-    found: dict[Key, PlayedAction] = {}
+    runs: dict[Key, PlayedAction] = {}
     numbers: dict[tuple[Path, str | None], int] = {}
     for played in actions:
         if played.path != ("Init",) and not played.path[0].startswith(STORY_PREFIX):
             number = numbers.get((played.path, played.actor), 0)
             numbers[played.path, played.actor] = number + 1
-            found[played.path, played.actor, number] = played
-    return found
+            runs[played.path, played.actor, number] = played
+    return runs
 
 
 class _Shifts:
@@ -196,13 +196,13 @@ class _Shifts:
 
     def _causes(self, conditions: Collection[Condition] | Iterator[Condition]) -> list[float]:
         """Shifts that conditions may pass on: of elements that they wait for, of entities that they look at."""
-        found, others = list[float](), 0
+        causes, others = list[float](), 0
         for condition in conditions:
             content = condition.content
             if isinstance(content, StoryboardElementStateCondition):
                 starts = content.state in (StoryboardElementState.START_TRANSITION, StoryboardElementState.RUNNING)
                 known = self._starts if starts else self._over
-                found += [shift for path, shift in known.items() if refers_to(content, path)]
+                causes += [shift for path, shift in known.items() if refers_to(content, path)]
                 continue
             others += 1
             looked_at = set(entity_references(content))
@@ -210,8 +210,8 @@ class _Shifts:
                 looked_at |= set(condition.triggering_entities.entity_refs)
             moved = [abs(shift) for name in looked_at for shift in self._of_entity.get(name, ())]
             far = PASSED_ON * max(moved, default=0.0)
-            found += np.arange(-far, far, EVENT_TOLERANCE / 5.0).tolist()
-        return found if found and not others else [*found, 0.0]
+            causes += np.arange(-far, far, EVENT_TOLERANCE / 5.0).tolist()
+        return causes if causes and not others else [*causes, 0.0]
 
     def _longer(self, then: PlayedAction, now: PlayedAction) -> list[float]:
         """By how much longer the action may last for its way. [s]"""
@@ -254,13 +254,13 @@ def _nearest(shift: float, causes: Sequence[float]) -> float:
 
 def _triggers_of(scenario: Scenario) -> dict[Path, tuple[Condition, ...]]:
     """Conditions that the start of each event waits for."""
-    found: dict[Path, tuple[Condition, ...]] = {}
+    conditions: dict[Path, tuple[Condition, ...]] = {}
     for story, act, group in scenario.storyboard.groups():
         for maneuver, event in group.events():
             triggers: tuple[Trigger | None, ...] = (act.start_trigger, event.start_trigger)
             path = (story.name, act.name, group.name, maneuver.name, event.name)
-            found[path] = tuple(condition for trigger in triggers for condition in conditions_of(trigger))
-    return found
+            conditions[path] = tuple(condition for trigger in triggers for condition in conditions_of(trigger))
+    return conditions
 
 
 def _other_order(then: Mapping[Key, PlayedAction], now: Mapping[Key, PlayedAction]) -> Iterator[Change]:
@@ -296,10 +296,10 @@ def _last_lanes(entity: EntityMotion, end: float) -> list[int]:
 
 def largest_of(comparisons: Sequence[Comparison]) -> tuple[EventShift, ...]:
     """Each event once, with its largest shift over several pairs of runs, in order of time."""
-    found: dict[tuple[str, str | None], EventShift] = {}
+    largest: dict[tuple[str, str | None], EventShift] = {}
     for shift in (one for comparison in comparisons for one in comparison.shifts):
         key = shift.event, shift.entity
         size = max(abs(shift.start), abs(shift.end))
-        if key not in found or size > max(abs(found[key].start), abs(found[key].end), -inf):
-            found[key] = shift
-    return tuple(sorted(found.values(), key=lambda one: one.time))
+        if key not in largest or size > max(abs(largest[key].start), abs(largest[key].end), -inf):
+            largest[key] = shift
+    return tuple(sorted(largest.values(), key=lambda shift: shift.time))

@@ -7,10 +7,12 @@ from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 
+from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.atomic import write_atomically
+from xosc_lateral.files.output_paths import claim, output_folder
 from xosc_lateral.workflows.live.c_numbers import inputs_of, numbers_of
 
 
@@ -19,39 +21,57 @@ def identifier(profile: DriverProfile) -> str:
     return "driver_" + re.sub(r"[^0-9A-Za-z]", "_", profile.name)
 
 
-def export_c(profile: DriverProfile, folder: str | Path) -> list[Path]:
+def export_c(profile: DriverProfile, folder: str | Path, *, force: bool = False) -> list[Path]:
     """Write a driver as C99: header, source, the profile's numbers, a CMake file and an example loop.
 
     Parameters
     ----------
     profile : DriverProfile
     folder : path
-        Made where there is none; files of the same names are replaced.
+        Made where there is none.
+    force : bool
+        Replace files of the same names.
 
-    Raises `DriverProfileError` if the profile has an effect or a core model of a plug-in.
+    Raises `DriverProfileError` if the profile has an effect or a core model of a plug-in; `FormatError` if a file is
+    there.
     """
     texts = c_sources(profile) | {name: filled(name, profile) for name in ("CMakeLists.txt", "example.c")}
-    written = [Path(folder) / name for name in texts]
+    written = [output_folder(folder) / name for name in texts]
+    claim(written, force=force)
     Path(folder).mkdir(parents=True, exist_ok=True)
     for path, text in zip(written, texts.values(), strict=True):
         write_atomically(path, text.encode())
     return written
 
 
+def _fields(profile: DriverProfile) -> dict[str, str]:
+    """What columns are called in C: other names than the usual begin with x_, and so are no words of C.
+
+    Raises `DriverProfileError` where two have the same.
+    """
+    columns: dict[str, str] = {}
+    for column in inputs_of(profile):
+        field = column if column in CONTEXT_UNITS else "x_" + re.sub(r"[^0-9A-Za-z]", "_", column)
+        if field in columns:
+            raise DriverProfileError(f"profile {profile.name}: {columns[field]!r} and {column!r} are both {field} in C")
+        columns[field] = column
+    return {column: field for field, column in columns.items()}
+
+
 def c_sources(profile: DriverProfile) -> dict[str, str]:
     """Header, source and numbers of a driver, by file name."""
-    name = identifier(profile)
+    name, fields = identifier(profile), _fields(profile)
     sizes, numbers = numbers_of(profile)
     words = {
-        "WHAT": f"Driver {profile.name} of xosc-lateral {__version__}, in C99.",
+        "WHAT": f"Driver {re.sub(r'[^ -.0-~]', '_', profile.name)} of xosc-lateral {__version__}, in C99.",
         "SIZES": "\n".join(f"#define DRIVER_{key} {value}" for key, value in sizes.items()),
         "MEMORY": str(_memory(sizes)),
         "PREVIEW": repr(round(sizes["LOOKS"] * profile.model.step, 9)),
-        "INPUTS": "\n".join(_input(column) for column in inputs_of(profile)),
+        "INPUTS": "\n".join(_input(column, field) for column, field in fields.items()),
         "KNOWN": "\n".join(
-            f"#define DRIVER_KNOWS_{column} UINT64_C({1 << k})" for k, column in enumerate(inputs_of(profile))
+            f"#define DRIVER_KNOWS_{field} UINT64_C({1 << k})" for k, field in enumerate(fields.values())
         ),
-        "ALL_KNOWN": str((1 << len(inputs_of(profile))) - 1),
+        "ALL_KNOWN": str((1 << len(fields)) - 1),
     }
     return {
         f"{name}.h": filled("driver.h", profile, words),
@@ -72,9 +92,8 @@ def _named(text: str, profile: DriverProfile) -> str:
     return re.sub(r"\bDRIVER(?=_|\.h|\b)", identifier(profile), text)
 
 
-def _input(column: str) -> str:
-    unit = CONTEXT_UNITS.get(column, "as in the profile")
-    return f"    double {column}; /* [{unit}] */"
+def _input(column: str, field: str) -> str:
+    return f"    double {field}; /* [{CONTEXT_UNITS.get(column, 'as in the profile')}] */"
 
 
 def _memory(sizes: Mapping[str, int]) -> int:

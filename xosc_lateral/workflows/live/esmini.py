@@ -28,6 +28,7 @@ from xosc_lateral.workflows.live.traffic import Moment, Traffic
 from xosc_lateral.world.motion.deviation import SETTLING_TIME, settle
 from xosc_lateral.world.scenario import Scenario
 from xosc_lateral.world.scenario.controllers import Domains
+from xosc_lateral.world.scenario.dependence import controlled_entities
 from xosc_lateral.world.scenario.private_actions import (
     FollowTrajectoryAction,
     LaneChangeAction,
@@ -35,7 +36,6 @@ from xosc_lateral.world.scenario.private_actions import (
     LateralDistanceAction,
     TeleportAction,
 )
-from xosc_lateral.world.scenario.under_test import controlled_entities
 from xosc_lateral.world.surroundings.moment import OpenDriveRoads, Places
 
 LATERAL = (LaneChangeAction, LaneOffsetAction, LateralDistanceAction, FollowTrajectoryAction, TeleportAction)

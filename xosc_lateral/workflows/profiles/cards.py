@@ -14,7 +14,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, MovementSummary, figures_of
 from xosc_lateral.drivers.evaluation.metrics import free_runs
 from xosc_lateral.drivers.evaluation.spectra import spectrum
-from xosc_lateral.drivers.fitting.answers import basis_of, responses_in_words
+from xosc_lateral.drivers.fitting.neighbours import basis_of, responses_in_words
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.drivers.model.profile import SIDES, DriverProfile, Provenance
 from xosc_lateral.files.pages.chart import SAMPLED
@@ -50,15 +50,11 @@ def list_text(entries: Sequence[Entry]) -> str:
 
 def _list_line(name: str, profile: DriverProfile, width: int) -> str:
     known, tags = profile.provenance, "".join(f"#{tag} " for tag in profile.metadata.tags)
+    licence = f" [{profile.metadata.licence}]" if profile.metadata.licence else ""
     return (
         f"{name:{width}s}  {profile.model.kind:14s} {known.hours:6.2f} h  {known.drives:4d} drives  "
-        f"{len(profile.effects)} effects  {tags}{noted(profile) or known.source}{_licence_note(profile)}"
+        f"{len(profile.effects)} effects  {tags}{noted(profile) or known.source}{licence}"
     ).rstrip()
-
-
-def _licence_note(profile: DriverProfile) -> str:
-    licence = profile.metadata.licence
-    return f" [{licence}]" if licence else ""
 
 
 def list_record(entries: Sequence[Entry]) -> list[dict[str, Any]]:
@@ -76,15 +72,8 @@ def list_record(entries: Sequence[Entry]) -> list[dict[str, Any]]:
 
 
 def _listed(profile: DriverProfile) -> dict[str, Any]:
-    known = profile.provenance
-    return {
-        **_identity(profile),
-        "hours": known.hours,
-        "drives": known.drives,
-        "effects": len(profile.effects),
-        "notes": known.notes,
-        "source": known.source,
-    }
+    known = {name: getattr(profile.provenance, name) for name in ("hours", "drives", "notes", "source")}
+    return {**_identity(profile), **known, "effects": len(profile.effects)}
 
 
 def _identity(profile: DriverProfile) -> dict[str, Any]:

@@ -39,6 +39,8 @@ def evaluate(
 ) -> Evaluation:
     """Score a profile beside other real drivers, and by the paper's four evaluations.
 
+    Raises `NotEnoughDataError`: Too little is left after cutting to compare.
+
     Parameters
     ----------
     profile : DriverProfile, path or name
@@ -50,11 +52,6 @@ def evaluate(
         Train classifiers to separate sampled and measured (extra `classifier`; a minute or two for some hours).
     library : path or paths
         Folders with further profiles.
-
-    Raises
-    ------
-    NotEnoughDataError
-        Too little is left after cutting to compare.
     """
     from xosc_lateral.drivers.drives.cuts import all_runs
     from xosc_lateral.drivers.evaluation.scores import score_profile

@@ -110,18 +110,16 @@ def evaluation_record(scores: ProfileScores, profile: DriverProfile, inputs: Map
 def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mapping[str, str]) -> str:
     """HTML page: scores beside those of real drivers, violins, spectra, and traces; same scores, same bytes."""
     page = Page(f"Evaluation of {scores.profile}")
+    verdict = scores.verdict.in_words()
     page.lead(
-        f"{scores.hours:.1f} h of measured driving ({scores.drives} drives), compared with offsets sampled from the "
-        f"profile `{scores.profile}` under the same context. Distances are Wasserstein distances in units of the "
-        "measured metric's standard deviation. Beside each stands the distance between real drivers: of measured data "
-        "from other measured data."
+        f"{verdict[:1].upper()}{verdict[1:]}. {scores.verdict.alarm_words().capitalize()}.",
+        f"{scores.hours:.1f} h of measured driving ({scores.drives} drives), beside offsets sampled from "
+        f"`{scores.profile}` under the same context. It is valid for: {profile.validity.in_words() or 'not stated'}.",
     )
     worst, ratio = worst_block(scores)
     worst_figure = KeyFigure(
         f"{ratio:.2f}", f"worst comparison: {worst}", "1: as close as other real drivers", _tone(ratio)
     )
-    page.text(f"Verdict: {scores.verdict.in_words()}. {scores.verdict.alarm_words().capitalize()}.")
-    page.text(f"The profile is valid for: {profile.validity.in_words() or 'not stated'}.")
     page.key_figures([worst_figure, *_key_figures(scores.realism)])
     if _fitted_on(profile, inputs):
         page.warning(FITTED)
@@ -152,7 +150,14 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         "Beyerer, 2024) and those of the profile are combined. Evaluation (1) combines the measured coarse part with "
         "the measured fine part, shifted in time: the best that the split allows.",
     )
-    page.table([_part_row(each) for each in scores.evaluations])
+    page.table(
+        [
+            {"evaluation": f"({each.number})", "coarse part": each.coarse, "fine part": each.fine}
+            | {"mean distance": each.distances.mean}
+            | {LABELS[name]: each.distances.by_metric[name] for name in ("std", "range", "diff_mean", "diff_std")}
+            for each in scores.evaluations
+        ]
+    )
     for each in scores.evaluations[:3]:
         _add_violins(page, each, f"({each.number}) Coarse part {each.coarse}, fine part {each.fine}.")
     page.section("Spectrum and autocorrelation")
@@ -184,12 +189,13 @@ def _add_realism(page: Page, realism: Realism) -> None:
     """The fair measure, and lane keeping."""
     page.section(
         "Compared with other real drivers",
-        "Differences between sampled and measured driving, divided by the differences between measured drivers: a "
-        "ratio of 1 is as close as other real drivers are. Where sampled snippets start at the measured offset, so do "
-        "the other drivers' snippets; free runs have no given start. Recordings contain the driver and the sensor. A "
-        "classifier that does not separate sampled from measured snippets has an AUC of 0.5; in brackets, the 95 % "
-        "interval over resampled drives. With context, the classifier also sees what was around the vehicle. A context "
-        "column that follows from the vehicle's own movement, such as its steering angle, gives sampled movement away.",
+        "Differences between sampled and measured driving (Wasserstein distances in units of the measured metric's "
+        "standard deviation), divided by those between measured drivers: 1 is as close as other real drivers are. "
+        "Where sampled snippets start at the measured offset, so do the other drivers'; free runs have no given start. "
+        "Recordings contain the driver and the sensor. A classifier that does not separate sampled from measured "
+        "snippets has an AUC of 0.5; in brackets, the 95 % interval over resampled drives. With context, it also sees "
+        "what was around the vehicle; a column that follows from the vehicle's own movement, such as its steering "
+        "angle, gives sampled movement away.",
     )
     for heading, group in condition_groups(realism).items():
         page.table(ratio_rows(group), heading)
@@ -214,17 +220,6 @@ def _add_violins(page: Page, each: PartEvaluation, caption: str) -> None:
         f"{caption} Bars: minimum, mean, maximum.",
         f"Ten pairs of violins; mean distance {each.distances.mean:.3f}.",
     )
-
-
-def _part_row(each: PartEvaluation) -> dict[str, object]:
-    shown = ("std", "range", "diff_mean", "diff_std")
-    return {
-        "evaluation": f"({each.number})",
-        "coarse part": each.coarse,
-        "fine part": each.fine,
-        "mean distance": each.distances.mean,
-        **{LABELS[name]: each.distances.by_metric[name] for name in shown},
-    }
 
 
 def _metric_rows(scores: SnippetScores) -> list[tuple[str, float, float]]:

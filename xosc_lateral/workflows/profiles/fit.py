@@ -18,6 +18,9 @@ PRIOR = "rural"
 def read_drives(drives: DrivesLike, columns: MappingLike | None = None) -> list[Drive]:
     """Read and clean drive tables.
 
+    Raises `FormatError`: A column is missing, or its values can't be in the unit meant; `NotEnoughDataError`: A table
+    without two rows of time, offset and lane width.
+
     Parameters
     ----------
     drives : path, DataFrame, Drive, or sequence of them
@@ -25,13 +28,6 @@ def read_drives(drives: DrivesLike, columns: MappingLike | None = None) -> list[
         `drive` when there are several; every other numeric column is context.
     columns : mapping of str to str, TableMapping, or path, optional
         Standard name -> foreign header, with a unit if need be: ``{"speed": "v_kmh:km/h"}``.
-
-    Raises
-    ------
-    FormatError
-        A column is missing, or its values can't be in the unit meant.
-    NotEnoughDataError
-        A table without two rows of time, offset and lane width.
     """
     return given_drives(drives, columns).drives
 
@@ -54,6 +50,8 @@ def fit(
 ) -> DriverProfile:
     """Fit a driver profile.
 
+    Raises `FormatError`, `NotEnoughDataError`, `DriverProfileError`.
+
     Parameters
     ----------
     drives, columns
@@ -72,23 +70,16 @@ def fit(
     left_hand : bool
         The drives are of left-hand traffic: roads with right-hand traffic get their mirror image.
     neighbours : bool, optional
-        Whether the profile holds how drivers keep away from vehicles beside them, from `left_distance` and
-        `right_distance`: of 30 drives that had somebody there, or of fewer that are taken as one driver's and say it
-        surely enough; not in the two-level model. None: where it can
-        be fitted; True: or an error says why not; False: in no case.
+        Whether the profile holds how drivers keep away from vehicles beside them; not in the two-level model. None:
+        where it can be fitted; True: or an error says why not; False: in no case.
     valid_below : float, optional
         Frequency below which drives show driving whose tables do not state it (column `valid_below`): tracks that their
         provider smoothed. [Hz]
     prior : DriverProfile, path or name, optional
-        Whose fast movement the profile has above the band that the drives show: `rural` of the library where tables
-        state a band below 0.5 Hz and no other table has one above it. Another one also where the sensor hides the
-        driver. None: none.
+        Whose fast movement the profile has above the band that the drives show: `rural` where tables state a band
+        below 0.5 Hz and no other table has one above it, another one also where the sensor hides the driver.
     library : path or paths
         Folders with further profiles.
-
-    Raises
-    ------
-    FormatError, NotEnoughDataError, DriverProfileError
     """
     from msgspec.structs import replace
 

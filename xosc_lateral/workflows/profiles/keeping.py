@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +16,7 @@ from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths
 def remove_profiles(names: Sequence[PathLike], library: Paths = ()) -> tuple[Path, ...]:
     """Delete the files of profiles of your own, all or none; those that can't be read go by their id only.
 
-    Raises
-    ------
-    FormatError
-        One comes with the package or another, or the file of a path is no profile.
+    Raises `FormatError`: One comes with the package or another, or the file of a path is no profile.
     """
     from xosc_lateral.files import profiles
     from xosc_lateral.files.source import edit_in_place
@@ -40,10 +37,7 @@ def rename_profile(name: PathLike, new: str, library: Paths = (), *, force: bool
     Its hash changes with its id: outputs that used it state the former one. Also for a file that is called other than
     the id in it.
 
-    Raises
-    ------
-    FormatError
-        It comes with the package or another, can't be read, or there is a profile of the new id.
+    Raises `FormatError`: It comes with the package or another, can't be read, or there is a profile of the new id.
     """
     from xosc_lateral.files import profiles
     from xosc_lateral.files.source import edit_in_place
@@ -95,20 +89,14 @@ class ProfileUses(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them."""
-        outputs = [
-            {
-                "output": str(use.output),
-                "entities": list(use.entities),
-                "sha256": use.sha256,
-                "is_current": use.is_current,
-            }
-            for use in self.uses
-        ]
+        outputs = [{**asdict(use), "output": str(use.output), "entities": list(use.entities)} for use in self.uses]
         return {"id": self.name, "outputs": outputs}
 
 
 def find_uses(name: str, outputs: Paths, library: Paths = ()) -> ProfileUses:
     """Look a profile up in the manifests of batches.
+
+    Raises `FormatError`: A folder without a manifest.
 
     Parameters
     ----------
@@ -116,11 +104,6 @@ def find_uses(name: str, outputs: Paths, library: Paths = ()) -> ProfileUses:
         Its id; it need not be in the library any more.
     outputs : path or paths
         Folders that batches wrote, or their manifests.
-
-    Raises
-    ------
-    FormatError
-        A folder without a manifest.
     """
     from xosc_lateral.files.profiles import profile_hash, read_profile
 

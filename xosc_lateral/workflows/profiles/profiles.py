@@ -24,6 +24,9 @@ PROFILE_SUFFIXES = (".json",)
 def read_profile(profile: PathLike, library: Paths = ()) -> DriverProfile:
     """Read a profile by its path or its name.
 
+    Raises `DriverProfileError`: No profile of that name; lists those that are there; `FormatError`: The file is not
+    there, or no valid profile.
+
     Parameters
     ----------
     profile : str or Path
@@ -31,13 +34,6 @@ def read_profile(profile: PathLike, library: Paths = ()) -> DriverProfile:
         ``XOSC_LATERAL_LIBRARY`` and of the configuration file, among those of plug-ins and those shipped.
     library : path or paths
         Folders with further profiles.
-
-    Raises
-    ------
-    DriverProfileError
-        No profile of that name; lists those that are there.
-    FormatError
-        The file is not there, or no valid profile.
     """
     return given_profile(profile, library)
 
@@ -45,10 +41,7 @@ def read_profile(profile: PathLike, library: Paths = ()) -> DriverProfile:
 def write_profile(profile: DriverProfile, path: PathLike, *, force: bool = False) -> Path:
     """Write a profile file; in a folder it is called after the profile. Same profile, same bytes.
 
-    Raises
-    ------
-    FormatError
-        The file is there and no profile that this package wrote.
+    Raises `FormatError`: The file is there and no profile that this package wrote.
     """
     from xosc_lateral.files import profiles
 
@@ -75,6 +68,9 @@ def derive_profile(
 ) -> Derived:
     """A driver from stated figures: what a profile does, made larger, slower or elsewhere until it has them.
 
+    Raises `DriverProfileError`: If figures contradict each other, are too far from the base's, or no car could drive
+    them.
+
     Parameters
     ----------
     base : DriverProfile, path or name
@@ -87,11 +83,6 @@ def derive_profile(
         Folders with further profiles.
     **asked
         Fields of `fitting.stated_figures.Asked`: ``sdlp=0.25``.
-
-    Raises
-    ------
-    DriverProfileError
-        If figures contradict each other, are too far from the base's, or no car could drive them.
     """
     from dataclasses import replace
 
@@ -144,6 +135,8 @@ def add_profile(
 ) -> Path:
     """Put a profile into a library's folder, under its id, with tags and metadata.
 
+    Raises `FormatError`: There is a profile of that id.
+
     Parameters
     ----------
     profile : DriverProfile, path or name
@@ -157,11 +150,6 @@ def add_profile(
         `version`, `driver`, `vehicle`, `road`, `country`, `date`, `licence`.
     force : bool
         Replace a profile of that id.
-
-    Raises
-    ------
-    FormatError
-        There is a profile of that id.
     """
     from xosc_lateral.files import profiles
     from xosc_lateral.files.profiles import described
@@ -185,10 +173,7 @@ def tag_profile(
 ) -> DriverProfile:
     """Change tags and metadata of a profile in its file.
 
-    Raises
-    ------
-    FormatError
-        It comes with the package, or can't be read.
+    Raises `FormatError`: It comes with the package, or can't be read.
     """
     from xosc_lateral.files import profiles
     from xosc_lateral.files.profiles import described, own_path

@@ -91,18 +91,13 @@ def _unknown_columns(profile: DriverProfile, drives: Sequence[Drive]) -> list[st
     """
     lacking: dict[tuple[str, ...], list[str]] = {}
     for column in profile.columns:
-        names = tuple(d.name for d in drives if column not in _known(d))
+        names = tuple(d.name for d in drives if column not in {"lane_width", *d.context, *d.empty})
         lacking.setdefault(names, []).append(column)
-    warnings = [
+    return [
         _neutral(f"drive {names[0]}" if len(names) == 1 else f"{len(names)} of {len(drives)} drives", columns)
         for names, columns in lacking.items()
         if names
     ]
-    return warnings
-
-
-def _known(drive: Drive) -> set[str]:
-    return {"lane_width", *drive.context, *drive.empty}
 
 
 def _neutral(where: str, columns: Sequence[str]) -> str:

@@ -58,16 +58,16 @@ def brakings(plan: VehiclePlan) -> list[int]:
 
 def encounters(plans: Sequence[VehiclePlan], network: RoadNetwork) -> tuple[Encounter, ...]:
     """All lane changes and brakings, in order of time."""
-    found = list[Encounter]()
+    met = list[Encounter]()
     for plan in plans:
-        for one, lane in zip(plan.lateral.transitions, plan.targets, strict=True):
-            if one.lanes:
-                time, side = one.start + 0.5 * one.duration, "left" if one.lanes > 0 else "right"
+        for transition, lane in zip(plan.lateral.transitions, plan.targets, strict=True):
+            if transition.lanes:
+                time, side = transition.start + 0.5 * transition.duration, "left" if transition.lanes > 0 else "right"
                 beside = _beside(plan, plans, time, network, lane)
-                found.append(Encounter("lane change", plan.name, time, side, *beside))
+                met.append(Encounter("lane change", plan.name, time, side, *beside))
         for time in plan.speed.time[brakings(plan)].tolist():
-            found.append(Encounter("braking", plan.name, time, "", *_beside(plan, plans, time, network, None)))
-    return tuple(sorted(found, key=lambda one: (one.time, one.vehicle)))
+            met.append(Encounter("braking", plan.name, time, "", *_beside(plan, plans, time, network, None)))
+    return tuple(sorted(met, key=lambda transition: (transition.time, transition.vehicle)))
 
 
 def _row(plan: VehiclePlan, time: float) -> int | None:
@@ -100,8 +100,8 @@ def _beside(
     row = _row(plan, time)
     if row is None:
         return None, None
-    road, own, way = _lane(plan, row, network)
-    wanted = road, own if lane is None else lane, way
+    road, here_lane, way = _lane(plan, row, network)
+    wanted = road, here_lane if lane is None else lane, way
     at = np.array([time])
     here, speed = way * float(_along(plan, at)[0]) + plan.vehicle.centre, _speed(plan, time)
     best: list[Beside | None] = [None, None]
@@ -124,11 +124,13 @@ def relative_triggers(
 ) -> tuple[dict[int, RelativeTrigger], dict[int, RelativeTrigger]]:
     """Triggers that the plans bear out: of transitions by their number, of brakings by their corner's."""
     changes, braking = dict[int, RelativeTrigger](), dict[int, RelativeTrigger]()
-    for k, (one, lane) in enumerate(zip(plan.lateral.transitions, plan.targets, strict=True)):
-        if one.lanes:
-            _, behind = _beside(plan, plans, one.start, network, lane)
-            ahead, _ = _beside(plan, plans, one.start, network, None)
-            if trigger := _trigger(plan, behind, plans, one.start) or _trigger(plan, ahead, plans, one.start):
+    for k, (transition, lane) in enumerate(zip(plan.lateral.transitions, plan.targets, strict=True)):
+        if transition.lanes:
+            _, behind = _beside(plan, plans, transition.start, network, lane)
+            ahead, _ = _beside(plan, plans, transition.start, network, None)
+            if trigger := _trigger(plan, behind, plans, transition.start) or _trigger(
+                plan, ahead, plans, transition.start
+            ):
                 changes[k] = trigger
     for k in brakings(plan):
         time = float(plan.speed.time[k])

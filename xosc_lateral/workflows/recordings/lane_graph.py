@@ -107,8 +107,7 @@ def neighbour_columns(
     *,
     scale: FloatArray | float = 1.0,
 ) -> dict[str, FloatArray]:
-    """Columns of leader and neighbours, see `find_neighbours`, at every instant, whoever is missing in a frame
-    included.
+    """Columns of leader and neighbours, see `find_neighbours`, at every instant, whoever misses a frame included.
 
     Rows sorted by vehicle and time, shape (n,); `piece`: -1: in no lane; `middle`: of the vehicle, along its piece. [m]
     `step`: usual from row to row. [s] `scale`: metres along the lane per metre of `middle`. [-]
@@ -168,21 +167,21 @@ def find_neighbours(
         best, truck = np.full(len(s), np.inf), np.zeros(len(s))
         for candidate in (after,) if ahead_only else (after, after - 1):
             inside = (candidate >= 0) & (candidate < len(axis)) & known
-            who = order[np.clip(candidate, 0, len(axis) - 1)]
-            free = np.maximum(scale * np.abs(s[who] - s) - 0.5 * (length[who] + length), 0.0)
-            gap = np.where(inside & (group[who] == target), free, np.inf)
+            other = order[np.clip(candidate, 0, len(axis) - 1)]
+            free = np.maximum(scale * np.abs(s[other] - s) - 0.5 * (length[other] + length), 0.0)
+            gap = np.where(inside & (group[other] == target), free, np.inf)
             closer = (gap < best) & (gap <= REACH)
-            best, truck = np.where(closer, gap, best), np.where(closer, is_truck[who], truck)
+            best, truck = np.where(closer, gap, best), np.where(closer, is_truck[other], truck)
         return np.where(there & known | np.isfinite(best), best, np.nan), truck
 
-    found = {
+    nearest_by_side = {
         "lead": nearest(group, known, ahead_only=True),
         "left": nearest(np.where(known, group + 1, -2), lane_on_left),
         "right": nearest(np.where(known & (lane > 0), group - 1, -2), lane_on_right),
     }
     return {
-        f"{who}_{what}": values
-        for who, both in found.items()
+        f"{other}_{what}": values
+        for other, both in nearest_by_side.items()
         for what, values in zip(("distance", "is_truck"), both, strict=True)
     }
 

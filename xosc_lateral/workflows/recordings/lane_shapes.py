@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
-from xosc_lateral.workflows.recordings.gate import LANE_AGREEMENT
+from xosc_lateral.workflows.recordings.cuts import LANE_AGREEMENT
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks
 from xosc_lateral.workflows.recordings.importers.tracks import PlacedTracks
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
@@ -103,13 +103,15 @@ def lane_graph(shapes: Sequence[LaneShape], left: IntArray, following: Sequence[
     """Lanes and how they hang together; what lies side by side on a curve has the same station."""
     facing = {}
     for number in np.flatnonzero(left >= 0).tolist():
-        for one, other in ((number, int(left[number])), (int(left[number]), number)):
-            shape = shapes[one]
+        for lane, other in ((number, int(left[number])), (int(left[number]), number)):
+            shape = shapes[lane]
             way = np.linspace(0.0, shape.length, int(np.ceil(shape.length / FACING_STEP)) + 1)
-            found = shapes[other].place(*(np.interp(way, shape.start, shape.centre[:, axis]) for axis in (0, 1)))[0]
-            known = np.isfinite(found)
+            facing_way = shapes[other].place(*(np.interp(way, shape.start, shape.centre[:, axis]) for axis in (0, 1)))[
+                0
+            ]
+            known = np.isfinite(facing_way)
             if known.sum() > 1:
-                facing[one, other] = way[known], np.maximum.accumulate(found[known])
+                facing[lane, other] = way[known], np.maximum.accumulate(facing_way[known])
     return LaneGraph(np.array([shape.length for shape in shapes]), left, following, facing)
 
 
@@ -158,10 +160,10 @@ class Strip(LaneShape):
         """Way along, distance to the left, number of the piece, and how far past its ends; shape as the arguments."""
         points = np.stack([x, y], axis=1)
         nearest = np.asarray(self._tree.query(points)[1], dtype=np.intp)
-        found = [self._on(points, np.clip(nearest + side, 0, len(self.size) - 1)) for side in (-1, 0)]
-        first = found[0][4] <= found[1][4]
-        way, aside, beyond = (np.where(first, found[0][n], found[1][n]) for n in (0, 1, 3))
-        k = np.where(first, found[0][2], found[1][2])
+        feet = [self._on(points, np.clip(nearest + side, 0, len(self.size) - 1)) for side in (-1, 0)]
+        first = feet[0][4] <= feet[1][4]
+        way, aside, beyond = (np.where(first, feet[0][n], feet[1][n]) for n in (0, 1, 3))
+        k = np.where(first, feet[0][2], feet[1][2])
         return way, aside, k, beyond
 
     def _on(self, points: FloatArray, k: NDArray[np.intp]) -> tuple[Any, ...]:

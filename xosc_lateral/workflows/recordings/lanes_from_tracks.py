@@ -71,8 +71,7 @@ class LaneCentreLine:
 def fit_lane_centre(
     s: FloatArray, d: FloatArray, height: FloatArray, passage: IntArray, *, knot_spacing: float = KNOT_SPACING
 ) -> LaneCentreLine:
-    """Fit one lane's centre to rows of vehicles that keep to it, one a second, sorted by passage and time, shape (n,).
-    [m]
+    """Fit one lane's centre to rows of vehicles that keep to it, one a second, by passage and time, shape (n,). [m]
 
     `passage`: uninterrupted, of one vehicle. `knot_spacing`: longer is blind to the bends that camera calibration puts
     into the tracks, shorter follows single drivers. [m]

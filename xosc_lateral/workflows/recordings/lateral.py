@@ -34,10 +34,10 @@ class LateralPlan:
         """Level at some times, shape as the argument. [m]"""
         value = np.full(len(time), self.start)
         before = self.start
-        for one in self.transitions:
-            share = SHAPES[one.shape](np.clip((time - one.start) / one.duration, 0.0, 1.0))
-            value = np.where(time >= one.start, before + (one.level - before) * share, value)
-            before = one.level
+        for transition in self.transitions:
+            share = SHAPES[transition.shape](np.clip((time - transition.start) / transition.duration, 0.0, 1.0))
+            value = np.where(time >= transition.start, before + (transition.level - before) * share, value)
+            before = transition.level
         return value
 
 
@@ -59,11 +59,11 @@ def lateral_plan(vehicle: RecordedVehicle, begin: float) -> LateralPlan:
         start = float(y[0]) if is_off or first == 0 else 0.0
     transitions = list[Transition]()
     free, before = begin, start
-    for one in rough:
-        found = fit_transition(course.time, y, one, free)
-        transitions.append(replace(found, change=found.level - before))
-        before = found.level
-        free = found.end
+    for movement in rough:
+        transition = fit_transition(course.time, y, movement, free)
+        transitions.append(replace(transition, change=transition.level - before))
+        before = transition.level
+        free = transition.end
     return LateralPlan(start, tuple(transitions), is_played)
 
 
@@ -88,9 +88,9 @@ def _between_levels(course: Course, still: NDArray[np.bool_]) -> list[Rough]:
     y, base, lanes = course.y, course.base, course.lanes
     rough = []
     parts = true_slices(still)
-    for one, other in pairwise([slice(0, 1), *parts] if not still[0] else parts):
-        before, after = float(np.median(y[one])), float(np.median(y[other]))
-        for first, last, low, high in _turned(y, one.stop - 1, other.start, before, after):
+    for part, next_part in pairwise([slice(0, 1), *parts] if not still[0] else parts):
+        before, after = float(np.median(y[part])), float(np.median(y[next_part]))
+        for first, last, low, high in _turned(y, part.stop - 1, next_part.start, before, after):
             if abs(high - low) > LEVEL:
                 change = int(lanes[last] - lanes[first])
                 rows = _reach(y, first, last, low, high)
@@ -157,17 +157,17 @@ class Course:
             rough += self._open_start(settled[0])
         for part in settled:
             rough += self._given_up(part)
-        for one, other in pairwise(settled):
-            if lanes[one.start] == lanes[other.start]:
-                rough += self._excursion(float(self.base[one.start]), one.stop, other.start)
+        for part, next_part in pairwise(settled):
+            if lanes[part.start] == lanes[next_part.start]:
+                rough += self._excursion(float(self.base[part.start]), part.stop, next_part.start)
             else:
-                rough.append(self._change(one.stop - 1, (one.stop + other.start) // 2, other.start))
+                rough.append(self._change(part.stop - 1, (part.stop + next_part.start) // 2, next_part.start))
         last = settled[-1].stop
         if last < len(lanes) and lanes[-1] != lanes[last - 1]:
             rough.append(self._change(last - 1, last, len(lanes) - 1, cut=True))
         else:
             rough += self._open_end(slice(settled[-1].start, len(lanes)))
-        return _apart(sorted(rough, key=lambda one: one.first))
+        return _apart(sorted(rough, key=lambda part: part.first))
 
     def _is_settled(self, part: slice, *, is_passing: bool) -> bool:
         """Near the lane's centre, and not just crossing it: between two crossings to one side, speed falls by half."""
@@ -186,39 +186,38 @@ class Course:
         return Rough(first, last, begin, high, int(self.lanes[after] - self.lanes[before]), cut=cut)
 
     def _begin(self, before: int, crossing: int, level: float, side: float) -> int:
-        """Row at which movement to a side begins: the last calm one near the level, else the nearest to it."""
+        """Row at which movement to a side begins."""
         low = int(np.searchsorted(self.time, self.time[crossing] - MAXIMUM_HALF_DURATION))
-        away = self.y[low : before + 1] - level
-        calm = np.flatnonzero((side * self.rate[low : before + 1] < CALM) & (np.abs(away) < SETTLED))
-        return low + (int(calm[-1]) if len(calm) else _nearest(away))
+        return self._calm_row(slice(low, before + 1), level, side * self.rate, -1)
 
     def _end(self, crossing: int, after: int, level: float, side: float) -> int:
-        """Row at which movement to a side is over: the first calm one near the level, else the nearest to it."""
+        """Row at which movement to a side is over."""
         high = min(int(np.searchsorted(self.time, self.time[crossing] + MAXIMUM_HALF_DURATION)), len(self.time) - 1)
-        away = self.y[after : high + 1] - level
-        calm = np.flatnonzero((side * self.rate[after : high + 1] < CALM) & (np.abs(away) < SETTLED))
-        return after + (int(calm[0]) if len(calm) else _nearest(away))
+        return self._calm_row(slice(after, high + 1), level, side * self.rate, 0)
+
+    def _calm_row(self, rows: slice, level: float, rate: FloatArray, pick: int) -> int:
+        """The first (0) or last (-1) row near a level at which it hardly moves, else the nearest to it."""
+        away = np.abs(self.y[rows] - level)
+        calm = np.flatnonzero((rate[rows] < CALM) & (away < SETTLED))
+        return int(rows.start) + int(calm[pick] if len(calm) else away.argmin() if len(away) else 0)
 
     def _open_start(self, part: slice) -> list[Rough]:
         """A track that begins far from its lane's centre, moving towards it: within a lane change."""
         begin, level = float(self.y[0]), float(self.base[0])
         towards = -np.sign(begin - level) * self.rate
-        near = np.abs(self.y[part] - level) < SETTLED
-        if abs(begin - level) <= SETTLED or towards[0] < CALM or not near.any():
+        is_near = (np.abs(self.y[part] - level) < SETTLED).any()
+        if abs(begin - level) <= SETTLED or towards[0] < CALM or not is_near:
             return []
-        done = np.flatnonzero(near & (towards[part] < CALM))
-        last = int(done[0]) if len(done) else _nearest(self.y[part] - level)
-        return [Rough(0, last, begin, level, 0, cut=True)]
+        return [Rough(0, self._calm_row(part, level, towards, 0), begin, level, 0, cut=True)]
 
     def _open_end(self, part: slice) -> list[Rough]:
         """A track that ends far from its lane's centre, moving away: within a lane change, or towards a ramp."""
         level, end = float(self.base[-1]), float(self.y[-1])
         away = np.sign(end - level) * self.rate
-        near = np.abs(self.y[part] - level) < SETTLED
-        if abs(end - level) <= SETTLED or away[-1] < CALM or not near.any():
+        is_near = (np.abs(self.y[part] - level) < SETTLED).any()
+        if abs(end - level) <= SETTLED or away[-1] < CALM or not is_near:
             return []
-        calm = np.flatnonzero(near & (away[part] < CALM))
-        first = part.start + (int(calm[-1]) if len(calm) else _nearest(self.y[part] - level))
+        first = self._calm_row(part, level, away, -1)
         return [Rough(first, len(self.y) - 1, level, end, 0, end - level, cut=True)]
 
     def _given_up(self, part: slice) -> list[Rough]:
@@ -242,16 +241,12 @@ class Course:
         ]
 
 
-def _nearest(away: FloatArray) -> int:
-    return int(np.abs(away).argmin()) if len(away) else 0
-
-
 def _apart(rough: list[Rough]) -> list[Rough]:
     """Without movement within a lane that is part of a lane change; both halves of an aborted one, or none."""
-    changes = [(one.first, one.last) for one in rough if one.lanes]
-    inside = [any(first < one.last and one.first < last for first, last in changes) for one in rough]
-    halves = {one.first: k for k, one in enumerate(rough) if one.aborted}
-    for k, one in enumerate(rough):
-        if one.aborted and (other := halves.get(one.last, k)) != k:
-            inside[k] = inside[other] = inside[k] or inside[other]
-    return [one for one, is_part in zip(rough, inside, strict=True) if one.lanes or not is_part]
+    changes = [(movement.first, movement.last) for movement in rough if movement.lanes]
+    inside = [any(first < movement.last and movement.first < last for first, last in changes) for movement in rough]
+    halves = {movement.first: k for k, movement in enumerate(rough) if movement.aborted}
+    for k, movement in enumerate(rough):
+        if movement.aborted and (half := halves.get(movement.last, k)) != k:
+            inside[k] = inside[half] = inside[k] or inside[half]
+    return [movement for movement, is_part in zip(rough, inside, strict=True) if movement.lanes or not is_part]

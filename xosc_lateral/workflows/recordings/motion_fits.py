@@ -99,9 +99,9 @@ def fit_transition(time: FloatArray, y: FloatArray, rough: Rough, free: float) -
     )
     best: tuple[float, float, float, DynamicsShape] = (np.inf, begin, duration, DynamicsShape.SINUSOIDAL)
     for shape in SHAPES if rough.held else (DynamicsShape.SINUSOIDAL, DynamicsShape.CUBIC):
-        found = _search(t, rows, rough, SHAPES[shape], middle, duration, free)
-        if found[0] < best[0] * (1.0 - 1e-9):
-            best = (*found, shape)
+        candidate = _search(t, rows, rough, SHAPES[shape], middle, duration, free)
+        if candidate[0] < best[0] * (1.0 - 1e-9):
+            best = (*candidate, shape)
     _, start, duration, shape = best
     residual = float(np.sqrt(best[0] / len(t))) if np.isfinite(best[0]) else 0.0
     where = rough.lanes, rough.offset, level

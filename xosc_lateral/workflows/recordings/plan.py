@@ -71,15 +71,15 @@ def plan_vehicles(recording: Recording, network: RoadNetwork, *, error: float) -
 
 def entity_names(names: Iterable[str]) -> list[str]:
     """Names that are also those of parameters: letters, digits and underscores, no digit first, each once."""
-    found = list[str]()
+    taken = list[str]()
     for name in names:
         plain = re.sub(r"\W", "_", name, flags=re.ASCII) or "V"
         plain = f"V{plain}" if plain[0].isdigit() else plain
-        number, one = 2, plain
-        while one in found:
-            one, number = f"{plain}_{number}", number + 1
-        found.append(one)
-    return found
+        number, unique = 2, plain
+        while unique in taken:
+            unique, number = f"{plain}_{number}", number + 1
+        taken.append(unique)
+    return taken
 
 
 def _plan(name: str, vehicle: RecordedVehicle, network: RoadNetwork, length: float, error: float) -> VehiclePlan:
@@ -142,26 +142,28 @@ def _from(speed: SpeedProfile, begin: float) -> SpeedProfile:
 def _beside_lanes(lateral: LateralPlan, vehicle: RecordedVehicle, network: RoadNetwork) -> LateralPlan:
     """With lane changes that begin where the lane that they lead to is there: it may come with the next road."""
     transitions = list[Transition]()
-    for one in lateral.transitions:
-        rows = np.flatnonzero((vehicle.time >= one.start) & (vehicle.time < one.end - FRAME))
-        for row in rows if one.lanes else ():
-            moved = replace(one, start=float(vehicle.time[row]), duration=one.end - float(vehicle.time[row]))
+    for transition in lateral.transitions:
+        rows = np.flatnonzero((vehicle.time >= transition.start) & (vehicle.time < transition.end - FRAME))
+        for row in rows if transition.lanes else ():
+            moved = replace(
+                transition, start=float(vehicle.time[row]), duration=transition.end - float(vehicle.time[row])
+            )
             lane = _target(vehicle, network, moved)
             if network.has_lane_at(int(vehicle.road[row]), lane, float(vehicle.s[row])):
                 if row > rows[0]:
                     late = min(ENTERED, 0.5 * moved.duration)
-                    one = replace(moved, start=moved.start + late, duration=moved.duration - late)
+                    transition = replace(moved, start=moved.start + late, duration=moved.duration - late)
                 break
-        transitions.append(one)
+        transitions.append(transition)
     return replace(lateral, transitions=tuple(transitions))
 
 
-def _target(vehicle: RecordedVehicle, network: RoadNetwork, one: Transition) -> int:
+def _target(vehicle: RecordedVehicle, network: RoadNetwork, transition: Transition) -> int:
     """Lane that a transition leads to, counted from where it begins: the recorded lane there may be a neighbour."""
     base, _ = vehicle.levels
-    row = min(int(np.searchsorted(vehicle.time, one.start)), len(base) - 1)
+    row = min(int(np.searchsorted(vehicle.time, transition.start)), len(base) - 1)
     road, lane = int(vehicle.road[row]), int(vehicle.lane[row])
-    steps = round(float((one.level - one.offset - base[row]) / vehicle.lane_width[row]))
+    steps = round(float((transition.level - transition.offset - base[row]) / vehicle.lane_width[row]))
     if not steps:
         return lane
     target = lane
@@ -188,6 +190,6 @@ def residuals_of(plan: VehiclePlan) -> Residuals:
     time = vehicle.time[rows]
     across = (vehicle.offset + vehicle.levels[0])[rows] - plan.lateral.at(time)
     in_lane = np.ones(len(time), dtype=np.bool_)
-    for one in plan.lateral.transitions:
-        in_lane &= (time < one.start) | (time > one.end)
+    for transition in plan.lateral.transitions:
+        in_lane &= (time < transition.start) | (time > transition.end)
     return Residuals(time, plan.way[rows] - plan.speed.way(time), across, in_lane)

@@ -15,6 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 
@@ -26,20 +27,65 @@ from xosc_lateral.base.texts import composed
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.evaluation.metrics import free_runs
 from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.files.mapping import MappingLike
 from xosc_lateral.files.profiles import find_profile, list_profiles, read_profile
 from xosc_lateral.workflows.conversion.drivers import AUTO_PROFILE
+from xosc_lateral.workflows.conversion.options import spelled_out, values_of
 from xosc_lateral.workflows.recordings.encounters import encounters, relative_triggers
 from xosc_lateral.workflows.recordings.plan import Residuals, VehiclePlan, plan_vehicles, residuals_of
 from xosc_lateral.workflows.recordings.reconstruction import ChosenDriver, Reconstruction
 from xosc_lateral.workflows.recordings.recorded import Track, place_tracks
-from xosc_lateral.workflows.recordings.recordings import RecordedTraffic
+from xosc_lateral.workflows.recordings.recordings import RecordedTraffic, read_recording
 from xosc_lateral.workflows.recordings.scenario import reconstructed_scenario
-from xosc_lateral.workflows.recordings.settings import ReconstructSettings
+from xosc_lateral.workflows.recordings.settings import ReconstructKeywords, ReconstructSettings
+from xosc_lateral.workflows.result import PathLike
 
 LONG_DRIVE = 100.0  # of road-following, for a profile of one vehicle: ten windows that the evaluation compares [s]
 LONGEST_WINDOW = 3600.0  # a scenario of more can't be looked at, and times in ms or us instead of s give it [s]
 AROUND = 100.0  # who comes as near as this to the vehicle in question, along or across, belongs to its surroundings [m]
 NO_HOST = "none"  # stands for no vehicle under test
+
+
+@spelled_out(ReconstructSettings)
+def reconstruct(
+    recording: PathLike,
+    output: PathLike | None = None,
+    *,
+    format: str | None = None,  # noqa: A002 (as in `import_drives`)
+    road: PathLike | None = None,
+    columns: MappingLike | None = None,
+    force: bool = False,
+    **options: Unpack[ReconstructKeywords],
+) -> Reconstruction:
+    """Turn a recording into maneuvers, a road and drivers.
+
+    Parameters
+    ----------
+    recording : str or Path
+        Tracks of several vehicles: DLR Highway Traffic, levelX, OSI traces, CommonRoad, SUMO's FCD output, or a table.
+    output : str or Path, optional
+        Folder to write to, see `Reconstruction.write`; without it nothing is written.
+    format : str, optional
+        "dlr-ht", "levelx", "osi", "commonroad", "fcd" or "tracks"; without it, told from the file.
+    road : str or Path, optional
+        OpenDRIVE file, for recordings that come without their lanes; SUMO's network, for its FCD output.
+    columns : dict, path or TableMapping, optional
+        Name -> ``COLUMN[:UNIT]`` for tables of tracks, or a saved mapping's file.
+    force : bool
+        Replace files that this package did not write.
+    options
+        `recordings.settings.ReconstructSettings`: which part and which vehicles, and what is written of them.
+
+    Raises
+    ------
+    FormatError, NotEnoughDataError
+    """
+    settings = ReconstructSettings(**values_of(ReconstructSettings, options))
+    traffic = read_recording(Path(recording), kind=format, road=None if road is None else Path(road), columns=columns)
+    result = reconstruct_recording(traffic, settings)
+    if output is not None:
+        result.write(output, force=force)
+    return result
 
 
 def reconstruct_recording(traffic: RecordedTraffic, settings: ReconstructSettings) -> Reconstruction:

@@ -192,21 +192,23 @@ def maneuver_rows(plans: Sequence[VehiclePlan], relative: Any) -> list[dict[str,
     rows = []
     for plan in plans:
         distances = relative.get(plan.name, ({}, {}))[0]
-        for number, one in enumerate(plan.lateral.transitions):
-            kind = "lane change" if one.lanes else "aborted lane change" if one.aborted else "lane offset"
+        for number, transition in enumerate(plan.lateral.transitions):
+            kind = "lane change" if transition.lanes else "aborted lane change" if transition.aborted else "lane offset"
             trigger = distances.get(number)
             rows.append(
                 {
                     "entity": plan.name,
                     "kind": kind,
-                    "side": "left" if one.change > 0 else "right",
-                    "start": round(one.start, 3),
-                    "duration": round(one.duration, 3),
-                    "shape": one.shape.value,
-                    "lanes": abs(one.lanes),
-                    "residual": round(one.residual, 4),
-                    "bell_residual": round(one.bell_residual, 4) if np.isfinite(one.bell_residual) else None,
-                    "cut_off": one.cut,
+                    "side": "left" if transition.change > 0 else "right",
+                    "start": round(transition.start, 3),
+                    "duration": round(transition.duration, 3),
+                    "shape": transition.shape.value,
+                    "lanes": abs(transition.lanes),
+                    "residual": round(transition.residual, 4),
+                    "bell_residual": round(transition.bell_residual, 4)
+                    if np.isfinite(transition.bell_residual)
+                    else None,
+                    "cut_off": transition.cut,
                     "begins": "by the clock" if trigger is None else f"{trigger.distance:.1f} m from {trigger.other}",
                 }
             )
@@ -233,16 +235,18 @@ def encounter_rows(met: Sequence[Encounter]) -> list[dict[str, Any]]:
 def not_expressed(plans: Sequence[VehiclePlan], residuals: Sequence[Residuals], left_out: Sequence[str]) -> list[str]:
     """What the scenario does not say, or not as well as asked for: a line each."""
     lines = list(left_out)
-    for plan, one in zip(plans, residuals, strict=True):
+    for plan, residual in zip(plans, residuals, strict=True):
         cut = sum(each.cut for each in plan.lateral.transitions)
         if cut:
             lines.append(f"{plan.name}: {cut} lateral maneuvers begin or end outside of the recording")
-        for word, values in (("along the road", one.along), ("beside its maneuvers", one.across)):
+        for word, values in (("along the road", residual.along), ("beside its maneuvers", residual.across)):
             if len(values) and (worst := float(np.abs(values).max())) > WORTH_NAMING:
                 row = int(np.abs(values).argmax())
-                lines.append(f"{plan.name}: up to {worst:.2f} m {word}, at {one.time[row]:.1f} s")
-    fitted = [one for plan in plans for one in plan.lateral.transitions if np.isfinite(one.bell_residual)]
-    if bells := sum(one.is_bell for one in fitted):
+                lines.append(f"{plan.name}: up to {worst:.2f} m {word}, at {residual.time[row]:.1f} s")
+    fitted = [
+        residual for plan in plans for residual in plan.lateral.transitions if np.isfinite(residual.bell_residual)
+    ]
+    if bells := sum(residual.is_bell for residual in fitted):
         lines.append(
             f"{bells} of {len(fitted)} lane changes are nearer to the bell of drivers than to a maneuver's shape: "
             "convert --lane-changes lifelike has it"

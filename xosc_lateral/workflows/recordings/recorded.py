@@ -103,9 +103,9 @@ def place_tracks(tracks: Sequence[Track], network: RoadNetwork, start: float, en
         rows = np.flatnonzero(inside & (track.time >= start - 1e-9) & (track.time <= end + 1e-9))
         if len(rows):
             rows = rows[np.r_[True, np.diff(track.time[rows]) > SHORTEST_STEP]]
-            found = _place(track, rows, network, left_out)
-            if found is not None:
-                vehicles.append(replace(found, time=found.time - start))
+            vehicle = _place(track, rows, network, left_out)
+            if vehicle is not None:
+                vehicles.append(replace(vehicle, time=vehicle.time - start))
     if not vehicles:
         why = f": {left_out[0]}" if left_out else ""
         raise NotEnoughDataError(f"no vehicle can be reconstructed between {start:g} and {end:g} s{why}")
@@ -117,14 +117,14 @@ def _place(track: Track, rows: NDArray[np.intp], network: RoadNetwork, left_out:
     velocity = np.stack([_slope(time, x), _slope(time, y)])
     heading = _steady_heading(time, x, y, velocity, track.heading[rows], network)
     x, y = x - track.ahead * np.cos(heading), y - track.ahead * np.sin(heading)
-    found = network.world_to_lane(x, y, heading=heading)
-    on_lane = (found.distance <= BESIDE) & (found.lane != 0)
+    place_on_road = network.world_to_lane(x, y, heading=heading)
+    on_lane = (place_on_road.distance <= BESIDE) & (place_on_road.lane != 0)
     if not on_lane.any():
         left_out.append(f"{track.name}: on no driving lane")
         return None
     lane_heading = np.zeros(len(x))
     there = np.flatnonzero(on_lane)
-    place = found.road[there], found.lane[there], found.s[there]
+    place = place_on_road.road[there], place_on_road.lane[there], place_on_road.s[there]
     lane_heading[there] = network.lane_to_world(*place).heading
     width = np.full(len(x), np.nan)
     width[there] = network.lane_width(*place)
@@ -133,18 +133,18 @@ def _place(track: Track, rows: NDArray[np.intp], network: RoadNetwork, left_out:
     passages = _passages(time, x, y, np.flatnonzero(on_lane & ~elsewhere))
     reasons = {"off the lanes": int((~on_lane).sum()), "across a lane or backwards": int(elsewhere.sum())}
     if not passages:
-        said = "".join(f", {rows} of {len(time)} rows {why}" for why, rows in reasons.items() if rows)
-        left_out.append(f"{track.name}: no {MINIMUM_PASSAGE:g} s along a driving lane without a gap{said}")
+        counts = "".join(f", {rows} of {len(time)} rows {why}" for why, rows in reasons.items() if rows)
+        left_out.append(f"{track.name}: no {MINIMUM_PASSAGE:g} s along a driving lane without a gap{counts}")
         return None
     best = max(passages, key=lambda part: time[part[-1]] - time[part[0]])
     lost = len(time) - len(best)
     if lost:
         reasons["beyond them, a gap or a leap"] = lost - sum(reasons.values())
-        said = ", ".join(f"{rows} {why}" for why, rows in reasons.items() if rows > 0)
-        left_out.append(f"{track.name}: {lost} of {len(time)} rows: {said}")
+        counts = ", ".join(f"{rows} {why}" for why, rows in reasons.items() if rows > 0)
+        left_out.append(f"{track.name}: {lost} of {len(time)} rows: {counts}")
     size = track.length, track.width, track.height, track.middle
-    road, lane = (each.astype(np.int64)[best] for each in (found.road, found.lane))
-    where = road, lane, found.s[best], (way * found.offset)[best]
+    road, lane = (each.astype(np.int64)[best] for each in (place_on_road.road, place_on_road.lane))
+    where = road, lane, place_on_road.s[best], (way * place_on_road.offset)[best]
     return RecordedVehicle(
         track.name, track.kind, *size, time[best], x[best], y[best], *where, width[best], way[best].astype(np.int64)
     )

@@ -19,7 +19,7 @@ from xosc_lateral.files.opendrive.write import SHOULDER, WIDTH_PIECE, WrittenLan
 from xosc_lateral.files.sumo import read_sumo_net
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.files.xml import root_tag
-from xosc_lateral.workflows.recordings.gate import require_along_lanes
+from xosc_lateral.workflows.recordings.cuts import require_along_lanes
 from xosc_lateral.workflows.recordings.importers import dlr_ht, levelx
 from xosc_lateral.workflows.recordings.importers.fcd import NET_ENDINGS, lanes_of_net, read_fcd
 from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH, Tracks, read_tracks, tracks_of
@@ -95,14 +95,14 @@ def _tracks(source: Path, road: Path | None, columns: TableMapping) -> RecordedT
 
 
 def _osi(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
+    from xosc_lateral.workflows.recordings.importers.osi import lanes_of
     from xosc_lateral.workflows.recordings.osi.read import read_osi
-    from xosc_lateral.workflows.recordings.osi.shapes import lanes_of
 
     recorded = read_osi(source)
-    own = recorded.opendrive
-    if road is None and own is None and (lanes := lanes_of(recorded)) is not None:
-        own = roads_of_lanes(driven_lanes(*lanes), name_of(source)).encode()
-    traffic = _on_road(recorded.tracks, source, road, own)
+    made = recorded.opendrive
+    if road is None and made is None and (lanes := lanes_of(recorded)) is not None:
+        made = roads_of_lanes(driven_lanes(*lanes), name_of(source)).encode()
+    traffic = _on_road(recorded.tracks, source, road, made)
     host = recorded.hosts[0] if len(recorded.hosts) == 1 else None
     return replace(traffic, notes=(*recorded.notes, *traffic.notes), host=host)
 
@@ -112,8 +112,8 @@ def _commonroad(source: Path, road: Path | None, columns: TableMapping) -> Recor
 
     tracks, shapes, graph, _ = read_obstacles(source, source.stem)
     names = tuple(name.removeprefix(f"{source.stem}:") for name in tracks.names)
-    own = None if road is not None else roads_of_lanes(driven_lanes(shapes, graph), name_of(source)).encode()
-    return _on_road(replace(tracks, names=names), source, road, own)
+    made = None if road is not None else roads_of_lanes(driven_lanes(shapes, graph), name_of(source)).encode()
+    return _on_road(replace(tracks, names=names), source, road, made)
 
 
 def _fcd(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
@@ -122,8 +122,8 @@ def _fcd(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraf
             raise FormatError("comes without lanes: give its network with --road FILE.net.xml", path=source)
         return _on_road(read_fcd(source), source, road)
     net = read_sumo_net(road)
-    own = roads_of_lanes(lanes_of_net(net, road), name_of(source), left_handed=net.left_hand).encode()
-    return replace(_on_road(read_fcd(source), source, None, own), sources=(source, road))
+    made = roads_of_lanes(lanes_of_net(net, road), name_of(source), left_handed=net.left_hand).encode()
+    return replace(_on_road(read_fcd(source), source, None, made), sources=(source, road))
 
 
 def name_of(source: Path) -> str:
@@ -131,12 +131,12 @@ def name_of(source: Path) -> str:
     return source.name.split(".")[0]
 
 
-def _on_road(tracks: Tracks, source: Path, road: Path | None, own: bytes | None = None) -> RecordedTraffic:
+def _on_road(tracks: Tracks, source: Path, road: Path | None, made: bytes | None = None) -> RecordedTraffic:
     """`own`: OpenDRIVE of the recording's own lanes, for where no road is given."""
     if road is not None:
         network, data, road_name = read_opendrive(road), road.read_bytes(), road.name
-    elif own is not None:
-        network, data, road_name = parse_opendrive(own, name_of(source)), own, f"{name_of(source)}.xodr"
+    elif made is not None:
+        network, data, road_name = parse_opendrive(made, name_of(source)), made, f"{name_of(source)}.xodr"
     else:
         raise FormatError("comes without a road: give it with --road FILE.xodr", path=source)
     x, y = network.header_offset.undo(tracks.x, tracks.y)

@@ -43,15 +43,17 @@ def roads_of_lanes(lanes: Sequence[DrivenLane], name: str, *, left_handed: bool 
         ]
     groups = _groups(lanes)
     places = {lane: (road, -1 - k) for road, group in enumerate(groups) for k, lane in enumerate(group)}
-    ways = sorted({(places[one], places[other]) for one in places for other in lanes[one].following if other in places})
+    ways = sorted(
+        {(places[place], places[other]) for place in places for other in lanes[place].following if other in places}
+    )
     links, junctions = _links(ways, len(groups))
     successors, predecessors = dict[Place, int](), dict[Place, int]()
-    for one, other in ways:
-        if links[one[0]]["successor"][0] == "road":
-            successors[one], predecessors[other] = other[1], one[1]
+    for place, other in ways:
+        if links[place[0]]["successor"][0] == "road":
+            successors[place], predecessors[other] = other[1], place[1]
     written = list[WrittenRoad]()
     for number, group in enumerate(groups):
-        road = _road(number, [lanes[one] for one in group], name)
+        road = _road(number, [lanes[place] for place in group], name)
         linked = [
             replace(lane, predecessor=predecessors.get((number, k)), successor=successors.get((number, k)))
             for k, lane in zip(range(-1, -len(group) - 1, -1), road.right, strict=True)
@@ -60,7 +62,7 @@ def roads_of_lanes(lanes: Sequence[DrivenLane], name: str, *, left_handed: bool 
     if left_handed:
         written = [_mirrored(road) for road in written]
         junctions = {
-            number: [(one, other, [(-a, -b) for a, b in pairs]) for one, other, pairs in connections]
+            number: [(place, other, [(-a, -b) for a, b in pairs]) for place, other, pairs in connections]
             for number, connections in junctions.items()
         }
     return roads_xml(name, written, junctions=junctions)
@@ -98,22 +100,24 @@ def _links(
         if road in done or not onward[road]:
             continue
         incoming, linked = {road}, set[int]()
-        while (more := set().union(*(onward[one] for one in incoming))) != linked:  # all that meet at the same place
+        while (
+            more := set().union(*(onward[before] for before in incoming))
+        ) != linked:  # all that meet at the same place
             linked = more
-            incoming = set().union(*(back[one] for one in linked))
+            incoming = set().union(*(back[before] for before in linked))
         done |= incoming
         if len(incoming) == len(linked) == 1:
             (other,) = linked
             links[road]["successor"], links[other]["predecessor"] = ("road", other + 1), ("road", road + 1)
             continue
         junction = count + len(junctions) + 1
-        pairs = [(one, other) for one in sorted(incoming) for other in sorted(onward[one])]
+        pairs = [(before, other) for before in sorted(incoming) for other in sorted(onward[before])]
         junctions[junction] = [
-            (one + 1, other + 1, [(a[1], b[1]) for a, b in ways if (a[0], b[0]) == (one, other)])
-            for one, other in pairs
+            (before + 1, other + 1, [(a[1], b[1]) for a, b in ways if (a[0], b[0]) == (before, other)])
+            for before, other in pairs
         ]
-        for one in incoming:
-            links[one]["successor"] = ("junction", junction)
+        for before in incoming:
+            links[before]["successor"] = ("junction", junction)
         for other in linked:
             links[other]["predecessor"] = ("junction", junction)
     return links, junctions

@@ -190,8 +190,8 @@ class _Vehicle:
             if first:
                 self._begin_by_distance(event, braking[first])
         transitions = zip(self._plan.lateral.transitions, self._plan.targets, strict=True)
-        for number, (one, target) in enumerate(transitions):
-            self._transition(one, target, number, changes.get(number))
+        for number, (transition, target) in enumerate(transitions):
+            self._transition(transition, target, number, changes.get(number))
 
     def _speeds(self, event: etree._Element, first: int, last: int) -> None:
         """Corners `first` to `last` of the speed profile: an action, or, in versions without profiles, one a piece."""
@@ -248,27 +248,32 @@ class _Vehicle:
         sub(follow, "TrajectoryFollowingMode", followingMode="position")
         self._begin(event, begin)
 
-    def _transition(self, one: Transition, target: int, number: int, relative: RelativeTrigger | None) -> None:
-        word = "change" if one.lanes else "aborted" if one.aborted else "offset"
+    def _transition(self, transition: Transition, target: int, number: int, relative: RelativeTrigger | None) -> None:
+        word = "change" if transition.lanes else "aborted" if transition.aborted else "offset"
         event = self._event(f"{word}{number + 1}")
         name = event.get("name")
         lateral = sub(build.private_action(event, f"{name}_action"), "LateralAction")
-        offset_t = self._plan.direction * one.offset
-        if one.lanes:
+        offset_t = self._plan.direction * transition.offset
+        if transition.lanes:
             aside = {"targetLaneOffset": decimal(offset_t, 4)} if abs(offset_t) > 1e-3 else {}
             action = sub(lateral, "LaneChangeAction", **aside)
-            duration = self._value(f"{name}_duration", one.duration, 3)
-            dynamics = {"dynamicsShape": one.shape.value, "dynamicsDimension": "time", "value": duration}
+            duration = self._value(f"{name}_duration", transition.duration, 3)
+            dynamics = {"dynamicsShape": transition.shape.value, "dynamicsDimension": "time", "value": duration}
             sub(action, "LaneChangeActionDynamics", **dynamics)
             sub(action, "LaneChangeTarget/AbsoluteTargetLane", value=str(target))
         else:
             action = sub(lateral, "LaneOffsetAction", continuous="false")
-            limit = peak_acceleration(one.shape, one.change, one.duration)
-            sub(action, "LaneOffsetActionDynamics", dynamicsShape=one.shape.value, maxLateralAcc=decimal(limit, 9))
+            limit = peak_acceleration(transition.shape, transition.change, transition.duration)
+            sub(
+                action,
+                "LaneOffsetActionDynamics",
+                dynamicsShape=transition.shape.value,
+                maxLateralAcc=decimal(limit, 9),
+            )
             wanted = self._value(f"{name}_offset", offset_t, 4)
             sub(action, "LaneOffsetTarget/AbsoluteTargetLaneOffset", value=wanted)
         if relative is not None:
             self._begin_by_distance(event, relative)
             return
-        (condition,) = self._begin(event, one.start).iter("SimulationTimeCondition")
-        condition.set("value", self._value(f"{name}_start", one.start, 3))
+        (condition,) = self._begin(event, transition.start).iter("SimulationTimeCondition")
+        condition.set("value", self._value(f"{name}_start", transition.start, 3))

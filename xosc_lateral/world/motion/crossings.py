@@ -40,34 +40,23 @@ LARGEST_SPEED_RATIO = 1.1
 
 
 class Crossing(Struct, frozen=True, eq=False):
-    """One lane change or lane offset action in a run.
+    """One lane change or lane offset action in a run."""
 
-    Parameters
-    ----------
-    first, last : int
-        Rows before and after its movement.
-    way : array, shape (last - first + 1,)
-        How far across it is, from its begin, positive to the left of travel. [m]
-    stays : str
-        Why it keeps the written way; empty: it can have the bell.
-    is_lane_change : bool
-    """
-
-    first: int
+    first: int  # rows before and after its movement
     last: int
-    way: FloatArray
-    stays: str
+    way: FloatArray  # how far across on these rows, from its begin, positive to the left of travel [m]
+    stays: str  # why it keeps the written way; empty: it can have the bell
     is_lane_change: bool
 
 
 def crossings(motion: NominalMotion, entity: EntityMotion, runs: Sequence[Sequence[SegmentSpan]]) -> Iterator[Crossing]:
     """Lane changes and lane offsets of an entity that its movement goes on through (`movement_runs`)."""
     kinds = (LaneChangeAction, LaneOffsetAction)
-    own = [one for one in motion.actions if one.actor == entity.name and isinstance(one.action.content, kinds)]
+    actions = [one for one in motion.actions if one.actor == entity.name and isinstance(one.action.content, kinds)]
     for run in runs:
         for span in run:
             if span.kind is SegmentKind.LATERAL_ACTION:
-                running = [one for one in own if one.start <= span.end and span.start <= (one.end or np.inf)]
+                running = [one for one in actions if one.start <= span.end and span.start <= (one.end or np.inf)]
                 first, last = max(span.first - 1, run[0].first), span.last
                 way = _way(entity, first, last)
                 stays = "another action overrules it, or it does not end" if len(running) != 1 else ""

@@ -53,21 +53,11 @@ RESOLUTION = 4
 
 
 class Move(Struct, frozen=True):
-    """One lane offset action: after a wait, sideways by a change, along half a cosine.
+    """One lane offset action: after a wait, sideways by a change, along half a cosine."""
 
-    Parameters
-    ----------
-    wait : float
-        After the end of the one before. [s]
-    duration : float
-        [s]
-    change : float
-        Positive to the left of travel. [m]
-    """
-
-    wait: float
-    duration: float
-    change: float
+    wait: float  # after the end of the one before [s]
+    duration: float  # [s]
+    change: float  # positive to the left of travel [m]
 
     @property
     def acceleration(self) -> float:
@@ -83,45 +73,23 @@ class Ring(Struct, frozen=True):
 
 
 class OffsetPath(Struct, frozen=True):
-    """Places by the distance driven: what is driven slowly or stands moves sideways slowly or not at all.
+    """Places by the distance driven: what is driven slowly or stands moves sideways slowly or not at all."""
 
-    Parameters
-    ----------
-    distance : tuple of float
-        From where it begins, increasing. [m]
-    offset : tuple of float
-        Positive left. [m]
-    """
-
-    distance: tuple[float, ...]
-    offset: tuple[float, ...]
+    distance: tuple[float, ...]  # from where it begins, increasing [m]
+    offset: tuple[float, ...]  # positive left [m]
 
 
 class OffsetChain(Struct, frozen=True):
-    """The moves of one entity after one action, or from the start.
-
-    Parameters
-    ----------
-    entity : str
-    after : tuple of str, optional
-        Names from the story down of the action whose end it begins with; None: from the start.
-    ring : Ring
-        Its offsets are from where the entity is by its maneuvers.
-    placed_t : float, optional
-        The entity is put down there, along +t from the lane's centre, and the ring begins at once; None: it is led to
-        the ring's origin. [m]
-    side : float
-        +1 where +t is to the left of travel, else -1.
-    path : OffsetPath, optional
-        Driven before the ring: of an entity that is put down at its beginning.
-    """
+    """The moves of one entity after one action, or from the start."""
 
     entity: str
-    after: tuple[str, ...] | None
-    ring: Ring
+    after: tuple[str, ...] | None  # names from the story down of the action whose end begins it; None: from the start
+    ring: Ring  # its offsets are from where the entity is by its maneuvers
+    # placed_t: the entity is put down there, along +t from the lane's centre, and the ring begins at once; None: it is
+    # led to the ring's origin [m]
     placed_t: float | None = None
-    side: float = 1.0
-    path: OffsetPath | None = None
+    side: float = 1.0  # +1 where +t is to the left of travel, else -1
+    path: OffsetPath | None = None  # driven before the ring, by an entity that is put down at its beginning
 
 
 class Size(NamedTuple):
@@ -214,8 +182,8 @@ def _costs(path: FloatArray, reach: int) -> FloatArray:
     cost, within = np.full((n, reach), JOINT_PRICE), np.tri(reach, reach + 1, 1)
     for factor in WEIGHTS:
         seen = share * within
-        own, both = weight @ (seen**2).T, (weight * real) @ seen.T
-        cost += factor**2 * GRID * (change**2 * own - 2.0 * change * both + (weight * real**2) @ within.T)
+        squares, both = weight @ (seen**2).T, (weight * real) @ seen.T
+        cost += factor**2 * GRID * (change**2 * squares - 2.0 * change * both + (weight * real**2) @ within.T)
         share, real = np.diff(share) / GRID, np.diff(real) / GRID
         weight, within = weight[:, 1:], within[:, 1:]
     return cost
@@ -261,20 +229,20 @@ def places_of(path: FloatArray, joints: IntArray) -> FloatArray:
         wanted.append(factor * weight[: len(design)] * whole)
         design, whole = np.diff(design, axis=0) / GRID, np.diff(whole) / GRID
     places = np.linalg.lstsq(np.vstack(rows), np.concatenate(wanted), rcond=None)[0]
-    own = float(np.sum((speeds[0] @ places) ** 2))
-    larger = min(float(np.sqrt(np.sum(speeds[1] ** 2) / own)), MOST_ENLARGED) if own > 0.0 else 1.0
+    squares = float(np.sum((speeds[0] @ places) ** 2))
+    larger = min(float(np.sqrt(np.sum(speeds[1] ** 2) / squares)), MOST_ENLARGED) if squares > 0.0 else 1.0
     return np.asarray(places.mean() + larger * (places - places.mean()))
 
 
 def _moves(joints: IntArray, rows: int, places: FloatArray) -> tuple[Move, ...]:
     """From place to place, without moves to where the car is already: those after them wait."""
-    found: list[Move] = []
+    moves: list[Move] = []
     wait = 0.0
     changes = np.round(np.diff(np.append(places, places[0])), RESOLUTION)
     for steps, change in zip(np.diff(np.append(joints, rows)).tolist(), changes.tolist(), strict=True):
         if change == 0.0:
             wait += GRID * steps
             continue
-        found.append(Move(wait, GRID * steps - REST, change))
+        moves.append(Move(wait, GRID * steps - REST, change))
         wait = 0.0
-    return tuple(found)
+    return tuple(moves)

@@ -45,34 +45,16 @@ STANDSTILL_TIME = 0.3
 
 
 class PathPiece(Struct, frozen=True):
-    """A stretch of rows without a stop.
+    """A stretch of rows without a stop."""
 
-    Parameters
-    ----------
-    first, last : int
-        Rows, both included. Equal: the entity is only placed there.
-    placed : bool
-        It begins by being placed there (teleport, or added), in the step that ends with row `first`.
-    stops : bool
-        The entity stands when it is over.
-    """
-
-    first: int
+    first: int  # rows, both included; equal: the entity is only placed there
     last: int
-    placed: bool
-    stops: bool
+    placed: bool  # it begins by being placed there (teleport, or added), in the step that ends with row `first`
+    stops: bool  # the entity stands when it is over
 
 
 def cut_path(time: FloatArray, x: FloatArray, y: FloatArray, activity: NDArray[np.uint8]) -> list[PathPiece]:
-    """Pieces of one entity's path, in order.
-
-    Parameters
-    ----------
-    time, x, y : array, shape (n,)
-        [s], [m]
-    activity : array of uint8, shape (n,)
-        `Activity` bits.
-    """
+    """Pieces of one entity's path, in order, from its rows, shape (n,): [s], [m], `Activity` bits."""
 
     def active(rows: slice) -> BoolArray:
         return np.asarray((activity[rows] & Activity.ACTIVE) != 0)
@@ -161,14 +143,14 @@ class _Error(NamedTuple):
 
 def _error(times: FloatArray, time: FloatArray, x: FloatArray, y: FloatArray) -> _Error:
     at_x, at_y = _interpolated(times, time, x), _interpolated(times, time, y)
-    largest, found, there = 0.0, [np.empty(0, dtype=np.intp)], [np.empty(0)]
+    largest, places, there = 0.0, [np.empty(0, dtype=np.intp)], [np.empty(0)]
     for rows in blocks(len(time)):
         away = np.hypot(x[rows] - np.interp(time[rows], times, at_x), y[rows] - np.interp(time[rows], times, at_y))
         beyond = np.flatnonzero(away > TOLERANCE)
         largest = max(largest, float(away.max()))
-        found.append(rows.start + beyond)
+        places.append(rows.start + beyond)
         there.append(away[beyond])
-    return _Error(largest, np.concatenate(found), np.concatenate(there))
+    return _Error(largest, np.concatenate(places), np.concatenate(there))
 
 
 def _refined(times: FloatArray, time: FloatArray, way: FloatArray, error: _Error, *, replace: bool) -> FloatArray:
@@ -243,7 +225,7 @@ def _stops(time: FloatArray, x: FloatArray, y: FloatArray, first: int, last: int
 
 def _reversals(x: FloatArray, y: FloatArray, first: int, last: int) -> list[int]:
     """Rows at which the entity goes back the way it came: a path that is followed by its length has no such fold."""
-    found: list[int] = []
+    turns: list[int] = []
     before = np.empty(0, dtype=np.complex128)
     for rows in blocks(last, first):
         around = slice(rows.start, rows.stop + 1)
@@ -251,9 +233,9 @@ def _reversals(x: FloatArray, y: FloatArray, first: int, last: int) -> list[int]
         moving = np.flatnonzero(np.abs(step) > LEAST_STEP)
         moved = np.append(before, step[moving])
         back = (moved[1:] * np.conj(moved[:-1])).real < 0.0
-        found += (rows.start + moving[len(moving) - len(back) :][back]).tolist()
+        turns += (rows.start + moving[len(moving) - len(back) :][back]).tolist()
         before = moved[-1:]
-    return found
+    return turns
 
 
 def _step(time: FloatArray, way: FloatArray, x: FloatArray, y: FloatArray) -> tuple[float, FloatArray]:

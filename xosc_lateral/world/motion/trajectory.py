@@ -79,8 +79,8 @@ def leaps(motion: EntityMotion) -> list[tuple[float, float]]:
         driven = np.maximum(speed[1:], speed[:-1]) * step
         return np.asarray(whole & (moved(around) > driven + _LEAP_DISTANCE + _MAXIMUM_LATERAL_SPEED * step))
 
-    found = rows_where(len(motion.time), leaps_there, 1)
-    return [(float(motion.time[k]), float(moved(slice(k - 1, k + 1))[0])) for k in found]
+    leaping = rows_where(len(motion.time), leaps_there, 1)
+    return [(float(motion.time[k]), float(moved(slice(k - 1, k + 1))[0])) for k in leaping]
 
 
 def displace(motion: EntityMotion, network: RoadNetwork, deviation: FloatArray) -> WorldTrajectory:

@@ -32,9 +32,9 @@ def corners(state: EntityState) -> tuple[Point, Point, Point, Point]:
     return world(front, left), world(rear, left), world(rear, right), world(front, right)
 
 
-def axis_gap(own: tuple[Point, ...], other: tuple[Point, ...], axis: Point) -> float:
-    """Signed gap from `own` to `other` along an axis; 0 where their shadows overlap."""
-    mine = [x * axis[0] + y * axis[1] for x, y in own]
+def axis_gap(corners_: tuple[Point, ...], other: tuple[Point, ...], axis: Point) -> float:
+    """Signed gap from `corners_` to `other` along an axis; 0 where their shadows overlap."""
+    mine = [x * axis[0] + y * axis[1] for x, y in corners_]
     theirs = [x * axis[0] + y * axis[1] for x, y in other]
     if max(mine) < min(theirs) - EPSILON:
         return min(theirs) - max(mine)
@@ -50,8 +50,8 @@ def overlap(a: EntityState, b: EntityState) -> bool:
     reach = hypot(box_a.length + box_b.length, box_a.width + box_b.width)
     if hypot(pb.x - pa.x, pb.y - pa.y) > reach or abs(b.pose.z - a.pose.z) > HEIGHT_APART:
         return False
-    own, other = corners(a), corners(b)
-    return not any(any(gaps(own, other, -heading)) for heading in (pa.heading, pb.heading))
+    first, other = corners(a), corners(b)
+    return not any(any(gaps(first, other, -heading)) for heading in (pa.heading, pb.heading))
 
 
 def distance_between(a: tuple[Point, ...], b: tuple[Point, ...]) -> float:
@@ -83,7 +83,7 @@ def _to_edge(point: Point, start: Point, end: Point) -> float:
     return hypot(point[0] - start[0] - u * ux, point[1] - start[1] - u * uy)
 
 
-def gaps(own: tuple[Point, ...], shape: tuple[Point, ...], turn: float) -> tuple[float, float]:
-    """Gap from `own` to a shape along the axes of a frame turned back by `turn` [rad]; 0 where they overlap."""
+def gaps(shape_: tuple[Point, ...], shape: tuple[Point, ...], turn: float) -> tuple[float, float]:
+    """Gap from `shape_` to a shape along the axes of a frame turned back by `turn` [rad]; 0 where they overlap."""
     c, s = cos(turn), sin(turn)
-    return axis_gap(own, shape, (c, -s)), axis_gap(own, shape, (s, c))
+    return axis_gap(shape_, shape, (c, -s)), axis_gap(shape_, shape, (s, c))

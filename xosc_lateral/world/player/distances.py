@@ -13,9 +13,9 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from xosc_lateral.world.player import boxes
+from xosc_lateral.world.player.drive import drawn_by
 from xosc_lateral.world.player.paths.base import nearest_s
 from xosc_lateral.world.player.state import NO_ROAD, EntityState
-from xosc_lateral.world.player.trailers import drawn_by
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.road.positions import RoadPath
 from xosc_lateral.world.scenario.enums import CoordinateSystem, RelativeDistanceType
@@ -96,8 +96,8 @@ def free_road_gap(state: EntityState, other: EntityState, *, limit: float = UNRE
     ds = Measure(CoordinateSystem.ROAD, RelativeDistanceType.LONGITUDINAL, freespace=True).to_entity(state, other)
     if ds is None:
         return None
-    own, theirs = (_project(state, *boxes.corners(one)[-1]) for one in (state, other))
-    gap = _gap_between(state, own, theirs, limit)
+    ours, theirs = (_project(state, *boxes.corners(one)[-1]) for one in (state, other))
+    gap = _gap_between(state, ours, theirs, limit)
     return gap and replace(gap, ds=ds)
 
 
@@ -109,29 +109,29 @@ def is_turned(state: EntityState, other: EntityState) -> bool:
     return gap is not None and gap.is_turned
 
 
-def _gap_between(state: EntityState, own: Spot, spot: Spot, limit: float) -> RoadGap | None:
-    path = _path_between(state, own, spot, limit)
+def _gap_between(state: EntityState, here: Spot, spot: Spot, limit: float) -> RoadGap | None:
+    path = _path_between(state, here, spot, limit)
     if path is None:
         return None
-    lane = _lane_there(state.network, own, path)
+    lane = _lane_there(state.network, here, path)
     opposite = lane * spot.lane < 0
     lanes = spot.lane - lane
     if opposite:
         lanes -= 1 if lanes > 0 else -1
-    return RoadGap(path.ds, _across(own, spot, path), lanes, opposite, path.is_turned)
+    return RoadGap(path.ds, _across(here, spot, path), lanes, opposite, path.is_turned)
 
 
-def _path_between(state: EntityState, own: Spot, spot: Spot, limit: float = UNREACHABLE_DISTANCE) -> RoadPath | None:
+def _path_between(state: EntityState, here: Spot, spot: Spot, limit: float = UNREACHABLE_DISTANCE) -> RoadPath | None:
     """The way that an entity would drive from one place to another; None: there is none."""
-    if own.road == NO_ROAD or spot.road == NO_ROAD:
+    if here.road == NO_ROAD or spot.road == NO_ROAD:
         return None
     direction = 1 if state.is_forward else -1
-    return state.network.path_between((own.road, own.s), (spot.road, spot.s), direction=direction, limit=limit)
+    return state.network.path_between((here.road, here.s), (spot.road, spot.s), direction=direction, limit=limit)
 
 
-def _across(own: Spot, spot: Spot, path: RoadPath) -> float:
+def _across(here: Spot, spot: Spot, path: RoadPath) -> float:
     """Change of t on the way, as it is counted there. [m]"""
-    return spot.t - (-own.t if path.is_turned else own.t)
+    return spot.t - (-here.t if path.is_turned else here.t)
 
 
 class Measure(Struct, frozen=True):
@@ -151,8 +151,8 @@ class Measure(Struct, frozen=True):
 
     def between(self, state: EntityState, target: Spot | EntityState) -> float:
         """From an entity to a spot, or to another entity, all trailers included; `UNREACHABLE_DISTANCE` if none. [m]"""
-        found = self.to_spot(state, target) if isinstance(target, Spot) else self._to_train(state, target)
-        return UNREACHABLE_DISTANCE if found is None else found
+        gap = self.to_spot(state, target) if isinstance(target, Spot) else self._to_train(state, target)
+        return UNREACHABLE_DISTANCE if gap is None else gap
 
     def _to_train(self, state: EntityState, target: EntityState) -> float | None:
         """Free space is that of the nearest two."""
@@ -160,8 +160,8 @@ class Measure(Struct, frozen=True):
         if not self.freespace or len(pairs) == 1:
             return self.to_entity(state, target)
         nearness = self if self.is_along_roads else replace(self, kind=RelativeDistanceType.EUCLIDIAN)
-        found = [nearness.to_entity(*pair) for pair in pairs]
-        gap, nearest = min(zip(found, pairs, strict=True), key=lambda one: inf if one[0] is None else abs(one[0]))
+        gaps = [nearness.to_entity(*pair) for pair in pairs]
+        gap, nearest = min(zip(gaps, pairs, strict=True), key=lambda each: inf if each[0] is None else abs(each[0]))
         return gap if nearness is self else self.to_entity(*nearest)
 
     def to_entity(self, state: EntityState, other: EntityState) -> float | None:
@@ -203,24 +203,24 @@ class Measure(Struct, frozen=True):
 
     def _between_boxes(self, state: EntityState, shape: tuple[boxes.Point, ...], touches: Callable[[], bool]) -> float:
         """Gap from an entity's box to a shape, straight or along the axes of the world or of the entity. [m]"""
-        own, along_own = boxes.corners(state), -state.plane.heading
+        ours, along_own = boxes.corners(state), -state.plane.heading
         if self.kind is RelativeDistanceType.EUCLIDIAN:
-            ahead, _ = boxes.gaps(own, shape, along_own)
-            return 0.0 if touches() else copysign(boxes.distance_between(own, shape), ahead or 1.0)
+            ahead, _ = boxes.gaps(ours, shape, along_own)
+            return 0.0 if touches() else copysign(boxes.distance_between(ours, shape), ahead or 1.0)
         in_world = self.system is CoordinateSystem.WORLD
-        along, across = boxes.gaps(own, shape, state.network.header_offset.heading if in_world else along_own)
+        along, across = boxes.gaps(ours, shape, state.network.header_offset.heading if in_world else along_own)
         return across if self.kind is RelativeDistanceType.LATERAL else along
 
     def _between_corners(self, state: EntityState, spots: list[Spot]) -> float | None:
         """Smallest gap along (or across) the road between the projected corners; 0 where they overlap. [m]"""
         state.locate()
         values = []
-        for own in (_project(state, x, y) for x, y in boxes.corners(state)):
+        for place in (_project(state, x, y) for x, y in boxes.corners(state)):
             for spot in spots:
-                path = _path_between(state, own, spot)
+                path = _path_between(state, place, spot)
                 if path is None:
                     return None
-                values.append(_across(own, spot, path) if self.kind is RelativeDistanceType.LATERAL else path.ds)
+                values.append(_across(place, spot, path) if self.kind is RelativeDistanceType.LATERAL else path.ds)
         return 0.0 if min(values) < 0.0 <= max(values) else min(values, key=abs)
 
 
@@ -247,17 +247,17 @@ def _project(state: EntityState, x: float, y: float) -> Spot:
     """Road coordinates of a point near an entity."""
     if state.road == NO_ROAD:
         return Spot(x, y)
-    found = state.network.world_to_lane_at(x, y, near=(state.road, state.s), lane_types=None)
-    return Spot(x, y, found.road, found.lane, found.s, found.t)
+    lane_position = state.network.world_to_lane_at(x, y, near=(state.road, state.s), lane_types=None)
+    return Spot(x, y, lane_position.road, lane_position.lane, lane_position.s, lane_position.t)
 
 
-def _lane_there(network: RoadNetwork, own: Spot, path: RoadPath) -> int:
+def _lane_there(network: RoadNetwork, here: Spot, path: RoadPath) -> int:
     """Lane that a place's lane leads to at the end of a way; where none does, its own, counted from there."""
-    road, lane, way = own.road, own.lane, path.way
+    road, lane, way = here.road, here.lane, path.way
     for entered, entry in path.entered:
         onward = network.next_lanes(road, lane, way)
         there = [link.lane for link in onward if (link.road, link.direction) == (entered, entry)]
         if not there:
-            return -own.lane if path.is_turned else own.lane
+            return -here.lane if path.is_turned else here.lane
         road, lane, way = entered, there[0], entry
     return lane

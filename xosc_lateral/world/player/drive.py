@@ -1,14 +1,15 @@
-"""Moving along lanes: the default driver, and what lane changes and lane offsets need of it."""
+"""Moving along lanes: the default driver, what lane changes and lane offsets need of it, and trailers behind it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from math import inf, pi
+from collections.abc import Iterable, Iterator, Sequence
+from math import atan2, cos, hypot, inf, nan, pi, sin
 
-from xosc_lateral.world.player.state import NO_ROAD, EntityState
+from xosc_lateral.world.player.state import NO_ROAD, EntityState, free
 from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.road import LaneLink
-from xosc_lateral.world.road.moving import most_turning
+from xosc_lateral.world.road.links import most_turning
+from xosc_lateral.world.road.positions import wrap
 
 _TIGHT = 1e-3
 """Beyond this share of the radius, the centre of a curve is so near that lengths beside the line say nothing. [-]"""
@@ -146,10 +147,10 @@ def _bridge_gap(state: EntityState, way: int) -> int | None:
     t = state.t
     if not at_end:
         beyond = state.s + way * EPSILON
-        found = network.lane_at(state.road, beyond, t - state.offset_t, lane_types=state.lane_types)
-        if not found.lane or found.lane == state.lane:
+        under_it = network.lane_at(state.road, beyond, t - state.offset_t, lane_types=state.lane_types)
+        if not under_it.lane or under_it.lane == state.lane:
             return None
-        state.move_to(state.road, found.lane, beyond, state.offset_t)
+        state.move_to(state.road, under_it.lane, beyond, state.offset_t)
         return way
     link = road.successor if way > 0 else road.predecessor
     if link is None or link.element_type != "road" or link.element_id not in network.road_ids:
@@ -160,10 +161,10 @@ def _bridge_gap(state: EntityState, way: int) -> int | None:
         t = -t
         _turn_round(state)
     s = 0.0 if entry > 0 else network.roads[index].length
-    found = network.lane_at(index, s, t, lane_types=state.lane_types)
-    if not found.lane:
+    under_it = network.lane_at(index, s, t, lane_types=state.lane_types)
+    if not under_it.lane:
         return None
-    state.move_to(index, found.lane, s, 0.0)
+    state.move_to(index, under_it.lane, s, 0.0)
     return entry
 
 
@@ -173,13 +174,13 @@ def _leave_narrow_lane(state: EntityState) -> None:
     if state.lane == 0 or network.lane_state_at(state.road, state.lane, state.s).width >= EPSILON:
         return
     t = state.t
-    nearest, found = inf, 0
+    nearest, lane_id = inf, 0
     for lane in network.lanes_at(state.road, state.s):
         away = abs(lane.centre_t - t) - 0.5 * lane.width
         if lane.width >= EPSILON and lane.type in state.lane_types and lane.id * state.lane > 0 and away < nearest:
-            nearest, found = away, lane.id
-    if found:
-        state.move_to(state.road, found, state.s, 0.0)
+            nearest, lane_id = away, lane.id
+    if lane_id:
+        state.move_to(state.road, lane_id, state.s, 0.0)
 
 
 def _note_surroundings(state: EntityState, way: int, *, blocked: bool) -> None:
@@ -196,3 +197,73 @@ def _note_surroundings(state: EntityState, way: int, *, blocked: bool) -> None:
         state.s >= road.length - EPSILON and road.successor is None
     )
     state.at_road_end = blocked or dead_end
+
+
+# ---- trailers ----
+# Derived here: the line from hitch to coupler keeps its direction towards where the trailer was (a tractrix in small
+# steps); its length is the drawbar's.
+_TRACTOR_HITCH = -1.0
+_TRAILER_COUPLER = 2.0
+"""Where a file says nothing of hitch and coupler: [m] ahead of the reference point."""
+
+
+def connect(tow: EntityState, trailer: EntityState) -> None:
+    """Hitch a trailer; whatever pulled it before lets go."""
+    if trailer.tow is not None:
+        disconnect(trailer.tow)
+    tow.trailer, trailer.tow = trailer, tow
+
+
+def disconnect(tow: EntityState) -> None:
+    """Let the trailer go."""
+    if tow.trailer is not None:
+        tow.trailer.tow = None
+        tow.trailer = None
+
+
+def drawn_by(front: EntityState) -> Iterator[tuple[EntityState, EntityState]]:
+    """All that hangs on a vehicle: each with what pulls it, from the front."""
+    while front.trailer is not None:
+        yield front, front.trailer
+        front = front.trailer
+
+
+def align_trailers(front: EntityState) -> None:
+    """Put all trailers straight behind their tractor."""
+    for tow, trailer in drawn_by(front):
+        pose = tow.plane
+        reach = _hitch(tow) - _coupler(trailer)
+        trailer.put_in_world(free(pose.x + reach * cos(pose.heading), pose.y + reach * sin(pose.heading), pose.heading))
+        trailer.set_speed(front.speed)
+
+
+def pull_trailers(entities: Iterable[EntityState]) -> None:
+    """Draw every trailer to where its hitch has gone: it turns so that its coupler is there."""
+    for front in entities:
+        if front.tow is None:
+            for tow, trailer in drawn_by(front):
+                _pull(tow, trailer)
+                trailer.set_speed(tow.speed)
+
+
+def _pull(tow: EntityState, trailer: EntityState) -> None:
+    pose, pulled = tow.plane, trailer.plane
+    hitch_x = pose.x + _hitch(tow) * cos(pose.heading)
+    hitch_y = pose.y + _hitch(tow) * sin(pose.heading)
+    dx, dy = pulled.x - hitch_x, pulled.y - hitch_y
+    length = hypot(dx, dy)
+    if length < 1e-9:
+        dx, dy, length = -cos(pulled.heading), -sin(pulled.heading), 1.0
+    reach = _coupler(trailer) / length
+    heading = wrap(atan2(dy, dx) + pi)
+    trailer.put_in_world(free(hitch_x + reach * dx, hitch_y + reach * dy, heading, nan))
+
+
+def _hitch(state: EntityState) -> float:
+    hitch = state.entity.hitch_x
+    return _TRACTOR_HITCH if hitch is None else hitch
+
+
+def _coupler(state: EntityState) -> float:
+    coupler = state.entity.coupler_x
+    return _TRAILER_COUPLER if coupler is None else coupler

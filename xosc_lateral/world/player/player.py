@@ -17,12 +17,11 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import PlaybackError
 from xosc_lateral.base.rows import BLOCK, columns, stored
 from xosc_lateral.world.motion.nominal import CUT_OFF, Activity, NominalMotion, Note
-from xosc_lateral.world.player.drive import drive, halt_at_road_end
+from xosc_lateral.world.player.drive import align_trailers, connect, drive, halt_at_road_end, pull_trailers
 from xosc_lateral.world.player.recorder import NO_LANE
 from xosc_lateral.world.player.simulation import Simulation
 from xosc_lateral.world.player.state import NO_ROAD, EntityState
 from xosc_lateral.world.player.storyboard_builder import build_storyboard, init_actions
-from xosc_lateral.world.player.trailers import align_trailers, connect, pull_trailers
 from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.road import RoadNetwork
 from xosc_lateral.world.scenario import Scenario

@@ -128,8 +128,8 @@ class Rows:
             "x", "y", "z", "heading", "pitch", "roll",
             "speed", "road", "lane", "s", "offset", "heading_relative", "activity",
         )  # fmt: skip
-        found = columns(len(time), self._worked_out(network, time))
-        return EntityMotion(entity=self.state.entity, time=time, **dict(zip(names, found, strict=True)))
+        worked_out = columns(len(time), self._worked_out(network, time))
+        return EntityMotion(entity=self.state.entity, time=time, **dict(zip(names, worked_out, strict=True)))
 
     def _worked_out(self, network: RoadNetwork, time: FloatArray) -> Iterator[tuple[NDArray[Any], ...]]:
         """Columns of `motion`, in blocks of rows."""
@@ -243,14 +243,14 @@ def _look_up(
     if not network.road_ids:
         where.road[rows] = NO_ROAD
         return
-    found = network.world_to_lane(free[:, 0], free[:, 1], height, lane_types=lane_types)
+    located = network.world_to_lane(free[:, 0], free[:, 1], height, lane_types=lane_types)
     where.road[rows], where.lane[rows], where.s[rows], where.offset[rows] = (
-        found.road,
-        found.lane,
-        found.s,
-        found.offset,
+        located.road,
+        located.lane,
+        located.s,
+        located.offset,
     )
-    direction[rows] = network.travel_directions(found.road, found.lane)
+    direction[rows] = network.travel_directions(located.road, located.lane)
 
 
 def _beside_road(network: RoadNetwork, where: _Where, pose: FloatArray) -> BoolArray:
@@ -263,8 +263,8 @@ def _beside_road(network: RoadNetwork, where: _Where, pose: FloatArray) -> BoolA
     suspects = rows[np.abs(offset) > 0.5 * network.lane_width(road, lane, s) + _LANE_TOLERANCE]  # beyond their own lane
     if len(suspects):
         types = {lane.type for r in network.roads for section in r.sections for lane in section.lanes} - {NO_LANE}
-        found = network.world_to_lane(pose[suspects, 0], pose[suspects, 1], lane_types=types)
-        beside[suspects] = ~(found.distance <= _LANE_TOLERANCE)
+        located = network.world_to_lane(pose[suspects, 0], pose[suspects, 1], lane_types=types)
+        beside[suspects] = ~(located.distance <= _LANE_TOLERANCE)
     return beside
 
 

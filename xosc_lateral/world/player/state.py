@@ -8,11 +8,11 @@ from math import cos, nan, pi, sin
 from typing import NamedTuple, Protocol
 
 from xosc_lateral.world.motion.nominal import Activity
-from xosc_lateral.world.player.angles import difference, is_forward, wrap
 from xosc_lateral.world.player.paths.base import PathProgress
 from xosc_lateral.world.road import LaneLink, Pose, RoadNetwork, RouteStep
 from xosc_lateral.world.road.lanes import DRIVING, WALKED
-from xosc_lateral.world.road.places import turn_for_heading, turned_in_surface
+from xosc_lateral.world.road.positions import difference, is_forward, wrap
+from xosc_lateral.world.road.road import turn_for_heading, turned_in_surface
 from xosc_lateral.world.scenario import Entity
 from xosc_lateral.world.scenario.controllers import DrivingControllers
 from xosc_lateral.world.scenario.enums import EntityCategory
@@ -50,9 +50,9 @@ class RouteGuide:
         """The link that leads along the route, be it by another connecting road; None: the route does not say."""
         roads = [step.road for step in self.steps]
         for index in (index for index, other in enumerate(roads) if other == road):
-            found = self._towards(roads[index + 1 :], options)
-            if found is not None:
-                return found
+            way = self._towards(roads[index + 1 :], options)
+            if way is not None:
+                return way
         return None
 
     def _towards(self, ahead: Sequence[int], options: Sequence[LaneLink]) -> LaneLink | None:
@@ -327,17 +327,17 @@ def locate(
     """Road coordinates under a world pose, which is kept; road -1 where the network has no roads."""
     if not network.road_ids:
         return Placement(NO_ROAD, 0, 0.0, 0.0, pose.heading, pose)
-    found = network.world_to_lane_at(
+    located = network.world_to_lane_at(
         pose.x, pose.y, pose.z if pose.z == pose.z else None, near=near, lane_types=lane_types
     )
-    lane_pose = network.pose_at(found.road, found.lane, found.s, found.offset)
+    lane_pose = network.pose_at(located.road, located.lane, located.s, located.offset)
     heading = difference(pose.heading, lane_pose.heading)
     if lane_pose.pitch or lane_pose.roll:
         heading = turn_for_heading(heading, lane_pose.pitch, lane_pose.roll)
-    if network.travel_direction(found.road, found.lane) < 0:
+    if network.travel_direction(located.road, located.lane) < 0:
         heading += pi
-    offset_t = network.offset_from_offset_t(found.road, found.lane, found.offset)
-    return Placement(found.road, found.lane, found.s, offset_t, wrap(heading), pose)
+    offset_t = network.offset_from_offset_t(located.road, located.lane, located.offset)
+    return Placement(located.road, located.lane, located.s, offset_t, wrap(heading), pose)
 
 
 def free(x: float, y: float, heading: float, z: float = nan, pitch: float = nan, roll: float = nan) -> Pose:

@@ -5,24 +5,30 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from xosc_lateral.world.player.actions import (
+    at_once,
     follow_trajectory,
-    global_actions,
     lateral,
     lateral_distance,
     longitudinal,
-    private_actions,
     speed_profile,
     synchronize,
 )
 from xosc_lateral.world.player.actions.base import Maker, RunningAction
 from xosc_lateral.world.player.conditions import distance, motion, value
-from xosc_lateral.world.player.conditions.base import EntityCheck, EntityChecks, ValueChecks
 from xosc_lateral.world.player.conditions.value import StateWatch
 from xosc_lateral.world.player.positions.on_road import reference_of
 from xosc_lateral.world.player.simulation import Simulation
 from xosc_lateral.world.player.state import EntityState
-from xosc_lateral.world.player.storyboard import EventElement, StoryboardElement
-from xosc_lateral.world.player.trigger import Check, RunningCondition, RunningTrigger
+from xosc_lateral.world.player.storyboard import (
+    Check,
+    EntityCheck,
+    EntityChecks,
+    EventElement,
+    RunningCondition,
+    RunningTrigger,
+    StoryboardElement,
+    ValueChecks,
+)
 from xosc_lateral.world.scenario import (
     Act,
     Action,
@@ -150,11 +156,10 @@ def _actions(action: Action, group: ManeuverGroup, simulation: Simulation) -> It
 # ---- all actions that can be played, as each family's module has them ----
 RUNNING: dict[type, Maker] = {
     **follow_trajectory.RUNNING,
-    **global_actions.RUNNING,
+    **at_once.RUNNING,
     **lateral.RUNNING,
     **lateral_distance.RUNNING,
     **longitudinal.RUNNING,
-    **private_actions.RUNNING,
     **speed_profile.RUNNING,
     **synchronize.RUNNING,
 }

@@ -26,13 +26,13 @@ _PEAK_SLOPE = {DynamicsShape.LINEAR: 1.0, DynamicsShape.CUBIC: 1.5, DynamicsShap
 class Transition:
     """A transition under way.
 
-    `dimension`: what the parameter is: seconds (`time`, `rate`) or metres (`distance`); `given`: range of the parameter
-    (a step has none), or peak slope for `rate` (its sign does not matter).
+    `dimension`: what the parameter is: seconds (`time`, `rate`) or metres (`distance`); `parameter_range`: its range (a
+    step has none), or peak slope for `rate` (its sign does not matter).
     """
 
     shape: DynamicsShape
     dimension: DynamicsDimension
-    given: InitVar[float]
+    parameter_range: InitVar[float]
     start: float = 0.0
     target: float = 0.0
     parameter: float = 0.0
@@ -40,12 +40,12 @@ class Transition:
     peak_rate: float = 0.0
     range: float = 0.0
 
-    def __post_init__(self, given: float) -> None:
+    def __post_init__(self, parameter_range: float) -> None:
         """Take the value as the dimension means it."""
         if self.dimension is DynamicsDimension.RATE:
-            self.peak_rate = abs(given)
+            self.peak_rate = abs(parameter_range)
         elif self.shape is not DynamicsShape.STEP:
-            self.range = given
+            self.range = parameter_range
 
     @classmethod
     def of(cls, dynamics: TransitionDynamics) -> Transition:

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from xosc_lateral.base.arrays import FloatArray, Int32Array
-from xosc_lateral.world.road.places import lane_at
 from xosc_lateral.world.road.positions import LaneCoordinates, LanePositions
 from xosc_lateral.world.road.projection import Feet, project, project_at
+from xosc_lateral.world.road.road import lane_at
 from xosc_lateral.world.road.samples import Candidates, Samples
 from xosc_lateral.world.road.tables import NetworkTables
 
@@ -44,8 +44,8 @@ class SurfaceIndex:
         lane_types: Collection[str] | None,
     ) -> LanePositions:
         """Nearest lanes (see `RoadNetwork.world_to_lane`)."""
-        given = [x, y, *(a for a in (z, heading) if a is not None)]
-        arrays = np.broadcast_arrays(*(np.asarray(a, dtype=np.float64) for a in given))
+        inputs = [x, y, *(a for a in (z, heading) if a is not None)]
+        arrays = np.broadcast_arrays(*(np.asarray(a, dtype=np.float64) for a in inputs))
         flat = [a.ravel() for a in arrays]
         _refuse_nan(flat)
         height = flat[2] if z is not None else None
@@ -54,8 +54,9 @@ class SurfaceIndex:
         best = _Best(len(flat[0]))
         for begin in range(0, len(flat[0]), 16384):
             part = slice(begin, begin + 16384)
-            found = self._candidates(flat[0][part], flat[1][part], types)
-            self._score(best, found._replace(point=found.point + begin), flat[0], flat[1], height, direction, types)
+            candidates = self._candidates(flat[0][part], flat[1][part], types)
+            candidates = candidates._replace(point=candidates.point + begin)
+            self._score(best, candidates, flat[0], flat[1], height, direction, types)
         return best.positions(arrays[0].shape)
 
     def _candidates(self, x: FloatArray, y: FloatArray, types: frozenset[str] | None) -> Candidates:
@@ -78,8 +79,8 @@ class SurfaceIndex:
         # Driven off the road that it was on, onto the next one: look again, without prejudice.
         lost = np.flatnonzero(best.distance > LANE_TOLERANCE)
         if len(lost):
-            found = self._candidates(flat[0][lost], flat[1][lost], types)
-            self._score(best, found._replace(point=lost[found.point]), flat[0], flat[1], None, None, types)
+            candidates = self._candidates(flat[0][lost], flat[1][lost], types)
+            self._score(best, candidates._replace(point=lost[candidates.point]), flat[0], flat[1], None, None, types)
         return best.positions(arrays[0].shape)
 
     def world_to_lane_at(
@@ -106,7 +107,7 @@ class SurfaceIndex:
     def _score(
         self,
         best: _Best,
-        found: Candidates,
+        candidates: Candidates,
         x: FloatArray,
         y: FloatArray,
         z: FloatArray | None,
@@ -114,7 +115,7 @@ class SurfaceIndex:
         types: frozenset[str] | None,
     ) -> None:
         """Project each point onto its candidate road, find the lane there, keep what beats the best so far."""
-        point, road, guess = found
+        point, road, guess = candidates
         feet = project(self._tables, road, x[point], y[point], guess)
         row, centre, width = self._lanes(road, feet, types)
         away = np.abs(feet.t - centre)
@@ -171,10 +172,10 @@ class _Best:
         self._found = LanePositions(*whole, np.zeros(n), np.zeros(n), np.zeros(n), np.full(n, np.inf))
         self.distance = self._found.distance
 
-    def offer(self, point: NDArray[np.int64], score: FloatArray, away: FloatArray, found: LanePositions) -> None:
+    def offer(self, point: NDArray[np.int64], score: FloatArray, away: FloatArray, located: LanePositions) -> None:
         """Take what has a smaller score; of equals (lanes on top of each other) the one whose centre is nearer."""
         score = np.round(score, 9)  # rounding noise must not decide between roads that touch
-        order = np.lexsort((found.road, np.round(away, 9), score, point))
+        order = np.lexsort((located.road, np.round(away, 9), score, point))
         order = order[np.append(True, np.diff(point[order]) > 0)] if len(order) else order
         target = point[order]
         better = (score[order] < self._score[target]) | (
@@ -183,7 +184,7 @@ class _Best:
         order, target = order[better], target[better]
         self._score[target], self._away[target] = score[order], away[order]
         kept: tuple[NDArray[Any], ...] = self._found
-        offered: tuple[NDArray[Any], ...] = found
+        offered: tuple[NDArray[Any], ...] = located
         for whole, part in zip(kept, offered, strict=True):
             whole[target] = part[order]
 

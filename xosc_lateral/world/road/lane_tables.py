@@ -16,8 +16,7 @@ from numpy.typing import ArrayLike
 from xosc_lateral.base.arrays import FloatArray, Int32Array
 from xosc_lateral.world.road.lanes import DRIVING, MINIMUM_LANE_WIDTH, Lane
 from xosc_lateral.world.road.piecewise import IndexLike, Lookup
-from xosc_lateral.world.road.places import find_lane, limit_at
-from xosc_lateral.world.road.road import Road
+from xosc_lateral.world.road.road import Road, find_lane, limit_at
 
 CHUNK = 8192
 """Places evaluated together: the two dozen temporary arrays of a chunk then stay in the processor's cache."""
@@ -113,13 +112,13 @@ class LaneTables:
     def travel_directions(self, road: ArrayLike, lane: ArrayLike) -> Int32Array:
         """+1 along s, -1 against s. Shape as the arguments. [-]"""
         road_, lane_ = np.broadcast_arrays(np.asarray(road, dtype=np.int32), np.asarray(lane, dtype=np.int32))
-        one = [_one_or_many(index, road_.shape) for index in (road_, lane_)]
-        if road_.size and isinstance(one[0], int) and isinstance(one[1], int):
-            return np.full(road_.shape, self.roads[one[0]].directions.get(one[1], 1), dtype=np.int32)
+        pair = [_one_or_many(index, road_.shape) for index in (road_, lane_)]
+        if road_.size and isinstance(pair[0], int) and isinstance(pair[1], int):
+            return np.full(road_.shape, self.roads[pair[0]].directions.get(pair[1], 1), dtype=np.int32)
         # One number for both: sorting pairs takes five times as long.
         both, inverse = np.unique(road_.ravel() * np.int64(2**32) + lane_.ravel(), return_inverse=True)
-        found = [self.roads[(k + 2**31) >> 32].directions.get((k + 2**31) % 2**32 - 2**31, 1) for k in both.tolist()]
-        return np.array(found, dtype=np.int32)[inverse.ravel()].reshape(road_.shape)
+        ways = [self.roads[(k + 2**31) >> 32].directions.get((k + 2**31) % 2**32 - 2**31, 1) for k in both.tolist()]
+        return np.array(ways, dtype=np.int32)[inverse.ravel()].reshape(road_.shape)
 
     def lane_index(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[Int32Array, Int32Array]:
         """Index from the right in travel direction among driving lanes of one direction, and their count.
@@ -128,32 +127,32 @@ class LaneTables:
         """
 
         def evaluate(road: IndexLike, s: FloatArray, lane: IndexLike) -> tuple[FloatArray, ...]:
-            own = np.broadcast_to(self.row_of(road, lane, s), s.shape)
+            rows = np.broadcast_to(self.row_of(road, lane, s), s.shape)
             section = np.broadcast_to(self.section_of(road, s), s.shape)
             index, count = np.full(len(s), -1.0), np.zeros(len(s))
             for which in np.flatnonzero(np.bincount(section)):
                 here = np.flatnonzero(section == which)
-                index[here], count[here] = self._section_index(int(which), own[here], s[here])
+                index[here], count[here] = self._section_index(int(which), rows[here], s[here])
             return index, count
 
         index, count = self._batch(evaluate, 2, road, s, lane=lane)
         return index.astype(np.int32), count.astype(np.int32)
 
-    def _section_index(self, section: int, own: Int32Array, s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _section_index(self, section: int, rows: Int32Array, s: FloatArray) -> tuple[FloatArray, FloatArray]:
         first, n = int(self.section_first[section]), int(self.section_count[section])
-        direction = self.directions[own]
+        direction = self.directions[rows]
         index, count, is_driving = np.zeros(len(s)), np.zeros(len(s)), np.zeros(len(s), dtype=bool)
         for row in range(first, first + n):
             if self.lanes[row].type not in DRIVING:
                 continue
-            itself = own == row
+            itself = rows == row
             is_driving |= itself
             there = ((self.profile_of(row, s).width > MINIMUM_LANE_WIDTH) | itself) & (
                 self.directions[row] == direction
             )
             count += there
             # rows run from left to right looking along s
-            index += there & (np.where(direction > 0, row > own, row < own))
+            index += there & (np.where(direction > 0, row > rows, row < rows))
         return np.where(is_driving, index, -1.0), count
 
     def speed_limit(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> FloatArray:

@@ -21,10 +21,8 @@ from xosc_lateral.base.arrays import FloatArray, Int32Array
 from xosc_lateral.base.errors import PlaybackError
 from xosc_lateral.world.road.index import SurfaceIndex
 from xosc_lateral.world.road.lanes import DRIVING
-from xosc_lateral.world.road.links import Links
-from xosc_lateral.world.road.moving import Chooser, advance, gone_on, straightest
+from xosc_lateral.world.road.links import Chooser, Links, advance, gone_on, straightest
 from xosc_lateral.world.road.piecewise import IndexLike
-from xosc_lateral.world.road.places import find_lane, lane_at, lane_pose, surface_pose
 from xosc_lateral.world.road.positions import (
     Advance,
     LaneCoordinates,
@@ -38,7 +36,7 @@ from xosc_lateral.world.road.positions import (
     RoadPath,
     RouteStep,
 )
-from xosc_lateral.world.road.road import Junction, Road
+from xosc_lateral.world.road.road import Junction, Road, find_lane, lane_at, lane_pose, surface_pose
 from xosc_lateral.world.road.routes import path_between, route
 from xosc_lateral.world.road.surface import HeaderOffset
 from xosc_lateral.world.road.tables import NetworkTables
@@ -205,8 +203,8 @@ class RoadNetwork:
         [m], [-], [m]
         """
         road_ = self.roads[road]
-        found = road_.section_at(s).by_id.get(lane)
-        return (found or find_lane(road_, lane, s)).state_at(s)
+        info = road_.section_at(s).by_id.get(lane)
+        return (info or find_lane(road_, lane, s)).state_at(s)
 
     def lanes_at(self, road: int, s: float) -> tuple[LaneInfo, ...]:
         """All lanes of the cross-section but the centre lane 0, from left to right looking along s. `s` in [m]."""
@@ -249,10 +247,10 @@ class RoadNetwork:
 
         `near` = (road, s) where it was a moment ago makes it cheap, and distinguishes roads that lie on each other.
         """
-        found = self._index.world_to_lane_at(x, y, z, heading, near=near, lane_types=lane_types)
+        located = self._index.world_to_lane_at(x, y, z, heading, near=near, lane_types=lane_types)
         if near is None or near[0] < 0:
-            return found
-        return gone_on(self._links, found, near, (x, y), lane_types=lane_types)
+            return located
+        return gone_on(self._links, located, near, (x, y), lane_types=lane_types)
 
     # ---- where lanes lead --------------------------------------------------------------------------------------------
     def next_lanes(self, road: int, lane: int, direction: int) -> tuple[LaneLink, ...]:

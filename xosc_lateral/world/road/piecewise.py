@@ -126,8 +126,8 @@ class Lookup:
             first, last = int(self.first[owner]), int(self._last[owner])
             if first == last:
                 return first
-            found = np.searchsorted(self.starts[first + 1 : last + 1], s, side="right")
-            return np.asarray(found + first)
+            piece = np.searchsorted(self.starts[first + 1 : last + 1], s, side="right")
+            return np.asarray(piece + first)
         return self._of_many(owner, s)
 
     def _of_many(self, owner: NDArray[np.integer], s: FloatArray) -> NDArray[np.intp]:

@@ -41,19 +41,19 @@ class ReferenceLines:
         clothoids: list[ClothoidPiece] = []
         cubics: list[tuple[float, ...]] = []
         for road in roads:
-            own: list[float] = []
+            curvatures: list[float] = []
             for start, element in zip(road.starts, road.elements, strict=True):
                 if isinstance(element, ParamCubic):
                     for i, parameter in enumerate(element.parameter):
-                        own.append(start + i * element.step)
-                        pieces.append((own[-1], True, len(cubics)))
+                        curvatures.append(start + i * element.step)
+                        pieces.append((curvatures[-1], True, len(cubics)))
                         cubics.append((*parameter, *element.x, *element.y))
                 else:
                     for piece in element.pieces():
-                        own.append(start + piece.start)
+                        curvatures.append(start + piece.start)
                         pieces.append((start + piece.middle, False, len(clothoids)))
                         clothoids.append(piece)
-            starts.append(own)
+            starts.append(curvatures)
         self._lookup = Lookup(starts)
         self._origin = np.array([origin for origin, _, _ in pieces])
         self._is_cubic = np.array([is_cubic for _, is_cubic, _ in pieces])

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
-from math import inf, nan
+from math import asin, atan, atan2, ceil, cos, inf, nan, pi, sin
 
+from xosc_lateral.base.errors import PlaybackError
 from xosc_lateral.world.road.geometry import Line, ReferenceElement
-from xosc_lateral.world.road.lanes import LaneSection
+from xosc_lateral.world.road.lanes import Lane, LaneSection
+from xosc_lateral.world.road.positions import LaneCoordinates, Pose
 from xosc_lateral.world.road.surface import Surface
 
 
@@ -101,10 +103,140 @@ class Road:
         element = self.elements[i]
         if isinstance(element, Line):
             return low, high, element, self.starts[i], 0.0
-        found = self.section_at(s).by_id.get(lane)
-        if found is None:
+        here = self.section_at(s).by_id.get(lane)
+        if here is None:
             return low, high, element, self.starts[i], nan
-        j = max(bisect_right(found.starts, s) - 1, 0)
-        low = max(low, found.starts[j] if j else -inf)
-        high = min(high, (*found.starts[j + 1 :], inf)[0])
-        return low, high, element, self.starts[i], nan if any(found.centre[j][1:]) else found.centre[j][0]
+        j = max(bisect_right(here.starts, s) - 1, 0)
+        low = max(low, here.starts[j] if j else -inf)
+        high = min(high, (*here.starts[j + 1 :], inf)[0])
+        return low, high, element, self.starts[i], nan if any(here.centre[j][1:]) else here.centre[j][0]
+
+
+# ---- one place at a time, in plain floats: what the player asks for in every frame ----
+# Derived here: the surface's axes are the reference line's, turned by its pitch and then by its roll; heading, pitch
+# and roll of a vehicle follow from the axes that its own heading gives within that surface.
+TWO_PI = 2.0 * pi
+
+
+def normal_angle(angle: float) -> float:
+    """The angle in (-pi, pi]. [rad]"""
+    if -pi < angle <= pi:
+        return angle
+    return angle - TWO_PI * ceil((angle - pi) / TWO_PI)
+
+
+def find_lane(road: Road, lane: int, s: float, path: str | None = None) -> Lane:
+    """A lane at s; raises `PlaybackError` naming the road, the lane and the lanes that are there. `s` in [m]."""
+    section = road.section_at(s)
+    found = section.by_id.get(lane)
+    if found is None:
+        there = ", ".join(str(other.id) for other in section.lanes) or "none"
+        raise PlaybackError(f"road '{road.id}' has no lane {lane} at s={s:.3f} m (lanes there: {there})", path=path)
+    return found
+
+
+def lane_pose(road: Road, lane: int, s: float, offset: float) -> Pose:
+    """Pose of driving along a lane; `offset` positive to the left of travel. [m], [rad]"""
+    s = 0.0 if s < 0.0 else s if s < road.length else road.length
+    found = road.section_at(s).by_id.get(lane) or find_lane(road, lane, s)
+    centre, slope, width = found.state_at(s)
+    direction = found.direction
+    return surface_pose(road, s, centre + direction * offset, slope, direction, found, centre, width)
+
+
+def surface_pose(
+    road: Road,
+    s: float,
+    t: float,
+    slope: float = 0.0,
+    direction: int = 1,
+    lane: Lane | None = None,
+    centre: float = 0.0,
+    width: float = 0.0,
+) -> Pose:
+    """Pose at (s, t), heading along (+1) or against (-1) s, turned by the slope of what is followed. [m], [rad]"""
+    x, y, heading = road.reference_at(s)
+    z = pitch = roll = 0.0
+    from_line = t
+    forward = heading
+    if not road.is_flat:
+        z, pitch, roll, shrink, drift, lead = road.surface.at(s, t)
+        from_line = t * shrink
+        if lead != 0.0:
+            x, y = x + lead * cos(heading), y + lead * sin(heading)
+        if drift != 0.0:
+            forward += atan(drift)
+        if lane is not None and lane.heights:
+            z += lane.height_at(s, across_lane(lane, t, centre, width))
+    x -= from_line * sin(heading)
+    y += from_line * cos(heading)
+    turn = atan(slope) if slope != 0.0 else 0.0
+    if turn != 0.0 and (pitch != 0.0 or roll != 0.0):
+        turn, pitch, roll = turned_in_surface(turn, pitch, roll)
+    if direction < 0:
+        turn, pitch, roll = turn + pi, -pitch, -roll
+    return Pose(x, y, z, normal_angle(forward + turn), pitch, roll)
+
+
+def turned_in_surface(turn: float, pitch: float, roll: float) -> tuple[float, float, float]:
+    """Heading change, pitch and roll after turning by `turn` within a surface that pitches and rolls.
+
+    The angles of the rotation Ry(pitch) Rx(roll) Rz(turn), seen as Rz Ry Rx again.
+    """
+    cos_turn, sin_turn, cos_pitch, sin_pitch = cos(turn), sin(turn), cos(pitch), sin(pitch)
+    cos_roll, sin_roll = cos(roll), sin(roll)
+    forward_x = cos_pitch * cos_turn + sin_pitch * sin_roll * sin_turn
+    forward_z = cos_pitch * sin_roll * sin_turn - sin_pitch * cos_turn
+    lateral_z = cos_pitch * sin_roll * cos_turn + sin_pitch * sin_turn
+    return (
+        atan2(cos_roll * sin_turn, forward_x),
+        -asin(min(max(forward_z, -1.0), 1.0)),
+        atan2(lateral_z, cos_pitch * cos_roll),
+    )
+
+
+def turn_for_heading(change: float, pitch: float, roll: float) -> float:
+    """Turn within a surface that pitches and rolls, for a change of heading: the reverse of `turned_in_surface`.
+
+    [rad]
+    """
+    sideways, ahead = sin(change), cos(change)
+    return atan2(cos(pitch) * sideways, cos(roll) * ahead - sin(pitch) * sin(roll) * sideways)
+
+
+def across_lane(lane: Lane, t: float, centre: float, width: float) -> float:
+    """How far across a lane t lies, from its inner (0) to its outer edge (1). [-]"""
+    if width <= 0.0:
+        return 0.0
+    outwards = (t - centre) / width if lane.id > 0 else (centre - t) / width
+    return min(max(0.5 + outwards, 0.0), 1.0)
+
+
+def lane_at(road: Road, index: int, s: float, t: float, lane_types: Collection[str] | None) -> LaneCoordinates:
+    """The lane of these types that holds t, else the nearest; lanes of no width only where there is nothing else.
+
+    `s`, `t` in [m].
+    """
+    best: tuple[float, float, float] | None = None
+    found: tuple[Lane, float] | None = None
+    for lane in road.section_at(s).lanes:
+        if lane_types is not None and lane.type not in lane_types:
+            continue
+        centre, _, width = lane.state_at(s)
+        away = abs(t - centre)
+        score = (max(away - 0.5 * width, 0.0) + (1e3 if width <= 1e-6 else 0.0), away, width)
+        if best is None or score < best:
+            best, found = score, (lane, centre)
+    if best is None or found is None:
+        return LaneCoordinates(index, 0, s, t, t, inf)
+    lane, centre = found
+    return LaneCoordinates(index, lane.id, s, lane.direction * (t - centre), t, max(best[1] - 0.5 * best[2], 0.0))
+
+
+def limit_at(speeds: tuple[tuple[float, float], ...], s: float) -> float:
+    """The speed limit of (s, limit) records at s; inf where there is none. [m/s]"""
+    limit = inf
+    for start, value in speeds:
+        if start <= s:
+            limit = value
+    return limit

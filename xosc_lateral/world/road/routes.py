@@ -13,8 +13,7 @@ from itertools import pairwise
 from math import inf
 
 from xosc_lateral.world.road.lanes import DRIVING
-from xosc_lateral.world.road.links import End, Links
-from xosc_lateral.world.road.moving import follow_section
+from xosc_lateral.world.road.links import End, Links, follow_section
 from xosc_lateral.world.road.positions import RoadPath, RouteStep
 from xosc_lateral.world.road.road import Road
 
@@ -30,9 +29,9 @@ def path_between(
     for way in (1, -1):
         room = links.roads[road].length - s if way > 0 else s
         reach = min(limit, abs(best.ds) if best is not None else inf)
-        found = _search(links, road, way, room, target, target_s, reach)
-        if found is not None and (best is None or found[0] < abs(best.ds)):
-            best = RoadPath(found[0] * way * direction, way, found[1])
+        steps = _search(links, road, way, room, target, target_s, reach)
+        if steps is not None and (best is None or steps[0] < abs(best.ds)):
+            best = RoadPath(steps[0] * way * direction, way, steps[1])
     return best if best is not None and abs(best.ds) <= limit else None
 
 
@@ -134,11 +133,11 @@ def _drivable(links: Links, here: End, lane: int | None, s: float | None = None)
     section = links.roads[road].sections[-1 if way > 0 else 0]
     reached: dict[tuple[End, int | None], None] = {}
     if lane is None:
-        leaving = [one.id for one in section.lanes if one.type in DRIVING and one.direction == way]
+        leaving = [way_out.id for way_out in section.lanes if way_out.type in DRIVING and way_out.direction == way]
     else:
         leaving = [found for found in (_at_end(links.roads[road], way, lane, s),) if found is not None]
-    for one in leaving:
-        for link in links.next_lanes(road, one, way):
+    for way_out in leaving:
+        for link in links.next_lanes(road, way_out, way):
             reached[(link.road, link.direction), None if lane is None else link.lane] = None
     yield from reached
 

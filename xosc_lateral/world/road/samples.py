@@ -77,11 +77,11 @@ class Samples:
         inside = (line >= 0) & (line < self._lines)
         key = np.where(inside, column * self._lines + line, -1)
         cell = np.minimum(np.searchsorted(self._cells, key), len(self._cells) - 1)
-        found = self._cells[cell] == key
-        hits = self._in_cells(np.flatnonzero(found), cell[found], x, y)
-        if found.all():
+        matches = self._cells[cell] == key
+        hits = self._in_cells(np.flatnonzero(matches), cell[matches], x, y)
+        if matches.all():
             return hits
-        far = self._nearest(np.flatnonzero(~found), x, y)
+        far = self._nearest(np.flatnonzero(~matches), x, y)
         point, road = np.concatenate([hits.point, far.point]), np.concatenate([hits.road, far.road])
         return Candidates(point, road, np.concatenate([hits.s, far.s]))
 

@@ -113,14 +113,14 @@ class NetworkTables(LaneTables):
             s = self._clamped(road, s)
             profile = self.profile_of(self.row_of(road, lane, s), s)
             frame, rising = self.lines.at(road, s), self._elevation.at(road, s)
-            found: tuple[FloatArray, ...] = ()
+            parts: tuple[FloatArray, ...] = ()
             for offset in offsets:
                 t = profile.centre + profile.direction * offset
-                found += self._point(frame, self._surface(road, s, t, rising, angles=False), s, t, profile)
-            return found
+                parts += self._point(frame, self._surface(road, s, t, rising, angles=False), s, t, profile)
+            return parts
 
-        found = self._batch(evaluate, 3 * len(offsets), road, s, *offsets, lane=lane)
-        return [found[k : k + 3] for k in range(0, len(found), 3)]
+        parts = self._batch(evaluate, 3 * len(offsets), road, s, *offsets, lane=lane)
+        return [parts[k : k + 3] for k in range(0, len(parts), 3)]
 
     def road_to_world(self, road: ArrayLike, s: ArrayLike, t: ArrayLike) -> Poses:
         """Poses along reference lines."""

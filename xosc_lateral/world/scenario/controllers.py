@@ -129,30 +129,30 @@ def kind_of(controller: Controller) -> ControllerKind:
 
 def switches(content: object) -> Iterator[tuple[Domains, bool]]:
     """Domains that an action switches on or off; to override pedals or the wheel is to drive, too."""
-    found: tuple[tuple[Domains, bool | None], ...] = ()
+    switched: tuple[tuple[Domains, bool | None], ...] = ()
     match content:
         case AssignControllerAction():
-            found = (
+            switched = (
                 (Domains.LONGITUDINAL, content.activate_longitudinal),
                 (Domains.LATERAL, content.activate_lateral),
             )
         case ActivateControllerAction():
-            found = (Domains.LONGITUDINAL, content.longitudinal), (Domains.LATERAL, content.lateral)
+            switched = (Domains.LONGITUDINAL, content.longitudinal), (Domains.LATERAL, content.lateral)
         case OverrideControllerValueAction():
-            found = tuple(
+            switched = tuple(
                 (Domains.LATERAL if "steering" in name.lower() else Domains.LONGITUDINAL, active)
                 for name, active, _ in content.overrides
             )
-    return ((domain, on) for domain, on in found if on is not None)
+    return ((domain, on) for domain, on in switched if on is not None)
 
 
 def gives_lateral(content: object) -> bool | None:
     """Whether an action gives the lateral domain to a controller, or takes it back; None: neither."""
-    found = next((on for domain, on in switches(content) if domain is Domains.LATERAL), None)
+    lateral = next((on for domain, on in switches(content) if domain is Domains.LATERAL), None)
     if isinstance(content, AssignControllerAction) and content.controller is not None:
         kind = kind_of(content.controller)
-        return Domains.LATERAL in kind.drives if kind.at_once else found
-    return found
+        return Domains.LATERAL in kind.drives if kind.at_once else lateral
+    return lateral
 
 
 def is_meant(controller: Controller, content: object) -> bool:
@@ -191,23 +191,23 @@ class DrivingControllers:
                 self._overridden |= domain if on else Domains.NONE
             return
         if self._for_carla and isinstance(content, ActivateControllerAction):
-            self._assigned = [one for one in self._assigned if one.kind is not AUTOPILOT]
+            self._assigned = [assigned for assigned in self._assigned if assigned.kind is not AUTOPILOT]
             self._assigned.append(_Assigned(Controller(AUTOPILOT.name, content.place), AUTOPILOT))
-        meant = next((one for one in reversed(self._assigned) if is_meant(one.controller, content)), None)
+        meant = next((each for each in reversed(self._assigned) if is_meant(each.controller, content)), None)
         if meant is None:
             return
         for domain, on in switches(content):
-            for one in self._assigned if on else [meant]:  # a domain has one driver
-                one.asked &= ~domain
+            for assigned in self._assigned if on else [meant]:  # a domain has one driver
+                assigned.asked &= ~domain
             meant.asked |= domain if on else Domains.NONE
 
     @property
     def domains(self) -> Domains:
         """What they drive now."""
-        found = Domains.NONE
-        for one in self._assigned:
-            found |= one.kind.active(one.asked | self._overridden)
-        return found
+        driven = Domains.NONE
+        for assigned in self._assigned:
+            driven |= assigned.kind.active(assigned.asked | self._overridden)
+        return driven
 
     def words(self) -> str:
         """Who drives what now; empty: nobody."""
@@ -216,9 +216,9 @@ class DrivingControllers:
 
     def _assign(self, controller: Controller) -> None:
         kind = kind_of(controller)
-        self._assigned = [one for one in self._assigned if one.controller != controller]
-        for one in self._assigned if kind.at_once else ():
-            one.asked = Domains.NONE
+        self._assigned = [assigned for assigned in self._assigned if assigned.controller != controller]
+        for assigned in self._assigned if kind.at_once else ():
+            assigned.asked = Domains.NONE
         self._assigned.append(_Assigned(controller, kind, Domains.BOTH if kind.at_once else Domains.NONE))
 
 

@@ -7,7 +7,7 @@ event that moves it or an action that refers to somebody. In doubt a thing depen
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -23,11 +23,19 @@ from xosc_lateral.world.scenario.conditions import (
     UserDefinedValueCondition,
     VariableCondition,
 )
+from xosc_lateral.world.scenario.controllers import AUTOPILOT, Domains, is_meant, kind_of, named, switches
+from xosc_lateral.world.scenario.entity import Controller, Entity
 from xosc_lateral.world.scenario.enums import StoryboardElementState, StoryboardElementType
 from xosc_lateral.world.scenario.global_actions import TrafficSignalControllerAction, TrafficSignalStateAction
-from xosc_lateral.world.scenario.private_actions import APPEARANCE, TeleportAction
+from xosc_lateral.world.scenario.private_actions import (
+    APPEARANCE,
+    CONTROLLER,
+    ActivateControllerAction,
+    AssignControllerAction,
+    TeleportAction,
+)
 from xosc_lateral.world.scenario.scenario import Scenario
-from xosc_lateral.world.scenario.storyboard import Act, Condition, Event, ManeuverGroup, Trigger
+from xosc_lateral.world.scenario.storyboard import Act, Action, Condition, Event, ManeuverGroup, Trigger
 
 Path = tuple[str, ...]
 
@@ -94,18 +102,18 @@ class Dependence:
 
 def dependence(scenario: Scenario, unforeseeable: Collection[str]) -> Dependence:
     """What depends on vehicles under test or with controllers of their own; nothing if there are none."""
-    found = Dependence(set(unforeseeable))
+    result = Dependence(set(unforeseeable))
     if not unforeseeable:
-        return found
+        return result
     size = -1
-    while found.size() != size:
-        size = found.size()
-        _follow_init(scenario, found)
+    while result.size() != size:
+        size = result.size()
+        _follow_init(scenario, result)
         for story in scenario.storyboard.stories:
             for act in story.acts:
-                _follow_act(found, (story.name,), act)
-        found.entities |= {e.trailer for e in scenario.entities if e.trailer is not None and e.name in found.entities}
-    return found
+                _follow_act(result, (story.name,), act)
+        result.entities |= {e.trailer for e in scenario.entities if e.trailer is not None and e.name in result.entities}
+    return result
 
 
 def entity_references(content: object) -> Iterator[str]:
@@ -138,50 +146,52 @@ def refers_to(content: StoryboardElementStateCondition, path: Path) -> bool:
     return _DEPTH.get(content.element_type) == len(path) and path[len(path) - len(wanted) :] == wanted
 
 
-def _follow_init(scenario: Scenario, found: Dependence) -> None:
+def _follow_init(scenario: Scenario, dependence: Dependence) -> None:
     for private in scenario.storyboard.init.privates:
         for action in private.actions:
             # Where others are at the start is known.
-            if not isinstance(action.content, TeleportAction) and found.entities & set(
+            if not isinstance(action.content, TeleportAction) and dependence.entities & set(
                 entity_references(action.content)
             ):
-                found.entities.add(private.entity_ref)
+                dependence.entities.add(private.entity_ref)
 
 
-def _follow_act(found: Dependence, above: Path, act: Act) -> None:
+def _follow_act(dependence: Dependence, above: Path, act: Act) -> None:
     path = (*above, act.name)
-    begins = found.of_trigger(act.start_trigger)
-    stops = found.of_trigger(act.stop_trigger)
+    begins = dependence.of_trigger(act.start_trigger)
+    stops = dependence.of_trigger(act.stop_trigger)
     if begins:
-        found.begins.add(path)
+        dependence.begins.add(path)
     if begins or stops:
-        found.ends |= {path, above}
+        dependence.ends |= {path, above}
     for group in act.maneuver_groups:
-        again = group.maximum_execution_count > 1 and (*path, group.name) in found.ends
+        again = group.maximum_execution_count > 1 and (*path, group.name) in dependence.ends
         for maneuver, event in group.events():
             here = (*path, group.name, maneuver.name, event.name)
-            _follow_event(found, here, act, group, event, cut=begins or stops or again)
+            _follow_event(dependence, here, act, group, event, cut=begins or stops or again)
 
 
-def _follow_event(found: Dependence, path: Path, act: Act, group: ManeuverGroup, event: Event, *, cut: bool) -> None:
-    depends = cut or found.of_trigger(event.start_trigger)
+def _follow_event(
+    dependence: Dependence, path: Path, act: Act, group: ManeuverGroup, event: Event, *, cut: bool
+) -> None:
+    depends = cut or dependence.of_trigger(event.start_trigger)
     actors = set(actors_of(act, group, event))
     refers = False
     for action in event.actions:
         references = set(entity_references(action.content))
         moves = action.is_private and not isinstance(action.content, APPEARANCE)
-        steered = bool(references & found.entities)
+        steered = bool(references & dependence.entities)
         refers |= steered
         if moves and (depends or steered):
-            found.entities |= actors
+            dependence.entities |= actors
         if not action.is_private and depends:
-            found.entities |= references  # appears or is gone then
-            found.values |= {_value(action.content)} - {""}
+            dependence.entities |= references  # appears or is gone then
+            dependence.values |= {_value(action.content)} - {""}
     if depends:
-        found.begins |= {path, *((*path, action.name) for action in event.actions)}
-    if depends or refers or actors & found.entities:
-        found.ends |= {path[:depth] for depth in range(1, len(path) + 1)}
-        found.ends |= {(*path, action.name) for action in event.actions}
+        dependence.begins |= {path, *((*path, action.name) for action in event.actions)}
+    if depends or refers or actors & dependence.entities:
+        dependence.ends |= {path[:depth] for depth in range(1, len(path) + 1)}
+        dependence.ends |= {(*path, action.name) for action in event.actions}
 
 
 def actors_of(act: Act, group: ManeuverGroup, event: Event) -> tuple[str, ...]:
@@ -205,3 +215,102 @@ def _value(content: object) -> str:
     if isinstance(content, TrafficSignalControllerAction):
         return content.controller_ref
     return str(getattr(content, "parameter_ref", "") or getattr(content, "variable_ref", ""))
+
+
+# ---- vehicles that the storyboard does not drive: those under test, and those that a controller has ----
+EXTERNAL_ENTITIES: Mapping[str, frozenset[str]] = {
+    # CARLA's ScenarioRunner, openscenario_configuration.py: ego vehicles are those of this type.
+    "type": frozenset({"ego_vehicle"}),
+}
+"""Property of a vehicle -> values that leave it to somebody else; both in lower case."""
+
+EXTERNAL_NAMES = frozenset({"hero", "ego_vehicle"})
+"""Names by which CARLA's tools look for the vehicle that they drive (its `role_name`)."""
+
+
+def vehicles_under_test(scenario: Scenario) -> dict[str, str]:
+    """Vehicles that the scenario leaves to somebody else, in its order, and what says so."""
+    assigned = assigned_controllers(scenario)
+    egos = {}
+    for entity in scenario.entities:
+        why = _why(entity, assigned[entity.name]) if entity.is_vehicle else ""
+        if why:
+            egos[entity.name] = why
+    return egos
+
+
+@dataclass(frozen=True, slots=True)
+class Control:
+    """Controllers that drive an entity at some time: their names, and the domains that they have then."""
+
+    controllers: tuple[str, ...]
+    domains: Domains
+
+    def __str__(self) -> str:
+        return f"{' and '.join(self.controllers)}: {self.domains.words()}"
+
+
+def controlled_entities(scenario: Scenario) -> dict[str, Control]:
+    """Entities whose motion controllers decide at some time, in the scenario's order.
+
+    Those alone that some action makes active: an assigned one that nothing activates drives nobody.
+    """
+    assigned, actions = assigned_controllers(scenario), dict[str, list[object]]()
+    for actors, action in _private_actions(scenario):
+        for actor in actors if isinstance(action.content, CONTROLLER) else ():
+            actions.setdefault(actor, []).append(action.content)
+    reasons = {}
+    for entity in scenario.entities:
+        names, domains = dict[str, None](), Domains.NONE
+        contents = actions.get(entity.name, [])
+        for controller in assigned[entity.name]:
+            kind = kind_of(controller)
+            asked = Domains.BOTH if kind.at_once else Domains.NONE
+            for domain in _switched_on(content for content in contents if is_meant(controller, content)):
+                asked |= domain
+            if kind.active(asked):
+                names[named(controller)] = None
+                domains |= kind.active(asked)
+        activations = (content for content in contents if isinstance(content, ActivateControllerAction))
+        if scenario.header.is_left_handed and any(_switched_on(activations)):
+            names[AUTOPILOT.name] = None
+            domains = Domains.BOTH
+        if domains:
+            reasons[entity.name] = Control(tuple(names), domains)
+    return reasons
+
+
+def _switched_on(contents: Iterable[object]) -> Iterator[Domains]:
+    return (domain for content in contents for domain, on in switches(content) if on)
+
+
+def assigned_controllers(scenario: Scenario) -> dict[str, list[Controller]]:
+    """Controllers of each entity, from the start or later."""
+    assigned = {entity.name: list(entity.controllers) for entity in scenario.entities}
+    for actors, action in _private_actions(scenario):
+        content = action.content
+        if isinstance(content, AssignControllerAction) and content.controller is not None:
+            for actor in actors:
+                assigned.setdefault(actor, []).append(content.controller)
+    return assigned
+
+
+def _why(entity: Entity, controllers: Iterable[Controller]) -> str:
+    for controller in controllers:
+        if kind_of(controller).is_external:
+            return f"controller {named(controller)}"
+    for name, value in entity.properties.items():
+        if value.strip().lower() in EXTERNAL_ENTITIES.get(name.strip().lower(), ()):
+            return f"{name} {value}"
+    return f"its name is '{entity.name}'" if entity.name in EXTERNAL_NAMES else ""
+
+
+def _private_actions(scenario: Scenario) -> Iterator[tuple[tuple[str, ...], Action]]:
+    for private in scenario.storyboard.init.privates:
+        for action in private.actions:
+            yield (private.entity_ref,), action
+    for _, act, group in scenario.storyboard.groups():
+        for _, event in group.events():
+            actors = actors_of(act, group, event)
+            for action in event.actions:
+                yield actors, action

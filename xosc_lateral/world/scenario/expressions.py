@@ -127,7 +127,7 @@ def from_text(text: str) -> Value:
 
 
 def _tokens(expression: str) -> list[tuple[str, str]]:
-    found, at = [], 0
+    tokens, at = [], 0
     text = expression.rstrip()
     while at < len(text):
         match = _TOKEN.match(text, at)
@@ -139,11 +139,11 @@ def _tokens(expression: str) -> list[tuple[str, str]]:
             word = SYNONYMS[word]
         if kind == "word" and word in WORD_OPERATORS:
             kind = "operator"
-        found.append((kind, word))
+        tokens.append((kind, word))
         at = match.end()
-    if not found:
+    if not tokens:
         raise ExpressionError("empty expression")
-    return found
+    return tokens
 
 
 def _joins_words(tokens: list[tuple[str, str]]) -> bool:

@@ -29,7 +29,7 @@ ALONGSIDE = 10.0
 """A vehicle in the next lane counts half as alongside at this free space lengthwise, wholly at half of it. [m]"""
 
 INFLUENCE_DISTANCE = 40.0
-"""Free space over which the influence of others fades to 37 %, as in `fitting.answers`: with so much more free space
+"""Free space over which the influence of others fades to 37 %, as in `fitting.neighbours`: with so much more free space
 for each factor e that less of a body lies in the lane, its influence is the product of both. [m]"""
 
 
@@ -121,11 +121,11 @@ class Extent(NamedTuple):
     center_x: FloatArray
 
 
-def free_space(seen: OtherVehicles, own: BoundingBox | Extent, other: BoundingBox | Extent) -> FloatArray:
+def free_space(seen: OtherVehicles, box: BoundingBox | Extent, other: BoundingBox | Extent) -> FloatArray:
     """Bumper to bumper, 0 while overlapping lengthwise. [m]"""
     turned = np.where(seen.oncoming, -1.0, 1.0)
-    between_centres = seen.ahead + turned * other.center_x - own.center_x
-    return np.maximum(np.abs(between_centres) - 0.5 * (own.length + other.length), 0.0)
+    between_centres = seen.ahead + turned * other.center_x - box.center_x
+    return np.maximum(np.abs(between_centres) - 0.5 * (box.length + other.length), 0.0)
 
 
 @dataclass(eq=False, slots=True)
@@ -179,14 +179,14 @@ class Around:
         columns = {"oncoming_distance": self.oncoming}
         if always_fade or (self.oncoming_there.max(initial=0.0) > 0.0 and self.oncoming_there.min(initial=1.0) < 1.0):
             columns[f"oncoming_distance{FADES}"] = self.oncoming_there
-        for side, found in self.sides.items():
-            columns |= {f"{side}_is_truck": found.is_truck}
-            lane = np.maximum(lanes[side], np.minimum(found.influence, 1.0))
-            columns[f"{side}_distance"] = np.where((lane > 0) & np.isnan(found.distance), np.inf, found.distance)
+        for side, others in self.sides.items():
+            columns |= {f"{side}_is_truck": others.is_truck}
+            lane = np.maximum(lanes[side], np.minimum(others.influence, 1.0))
+            columns[f"{side}_distance"] = np.where((lane > 0) & np.isnan(others.distance), np.inf, others.distance)
             if always_fade or (lane.max(initial=0.0) > 0.0 and lane.min(initial=1.0) < 1.0):
                 columns[f"{side}_distance{FADES}"] = lane
             if side != "lead":  # the same as measured drives often have it: a flag for what drives beside
-                columns |= {f"truck_{side}": found.truck_alongside, f"car_{side}": found.car_alongside}
+                columns |= {f"truck_{side}": others.truck_alongside, f"car_{side}": others.car_alongside}
         return columns
 
 

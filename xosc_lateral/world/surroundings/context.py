@@ -84,9 +84,9 @@ def _road(entity: EntityMotion, network: RoadNetwork, grid: IntArray) -> dict[st
 
 def spread_out(values: FloatArray, where: BoolArray) -> FloatArray:
     """As many values as there are rows `where` they belong, NaN in the others; shape of `where`."""
-    found = np.full(len(where), np.nan)
-    found[where] = values
-    return found
+    known = np.full(len(where), np.nan)
+    known[where] = values
+    return known
 
 
 def road_columns(
@@ -123,15 +123,15 @@ def _around(values: FloatArray, step: float) -> FloatArray:
 def _neighbours(
     motion: NominalMotion, network: RoadNetwork, index: int, grid: IntArray, lanes: Mapping[str, FloatArray]
 ) -> dict[str, FloatArray]:
-    own = motion.entities[index]
+    observer = motion.entities[index]
     steps = np.diff(grid)
     every = int(steps[0]) if len(steps) and (steps == steps[0]).all() else 1
     traffic = _traffic(motion, network, int(grid[0]) % every, every)
     columns = grid // every
     around = Around.with_no_one(len(grid))
-    groups = _own_lane_groups(own, network, grid, traffic.direction[index, columns])
-    width = _own_lane_width(own, network, grid)
-    extent, box = traffic.extent, own.entity.bounding_box
+    groups = _own_lane_groups(observer, network, grid, traffic.direction[index, columns])
+    width = _own_lane_width(observer, network, grid)
+    extent, box = traffic.extent, observer.entity.bounding_box
     far = (
         SIGHT_DISTANCE
         + 0.5 * box.length
@@ -149,14 +149,14 @@ def _neighbours(
                 members = of_group[part]
                 if not len(members):
                     continue
-                u, offset = (np.tile(values, len(others)) for values in (own_u[part], own.offset[grid[members]]))
+                u, offset = (np.tile(values, len(others)) for values in (own_u[part], observer.offset[grid[members]]))
                 road, s, t, direction = traffic.of(others, columns[members])
                 seen = see_along(path, u, offset, road, s, t, direction, network.lane_centre_t)
                 k = np.flatnonzero(np.abs(seen.ahead) <= far)
                 seen = OtherVehicles(seen.ahead[k], seen.left[k], seen.oncoming[k])
-                who, rows = others[k // len(members)], members[k % len(members)]
-                gap = free_space(seen, box, Extent(*(values[who] for values in extent)))
-                around.add(rows, seen, gap, width[rows], traffic.width[who], traffic.is_truck[who])
+                number, rows = others[k // len(members)], members[k % len(members)]
+                gap = free_space(seen, box, Extent(*(values[number] for values in extent)))
+                around.add(rows, seen, gap, width[rows], traffic.width[number], traffic.is_truck[number])
     return around.columns(lanes)
 
 
@@ -205,12 +205,12 @@ def _traffic(motion: NominalMotion, network: RoadNetwork, first: int, every: int
     return _Traffic._make([*tables, Extent(length, centre), width, is_truck])
 
 
-def _own_lane_width(own: EntityMotion, network: RoadNetwork, grid: IntArray) -> FloatArray:
+def _own_lane_width(observer: EntityMotion, network: RoadNetwork, grid: IntArray) -> FloatArray:
     """Of the lane, at least the vehicle's own, shape (n,). [m]"""
-    width = np.full(len(grid), own.entity.bounding_box.width)
-    on = (own.road[grid] >= 0) & (own.lane[grid] != 0)
+    width = np.full(len(grid), observer.entity.bounding_box.width)
+    on = (observer.road[grid] >= 0) & (observer.lane[grid] != 0)
     rows = grid[on]
-    width[on] = np.maximum(width[on], network.lane_width(own.road[rows], own.lane[rows], own.s[rows]))
+    width[on] = np.maximum(width[on], network.lane_width(observer.road[rows], observer.lane[rows], observer.s[rows]))
     return np.asarray(np.maximum(width, 0.1))
 
 
@@ -241,27 +241,27 @@ def _in_sight(motion: NominalMotion) -> list[tuple[slice, list[IntArray]]]:
     """
 
     def where_active(axis: str) -> Iterator[FloatArray]:
-        for one in motion.entities:
-            yield np.where((one.activity & Activity.ACTIVE) != 0, getattr(one, axis), np.nan)
+        for entity in motion.entities:
+            yield np.where((entity.activity & Activity.ACTIVE) != 0, getattr(entity, axis), np.nan)
 
-    found: list[tuple[slice, list[IntArray]]] = []
+    parts: list[tuple[slice, list[IntArray]]] = []
     if len(motion.entities) < 2:
-        return found
+        return parts
     for rows, pairs in stretches_within(where_active("x"), where_active("y"), IN_SIGHT, blocks=64):
         both = np.array([*pairs, *(pair[::-1] for pair in pairs)], dtype=np.int64)
         both = both[np.lexsort((both[:, 1], both[:, 0]))]
         ends = np.searchsorted(both[:, 0], np.arange(1, len(motion.entities)))
-        found.append((rows, np.split(both[:, 1].copy(), ends)))
-    return found
+        parts.append((rows, np.split(both[:, 1].copy(), ends)))
+    return parts
 
 
 def _own_lane_groups(
-    own: EntityMotion, network: RoadNetwork, grid: IntArray, direction: NDArray[np.int8]
+    entity: EntityMotion, network: RoadNetwork, grid: IntArray, direction: NDArray[np.int8]
 ) -> list[tuple[IntArray, FloatArray, list[Reach]]]:
     """Rows of the grid that share one lane path: positions in the grid, own u there, and the path."""
     groups: dict[tuple[int, int, float, int], list[IntArray]] = {}
     on = np.flatnonzero(direction)
-    road, lane, s = own.road[grid[on]], own.lane[grid[on]], own.s[grid[on]]
+    road, lane, s = entity.road[grid[on]], entity.lane[grid[on]], entity.s[grid[on]]
     keys = np.stack([road, lane, network.section_numbers(road, s), direction[on]])
     for part in np.split(np.arange(len(on)), np.flatnonzero((np.diff(keys) != 0).any(axis=0)) + 1):
         if len(part):
@@ -271,7 +271,7 @@ def _own_lane_groups(
     result = []
     for (number, lane_id, _, forward), members in groups.items():
         rows = np.concatenate(members)
-        along = own.s[grid[rows]]
+        along = entity.s[grid[rows]]
         path = lane_path(network, number, lane_id, float(along[0]), forward)
         result.append((rows, path[0].sign * (along - along[0]), path))
     return result
@@ -296,30 +296,30 @@ def _environments(motion: NominalMotion) -> list[tuple[float, Environment]]:
 
 def _stated(environment: Environment, time: FloatArray, start: float, heading: FloatArray) -> Mapping[str, FloatArray]:
     """What one environment states, in DESIGN's units."""
-    one = np.ones(len(time))
+    even = np.ones(len(time))
     values: dict[str, FloatArray] = {}
     clock = environment.time_of_day
     if clock is not None:
         seconds = clock.date_time.hour * 3600.0 + clock.date_time.minute * 60.0 + clock.date_time.second
         running = time - start if clock.animation else 0.0
-        values["time_of_day"] = (seconds + running) / 3600.0 % 24.0 * one
+        values["time_of_day"] = (seconds + running) / 3600.0 % 24.0 * even
     if environment.friction_scale_factor is not None:
-        values["friction"] = environment.friction_scale_factor * one
+        values["friction"] = environment.friction_scale_factor * even
     weather = environment.weather
-    return values if weather is None else values | _stated_weather(weather, one, heading)
+    return values if weather is None else values | _stated_weather(weather, even, heading)
 
 
-def _stated_weather(weather: Weather, one: FloatArray, heading: FloatArray) -> dict[str, FloatArray]:
+def _stated_weather(weather: Weather, ones: FloatArray, heading: FloatArray) -> dict[str, FloatArray]:
     """Light, rain and wind, shape (n,) each."""
     values: dict[str, FloatArray] = {}
     if weather.illuminance is not None:
-        values["illuminance"] = weather.illuminance * one
+        values["illuminance"] = weather.illuminance * ones
     if weather.precipitation_type == "dry":
-        values["rain"] = 0.0 * one
+        values["rain"] = 0.0 * ones
     elif weather.precipitation_type == "rain" and weather.precipitation_intensity is not None:
-        values["rain"] = weather.precipitation_intensity * one
+        values["rain"] = weather.precipitation_intensity * ones
     if weather.wind_speed is not None and weather.wind_direction is not None:
-        values["wind_speed"] = weather.wind_speed * one
+        values["wind_speed"] = weather.wind_speed * ones
         # 90 deg blows to the left of travel; the standard's direction is where the wind blows to, against world x
         values["wind_direction"] = np.degrees(weather.wind_direction - heading) % 360.0
     return values

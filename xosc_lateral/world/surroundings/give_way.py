@@ -82,33 +82,35 @@ def give_way(
     left, right, none = empty((count, n)), empty((count, n)), np.zeros(n)
     names = ("x", "y", "heading", "deviation", "can_move", "present")
     tables = [empty((count, n), bool if name in names[4:] else np.float64) for name in names]
-    for k, one in enumerate(sampled):
-        for table, values in zip((left, right, *tables), (none, none, *Frame.of(one, rows)[: len(names)]), strict=True):
+    for k, samples in enumerate(sampled):
+        columns = (none, none, *Frame.of(samples, rows)[: len(names)])
+        for table, values in zip((left, right, *tables), columns, strict=True):
             put(table, slice(k, k + 1), np.asarray(values))
     left_hand = np.array(_left_hand(network, sampled, rows), dtype=bool)
     x, y = (
         (np.where(there, row, np.nan) for row, there in zip(table, tables[-1], strict=True)) for table in tables[:2]
     )
-    boxes = [one.motion.entity.bounding_box for one in sampled]
+    boxes = [samples.motion.entity.bounding_box for samples in sampled]
     length, width = (np.array([getattr(box, name) for box in boxes]) for name in ("length", "width"))
-    can_move = [one.can_move.any() for one in sampled]
+    can_move = [samples.can_move.any() for samples in sampled]
     responses = Response(*(
-        np.array([side in getattr(one, name) for one in sampled], dtype=bool)
+        np.array([side in getattr(samples, name) for samples in sampled], dtype=bool)
         for name in ("responds", "alone") for side in ("left", "right")
     ))  # fmt: skip
     for stretch, near_pairs in stretches_within(x, y, FADES + length.max(initial=0.0) + MARGIN):
         meeting = [pair for pair in near_pairs if can_move[pair[0]] or can_move[pair[1]]]
         part = [table[:, stretch] for table in tables]
-        for own, other in _together(meeting, part[0].shape[1]):
-            near = np.flatnonzero(_rows_near(part, length, own, other))
-            who, at = np.divmod(near, part[0].shape[1])
-            own, other = own[who], other[who]
+        for vehicle, other in _together(meeting, part[0].shape[1]):
+            near = np.flatnonzero(_rows_near(part, length, vehicle, other))
+            number, at = np.divmod(near, part[0].shape[1])
+            vehicle, other = vehicle[number], other[number]
             first, second = (
-                Frame._make([*(table[who, at] for table in part), length[who], width[who]]) for who in (own, other)
+                Frame._make([*(table[who, at] for table in part), length[who], width[who]]) for who in (vehicle, other)
             )
-            aside = moved_aside(first, second, Response._make(column[own] for column in responses), left_hand[own])
-            np.maximum.at(right[:, stretch], (own, at), np.maximum(0.0 - aside, 0.0))
-            np.maximum.at(left[:, stretch], (own, at), np.maximum(aside, 0.0))
+            response = Response._make(column[vehicle] for column in responses)
+            aside = moved_aside(first, second, response, left_hand[vehicle])
+            np.maximum.at(right[:, stretch], (vehicle, at), np.maximum(0.0 - aside, 0.0))
+            np.maximum.at(left[:, stretch], (vehicle, at), np.maximum(aside, 0.0))
     every = max(1, int(rows[1] - rows[0])) if n > 1 else 1
     smoothed = STEERING / (motion.step * every)
     result: list[FloatArray | None] = []
@@ -136,16 +138,16 @@ def give_way_now(
     cos, sin = np.cos(places.heading), np.sin(places.heading)
     x, y = (axis + places.center_x * part for axis, part in ((places.x, cos), (places.y, sin)))
     a, b = pairs_now(x, y, FADES + float(places.length.max(initial=0.0)) + MARGIN)
-    own, other = np.concatenate([a, b]), np.concatenate([b, a])
-    own, other = own[can_move[own]], other[can_move[own]]
+    vehicle, other = np.concatenate([a, b]), np.concatenate([b, a])
+    vehicle, other = vehicle[can_move[vehicle]], other[can_move[vehicle]]
     x, y = x + lateral * sin, y - lateral * cos  # on the lane's centre line, from which a deviation counts
     present = np.ones(n, dtype=np.bool_)
     columns = (x, y, places.heading, deviation, can_move, present, places.length, places.width)
-    first, second = (Frame._make(column[who] for column in columns) for who in (own, other))
-    aside = moved_aside(first, second, Response._make(column[own] for column in response), left_hand)
+    first, second = (Frame._make(column[who] for column in columns) for who in (vehicle, other))
+    aside = moved_aside(first, second, Response._make(column[vehicle] for column in response), left_hand)
     left, right = np.zeros((2, n))
-    np.maximum.at(right, own, np.maximum(0.0 - aside, 0.0))
-    np.maximum.at(left, own, np.maximum(aside, 0.0))
+    np.maximum.at(right, vehicle, np.maximum(0.0 - aside, 0.0))
+    np.maximum.at(left, vehicle, np.maximum(aside, 0.0))
     return left - right
 
 
@@ -157,12 +159,12 @@ def _together(meeting: Sequence[tuple[int, int]], n: int) -> Iterator[tuple[IntA
         yield pairs[begin : begin + step, 0], pairs[begin : begin + step, 1]
 
 
-def _rows_near(tables: Sequence[NDArray[Any]], length: FloatArray, own: IntArray, other: IntArray) -> BoolArray:
+def _rows_near(tables: Sequence[NDArray[Any]], length: FloatArray, vehicle: IntArray, other: IntArray) -> BoolArray:
     """Where pairs of vehicles are near enough for `widened`, shape (pairs, n); `tables`: x, y ... of all vehicles."""
     x, y, present = tables[0], tables[1], tables[-1]
-    reach = (FADES + 0.5 * (length[own] + length[other]) + MARGIN)[:, None]
-    away = (x[other] - x[own]) ** 2 + (y[other] - y[own]) ** 2
-    return np.asarray(present[own] & present[other] & (away < reach**2))
+    reach = (FADES + 0.5 * (length[vehicle] + length[other]) + MARGIN)[:, None]
+    away = (x[other] - x[vehicle]) ** 2 + (y[other] - y[vehicle]) ** 2
+    return np.asarray(present[vehicle] & present[other] & (away < reach**2))
 
 
 MARGIN = 10.0
@@ -204,25 +206,25 @@ class Frame(NamedTuple):
 
 
 def widened(
-    own: Frame, other: Frame, responds_left: bool | BoolArray, responds_right: bool | BoolArray
+    vehicle: Frame, other: Frame, responds_left: bool | BoolArray, responds_right: bool | BoolArray
 ) -> tuple[FloatArray, BoolArray, BoolArray] | None:
     """By how much the gap to the other is widened, whether it is to the left, and whether the profile responds to it.
 
     None if the other never is near.
     """
-    ahead_x, ahead_y = other.x - own.x, other.y - own.y
-    reach = FADES + 0.5 * (own.length + other.length)
-    near = own.present & other.present & (ahead_x**2 + ahead_y**2 < (reach + MARGIN) ** 2)
+    ahead_x, ahead_y = other.x - vehicle.x, other.y - vehicle.y
+    reach = FADES + 0.5 * (vehicle.length + other.length)
+    near = vehicle.present & other.present & (ahead_x**2 + ahead_y**2 < (reach + MARGIN) ** 2)
     if not near.any():
         return None
-    cos, sin = np.cos(own.heading), np.sin(own.heading)
+    cos, sin = np.cos(vehicle.heading), np.sin(vehicle.heading)
     along, aside = ahead_x * cos + ahead_y * sin, ahead_y * cos - ahead_x * sin
-    same_way = np.cos(other.heading - own.heading) > 0.9
-    half = 0.5 * (own.width + other.width)
+    same_way = np.cos(other.heading - vehicle.heading) > 0.9
+    half = 0.5 * (vehicle.width + other.width)
     is_left = aside > 0
     nominal = np.abs(aside) - half
-    gap = nominal + np.where(is_left, 1.0, -1.0) * (other.deviation - own.deviation)
-    free = np.maximum(np.abs(along) - 0.5 * (own.length + other.length), 0.0)
+    gap = nominal + np.where(is_left, 1.0, -1.0) * (other.deviation - vehicle.deviation)
+    free = np.maximum(np.abs(along) - 0.5 * (vehicle.length + other.length), 0.0)
     responding = np.where(is_left, responds_left, responds_right)
     weight = 1.0 - smooth_step(free / np.where(responding, RESPONDING_FADES, FADES))
     weight *= smooth_step(nominal / ENTERING) * (near & same_way)
@@ -238,14 +240,14 @@ class Response(NamedTuple):
     alone_right: BoolArray
 
 
-def moved_aside(own: Frame, other: Frame, response: Response, left_hand: bool | BoolArray) -> FloatArray:
+def moved_aside(vehicle: Frame, other: Frame, response: Response, left_hand: bool | BoolArray) -> FloatArray:
     """By how much each moves aside for another, positive left, shape (n,). [m]"""
-    widening = widened(own, other, response.responds_left, response.responds_right)
+    widening = widened(vehicle, other, response.responds_left, response.responds_right)
     if widening is None:
-        return np.zeros(len(own.deviation))
+        return np.zeros(len(vehicle.deviation))
     aside, is_left, responding = widening
     alone = np.where(is_left, response.alone_left, response.alone_right)
-    aside = aside * own_share(is_left == left_hand, responding, other.can_move, alone) * own.can_move
+    aside = aside * own_share(is_left == left_hand, responding, other.can_move, alone) * vehicle.can_move
     return np.where(is_left, 0.0 - aside, aside)  # no negative zeros
 
 
@@ -278,9 +280,9 @@ def _smoothed(values: FloatArray, width: float) -> FloatArray:
 
 def _left_hand(network: RoadNetwork, sampled: Sequence[SampledVehicle], rows: IntArray) -> list[bool]:
     """Whether each vehicle drives where one keeps left: the first road that it is on says so."""
-    found = []
-    for one in sampled:
-        road = one.motion.road[rows]
+    nearest = []
+    for entity in sampled:
+        road = entity.motion.road[rows]
         on = np.flatnonzero(road >= 0)
-        found.append(bool(len(on)) and network.roads[int(road[on[0]])].rule == "LHT")
-    return found
+        nearest.append(bool(len(on)) and network.roads[int(road[on[0]])].rule == "LHT")
+    return nearest

@@ -132,11 +132,11 @@ def _along_paths(
         group[k], start, path = origins[key]
         u[k] = path[0].sign * (s - start)
     a, b = pairs_now(np.where(group >= 0, places.x, np.nan), places.y, IN_SIGHT)
-    who, whom = np.concatenate([a, b]), np.concatenate([b, a])
-    order = np.argsort(group[who], kind="stable")
-    who, whom = who[order], whom[order]
-    ends = np.searchsorted(group[who], np.arange(len(origins) + 1))
+    vehicle, other = np.concatenate([a, b]), np.concatenate([b, a])
+    order = np.argsort(group[vehicle], kind="stable")
+    vehicle, other = vehicle[order], other[order]
+    ends = np.searchsorted(group[vehicle], np.arange(len(origins) + 1))
     for number, (_, _, path) in enumerate(origins.values()):
         pairs = slice(ends[number], ends[number + 1])
         if pairs.start < pairs.stop:
-            yield path, u, who[pairs], whom[pairs]
+            yield path, u, vehicle[pairs], other[pairs]

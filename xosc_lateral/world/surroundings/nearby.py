@@ -46,8 +46,8 @@ def stretches_within(
         if len(there) > 1:
             first, second = _overlapping(low[:, block, there], high[:, block, there], there, reach, block)
             if len(first):
-                found = set(zip(first.tolist(), second.tolist(), strict=True))
-                yield slice(BLOCK * begin, BLOCK * (begin + blocks)), sorted(found)
+                pairs = set(zip(first.tolist(), second.tolist(), strict=True))
+                yield slice(BLOCK * begin, BLOCK * (begin + blocks)), sorted(pairs)
 
 
 def pairs_now(x: FloatArray, y: FloatArray, reach: float) -> tuple[IntArray, IntArray]:
@@ -68,9 +68,9 @@ def _bounds(x: Iterable[FloatArray], y: Iterable[FloatArray]) -> tuple[FloatArra
     lows, highs = [np.empty((2, 0))], [np.empty((2, 0))]
     for point in zip(x, y, strict=True):
         starts = np.arange(0, len(point[0]), BLOCK)
-        for found, ufunc in ((lows, np.fmin), (highs, np.fmax)):  # they pass over NaN
-            found.append(np.stack([ufunc.reduceat(values, starts) for values in point]))
-    low, high = (np.stack(found[1:] or found, axis=-1) for found in (lows, highs))
+        for extremes, ufunc in ((lows, np.fmin), (highs, np.fmax)):  # they pass over NaN
+            extremes.append(np.stack([ufunc.reduceat(values, starts) for values in point]))
+    low, high = (np.stack(extremes[1:] or extremes, axis=-1) for extremes in (lows, highs))
     return low, high
 
 
@@ -91,8 +91,8 @@ def _overlapping(
     counts = np.maximum(ends - np.arange(len(order)) - 1, 0)
     first = np.repeat(np.arange(len(order)), counts)
     second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(counts) - counts, counts)
-    one, two = order[first], order[second]
+    left, right = order[first], order[second]
     other = 1 - axis
-    near = (low[other, two] <= high[other, one] + reach) & (low[other, one] <= high[other, two] + reach)
-    one, two = names[one[near]], names[two[near]]
-    return np.minimum(one, two), np.maximum(one, two)
+    near = (low[other, right] <= high[other, left] + reach) & (low[other, left] <= high[other, right] + reach)
+    left, right = names[left[near]], names[right[near]]
+    return np.minimum(left, right), np.maximum(left, right)

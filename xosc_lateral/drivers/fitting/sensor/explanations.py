@@ -44,14 +44,14 @@ class Explanation:
 def explanations(measured: Measured, view: SecondView | None = None, *, only_view: bool = False) -> list[Explanation]:
     """All that were tried; of a second view, also or only what it shows."""
     seen = [] if view is None else [Colour(alone=alone, view=view) for alone in (False, True)]
-    found = [_explanation(measured, colour) for colour in seen]
-    if found and only_view:
-        return found
-    found.append(_explanation(measured, Colour()))
+    candidates = [_explanation(measured, colour) for colour in seen]
+    if candidates and only_view:
+        return candidates
+    candidates.append(_explanation(measured, Colour()))
     for order in ORDERS:
         for alone in (False, True):
-            found += _of_family(measured, order, alone)
-    return found
+            candidates += _of_family(measured, order, alone)
+    return candidates
 
 
 def _of_family(measured: Measured, order: int, alone: bool) -> Iterator[Explanation]:
@@ -86,7 +86,9 @@ def _explanation(measured: Measured, colour: Colour, start: Solution | None = No
     A second view has a level, too, and a shape that is known from as many windows as the data: its own chance costs a
     likelihood as much as fitting its knots would gain, half for each, which is given back.
     """
-    found = solve(measured, colour, start)
+    solution = solve(measured, colour, start)
     numbers = 2 * bool(colour.order) + (colour.view is not None) + (not colour.alone)
     own_chance = 0 if colour.view is None else len(colour.view.knots)
-    return Explanation(found, colour, 2.0 * found.loss + numbers * float(np.log(measured.data.count)) - own_chance)
+    return Explanation(
+        solution, colour, 2.0 * solution.loss + numbers * float(np.log(measured.data.count)) - own_chance
+    )

@@ -197,6 +197,6 @@ def rounding_density(
     terms = np.exp(-2.0 * (np.pi * order) ** 2 * structure / step**2) / order**2
     covariance = step**2 / (2.0 * np.pi**2) * terms.sum(axis=0)
     at = np.concatenate([[0.005], np.geomspace(0.01, 3.0, 90)])
-    found = 2.0 / rate * (uniform_variance(step) + 2.0 * np.cos(2.0 * np.pi * np.outer(at, lag)) @ covariance)
-    log = np.log(np.maximum(found, 1e-9 * found.max()))
+    density = 2.0 / rate * (uniform_variance(step) + 2.0 * np.cos(2.0 * np.pi * np.outer(at, lag)) @ covariance)
+    log = np.log(np.maximum(density, 1e-9 * density.max()))
     return lambda where: np.exp(np.interp(where, at, log))

@@ -35,7 +35,7 @@ def driver_runs(
         variance = float(np.concatenate([run.offset for run in runs]).var())
         return list(runs), SensorModel(0.0, driver_variance=significant(variance, 7), driver_share=(1.0, 1.0))
     rows, rate = rows_of(runs, drives)
-    found = separate(
+    separated = separate(
         [run.offset for run in runs],
         STEP,
         rows=rows,
@@ -46,7 +46,7 @@ def driver_runs(
         one_camera=all(drive.mended is not None for drive in drives),
         highest=highest,
     )
-    return [replace(run, offset=found.driver_part(run.offset, STEP)) for run in runs], found.sensor
+    return [replace(run, offset=separated.driver_part(run.offset, STEP)) for run in runs], separated.sensor
 
 
 def rows_of(runs: Sequence[Run], drives: Sequence[Drive]) -> tuple[list[FloatArray] | None, float | None]:

@@ -130,15 +130,15 @@ def separate(
     known = None if sensor_noise is None else Known(sensor_noise, per_second, rounded_off)
     asked = Measured(data, rounding(data.frequency), known)
     view = second_view(half_widths, step) if half_widths else None
-    found = explanations(asked, view, only_view=one_camera)
-    least = _taken(found)
+    candidates = explanations(asked, view, only_view=one_camera)
+    least = _taken(candidates)
     best, colour = least.solution, least.colour
     beside = _with_view(rounding, best, colour)
     result = Separation(best.knots, _sensor(best, colour, grain), beside)
     driver = float(np.concatenate([result.driver_part(run, step) for run in runs]).var())
     error = _in_band(best, colour, data)
     share = min(driver, max(variance - error, 0.0)) / variance if variance > 0.0 else 1.0
-    plausible = [(one.solution, one.colour) for one in found if one.criterion < least.criterion + PLAUSIBLE]
+    plausible = [(one.solution, one.colour) for one in candidates if one.criterion < least.criterion + PLAUSIBLE]
     if colour.view is not None:
         plausible += [(solve(asked, one, best), one) for one in _other_views(colour, colour.view)]
     interval = (0.0, 1.0) if too_coarse else _interval(of_windows, windows, least, asked, plausible, share)
@@ -146,11 +146,13 @@ def separate(
     return Separation(best.knots, sensor, beside)
 
 
-def _taken(found: Sequence[Explanation]) -> Explanation:
+def _taken(candidates: Sequence[Explanation]) -> Explanation:
     """The best by its criterion, or that of the plausible ones which another measurement supports."""
-    least = min(found, key=lambda one: one.criterion)
-    seen = [one for one in found if one.colour.view is not None and one.criterion < least.criterion + PLAUSIBLE]
-    return min(seen, key=lambda one: one.criterion, default=least)
+    least = min(candidates, key=lambda each: each.criterion)
+    seen = [
+        each for each in candidates if each.colour.view is not None and each.criterion < least.criterion + PLAUSIBLE
+    ]
+    return min(seen, key=lambda each: each.criterion, default=least)
 
 
 def _variance(rows: Sequence[FloatArray], durations: Sequence[FloatArray] | None) -> float:
@@ -163,12 +165,12 @@ def _variance(rows: Sequence[FloatArray], durations: Sequence[FloatArray] | None
 
 
 def _with_view(
-    rounding: Callable[[FloatArray], FloatArray], found: Solution, colour: Colour
+    rounding: Callable[[FloatArray], FloatArray], solution: Solution, colour: Colour
 ) -> Callable[[FloatArray], FloatArray]:
     """Density of rounding, and of errors that a second view shows, where one does."""
     if colour.view is None:
         return rounding
-    return lambda frequency: rounding(frequency) + found.coloured(colour, frequency)
+    return lambda frequency: rounding(frequency) + solution.coloured(colour, frequency)
 
 
 def _other_views(colour: Colour, view: SecondView) -> list[Colour]:
@@ -179,16 +181,16 @@ def _other_views(colour: Colour, view: SecondView) -> list[Colour]:
 
 
 def _sensor(
-    found: Solution,
+    solution: Solution,
     colour: Colour,
     grain: float,
     driver: float = 0.0,
     rest: float = 0.0,
     interval: tuple[float, float] = (0.0, 1.0),
 ) -> SensorModel:
-    level = float(np.exp(found.colour))
+    level = float(np.exp(solution.colour))
     coloured, seen = (level, 0.0) if colour.view is None else (0.0, level)
-    numbers = (np.exp(found.white), coloured, colour.corner, driver, rest, *interval, seen)
+    numbers = (np.exp(solution.white), coloured, colour.corner, driver, rest, *interval, seen)
     white, coloured, corner, driver, rest, low, high, seen = all_significant(numbers, DIGITS)
     return SensorModel(white, coloured, corner, colour.order, grain, driver, rest, (low, high), second_view=seen)
 
@@ -207,30 +209,30 @@ def _rounding(data: Periodogram, grain: float, variance: float, rate: float) -> 
     level = 2.0 * error / rate  # white, to begin with
     shape: Callable[[FloatArray], FloatArray] = lambda frequency: np.full(np.shape(frequency), level)  # noqa: E731
     for _ in range(ROUNDING_ROUNDS):
-        found = solve(Measured(data, shape(data.frequency)), Colour())
-        noise = min(0.5 * float(np.exp(found.white)) * rate, MOST_NOISE * (variance - error))
-        spectrum = partial(density, found.knots)
+        solution = solve(Measured(data, shape(data.frequency)), Colour())
+        noise = min(0.5 * float(np.exp(solution.white)) * rate, MOST_NOISE * (variance - error))
+        spectrum = partial(density, solution.knots)
         shape = rounding_density(grain, spectrum, variance - error - noise, rate=rate, noise=noise)
     return shape
 
 
-def _chance(found: Solution, colour: Colour, data: Periodogram) -> float:
+def _chance(solution: Solution, colour: Colour, data: Periodogram) -> float:
     """Standard error of what a second view says of a sensor's power: its errors are not the offset's own. [m2]
 
     Both are one draw each of the same density, of which a bin of weight w shows its mean to a share of 1 / sqrt(w).
     """
-    power = found.coloured(colour, data.frequency) * np.gradient(data.frequency)
+    power = solution.coloured(colour, data.frequency) * np.gradient(data.frequency)
     return float(np.sqrt((2.0 * power**2 / data.weight).sum()))
 
 
-def _in_band(found: Solution, colour: Colour, data: Periodogram) -> float:
+def _in_band(solution: Solution, colour: Colour, data: Periodogram) -> float:
     """Sensor's power among what was seen. [m2]"""
     from scipy.integrate import trapezoid
 
     frequency = np.linspace(0.0, float(data.frequency[-1]), 400)
-    total = np.full(len(frequency), np.exp(found.white))
+    total = np.full(len(frequency), np.exp(solution.white))
     if colour.is_there:
-        total += found.coloured(colour, frequency)
+        total += solution.coloured(colour, frequency)
     return float(trapezoid(total, frequency))
 
 

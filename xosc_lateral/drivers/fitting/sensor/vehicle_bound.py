@@ -121,15 +121,15 @@ def prior(state: FloatArray, *, is_corner_free: bool = True) -> tuple[FloatArray
 
     Where the corner is not free, the slopes expected are those of `BRISKEST`, whatever the state says.
     """
-    knots, own = state[:N_KNOTS], float(state[N_KNOTS])
-    shift, deviation = own if is_corner_free else 0.0, SLOWER_SD if own < 0.0 else BRISKER_SD
+    knots, excess = state[:N_KNOTS], float(state[N_KNOTS])
+    shift, deviation = excess if is_corner_free else 0.0, SLOWER_SD if excess < 0.0 else BRISKER_SD
     jacobian = np.zeros((len(_ROWS) + 1, N_STATE))
     jacobian[:-1, :N_KNOTS] = _ROWS
     if is_corner_free:
         jacobian[:-1, N_KNOTS] = -_of_slopes(_change_with_corner(KNOTS, shift))
     jacobian[-1, N_KNOTS] = 1.0 / deviation
     residuals = _ROWS @ knots - _of_slopes(expected_log_density(KNOTS, shift))
-    return np.append(residuals, own / deviation), jacobian
+    return np.append(residuals, excess / deviation), jacobian
 
 
 def interpolation(frequency: FloatArray) -> FloatArray:

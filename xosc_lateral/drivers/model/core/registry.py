@@ -75,10 +75,10 @@ def model_named(name: str) -> KnownModel:
     """
     name = ALIASES.get(str(name), str(name))
     here = {entry.model.kind: entry for entry in CORE_MODELS}
-    found = here.get(name) or known_models().get(name)
-    if found is None:
+    known = here.get(name) or known_models().get(name)
+    if known is None:
         raise DriverProfileError(f"no core model {name!r}; known are {', '.join(known_models())}")
-    return found
+    return known
 
 
 def any_model(kind: str | None = None) -> Any:

@@ -39,15 +39,15 @@ def known_effects() -> tuple[type[Effect], ...]:
 
     Raises `DriverProfileError` if a plug-in offers something else than an effect, or one of a kind that is taken.
     """
-    found = list(EFFECTS)
+    kinds = list(EFFECTS)
     for entry in entry_points(group=ENTRY_POINTS):
         effect = entry.load()
         if not (isinstance(effect, type) and issubclass(effect, Effect)):
             raise DriverProfileError(f"plug-in {entry.name}: {entry.value} is not an effect")
-        if effect.kind in {known.kind for known in found}:
+        if effect.kind in {known.kind for known in kinds}:
             raise DriverProfileError(f"plug-in {entry.name}: there is an effect of the kind {effect.kind!r} already")
-        found.append(effect)
-    return tuple(found)
+        kinds.append(effect)
+    return tuple(kinds)
 
 
 def any_effect(kinds: Iterable[str] | None = None) -> Any:

@@ -85,9 +85,11 @@ class Adapted(HiddenEffect, frozen=True, kw_only=True):
 
     def advance(self, state: NoState, time: FloatArray, step: float) -> EffectTerms:
         """The same at all times, shape (n,): shift [m], factors [-]; what is 1 is left out."""
-        one = np.ones(len(time))
-        spread, rate, fine = (None if factor == 1.0 else factor * one for factor in (self.spread, self.rate, self.fine))
-        return EffectTerms(self.shift * one, spread, rate, fine)
+        even = np.ones(len(time))
+        spread, rate, fine = (
+            None if factor == 1.0 else factor * even for factor in (self.spread, self.rate, self.fine)
+        )
+        return EffectTerms(self.shift * even, spread, rate, fine)
 
 
 class PopulationState(msgspec.Struct):

@@ -112,8 +112,8 @@ class Response:
         value = reduce(add, (weight * self._row(held, row + whole, share) for whole, share, weight in self._shifts))
         if self._keep is not None:
             settled = self._settled(value)
-            for own in settled.reshape(self._order, -1):
-                own[:] = value = (1.0 - self._keep) * value + self._keep * own
+            for lagged in settled.reshape(self._order, -1):
+                lagged[:] = value = (1.0 - self._keep) * value + self._keep * lagged
             self.state.settled = settled
         return np.asarray(value[None, :])
 
@@ -154,10 +154,10 @@ class Response:
         if self._keep is None or not len(values):
             return values
         settled, keep = self._settled(values[0]), np.array([self._keep])
-        for own in settled.reshape(self._order, -1):
+        for lagged in settled.reshape(self._order, -1):
             for k in range(values.shape[1]):
-                values[:, k] = recur(own[k : k + 1], (1.0 - self._keep) * values[:, k], keep)[1:]
-            own[:] = values[-1]
+                values[:, k] = recur(lagged[k : k + 1], (1.0 - self._keep) * values[:, k], keep)[1:]
+            lagged[:] = values[-1]
         self.state.settled = settled
         return values
 

@@ -6,14 +6,18 @@ it writes whole documents of one version where we change a few elements of someb
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import hashlib
+from collections.abc import Callable, Iterator, Sequence
 
 import msgspec
 import numpy as np
 from lxml import etree
+from msgspec import Struct
 from numpy.typing import NDArray
 
+from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.files.openscenario.element import parent_of
+from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.world.scenario.enums import Priority
 
 Version = tuple[int, int]
@@ -47,13 +51,13 @@ def decimals(values: NDArray[np.float64], digits: Sequence[int]) -> tuple[str, .
     whole = np.rint(scaled)
     rounded = whole / 10.0 ** np.asarray(digits) + 0.0  # no negative zero
     text = msgspec.json.encode(rounded.ravel().tolist()).decode()
-    found = text[1:-1].replace(".0,", ",").removesuffix(".0").split(",")
+    numbers = text[1:-1].replace(".0,", ",").removesuffix(".0").split(",")
     size = np.abs(scaled)
     odd = np.abs(np.abs(scaled - whole) - 0.5) <= 1e-6 + size * np.finfo(np.float64).eps
     odd |= (whole != 0.0) & (np.abs(rounded) < 1e-5) | (size >= 2.0**50)
     for row, column in np.argwhere(odd).tolist():
-        found[row * len(digits) + column] = decimal(values[row, column], digits[column])
-    return tuple(found)
+        numbers[row * len(digits) + column] = decimal(values[row, column], digits[column])
+    return tuple(numbers)
 
 
 def sub(parent: etree._Element, path: str, **attributes: str) -> etree._Element:
@@ -157,12 +161,12 @@ def insert_indented(parent: etree._Element, index: int, element: etree._Element)
     depth = sum(1 for _ in parent.iterancestors()) + 1
     if isinstance(element.tag, str):
         etree.indent(element, indent, level=depth)
-    own, closing = "\n" + indent * depth, "\n" + indent * (depth - 1)
+    opening, closing = "\n" + indent * depth, "\n" + indent * (depth - 1)
     if len(parent) == 0:
-        parent.text = own
+        parent.text = opening
     elif index >= len(parent):
-        parent[-1].tail = own
-    element.tail = closing if index >= len(parent) else own
+        parent[-1].tail = opening
+    element.tail = closing if index >= len(parent) else opening
     parent.insert(index, element)
 
 
@@ -177,3 +181,87 @@ def document(root: etree._Element) -> bytes:
     elements = (*reversed(list(root.itersiblings(preceding=True))), root, *root.itersiblings())
     parts = [etree.tostring(element, encoding="UTF-8", xml_declaration=False, with_tail=False) for element in elements]
     return b"\n".join([b"<?xml version='1.0' encoding='UTF-8'?>", *parts, b""])
+
+
+# ---- vertices: text only while the document is written, for as elements they take 3 kB each ----
+BLOCK = 1000
+"""Vertices that are text at a time."""
+
+_POSE, _MOTION = ("x", "y", "z", "h", "p", "r"), ("speed_longitudinal", "acceleration_longitudinal")
+
+_DIGITS = (6, 5, 5, 5, 6, 6, 6, 4, 4)
+"""Decimals of the time and of these."""
+
+
+ColumnsOf = Callable[[slice], Sequence[FloatArray]]
+
+
+class TimedVertices(Struct, frozen=True, eq=False):
+    """Vertices of one trajectory.
+
+    Parameters
+    ----------
+    count : int
+        How many they are.
+    columns_of : callable
+        Gives, for some of them, time [s], x, y, z [m], heading, pitch, roll [rad] and, where vertices have a motion,
+        speed [m/s] and acceleration [m/s2]; shape (n,) each.
+    """
+
+    count: int
+    columns_of: ColumnsOf
+
+    def text(self, indent: str, unit: str) -> Iterator[str]:
+        """XML of the vertices, set out at `indent`, each level below by `unit` more; the first without its indent."""
+        inner, innermost = f"\n{indent}{unit}", f"\n{indent}{unit}{unit}"
+        for begin in range(0, self.count, BLOCK):
+            block = np.stack(self.columns_of(slice(begin, begin + BLOCK)))
+            varies = np.ptp(block, axis=1) != 0.0
+            digits = _DIGITS[: len(block)]
+            time, *values = ("%s" if varies[k] else build.decimal(block[k, 0], count) for k, count in enumerate(digits))
+            pose, motion = (
+                "".join(f' {name}="{value}"' for name, value in zip(names, part, strict=True))
+                for names, part in ((_POSE, values[:6]), (_MOTION[: len(values) - 6], values[6:]))
+            )
+            vertex = (
+                f'<Vertex time="{time}">{inner}<Position>{innermost}<WorldPosition{pose}/>{inner}</Position>'
+                + (f"{inner}<Motion{motion}/>" if motion else "")
+                + f"\n{indent}</Vertex>"
+            )
+            numbers = build.decimals(block[varies].T, [_DIGITS[k] for k in np.flatnonzero(varies)])
+            text = f"\n{indent}".join([vertex] * block.shape[1]) % numbers
+            yield (f"\n{indent}" if begin else "") + text
+
+
+class Vertices:
+    """Polylines of a document, and where in it they go.
+
+    Parameters
+    ----------
+    source : bytes
+        The document before: no mark of ours can be in it by chance or by malice, for its hash is part of the mark.
+    """
+
+    def __init__(self, source: bytes) -> None:
+        self._mark = f"vertices-{hashlib.sha256(source).hexdigest()[:32]}"
+        self._polylines: list[TimedVertices] = []
+
+    def add(self, owner: etree._Element, polyline: TimedVertices) -> None:
+        """Let an element hold these vertices and nothing else."""
+        owner.append(etree.ProcessingInstruction(self._mark, str(len(self._polylines))))
+        self._polylines.append(polyline)
+
+    def document(self, root: etree._Element) -> Iterator[bytes]:
+        """The whole file in pieces; see `build.document`."""
+        unit = build.indentation(root)
+        rest = build.document(root)
+        begin, end = f"<?{self._mark} ".encode(), b"?>"
+        while (at := rest.find(begin)) >= 0:
+            number, _, after = rest[at + len(begin) :].partition(end)
+            before = rest[:at]
+            yield before
+            indent = before[before.rfind(b"\n") + 1 :].decode()
+            for text in self._polylines[int(number)].text(indent, unit):
+                yield text.encode()
+            rest = after
+        yield rest

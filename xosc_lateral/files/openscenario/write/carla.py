@@ -31,11 +31,11 @@ from lxml import etree
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.files.openscenario.element import elements, local_name
 from xosc_lateral.files.openscenario.write import build
+from xosc_lateral.files.openscenario.write.build import TimedVertices
 from xosc_lateral.files.openscenario.write.draft import Draft
 from xosc_lateral.files.openscenario.write.losses import Losses, remove
 from xosc_lateral.files.openscenario.write.moving import Moving, add_vertices, wrapped
 from xosc_lateral.files.openscenario.write.older import add_missing_overrides
-from xosc_lateral.files.openscenario.write.vertices import TimedVertices
 from xosc_lateral.world.motion.nominal import Activity, NominalMotion
 from xosc_lateral.world.motion.path_pieces import VERTEX_SPACING, PathPiece, vertex_times
 from xosc_lateral.world.scenario import Entity, Scenario
@@ -59,10 +59,10 @@ _NO_BLUEPRINT = ("trailer", "semitrailer", "train", "tram")
 
 def start_of(item: Moving) -> tuple[build.Pose, float]:
     """Pose and speed at the start, where an entity that appears later waits: all are there from the start."""
-    found = item.start
-    if found is None:
+    begin = item.start
+    if begin is None:
         return item.pose(item.pieces[0].first if item.pieces else 0), 0.0
-    pose, speed = found
+    pose, speed = begin
     return pose, max(speed, 0.0)
 
 
@@ -121,12 +121,12 @@ def _vertices(item: Moving, pieces: Sequence[PathPiece], begin: float) -> tuple[
 
 def _moments(item: Moving, pieces: Sequence[PathPiece], begin: float) -> FloatArray:
     """Times of the vertices, amid frames, from `begin` on. [s]"""
-    path, found = item.path, [begin]
+    path, times = item.path, [begin]
     for piece in pieces:
         rows = slice(piece.first, piece.last + 1)
-        found += [float(path.time[piece.first]), *vertex_times(path.time[rows], path.x[rows], path.y[rows]).tolist()]
-        found.append(float(path.time[piece.last]) + FRAME)
-    between = (np.floor((np.array(found[1:]) - begin) / FRAME - 0.5) + 0.5) * FRAME
+        times += [float(path.time[piece.first]), *vertex_times(path.time[rows], path.x[rows], path.y[rows]).tolist()]
+        times.append(float(path.time[piece.last]) + FRAME)
+    between = (np.floor((np.array(times[1:]) - begin) / FRAME - 0.5) + 0.5) * FRAME
     moments = begin + np.unique(np.append(0.0, np.maximum(np.round(between, 6), 0.5 * FRAME)))
     return np.asarray(moments)
 

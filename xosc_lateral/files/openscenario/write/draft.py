@@ -13,8 +13,8 @@ from xosc_lateral.files.openscenario.declarations import final, parameter_name
 from xosc_lateral.files.openscenario.element import at_node, child_of
 from xosc_lateral.files.openscenario.provenance import refuse_converted
 from xosc_lateral.files.openscenario.write import build
+from xosc_lateral.files.openscenario.write.build import Vertices
 from xosc_lateral.files.openscenario.write.target import STANDARD, TargetPlayer
-from xosc_lateral.files.openscenario.write.vertices import Vertices
 from xosc_lateral.files.xml import parse_xml, read_document
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.scenario import Action, Scenario
@@ -64,9 +64,9 @@ class Draft:
     @property
     def storyboard(self) -> etree._Element:
         """In the tree."""
-        found = child_of(self.root, "Storyboard")
-        assert found is not None
-        return found
+        board = child_of(self.root, "Storyboard")
+        assert board is not None
+        return board
 
     @property
     def init_actions(self) -> etree._Element:
@@ -90,10 +90,10 @@ class Draft:
     def override_parameters(self) -> None:
         """Write the values that parameters were played with, where they are not the file's own."""
         declarations = self.root.findall("{*}ParameterDeclarations/{*}ParameterDeclaration")
-        own = Scope({parameter_name(item.get("name") or ""): item.get("value") or "" for item in declarations})
+        declared = Scope({parameter_name(item.get("name") or ""): item.get("value") or "" for item in declarations})
         for item in declarations:
             parameter = self.scenario.parameters.get(parameter_name(item.get("name") or ""))
-            if parameter is not None and own.value(parameter.name) != parameter.value:
+            if parameter is not None and declared.value(parameter.name) != parameter.value:
                 item.set("value", parameter.value)
 
 

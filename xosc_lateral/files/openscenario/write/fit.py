@@ -13,7 +13,6 @@ from xosc_lateral.files.openscenario.read import is_town
 from xosc_lateral.files.openscenario.write.build import named
 from xosc_lateral.files.openscenario.write.carla import fit_carla
 from xosc_lateral.files.openscenario.write.draft import Draft, WrittenScenario
-from xosc_lateral.files.openscenario.write.esmini import fit_esmini
 from xosc_lateral.files.openscenario.write.literal import fill_in, inline_catalogs
 from xosc_lateral.files.openscenario.write.losses import Losses
 from xosc_lateral.files.openscenario.write.target import Player
@@ -119,3 +118,37 @@ def _catalogs_found_elsewhere(scenario: Scenario) -> list[Path]:
 def _absolute(path: Path) -> Path:
     """Absolute and without dots, links not followed: what a player would do with the reference."""
     return Path(os.path.normpath(path.absolute()))
+
+
+# ---- what esmini (3.6.0) wants: the one place of its quirks ----
+# All outputs are written such that it plays them to the millimetre, since other players mind none of that: vertices
+# at least 0.1 m apart, which it would merge (`path_pieces`), and paths cut where a car stands; lane offsets as half
+# cosines whose duration follows from the lateral acceleration (`offset_chain`); triggers without an edge, which it
+# would miss in its first frame. It reads every version, and passes over the `Motion` of vertices, since their times
+# say the same.
+_STOPS_AT = {
+    ("Polyline", "Interpolation"),
+    ("RoutingAction", "PreferredLaneLayerAction"),
+    ("RoutingAction", "RandomRouteAction"),
+    ("EntityCondition", "RelativeAngleCondition"),
+    ("ScenarioObject", "ExternalObjectReference"),
+    ("Position", "GeoPosition"),
+}
+"""(tag above, tag): it ends with an error where it reads one."""
+
+
+def fit_esmini(losses: Losses) -> None:
+    """Take out what stops esmini.
+
+    Raises
+    ------
+    FormatError
+        In a condition, an entity, or a maneuver of a scenario that stays reactive.
+    """
+    for item in list(losses.root.iter("{*}*")):
+        parent = item.getparent()
+        if parent is None or (local_name(parent), local_name(item)) not in _STOPS_AT:
+            continue
+        if local_name(item) == "ExternalObjectReference":
+            losses.refuse(item, local_name(item), hint="")
+        losses.element(item, "esmini would stop there")

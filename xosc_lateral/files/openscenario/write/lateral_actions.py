@@ -9,35 +9,20 @@ from msgspec import Struct
 
 from xosc_lateral.world.scenario import Action, Scenario
 from xosc_lateral.world.scenario.controllers import Domains, gives_lateral
-from xosc_lateral.world.scenario.dependence import actors_of
+from xosc_lateral.world.scenario.dependence import actors_of, controlled_entities
 from xosc_lateral.world.scenario.global_actions import AddEntityAction
 from xosc_lateral.world.scenario.private_actions import LATERAL, LONGITUDINAL, TeleportAction
-from xosc_lateral.world.scenario.under_test import controlled_entities
 
 
 class LateralAction(Struct, frozen=True):
-    """A lateral action, a teleport or the adding of an entity.
+    """A lateral action, a teleport or the adding of an entity."""
 
-    Parameters
-    ----------
-    path : tuple of str
-        Its names from the story down.
-    kind, reference : str
-        The type and name that a condition refers to it by.
-    repeats : bool
-        It may run more than once.
-    adds : bool
-        It adds the entity.
-    steers : bool, optional
-        It gives the lateral domain to a controller; False: it takes it back.
-    """
-
-    path: tuple[str, ...]
-    kind: str
+    path: tuple[str, ...]  # its names from the story down
+    kind: str  # type and name that a condition refers to it by
     reference: str
-    repeats: bool = False
-    adds: bool = False
-    steers: bool | None = None
+    repeats: bool = False  # it may run more than once
+    adds: bool = False  # it adds the entity
+    steers: bool | None = None  # it gives the lateral domain to a controller; False: it takes it back
 
 
 def lateral_actions(scenario: Scenario) -> dict[str, tuple[LateralAction, ...]]:
@@ -50,21 +35,21 @@ def lateral_actions(scenario: Scenario) -> dict[str, tuple[LateralAction, ...]]:
         if steers is not None:
             actors = tuple(actor for actor in actors if actor in steered)
         if adds or steers is not None or isinstance(action.content, (*LATERAL, TeleportAction)):
-            found = LateralAction(path, *_reference(path, is_alone, names), repeats, adds, steers)
+            lateral = LateralAction(path, *_reference(path, is_alone, names), repeats, adds, steers)
             for actor in (action.content.entity_ref,) if isinstance(action.content, AddEntityAction) else actors:
-                by_entity.setdefault(actor, {})[found] = None
+                by_entity.setdefault(actor, {})[lateral] = None
     return {entity: tuple(actions) for entity, actions in by_entity.items()}
 
 
 def changing_speed(scenario: Scenario) -> set[str]:
     """Entities that have longitudinal actions in events, or a controller."""
-    own = {
+    changing = {
         actor
         for _, actors, action, *_ in _actions(scenario)
         if isinstance(action.content, LONGITUDINAL)
         for actor in actors
     }
-    return own | controlled_entities(scenario).keys()
+    return changing | controlled_entities(scenario).keys()
 
 
 def _actions(scenario: Scenario) -> Iterator[tuple[tuple[str, ...], tuple[str, ...], Action, bool, bool]]:

@@ -56,16 +56,16 @@ def name_literally(root: etree._Element, path: Path, scope: Scope, wanted: Colle
     Conditions elsewhere refer to such an element by its value; who looks at the file alone would find no element of
     that name.
     """
-    found: list[tuple[etree._Element, str, str]] = []
+    attributes: list[tuple[etree._Element, str, str]] = []
     for storyboard in elements(root, "Storyboard"):
         for item, within in in_scope(storyboard, path, scope):
             for attribute in ("name", "storyboardElementRef"):
                 text = item.get(attribute) or ""
                 if text.startswith("$") and (attribute != "name" or local_name(item) in _REFERENCED_ELEMENTS):
                     with suppress(ExpressionError):  # then nobody can refer to it
-                        found.append((item, attribute, within.fill(text)))
-    if any(attribute == "name" and value in wanted for _, attribute, value in found):
-        for item, attribute, value in found:
+                        attributes.append((item, attribute, within.fill(text)))
+    if any(attribute == "name" and value in wanted for _, attribute, value in attributes):
+        for item, attribute, value in attributes:
             item.set(attribute, value)
 
 
@@ -108,8 +108,8 @@ def inline_maneuvers(draft: Draft, wanted: Collection[str]) -> None:
 
 
 def _references(draft: Draft) -> list[XmlElement]:
-    path, found = draft.scenario.path, in_scope(draft.root, draft.scenario.path, draft.scope)
-    return [XmlElement(item, path, within) for item, within in found if local_name(item) == "CatalogReference"]
+    path, places = draft.scenario.path, in_scope(draft.root, draft.scenario.path, draft.scope)
+    return [XmlElement(item, path, within) for item, within in places if local_name(item) == "CatalogReference"]
 
 
 def _entry(reference: XmlElement, scenario: Scenario) -> tuple[etree._Element, Path] | None:
@@ -118,9 +118,9 @@ def _entry(reference: XmlElement, scenario: Scenario) -> tuple[etree._Element, P
     for path in scenario.input_files[1:]:
         for owner in elements(unchanged(path, scenario), "Catalog"):
             if catalog in (path.stem, owner.get("name")):
-                found = next((item for item in children_of(owner) if item.get("name") == name), None)
-                if found is not None:
-                    return found, path
+                match = next((item for item in children_of(owner) if item.get("name") == name), None)
+                if match is not None:
+                    return match, path
     return None
 
 

@@ -13,9 +13,8 @@ from msgspec import structs
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.rows import blocks, columns, stored
 from xosc_lateral.files.openscenario.write import build
-from xosc_lateral.files.openscenario.write.build import Pose
+from xosc_lateral.files.openscenario.write.build import ColumnsOf, Pose, TimedVertices
 from xosc_lateral.files.openscenario.write.draft import Draft
-from xosc_lateral.files.openscenario.write.vertices import ColumnsOf, TimedVertices
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.motion.path_pieces import (
     LEAST_SPACING,
@@ -76,13 +75,13 @@ class Moving:
 
 def moving_entities(draft: Draft, trajectories: Mapping[str, WorldTrajectory]) -> dict[str, Moving]:
     """Entities that follow trajectories, in the order of the run; mirrored where the scenario is left-handed."""
-    found = {}
+    paths = {}
     for entity in draft.motion.entities:
         if entity.name in trajectories:
             path = trajectories[entity.name]
             path = _mirrored(path) if draft.scenario.header.is_left_handed else path
-            found[entity.name] = Moving(entity, path, draft.motion)
-    return found
+            paths[entity.name] = Moving(entity, path, draft.motion)
+    return paths
 
 
 def _mirrored(path: WorldTrajectory) -> WorldTrajectory:
@@ -185,11 +184,11 @@ def _columns_of(path: WorldTrajectory, rows: slice, times: FloatArray, version: 
         x, y, z, p, r = (np.interp(times[part], time[around], values[around]) for values in arrays)
         turned = _around(time, later[part])
         h = np.interp(later[part], time[turned], heading[turned])
-        found = [times[part], x, y, z, wrapped(h), p, r]
+        columns = [times[part], x, y, z, wrapped(h), p, r]
         if version >= MOTION_SINCE:
             rates = _rate(speed, time, around)
-            found += [np.interp(times[part], time[around], values) for values in (speed[around], rates)]
-        return found
+            columns += [np.interp(times[part], time[around], values) for values in (speed[around], rates)]
+        return columns
 
     return columns_of
 

@@ -16,14 +16,15 @@ from xosc_lateral.base.errors import locate
 from xosc_lateral.files.openscenario.element import at_node, child_of
 from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.draft import Draft
-from xosc_lateral.files.openscenario.write.entities import remove_controllers, rewrite_init
-from xosc_lateral.files.openscenario.write.moving import Moving, add_trajectories
-from xosc_lateral.files.openscenario.write.non_motion_actions import (
+from xosc_lateral.files.openscenario.write.entities import (
     add_kept_actions,
     dropped_reason,
     is_replaced,
     note_dropped,
+    remove_controllers,
+    rewrite_init,
 )
+from xosc_lateral.files.openscenario.write.moving import Moving, add_trajectories
 from xosc_lateral.world.motion.nominal import PlayedAction
 from xosc_lateral.world.scenario import Act, ManeuverGroup, Scenario
 from xosc_lateral.world.scenario.conditions import StoryboardElementStateCondition
@@ -84,9 +85,9 @@ def replaced_groups(scenario: Scenario, entities: Collection[str]) -> list[Group
     return [one for one in groups_of(scenario) if _is_theirs(one, entities)]
 
 
-def _is_theirs(one: Group, entities: Collection[str]) -> bool:
-    alone = bool(one.actors) and one.actors <= set(entities)
-    return alone and not one.group.actors.select_triggering_entities
+def _is_theirs(member: Group, entities: Collection[str]) -> bool:
+    alone = bool(member.actors) and member.actors <= set(entities)
+    return alone and not member.group.actors.select_triggering_entities
 
 
 def separable(scenario: Scenario, wanted: Collection[str]) -> frozenset[str]:
@@ -95,45 +96,45 @@ def separable(scenario: Scenario, wanted: Collection[str]) -> frozenset[str]:
     Not those that share a group with others, that act because they trigger, that come, go, or pull a trailer, nor those
     whose maneuvers a condition that stays looks at.
     """
-    found = set(wanted) - _coupled(scenario)
+    replaceable = set(wanted) - _coupled(scenario)
     while True:
-        before = set(found)
-        for one in groups_of(scenario):
-            if one.actors & found and not _is_theirs(one, found):
-                found -= one.actors
-        gone = replaced_groups(scenario, found)
+        before = set(replaceable)
+        for group in groups_of(scenario):
+            if group.actors & replaceable and not _is_theirs(group, replaceable):
+                replaceable -= group.actors
+        gone = replaced_groups(scenario, replaceable)
         for condition in _kept_conditions(scenario, gone):
-            for one in gone:
-                if one.element_of(condition) is not None:
-                    found -= one.actors
-        if found == before:
-            return frozenset(found)
+            for group in gone:
+                if group.element_of(condition) is not None:
+                    replaceable -= group.actors
+        if replaceable == before:
+            return frozenset(replaceable)
 
 
 def _coupled(scenario: Scenario) -> set[str]:
-    found = {name for entity in scenario.entities if entity.trailer for name in (entity.name, entity.trailer)}
-    for one in groups_of(scenario):
-        for _, event in one.group.events():
-            if one.group.actors.select_triggering_entities:
-                found |= set(actors_of(one.act, one.group, event))
+    names = {name for entity in scenario.entities if entity.trailer for name in (entity.name, entity.trailer)}
+    for member in groups_of(scenario):
+        for _, event in member.group.events():
+            if member.group.actors.select_triggering_entities:
+                names |= set(actors_of(member.act, member.group, event))
             for action in event.actions:
                 if isinstance(action.content, AddEntityAction | DeleteEntityAction):
-                    found.add(action.content.entity_ref)
+                    names.add(action.content.entity_ref)
                 elif isinstance(action.content, ConnectTrailerAction):
-                    found |= {action.content.trailer_ref, *one.actors}
-    return found
+                    names |= {action.content.trailer_ref, *member.actors}
+    return names
 
 
 def _kept_conditions(scenario: Scenario, gone: Collection[Group]) -> list[StoryboardElementStateCondition]:
     """Conditions on states of storyboard elements that are still there without some groups."""
     paths = {one.path for one in gone}
     kept = [one for one in groups_of(scenario) if one.path not in paths]
-    found = list(conditions_of(scenario.storyboard.stop_trigger))
+    triggers = list(conditions_of(scenario.storyboard.stop_trigger))
     for act in dict.fromkeys(one.path[:2] for one in kept):
         of_act = next(one.act for one in kept if one.path[:2] == act)
-        found += [*conditions_of(of_act.start_trigger), *conditions_of(of_act.stop_trigger)]
-    found += [condition for one in kept for condition in one.conditions()]
-    return [c.content for c in found if isinstance(c.content, StoryboardElementStateCondition)]
+        triggers += [*conditions_of(of_act.start_trigger), *conditions_of(of_act.stop_trigger)]
+    triggers += [condition for one in kept for condition in one.conditions()]
+    return [c.content for c in triggers if isinstance(c.content, StoryboardElementStateCondition)]
 
 
 class ReplacedManeuvers:

@@ -12,15 +12,16 @@ from xosc_lateral.files.openscenario.element import child_of
 from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.carla import add_drives, start_of
 from xosc_lateral.files.openscenario.write.draft import Draft, WrittenScenario, source_of
-from xosc_lateral.files.openscenario.write.entities import remove_controllers, rewrite_init
-from xosc_lateral.files.openscenario.write.fit import finish
-from xosc_lateral.files.openscenario.write.moving import Moving, add_trajectories, moving_entities
-from xosc_lateral.files.openscenario.write.non_motion_actions import (
+from xosc_lateral.files.openscenario.write.entities import (
     add_kept_actions,
     dropped_reason,
     is_replaced,
     note_dropped,
+    remove_controllers,
+    rewrite_init,
 )
+from xosc_lateral.files.openscenario.write.fit import finish
+from xosc_lateral.files.openscenario.write.moving import Moving, add_trajectories, moving_entities
 from xosc_lateral.files.openscenario.write.target import STANDARD, Player, TargetPlayer
 from xosc_lateral.files.openscenario.write.versions import newer_than
 from xosc_lateral.files.xml import parse_xml
@@ -175,15 +176,15 @@ def motion_unknown_to(
     if version >= scenario.header.version:
         return {}
     root = parse_xml(scenario.source, scenario.path)
-    found: dict[str, str] = {}
+    reasons: dict[str, str] = {}
     for played in motion.actions:
         actor, content = played.actor, played.action.content
-        if actor is None or actor not in entities or actor in found or not isinstance(content, MOTION):
+        if actor is None or actor not in entities or actor in reasons or not isinstance(content, MOTION):
             continue
         what = newer_than(source_of(played.action, scenario, root), version)
         if what is not None:
-            found[actor] = f"version {build.named(version)} has no {what}"
+            reasons[actor] = f"version {build.named(version)} has no {what}"
     if version < TRAILERS_SINCE:
         trailers = sorted(pulled_entities(scenario, motion) & set(entities))
-        found |= dict.fromkeys(trailers, f"version {build.named(version)} has no Trailer")
-    return found
+        reasons |= dict.fromkeys(trailers, f"version {build.named(version)} has no Trailer")
+    return reasons

@@ -34,8 +34,7 @@ from xosc_lateral.files.sumo import (
     usual_length,
     wrong_element,
 )
-from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
-from xosc_lateral.workflows.recordings.gate import is_right_to_left
+from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS, is_right_to_left
 from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph, neighbour_columns

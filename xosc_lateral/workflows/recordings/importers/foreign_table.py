@@ -97,16 +97,16 @@ def propose_mapping(files: Sequence[Path]) -> str:
     if not shared:
         raise FormatError("the tables have no column in common", path=files[-1])
     values = {name: pd.concat([table[name] for table in tables], ignore_index=True) for name in shared}
-    found: dict[str, str] = {}
+    headers: dict[str, str] = {}
     for header in shared:
         bare, _ = _parts_of(header)
         placed = _place_named(bare)
         known = {} if set(bare.split("_")) & SATELLITE else HEADERS
-        usual = (name for name, words in known.items() if name not in found and _fits(words, bare))
-        name = placed if placed is not None and placed not in found else next(usual, None)
+        usual = (name for name, words in known.items() if name not in headers and _fits(words, bare))
+        name = placed if placed is not None and placed not in headers else next(usual, None)
         if name is not None:
-            found[name] = header
-    sides = {"distance_left", "distance_right"} <= found.keys()
+            headers[name] = header
+    sides = {"distance_left", "distance_right"} <= headers.keys()
     needed = ("time",) if sides else ("time", "offset", "lane_width")
     codes = sorted({text_encoding(path) for path in files} - {"utf-8"})
     lines = [
@@ -115,13 +115,13 @@ def propose_mapping(files: Sequence[Path]) -> str:
         *(f"encoding = {_quoted(code)}" for code in codes[:1]),
         "",
         "[columns]",
-        *(_line(name, header, values[header]) for name, header in found.items()),
-        *(f'# {name} = "?"  # needed, and not found' for name in needed if name not in found),
+        *(_line(name, header, values[header]) for name, header in headers.items()),
+        *(f'# {name} = "?"  # needed, and not found' for name in needed if name not in headers),
     ]
-    for name, header in found.items():
+    for name, header in headers.items():
         if name != "drive" and not len(_numbers(values[header])):
             lines += _texts(name, values[header])
-    left = [header for header in shared if header not in found.values()]
+    left = [header for header in shared if header not in headers.values()]
     if left:
         lines += ["", f"# Others keep their names: {', '.join(left[:40])}"]
     lines += ["", "# [roles]  # where a column comes from, for close-loop", '# curvature = "road"', ""]
@@ -182,8 +182,8 @@ def _line(name: str, header: str, column: pd.Series) -> str:
         why = "unit by the size of its values" if unit else why
     seen = f"; {numbers.min():.4g} to {numbers.max():.4g}" if len(numbers) else ""
     sign = f"; CHECK: {SIGNS[name]}" if name in SIGNS else ""
-    given = f"{header}:{unit}" if unit else header
-    entry = f"{{column = {_quoted(header)}}}" if ":" in header and not unit else _quoted(given)
+    source = f"{header}:{unit}" if unit else header
+    entry = f"{{column = {_quoted(header)}}}" if ":" in header and not unit else _quoted(source)
     return f"{name} = {entry}  # {why}{seen}{sign}"
 
 

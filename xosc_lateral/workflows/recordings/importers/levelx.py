@@ -29,8 +29,7 @@ from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.tables import read_table
-from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings, Rows, cut_table
-from xosc_lateral.workflows.recordings.gate import require_lane_direction
+from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings, Rows, cut_table, require_lane_direction
 from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
 from xosc_lateral.workflows.recordings.lane_graph import REACH, find_neighbours
 
@@ -63,10 +62,14 @@ def import_levelx(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cu
 
 def _read_recording(path: Path, settings: CutSettings) -> tuple[pd.DataFrame, str, float]:
     tracks, meta, recording = read_recording_files(path)
-    number, step = path.name.split("_")[0], 1.0 / frame_rate(recording, path)
+    step = 1.0 / frame_rate(recording, path)
     if "latLaneCenterOffset" in tracks.columns:
-        return _from_exid(tracks, meta, number, step, path, settings), "exiD", step
-    return _from_highd(tracks, meta, recording, number, step, path, settings), "highD", step
+        return _from_exid(tracks, meta, step, path, settings), "exiD", step
+    return _from_highd(tracks, meta, recording, step, path, settings), "highD", step
+
+
+def _number(path: Path) -> str:
+    return path.name.split("_")[0]
 
 
 def read_recording_files(path: Path) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
@@ -112,17 +115,11 @@ def require(frame: pd.DataFrame, columns: Sequence[str], path: Path) -> None:
 
 # ---- highD -----------------------------------------------------------------------------------------------------------
 def _from_highd(
-    tracks: pd.DataFrame,
-    tracks_meta: pd.DataFrame,
-    recording: pd.DataFrame,
-    number: str,
-    step: float,
-    path: Path,
-    settings: CutSettings,
+    tracks: pd.DataFrame, meta: pd.DataFrame, recording: pd.DataFrame, step: float, path: Path, settings: CutSettings
 ) -> pd.DataFrame:
     require(tracks, HIGHD_COLUMNS, path)
     tracks = tracks.sort_values(["id", "frame"], ignore_index=True)
-    meta = tracks_meta.set_index("id").reindex(tracks["id"])
+    meta = meta.set_index("id").reindex(tracks["id"])
     rightwards = meta["drivingDirection"].to_numpy() == 2
     way = np.where(rightwards, 1.0, -1.0)
     velocity = tracks["xVelocity"].to_numpy(dtype=np.float64)
@@ -152,7 +149,7 @@ def _from_highd(
         lane_on_right=lane_number > 0,
     )
     columns = {
-        "drive": f"highd-{number}-" + tracks["id"].astype(str),
+        "drive": f"highd-{_number(path)}-" + tracks["id"].astype(str),
         "time": np.round(frame * step, 4),
         "offset": offset,
         "lane_width": width,
@@ -168,11 +165,11 @@ def _from_highd(
 
 # ---- exiD ------------------------------------------------------------------------------------------------------------
 def _from_exid(
-    tracks: pd.DataFrame, tracks_meta: pd.DataFrame, number: str, step: float, path: Path, settings: CutSettings
+    tracks: pd.DataFrame, meta: pd.DataFrame, step: float, path: Path, settings: CutSettings
 ) -> pd.DataFrame:
     require(tracks, EXID_COLUMNS, path)
     tracks = tracks.sort_values(["trackId", "frame"], ignore_index=True)
-    kind = tracks_meta.set_index("trackId").reindex(tracks["trackId"])["class"].astype(str).str.lower().to_numpy()
+    kind = meta.set_index("trackId").reindex(tracks["trackId"])["class"].astype(str).str.lower().to_numpy()
     offset, width = _first(tracks["latLaneCenterOffset"]), _first(tracks["laneWidth"])
     vehicle, frame = tracks["trackId"].to_numpy(), tracks["frame"].to_numpy()
     known = np.isfinite(offset) & np.isfinite(width) & (width > 0.0)
@@ -185,7 +182,7 @@ def _from_exid(
     offset = offset * _left_sign(lateral, tracks, vehicle, step, path)
     is_truck = np.isin(kind, TRUCKS)
     columns = {
-        "drive": f"exid-{number}-" + tracks["trackId"].astype(str),
+        "drive": f"exid-{_number(path)}-" + tracks["trackId"].astype(str),
         "time": np.round(frame * step, 4),
         "offset": offset,
         "lane_width": width,

@@ -19,7 +19,7 @@ from xosc_lateral.files.mapping import UNITS, ColumnSource, MappingLike, TableMa
 from xosc_lateral.files.output_tables import COLUMNS
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import foreign_errors, read_table, unpacked_text
-from xosc_lateral.workflows.recordings.gate import MOVING_SPEED, require_headings
+from xosc_lateral.workflows.recordings.cuts import MOVING_SPEED, require_headings
 
 HEADERS: Mapping[str, tuple[str, ...]] = {
     "vehicle": ("vehicle", "id", "track_id", "trackid", "vehicle_id", "object_id", "track", "drive"),

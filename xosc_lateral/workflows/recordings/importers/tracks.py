@@ -18,8 +18,14 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.mapping import MappingLike
 from xosc_lateral.files.opendrive import read_opendrive
-from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings, Rows, cut_table
-from xosc_lateral.workflows.recordings.gate import MOVING_SPEED, require_lane_direction
+from xosc_lateral.workflows.recordings.cuts import (
+    DEFAULT_CUTS,
+    MOVING_SPEED,
+    CutSettings,
+    Rows,
+    cut_table,
+    require_lane_direction,
+)
 from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks, rate, read_tracks
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph, neighbour_columns
@@ -62,10 +68,10 @@ def place_on_road(tracks: Tracks, network: RoadNetwork) -> tuple[PlacedTracks, L
         raise FormatError("the road has no driving lane that tracks could lie in", path=network.path)
     x, y = network.header_offset.undo(tracks.x, tracks.y)
     heading = tracks.heading - network.header_offset.heading
-    found = network.world_to_lane(x, y, heading=heading)
+    place = network.world_to_lane(x, y, heading=heading)
     piece, along = np.full(len(tracks.x), -1), np.zeros(len(tracks.x))
-    inside = np.flatnonzero((found.distance <= 0.0) & (found.lane != 0))
-    road, lane, s = found.road[inside], found.lane[inside], found.s[inside]
+    inside = np.flatnonzero((place.distance <= 0.0) & (place.lane != 0))
+    road, lane, s = place.road[inside], place.lane[inside], place.s[inside]
     number = np.array([network.roads[r].section_number(at) for r, at in zip(road.tolist(), s.tolist(), strict=True)])
     for index, k, name in sorted(set(zip(road.tolist(), number.tolist(), lane.tolist(), strict=True))):
         mine = (road == index) & (number == k) & (lane == name)
@@ -73,7 +79,7 @@ def place_on_road(tracks: Tracks, network: RoadNetwork) -> tuple[PlacedTracks, L
         piece[inside[mine]] = pieces.get((index, k, name), -1)
         along[inside[mine]] = s[mine] - section.start if forward else section.end - s[mine]
     there = np.flatnonzero(piece >= 0)
-    where = found.road[there], found.lane[there], found.s[there]
+    where = place.road[there], place.lane[there], place.s[there]
     lane_index, lane_count = network.lane_index(*where)
     bend = network.curvature(where[0], where[2])
     values = {
@@ -89,7 +95,7 @@ def place_on_road(tracks: Tracks, network: RoadNetwork) -> tuple[PlacedTracks, L
     columns = {name: np.full(len(piece), np.nan) for name in values}
     for name, known in values.items():
         columns[name][there] = known
-    offset, (width, agreement, scale) = np.where(piece >= 0, found.offset, np.nan), map(columns.pop, LANE_VALUES)
+    offset, (width, agreement, scale) = np.where(piece >= 0, place.offset, np.nan), map(columns.pop, LANE_VALUES)
     return PlacedTracks(tracks, piece, along, offset, width, agreement, columns, np.nan_to_num(scale, nan=1.0)), graph
 
 
@@ -122,8 +128,8 @@ def _following(
     step = network.advance(index, name, end, 2 * INTO_NEXT)
     if step.remaining > 0.0:
         return []
-    found = pieces.get((step.road, network.roads[step.road].section_number(step.s), step.lane))
-    return [] if found is None or found == pieces[index, k, name] else [found]
+    ahead = pieces.get((step.road, network.roads[step.road].section_number(step.s), step.lane))
+    return [] if ahead is None or ahead == pieces[index, k, name] else [ahead]
 
 
 TRUCKS = ("truck", "bus", "trailer", "semitrailer", "lorry", "van_trailer", "truck_trailer")

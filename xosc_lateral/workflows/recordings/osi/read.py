@@ -76,8 +76,8 @@ class _Collected:
             self.zero = nanoseconds
         if message.HasField("host_vehicle_id"):
             self.hosts[message.host_vehicle_id.value] = None
-        for one in message.moving_object:
-            self._vehicle(one, 1e-9 * (nanoseconds - self.zero), number)
+        for thing_there in message.moving_object:
+            self._vehicle(thing_there, 1e-9 * (nanoseconds - self.zero), number)
         for name, known in self.things.items():
             for thing in getattr(message, name):
                 number_of = thing.id.value
@@ -93,20 +93,20 @@ class _Collected:
                 else:
                     extend_thing(known[number_of], thing)
 
-    def _vehicle(self, one: Any, time: float, number: int) -> None:
-        name = one.id.value
+    def _vehicle(self, vehicle: Any, time: float, number: int) -> None:
+        name = vehicle.id.value
         if name not in self.names:
-            self._meet(one)
+            self._meet(vehicle)
         if name not in self.kinds:
             return
-        base = one.base
+        base = vehicle.base
         where = f"message {number}: moving object {name}"
         if not base.HasField("position"):
             raise FormatError("has no position", path=self.path, element=where)
         yaw = base.orientation.yaw if base.HasField("orientation") else np.nan
         speed = np.hypot(base.velocity.x, base.velocity.y) if base.HasField("velocity") else np.nan
         length = base.dimension.length if base.HasField("dimension") else 0.0
-        rear = one.vehicle_attributes.bbcenter_to_rear
+        rear = vehicle.vehicle_attributes.bbcenter_to_rear
         turned = base.orientation.pitch, base.orientation.roll
         x, y = base.position.x, base.position.y
         row = (name, time, x, y, yaw, speed, length or np.nan, *turned, rear.x, rear.y, -0.5 * base.dimension.height)
@@ -114,17 +114,17 @@ class _Collected:
             raise FormatError(f"x {row[2]:g}, y {row[3]:g}: not a position", path=self.path, element=where)
         self.values.extend(map(float, row))
 
-    def _meet(self, one: Any) -> None:
+    def _meet(self, vehicle: Any) -> None:
         kinds = osi("osi3.osi_object_pb2").MovingObject
-        name = one.id.value
-        said = [r.identifier[-1] for r in one.source_reference if "openscenario" in r.type and r.identifier]
-        self.names[name] = said[0] if said and said[0] not in self.names.values() else str(name)
-        has_class = one.HasField("vehicle_classification")
-        if one.type == kinds.TYPE_VEHICLE or (one.type == kinds.TYPE_UNKNOWN and has_class):
-            kind = kinds.VehicleClassification.Type.Name(one.vehicle_classification.type).removeprefix("TYPE_")
+        name = vehicle.id.value
+        stated = [r.identifier[-1] for r in vehicle.source_reference if "openscenario" in r.type and r.identifier]
+        self.names[name] = stated[0] if stated and stated[0] not in self.names.values() else str(name)
+        has_class = vehicle.HasField("vehicle_classification")
+        if vehicle.type == kinds.TYPE_VEHICLE or (vehicle.type == kinds.TYPE_UNKNOWN and has_class):
+            kind = kinds.VehicleClassification.Type.Name(vehicle.vehicle_classification.type).removeprefix("TYPE_")
             self.kinds[name] = KINDS.get(kind, "" if kind in ("UNKNOWN", "OTHER") else kind.lower())
         else:
-            self.left_out[kinds.Type.Name(one.type).removeprefix("TYPE_").lower()] += 1
+            self.left_out[kinds.Type.Name(vehicle.type).removeprefix("TYPE_").lower()] += 1
 
     def recorded(self, notes: list[str]) -> Recorded:
         """All of it, in order."""
@@ -219,10 +219,10 @@ def _beyond(before: Any, end: Any, points: list[Any], place: Callable[[Any], Any
     """Of points from the far end inwards, those past a line's end."""
     dx, dy = end.x - before.x, end.y - before.y
     size = max((dx * dx + dy * dy) ** 0.5, 1e-9)
-    found = []
+    beyond = []
     for point in points:
         at = place(point)
         if ((at.x - end.x) * dx + (at.y - end.y) * dy) / size <= BEYOND_END:
             break
-        found.append(point)
-    return found
+        beyond.append(point)
+    return beyond

@@ -56,16 +56,19 @@ class Trace:
         if not reader.open(self.path):
             raise FormatError("not an MCAP file, or one that was not closed", path=self.path)
         names = {kind: name for name, kind in osi("osi_utilities").MessageType.__members__.items()}
-        found = {one.topic: names[one.message_type] for one in reader.list_channel_specifications()}
-        others = [topic for topic in reader.get_available_topics() if topic not in found]
-        said = ", ".join([f"{topic} ({kind})" for topic, kind in found.items()] + others) or "none"
-        chosen = _chosen(found, channel)
+        topics = {
+            channel_there.topic: names[channel_there.message_type]
+            for channel_there in reader.list_channel_specifications()
+        }
+        others = [topic for topic in reader.get_available_topics() if topic not in topics]
+        listed = ", ".join([f"{topic} ({kind})" for topic, kind in topics.items()] + others) or "none"
+        chosen = _chosen(topics, channel)
         if chosen is None:
             reader.close()
             what = "ground truth or a sensor view" + ("" if channel is None else f" named {channel!r}")
-            raise FormatError(f"no channel with {what}; there are: {said}", path=self.path)
-        if len(found) + len(others) > 1:
-            self.notes.append(f"{self.path.name}: read channel {chosen} of {said}")
+            raise FormatError(f"no channel with {what}; there are: {listed}", path=self.path)
+        if len(topics) + len(others) > 1:
+            self.notes.append(f"{self.path.name}: read channel {chosen} of {listed}")
         reader.set_topics([chosen])
         return reader
 

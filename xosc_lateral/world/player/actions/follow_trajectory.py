@@ -6,12 +6,12 @@ from math import copysign, cos, hypot, pi, sin
 
 from xosc_lateral.world.motion.nominal import Activity
 from xosc_lateral.world.player.actions.base import Domain, Maker, RunningPrivateAction
-from xosc_lateral.world.player.angles import HALF_PI, difference
 from xosc_lateral.world.player.paths.base import PathPoint, PathProgress
 from xosc_lateral.world.player.paths.registry import duration, path_of
 from xosc_lateral.world.player.positions.resolve import pose_of
 from xosc_lateral.world.player.state import free
 from xosc_lateral.world.player.transition import EPSILON
+from xosc_lateral.world.road.positions import HALF_PI, difference
 from xosc_lateral.world.scenario.enums import FollowingMode, ReferenceContext
 from xosc_lateral.world.scenario.private_actions import FollowTrajectoryAction
 

@@ -119,8 +119,8 @@ class RunningLaneChange(RunningPrivateAction):
         """Put the actor where its guide is, on the lane that is under it."""
         network, state = self.simulation.network, self.actor
         t = guide.t
-        found = network.lane_at(guide.road, guide.s, t, lane_types=state.lane_types)
-        lane = found.lane or guide.lane
+        under_it = network.lane_at(guide.road, guide.s, t, lane_types=state.lane_types)
+        lane = under_it.lane or guide.lane
         under = network.lane_state_at(guide.road, lane, guide.s)
         state.move_to(guide.road, lane, guide.s, t - under.centre_t)
         # The course is relative to the target lane; lanes side by side are not parallel where one widens.

@@ -10,12 +10,12 @@ from math import acos, atan2, copysign, cos, hypot, inf, pi, sin, sqrt
 
 from xosc_lateral.world.motion.nominal import Activity
 from xosc_lateral.world.player.actions.base import Domain, Maker, RunningPrivateAction
-from xosc_lateral.world.player.angles import difference
 from xosc_lateral.world.player.distances import ahead_and_left, road_gap, spot_of
 from xosc_lateral.world.player.drive import move_along_lane
 from xosc_lateral.world.player.state import NO_ROAD, EntityState, free
 from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.road import Pose
+from xosc_lateral.world.road.positions import difference
 from xosc_lateral.world.scenario.enums import CoordinateSystem, LateralDisplacement
 from xosc_lateral.world.scenario.private_actions import DynamicConstraints, LateralDistanceAction
 
@@ -99,9 +99,9 @@ class BesideOnRoad:
         state, network = self._state, self._state.network
         heading = state.road_heading()
         x, y = state.pose.x - sin(heading) * rest, state.pose.y + cos(heading) * rest
-        found = network.world_to_lane_at(x, y, near=(state.road, state.s))
+        there = network.world_to_lane_at(x, y, near=(state.road, state.s))
         state.move_to(
-            found.road, found.lane, found.s, network.offset_from_offset_t(found.road, found.lane, found.offset)
+            there.road, there.lane, there.s, network.offset_from_offset_t(there.road, there.lane, there.offset)
         )
         state.section = (0.0, -1.0)
 
@@ -162,35 +162,35 @@ class BesideEntity:
 
     def move(self, step: float) -> float:
         """One frame; returns how far the line was away. [m]"""
-        state, own, other = self._state, self._state.plane, self._other.plane
+        state, ours, other = self._state, self._state.plane, self._other.plane
         state.take_control(Activity.LATERAL)
         state.speed_taken = True
         c, s = cos(other.heading), sin(other.heading)
-        to_left = (own.y - other.y) * c - (own.x - other.x) * s
+        to_left = (ours.y - other.y) * c - (ours.x - other.x) * s
         dx, dy = (to_left - self._wanted) * s, (self._wanted - to_left) * c
         rest = hypot(dx, dy)
         way = state.speed * step
         if self.is_unlimited:
             ahead = max(abs(way) - rest, 0.0)
-            state.put_in_world(free(own.x + dx + c * ahead, own.y + dy + s * ahead, other.heading))
+            state.put_in_world(free(ours.x + dx + c * ahead, ours.y + dy + s * ahead, other.heading))
         elif rest < EPSILON:
-            state.put_in_world(free(own.x + c * way, own.y + s * way, other.heading))
+            state.put_in_world(free(ours.x + c * way, ours.y + s * way, other.heading))
         else:
-            heading = self._heading(own.heading, other.heading, (dx, dy), rest, step)
-            state.put_in_world(free(own.x + cos(heading) * way, own.y + sin(heading) * way, heading))
+            heading = self._heading(ours.heading, other.heading, (dx, dy), rest, step)
+            state.put_in_world(free(ours.x + cos(heading) * way, ours.y + sin(heading) * way, heading))
         return rest
 
     def align(self) -> None:
         """Nothing to put straight: it has the other entity's heading."""
 
-    def _heading(self, own: float, other: float, delta: tuple[float, float], rest: float, step: float) -> float:
+    def _heading(self, heading: float, other: float, delta: tuple[float, float], rest: float, step: float) -> float:
         speed = self._state.speed
         way = speed * step
         radius = max(LEAST_RADIUS, PEAK * speed * speed / min(self._acceleration, MOST_ACCELERATION))
         if rest < 0.5 * way - EPSILON and 0.5 * way > radius - EPSILON:
             return _onto_line(other, delta, way)
         most = min(abs(speed / radius * step) * PEAK, pi - EPSILON)
-        towards = difference(atan2(delta[1], delta[0]), own)
+        towards = difference(atan2(delta[1], delta[0]), heading)
         if rest > radius - EPSILON:
             turn = towards
         else:
@@ -198,8 +198,8 @@ class BesideEntity:
             angle = max(acos(1.0 - rest / radius), 0.5 * segment)
             share = (2.0 * angle - 0.5 * segment) / pi
             share = share * share * (3.0 - 2.0 * share)
-            turn = share * towards + (1.0 - share) * difference(other, own)
-        return own + min(max(turn, -most), most)
+            turn = share * towards + (1.0 - share) * difference(other, heading)
+        return heading + min(max(turn, -most), most)
 
 
 def _onto_line(heading: float, delta: tuple[float, float], way: float) -> float:

@@ -30,9 +30,9 @@ def limits_of(constraints: DynamicConstraints | None, performance: Performance) 
     """Constraints that are not given are the entity's own; without any constraints, only the speed has a limit."""
     if constraints is None:
         return Performance(performance.max_speed)
-    own = asdict(performance)
-    given = {name: min(value, own[name]) for name, value in asdict(constraints).items() if value is not None}
-    return Performance(**own | given)
+    limits = asdict(performance)
+    tighter = {name: min(value, limits[name]) for name, value in asdict(constraints).items() if value is not None}
+    return Performance(**limits | tighter)
 
 
 _NO_LIMIT = 1e10

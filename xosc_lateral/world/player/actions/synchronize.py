@@ -11,12 +11,12 @@ from math import copysign, cos, inf, sin, sqrt
 
 from xosc_lateral.world.player.actions.base import Domain, Maker, RunningPrivateAction
 from xosc_lateral.world.player.actions.longitudinal import relative_to
-from xosc_lateral.world.player.angles import is_forward
 from xosc_lateral.world.player.distances import UNREACHABLE_DISTANCE, Spot, ahead_and_left, apart, road_gap
 from xosc_lateral.world.player.paths.base import Path, PathProgress, nearest_s
 from xosc_lateral.world.player.positions.resolve import spot_at
 from xosc_lateral.world.player.state import EntityState
 from xosc_lateral.world.player.transition import EPSILON
+from xosc_lateral.world.road.positions import is_forward
 from xosc_lateral.world.scenario.position import Position, TrajectoryPosition
 from xosc_lateral.world.scenario.private_actions import RelativeSpeedToMaster, SynchronizeAction
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from math import copysign, hypot, pi
 
-from xosc_lateral.world.player.angles import difference
-from xosc_lateral.world.player.conditions.base import EntityCheck, EntityChecks
 from xosc_lateral.world.player.simulation import Simulation
 from xosc_lateral.world.player.state import NO_ROAD, EntityState
+from xosc_lateral.world.player.storyboard import EntityCheck, EntityChecks
 from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.player.values import holds
 from xosc_lateral.world.road import Pose
+from xosc_lateral.world.road.positions import difference
 from xosc_lateral.world.scenario.conditions import (
     AccelerationCondition,
     AngleCondition,
@@ -136,10 +136,10 @@ def prepare_relative_angle(content: RelativeAngleCondition, simulation: Simulati
     def check(state: EntityState) -> bool:
         if not other.active:
             return False
-        own, its = (_angle(entity, content.angle_type, system, simulation) for entity in (state, other))
-        if own is None or its is None:
+        angle_here, its = (_angle(entity, content.angle_type, system, simulation) for entity in (state, other))
+        if angle_here is None or its is None:
             return False
-        return abs(difference(own - its, content.angle)) < content.tolerance + EPSILON
+        return abs(difference(angle_here - its, content.angle)) < content.tolerance + EPSILON
 
     return check
 
@@ -164,10 +164,10 @@ def _angle(state: EntityState, kind: AngleType, system: CoordinateSystem, simula
         if state.path is None:
             return None
         return state.plane.heading - state.path.path.at(state.path.s).tangent
-    own = _of_kind(state.pose, kind)
+    actual = _of_kind(state.pose, kind)
     if system is CoordinateSystem.WORLD:
-        return own + simulation.network.header_offset.heading if kind is AngleType.HEADING else own
-    return own - _reference(state, kind, system)
+        return actual + simulation.network.header_offset.heading if kind is AngleType.HEADING else actual
+    return actual - _reference(state, kind, system)
 
 
 def _reference(state: EntityState, kind: AngleType, system: CoordinateSystem) -> float:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from xosc_lateral.world.player.conditions.base import ValueCheck, ValueChecks
 from xosc_lateral.world.player.simulation import Simulation
-from xosc_lateral.world.player.storyboard import StoryboardElement
-from xosc_lateral.world.player.trigger import Watch
+from xosc_lateral.world.player.storyboard import StoryboardElement, ValueCheck, ValueChecks, Watch
 from xosc_lateral.world.player.values import Values, holds
 from xosc_lateral.world.scenario.conditions import (
     ParameterCondition,

@@ -17,11 +17,11 @@ import numpy as np
 from msgspec import Struct
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.world.player.angles import wrap
 from xosc_lateral.world.player.paths.base import Path, PathPoint
 from xosc_lateral.world.player.paths.polyline import Corner, PolylinePath
 from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.road.geometry import Spiral
+from xosc_lateral.world.road.positions import wrap
 
 SAMPLE = 1.0
 """Length of the control polygon per sample. [m]"""

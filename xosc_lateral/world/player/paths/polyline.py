@@ -18,9 +18,9 @@ from math import atan2, hypot, nan
 from msgspec import Struct
 from msgspec.structs import replace
 
-from xosc_lateral.world.player.angles import difference, wrap
 from xosc_lateral.world.player.paths.base import Path, PathPoint
 from xosc_lateral.world.player.transition import EPSILON
+from xosc_lateral.world.road.positions import difference, wrap
 
 CORNER = 2.0
 """Around a corner, the heading turns over this length before and after it (or half the piece). [m]"""
@@ -237,8 +237,8 @@ def _pitches(corners: Sequence[Corner], lengths: Sequence[float]) -> tuple[float
         if ahead >= 0 and lengths[ahead + 1] - lengths[ahead] > EPSILON:
             climb = -atan2(heights[ahead + 1] - heights[ahead], lengths[ahead + 1] - lengths[ahead])
         before = pitches[-1] if pitches else 0.0
-        found = corner.pitch if corner.pitch == corner.pitch else climb
-        pitches.append(found if found == found else before)
+        tilt = corner.pitch if corner.pitch == corner.pitch else climb
+        pitches.append(tilt if tilt == tilt else before)
     return tuple(pitches)
 
 

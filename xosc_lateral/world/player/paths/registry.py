@@ -220,8 +220,8 @@ def duration(shape: Shape) -> float:
 
 def _given_angles(position: Position) -> tuple[float | None, float | None, float | None]:
     """Heading, pitch and roll as written, absolute or relative; None: the path's own."""
-    given = position if isinstance(position, WorldPosition) else getattr(position, "orientation", None)
-    return (None, None, None) if given is None else (given.h, given.p, given.r)
+    orientation = position if isinstance(position, WorldPosition) else getattr(position, "orientation", None)
+    return (None, None, None) if orientation is None else (orientation.h, orientation.p, orientation.r)
 
 
 def _gives_height(position: Position) -> bool:

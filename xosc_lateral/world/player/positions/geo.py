@@ -55,9 +55,9 @@ def project(reference: str | None, latitude: float, longitude: float) -> tuple[f
         raise ProjectionError(
             "the road network has no geoReference with a PROJ string: geographic positions have no place"
         )
-    given = _settings(reference)
+    settings = _settings(reference)
     try:
-        return _project(given, latitude, longitude)
+        return _project(settings, latitude, longitude)
     except ProjectionError:
         raise
     except (KeyError, ValueError, ZeroDivisionError) as error:
@@ -66,36 +66,36 @@ def project(reference: str | None, latitude: float, longitude: float) -> tuple[f
         ) from error
 
 
-def _project(given: dict[str, str], latitude: float, longitude: float) -> tuple[float, float]:
-    kind = given["proj"]
-    if kind == "utm" and "zone" not in given and {"lat_0", "lon_0"} <= given.keys():
+def _project(settings: dict[str, str], latitude: float, longitude: float) -> tuple[float, float]:
+    kind = settings["proj"]
+    if kind == "utm" and "zone" not in settings and {"lat_0", "lon_0"} <= settings.keys():
         kind = "tmerc"  # field maps name an origin of their own instead of a zone: it is the map's
     if kind == "utm":
-        given |= _utm(given)
+        settings |= _utm(settings)
     elif kind not in ("tmerc", "etmerc", "merc"):
         raise ProjectionError(
             f"projection '{kind}' of the road network's geoReference is not known (utm, tmerc, merc are)"
         )
-    k = float(given.get("k", given.get("k_0", "1")))
-    lon_0, lat_0 = radians(float(given.get("lon_0", "0"))), radians(float(given.get("lat_0", "0")))
+    k = float(settings.get("k", settings.get("k_0", "1")))
+    lon_0, lat_0 = radians(float(settings.get("lon_0", "0"))), radians(float(settings.get("lat_0", "0")))
     if kind == "merc":
         x, y = _mercator(latitude, longitude - lon_0, k)
         y_0 = 0.0
     else:
         x, y = _transverse(latitude, longitude - lon_0, k)
         y_0 = _transverse(lat_0, 0.0, k)[1]
-    return x + float(given.get("x_0", "0")), y - y_0 + float(given.get("y_0", "0"))
+    return x + float(settings.get("x_0", "0")), y - y_0 + float(settings.get("y_0", "0"))
 
 
-def _utm(given: dict[str, str]) -> dict[str, str]:
+def _utm(settings: dict[str, str]) -> dict[str, str]:
     """A zone of UTM as a transverse Mercator projection, by its definition."""
-    zone = int(given["zone"])
+    zone = int(settings["zone"])
     return {
         "lon_0": str(6 * zone - 183),
         "k": str(_UTM_SCALE),
         "lat_0": "0",
         "x_0": str(_UTM_EASTING),
-        "y_0": str(_UTM_SOUTH if "south" in given else 0.0),
+        "y_0": str(_UTM_SOUTH if "south" in settings else 0.0),
     }
 
 

@@ -97,8 +97,8 @@ def _placement(
 # ---- orientations ----------------------------------------------------------------------------------------------------
 def headed(orientation: Orientation | None, heading: float, simulation: Simulation) -> float:
     """That of the reference plus what is given, or what is given alone where it is absolute. [rad]"""
-    given = 0.0 if orientation is None or orientation.h is None else orientation.h
-    return given if _is_absolute(orientation, simulation) else given + heading
+    turn = 0.0 if orientation is None or orientation.h is None else orientation.h
+    return turn if _is_absolute(orientation, simulation) else turn + heading
 
 
 def tilted_or_road(orientation: Orientation | None, pose: Pose, simulation: Simulation) -> tuple[float, float]:

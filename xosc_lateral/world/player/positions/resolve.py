@@ -6,7 +6,6 @@ from collections.abc import Callable
 from math import cos, nan, pi, sin
 
 from xosc_lateral.base.errors import PlaybackError, UnsupportedElementError
-from xosc_lateral.world.player.angles import is_forward
 from xosc_lateral.world.player.distances import Spot
 from xosc_lateral.world.player.paths.registry import path_of
 from xosc_lateral.world.player.positions.geo import geo_position
@@ -22,6 +21,7 @@ from xosc_lateral.world.player.positions.on_road import (
 from xosc_lateral.world.player.simulation import Simulation
 from xosc_lateral.world.player.state import NO_ROAD, Placement, RouteGuide, free, guide, locate, world_pose
 from xosc_lateral.world.road import Pose
+from xosc_lateral.world.road.positions import is_forward
 from xosc_lateral.world.scenario import Unsupported
 from xosc_lateral.world.scenario.position import (
     FromCurrentEntity,

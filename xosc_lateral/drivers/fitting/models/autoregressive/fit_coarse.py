@@ -88,8 +88,8 @@ def fit_autoregression(
         coefficients = np.asarray(np.linalg.solve(normal, right), dtype=np.float64)
         squares = [float(np.sum((y - past @ coefficients) ** 2)) for past, y in zip(pasts, nexts, strict=True)]
         raw = np.bincount(whose, squares) / counts
-        own = between * (1.0 - coefficients.sum()) ** 2  # what the drivers' means leave in the residual
-        variances = np.maximum(raw - own, LEAST_RESIDUAL * raw) + smallest
+        between_share = between * (1.0 - coefficients.sum()) ** 2  # what the drivers' means leave in the residual
+        variances = np.maximum(raw - between_share, LEAST_RESIDUAL * raw) + smallest
     scale = float(np.exp(0.5 * np.average(np.log(variances), weights=counts)))
     return Autoregression(stabilise(coefficients), scale)
 

@@ -66,15 +66,15 @@ def with_volatility(
     """
     steady = simulate(model, 2000, settings.seed, drivers=64)
     reference = [split_bands(row, settings.step) for row in steady]
-    found = []
+    candidates = []
     for which, seconds in ((_wiggle, settings.coarse_window), (_fine_of, settings.fine_window)):
         window = round(seconds / settings.step)
         n_lags = max(2, int(MAX_LAG / seconds))
         measured = [log_power(which(pair), window) for pair in bands if len(which(pair)) >= window]
         covariance, counts = autocovariance(measured, n_lags)
         expected, _ = autocovariance([log_power(which(pair), window) for pair in reference], n_lags)
-        found.append(fit_volatility(covariance - expected, counts, seconds, population=population))
-    coarse, fine = (part if part.total > LEAST_VOLATILITY.total else LEAST_VOLATILITY for part in found)
+        candidates.append(fit_volatility(covariance - expected, counts, seconds, population=population))
+    coarse, fine = (part if part.total > LEAST_VOLATILITY.total else LEAST_VOLATILITY for part in candidates)
     return replace(model, coarse_volatility=coarse, fine_volatility=fine, correlation=0.5)
 
 
@@ -114,12 +114,12 @@ def matched(model: AutoregressiveModel, runs: Sequence[FloatArray], settings: Fi
     slopes: FloatArray | None = None
     for left in reversed(range(settings.rounds)):
         simulated = _drives_of(model, length, settings.seed, SIMULATED if left else many)
-        lacks, found = spectrum - _log_spectrum([simulated], window), _moments(simulated.reshape(-1, length))
+        lacks, moments = spectrum - _log_spectrum([simulated], window), _moments(simulated.reshape(-1, length))
         if slopes is None:
             nudged = _drives_of(_volatile(model, NUDGE, NUDGE), length, settings.seed, len(simulated))
-            slopes = _asked(_moments(nudged.reshape(-1, length)) - found) / NUDGE
+            slopes = _asked(_moments(nudged.reshape(-1, length)) - moments) / NUDGE
         fine = replace(model.fine, damping=model.fine.damping * _gain(model, lacks))
-        scale, model = model.coarse.scale, _corrected(model, target - found, slopes, settings)
+        scale, model = model.coarse.scale, _corrected(model, target - moments, slopes, settings)
         still = lacks - 2.0 * np.log(model.coarse.scale / scale)  # lacking after the coarse movement was scaled
         model = replace(model, coarse=scaled_spectrum(model.coarse, _coarse_gain(still, settings)), fine=fine)
     return model
@@ -251,12 +251,12 @@ def fit_volatility(excess: FloatArray, counts: FloatArray, seconds: float, *, po
         shape = averaged_covariance(len(excess), seconds, time)
         for basis in ([shape, np.ones(len(excess))], [shape]):
             columns = np.stack(basis, axis=1)
-            found = np.linalg.lstsq(columns * weights[:, None], excess * weights, rcond=None)[0]
-            if (found < 0).any():
+            shares = np.linalg.lstsq(columns * weights[:, None], excess * weights, rcond=None)[0]
+            if (shares < 0).any():
                 continue
-            error = float((((columns @ found - excess) * weights) ** 2).sum())
+            error = float((((columns @ shares - excess) * weights) ** 2).sum())
             if error < least - 1e-12:
-                lasting = float(found[1]) if len(found) > 1 else 0.0
-                best, least = Volatility(lasting, float(found[0]), time), error
+                lasting = float(shares[1]) if len(shares) > 1 else 0.0
+                best, least = Volatility(lasting, float(shares[0]), time), error
             break
     return best if population else Volatility(0.0, best.within, best.correlation_time, best.between)

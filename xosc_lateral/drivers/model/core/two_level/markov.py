@@ -40,12 +40,12 @@ def _nearest(bins: IntArray, goals: IntArray) -> IntArray:
 
 def _reachable(counts: IntArray, start: BoolArray) -> BoolArray:
     """Bins that the chain can get to from `start` (itself included)."""
-    found = start.copy()
+    bins = start.copy()
     while True:
-        more = found | (counts[found] > 0).any(axis=0)
-        if (more == found).all():
-            return found
-        found = more
+        more = bins | (counts[bins] > 0).any(axis=0)
+        if (more == bins).all():
+            return bins
+        bins = more
 
 
 def _main_part(counts: IntArray) -> BoolArray:

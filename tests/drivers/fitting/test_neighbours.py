@@ -10,8 +10,8 @@ import pytest
 from tests.kit.motion import LANE_WIDTH, drive, entity, together, two_roads
 from tests.kit.profiles import simulated_profile
 from xosc_lateral.drivers.drives.drive import Run
-from xosc_lateral.drivers.fitting.answers import LAG, ORDER, RESPONSE, SCALE, basis_of, measure_beside
 from xosc_lateral.drivers.fitting.fitting import fit_population
+from xosc_lateral.drivers.fitting.neighbours import LAG, ORDER, RESPONSE, SCALE, basis_of, measure_beside
 from xosc_lateral.drivers.model.effects import Acts, Proximity
 from xosc_lateral.drivers.model.profile import Basis, Beside
 from xosc_lateral.workflows.conversion.enrich import enrich

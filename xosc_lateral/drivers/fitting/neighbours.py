@@ -1,4 +1,4 @@
-"""Whether a driver answers to vehicles beside him: measured, declared, or unknown.
+"""How a driver responds to vehicles beside him: measured, declared, or unknown.
 
 Measured means that enough driving beside somebody was seen to say how far he moves, also when that is not at all. What
 is unknown is a population's to lend.
@@ -18,6 +18,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.fitting.regression import clustered_least_squares
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Linear, Proximity
 from xosc_lateral.drivers.model.profile import COLUMNS, SIDES, Basis, Beside, DriverProfile
 
@@ -86,33 +87,33 @@ def measure_beside(runs: Sequence[Run]) -> dict[str, Beside]:
         return {}
     near = {side: [_rows_beside(run, shape) for run in runs] for side, shape in shapes.items()}
     slopes, errors = _within_drives(runs, near)
-    found = {}
+    measured = {}
     for side, slope, error in zip(shapes, slopes, errors, strict=True):
         beside = np.concatenate(near[side]) > np.exp(-1.0)
         seconds, away = STEP * beside.sum(), STEP * (~beside).sum()
         sure = error <= MEASURED_ERROR and min(seconds, away) >= LEAST_SECONDS
         if sure:
-            found[side] = Beside(
+            measured[side] = Beside(
                 Basis.MEASURED, round(float(seconds), 1), round(float(slope), 4), round(float(error), 4)
             )
-    return found
+    return measured
 
 
 def answer_effects(runs: Sequence[Run], known: Mapping[str, Beside]) -> list[ColumnEffect]:
     """Effects of measured shifts that are beyond chance, pooled with the population's as their errors ask."""
     from msgspec.structs import replace
 
-    found: list[ColumnEffect] = []
-    for side, one in known.items():
+    effects: list[ColumnEffect] = []
+    for side, beside in known.items():
         shape = _shape(runs, side)
-        if shape is None or one.basis is not Basis.MEASURED or abs(one.shift) <= SIGNIFICANT * one.error:
+        if shape is None or beside.basis is not Basis.MEASURED or abs(beside.shift) <= SIGNIFICANT * beside.error:
             continue
         mean, spread = AMONG_DRIVERS[side]
-        own = spread**2 / (spread**2 + one.error**2)
-        size, error = own * one.shift + (1.0 - own) * mean, np.sqrt(own) * one.error
+        weight = spread**2 / (spread**2 + beside.error**2)
+        size, error = weight * beside.shift + (1.0 - weight) * mean, np.sqrt(weight) * beside.error
         numbers = {"coefficients": (round(size, 4),), "errors": (round(float(error), 4),), "reference": (0.0,)}
-        found.append(replace(shape, **numbers))
-    return found
+        effects.append(replace(shape, **numbers))
+    return effects
 
 
 def _shape(runs: Sequence[Run], side: str) -> ColumnEffect | None:
@@ -172,28 +173,12 @@ def _within_drives(runs: Sequence[Run], near: Mapping[str, Sequence[FloatArray]]
     table = _centred(table, groups)
     observed, design = table[:, 0], table[:, 1:]
     distinct, cluster = np.unique(number, axis=0, return_inverse=True)
-    slopes, covariance = cluster_robust_slopes(design, observed, cluster.ravel())
+    slopes, covariance = clustered_least_squares(design, observed, cluster.ravel())
     blocks, free = len(distinct), max(len(observed) - len(numbers) - design.shape[1], 1)
     covariance *= blocks / max(blocks - 1, 1) * len(observed) / free
     known = np.diag(design.T @ design)[:sides] > 1e-6
     errors = np.where(known & (blocks > 2), CLUSTERED * np.sqrt(np.maximum(np.diag(covariance)[:sides], 0.0)), np.inf)
     return np.where(known, slopes[:sides], 0.0), errors
-
-
-def cluster_robust_slopes(design: FloatArray, observed: FloatArray, cluster: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Slopes, shape (k,), of observations, shape (n,), by a design, shape (n, k), and their covariance, shape (k, k).
-
-    The covariance is robust against whatever the observations of one cluster, 0, 1, 2 ..., share.
-    """
-    inverse = np.linalg.pinv(design.T @ design)
-    slopes = inverse @ design.T @ observed
-    scores = cluster_sums(design * (observed - design @ slopes)[:, None], cluster)
-    return slopes, inverse @ (scores.T @ scores) @ inverse
-
-
-def cluster_sums(rows: FloatArray, cluster: IntArray) -> FloatArray:
-    """Sums of rows, shape (n, k), over each cluster 0, 1, 2 ..., shape (clusters, k)."""
-    return np.column_stack([np.bincount(cluster, column) for column in rows.T])
 
 
 def _centred(table: FloatArray, groups: IntArray) -> FloatArray:

@@ -1,0 +1,234 @@
+"""Actions that are done at once, or only take time: global ones, places, routes, controllers, trailers, lights."""
+
+from __future__ import annotations
+
+from xosc_lateral.world.motion.nominal import Activity
+from xosc_lateral.world.player.actions.base import AtOnce, Domain, Maker, RunningPrivateAction, at_once
+from xosc_lateral.world.player.drive import align_trailers, connect, disconnect
+from xosc_lateral.world.player.positions.resolve import resolve, route_guide
+from xosc_lateral.world.player.state import guide
+from xosc_lateral.world.player.values import Values
+from xosc_lateral.world.scenario import Unsupported
+from xosc_lateral.world.scenario.controllers import Domains
+from xosc_lateral.world.scenario.enums import RouteStrategy
+from xosc_lateral.world.scenario.global_actions import (
+    AddEntityAction,
+    DeleteEntityAction,
+    EnvironmentAction,
+    ParameterModifyAction,
+    ParameterSetAction,
+    SetMonitorAction,
+    TrafficAction,
+    TrafficSignalControllerAction,
+    TrafficSignalStateAction,
+    UserDefinedAction,
+    VariableModifyAction,
+    VariableSetAction,
+)
+from xosc_lateral.world.scenario.private_actions import (
+    AcquirePositionAction,
+    ActivateControllerAction,
+    AnimationAction,
+    AssignControllerAction,
+    AssignRouteAction,
+    ConnectTrailerAction,
+    DisconnectTrailerAction,
+    LightStateAction,
+    OverrideControllerValueAction,
+    TeleportAction,
+    VisibilityAction,
+)
+
+
+def environment(content: EnvironmentAction, action: AtOnce) -> None:
+    """Only the time of day matters to playback; the rest is recorded with the start of the action."""
+    clock = content.environment.time_of_day
+    if clock is not None:
+        action.simulation.time_of_day = (clock.date_time, clock.animation, action.simulation.time)
+
+
+def set_value(content: ParameterSetAction | VariableSetAction, action: AtOnce) -> None:
+    """Conditions see the new value from now on; what was read from the file before does not change."""
+    kind, values, name = _values(content, action)
+    if name in values:
+        values.set(name, content.value)
+    else:
+        action.note(f"{kind} '{name}' is not declared: nothing is set")
+
+
+def modify_value(content: ParameterModifyAction | VariableModifyAction, action: AtOnce) -> None:
+    """Add to a value, or multiply it."""
+    kind, values, name = _values(content, action)
+    if name not in values:
+        action.note(f"{kind} '{name}' is not declared: nothing is modified")
+    elif not values.modify(name, content.operation, content.value):
+        action.note(f"{kind} '{name}' is not a number: nothing is modified")
+
+
+def _values(
+    content: ParameterSetAction | ParameterModifyAction | VariableSetAction | VariableModifyAction, action: AtOnce
+) -> tuple[str, Values, str]:
+    """What it is called in notes, all of its kind, and its name."""
+    if isinstance(content, ParameterSetAction | ParameterModifyAction):
+        return "parameter", action.simulation.parameters, content.parameter_ref
+    return "variable", action.simulation.variables, content.variable_ref
+
+
+def signal_state(content: TrafficSignalStateAction, action: AtOnce) -> None:
+    """A signal shows a state from now on."""
+    action.simulation.signals.set_state(content.name, content.state, action.simulation.time)
+
+
+def signal_phase(content: TrafficSignalControllerAction, action: AtOnce) -> None:
+    """A signal controller goes to a phase."""
+    controller, phase = content.controller_ref, content.phase
+    if not action.simulation.signals.go_to_phase(controller, phase, action.simulation.time):
+        action.note(f"no signal controller '{controller}' with a phase '{phase}'")
+
+
+def add_entity(content: AddEntityAction, action: AtOnce) -> None:
+    """The entity appears at the position, with the speed that it had when it was taken out (at first: none)."""
+    state = action.simulation.entity(content.entity_ref, content.place)
+    if state.active:
+        action.note(f"'{state.name}' exists already: it is not added")
+        return
+    state.active = True
+    state.put(resolve(content.position, action.simulation))
+    state.teleported = True
+    state.activity = Activity.ACTIVE | Activity.TELEPORTED
+
+
+def delete_entity(content: DeleteEntityAction, action: AtOnce) -> None:
+    """The entity is gone, and with it what it was doing; trailers are left behind."""
+    state = action.simulation.entity(content.entity_ref, content.place)
+    state.active = False
+    state.activity = 0
+    disconnect(state)
+    if state.tow is not None:
+        disconnect(state.tow)
+    for running in state.actions:
+        if running.is_running:
+            running.end()
+
+
+def traffic(content: TrafficAction, action: AtOnce) -> None:
+    """Traffic of a tool's own making: no file says where its cars are."""
+    action.note(f"{content.kind}: its vehicles are made by the simulator and are not played")
+
+
+def unsupported(content: Unsupported, action: AtOnce) -> None:
+    """Named, and over at once."""
+    action.note(content.reason or f"{content.kind} is not played")
+
+
+def recorded(content: object, action: AtOnce) -> None:
+    """The start is recorded like that of every action; nothing moves."""
+
+
+# ---- Private actions that are done at once, or only take time: te ----
+def teleport(content: TeleportAction, action: AtOnce) -> None:
+    """To a place, with all trailers. A towed vehicle stays behind its tractor."""
+    state = action.actor
+    place = resolve(content.position, action.simulation, route=state.route)
+    if state.tow is not None:
+        action.note(f"'{state.name}' is towed by '{state.tow.name}': it is not teleported")
+        return
+    state.put(place)
+    state.teleported = True
+    state.longitudinal_taken = state.speed_taken = True
+    state.activity |= Activity.TELEPORTED
+    align_trailers(state)
+
+
+def assign_route(content: AssignRouteAction, action: AtOnce) -> None:
+    """The route holds until another one is assigned."""
+    others = {waypoint.strategy for waypoint in content.route.waypoints} - {RouteStrategy.SHORTEST}
+    if others:
+        action.note(f"routeStrategy {', '.join(sorted(others))}: the shortest way is taken")
+    action.actor.route = route_guide(content.route, action.simulation)
+    if action.actor.route is None:
+        action.note(f"no way leads along route '{content.route.name}': it is not followed")
+
+
+def acquire_position(content: AcquirePositionAction, action: AtOnce) -> None:
+    """The shortest way from here to there becomes the route; nothing stops the entity there."""
+    state = action.actor
+    state.locate()
+    state.route = guide(state.network, [state.place, resolve(content.position, action.simulation)])
+    if state.route is None:
+        action.note("no way leads to the position: it is not acquired")
+
+
+def controller(
+    content: ActivateControllerAction | AssignControllerAction | OverrideControllerValueAction, action: AtOnce
+) -> None:
+    """Who drives which domain from now on is written down; the default driver drives all the same."""
+    state, controllers = action.actor, action.actor.controllers
+    controllers.follow(content)
+    state.steered = int(Activity.STEERED) if Domains.LATERAL in controllers.domains else 0
+    state.activity = state.activity & ~int(Activity.STEERED) | state.steered
+    if words := controllers.words():
+        since = f"from {action.simulation.time:.2f} s on"
+        action.note(f"'{state.name}' is driven by controller {words} {since}: the default driver drives instead")
+    action.end()
+
+
+def connect_trailer(content: ConnectTrailerAction, action: AtOnce) -> None:
+    """Hitch a trailer; one that hangs on already is left behind."""
+    trailer = action.simulation.entity(content.trailer_ref, content.place)
+    if trailer is not action.actor.trailer:
+        disconnect(action.actor)
+        connect(action.actor, trailer)
+
+
+def disconnect_trailer(content: DisconnectTrailerAction, action: AtOnce) -> None:
+    """Leave the trailer where it is."""
+    if action.actor.trailer is None:
+        action.note(f"'{action.actor.name}' has no trailer")
+    disconnect(action.actor)
+
+
+class RunningForTime(RunningPrivateAction):
+    """Over after its time; what flashes or loops does so until something else is asked of it. [s]"""
+
+    content: LightStateAction | AnimationAction
+
+    def _begin(self) -> None:
+        if isinstance(self.content, LightStateAction):
+            self._left, self._goes_on = self.content.transition_time, self.content.mode == "flashing"
+        else:
+            self._left, self._goes_on = self.content.duration, self.content.loop
+
+    def _act(self, time: float, step: float) -> None:
+        if self._left <= 0.0 and not self._goes_on:
+            self.end()
+        self._left -= step
+
+
+RUNNING: dict[type, Maker] = {
+    EnvironmentAction: at_once(environment),
+    ParameterModifyAction: at_once(modify_value),
+    ParameterSetAction: at_once(set_value),
+    TrafficSignalControllerAction: at_once(signal_phase),
+    TrafficSignalStateAction: at_once(signal_state),
+    VariableModifyAction: at_once(modify_value),
+    VariableSetAction: at_once(set_value),
+    AddEntityAction: at_once(add_entity),
+    DeleteEntityAction: at_once(delete_entity),
+    SetMonitorAction: at_once(recorded),
+    TrafficAction: at_once(traffic),
+    Unsupported: at_once(unsupported),
+    UserDefinedAction: at_once(recorded),
+    TeleportAction: at_once(teleport, Domain.BOTH),
+    # as in the reference player: an action on speed or distance ends when it begins
+    AcquirePositionAction: at_once(acquire_position, Domain.LONGITUDINAL),
+    AssignRouteAction: at_once(assign_route),
+    ActivateControllerAction: at_once(controller),
+    AssignControllerAction: at_once(controller),
+    OverrideControllerValueAction: at_once(controller),
+    ConnectTrailerAction: at_once(connect_trailer),
+    DisconnectTrailerAction: at_once(disconnect_trailer),
+    AnimationAction: RunningForTime,
+    LightStateAction: RunningForTime,
+    VisibilityAction: at_once(recorded),
+}
