@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
@@ -257,6 +258,20 @@ def test_a_clothoid_spline_of_a_reactive_scenario_is_refused_before_1_3(tmp_path
     with pytest.raises(FormatError, match=rf"version 1\.{minor} has no ClothoidSpline; use --mode trajectory"):
         reactive(source, f"1.{minor}")
     assert "Polyline" in etree.tostring(written(source, f"1.{minor}")[1], encoding="unicode")
+
+
+def test_before_1_1_a_trajectory_lies_right_in_its_action(tmp_path: Path) -> None:
+    corners = "".join(
+        f'<Vertex time="0"><Position><WorldPosition x="{x}" y="0"/></Position></Vertex>' for x in (10, 50)
+    )
+    shape = f"<Polyline>{corners}</Polyline>"
+    way = re.sub("<ClothoidSpline>.*</ClothoidSpline>", shape, SPLINE)
+    source = tree(tmp_path, stories=story(event("follow", action("follow", way))))
+    for minor in range(2):
+        root = reactive(source, f"1.{minor}")[1]
+        schema_of(minor).assertValid(root)
+        parent = root.find(".//Trajectory[@name='way']").getparent().tag
+        assert parent == ("TrajectoryRef" if minor else "FollowTrajectoryAction")
 
 
 def test_an_orientation_without_a_type_means_what_it_meant(tmp_path: Path) -> None:

@@ -252,3 +252,14 @@ def test_a_lean_on_a_grade_leads_along_s_and_finds_back():
     assert t * shrink == pytest.approx(t * cos(lean))
     assert height == pytest.approx(10.0 * grade + t * cos(pitch) * sin(lean))
     assert surface.lead_at(10.0, t * shrink) == pytest.approx(lead)
+
+
+@pytest.mark.parametrize("name", ["straight", "arcs", "cubics"])
+def test_a_stretch_is_all_of_one_element_of_the_reference_line(name: str) -> None:
+    for road in hand_written(name).roads:
+        ends = [-np.inf, *road.starts[1:], np.inf]
+        for number, element in enumerate(road.elements):
+            for s in np.linspace(road.starts[number], min(ends[number + 1], road.length) - 1e-6, 5):
+                low, high, held, start, _ = road.stretch_of(-1, float(s))
+                assert (low, high, start) == (ends[number], ends[number + 1], road.starts[number])
+                assert held is element
