@@ -127,11 +127,19 @@ def _moment(rng: Rng) -> Moment:
 
 
 def attack_fmu(count: int, seed: int, folder: Path, tally: Count) -> Iterator[Fault]:
-    """So many inputs and steps, good and bad in turn, of a unit; after a refusal the next good step goes on."""
+    """So many inputs and steps, good and bad in turn, of a unit in Python and, where it compiles, of one in C."""
+    for python in (True, False):
+        place = folder / ("python" if python else "c")
+        place.mkdir(parents=True)
+        if export_fmu(read_profile("motorway"), place / "driver.fmu", python=python) or python:
+            yield from _attack_unit(count // 2, seed, place, tally)
+
+
+def _attack_unit(count: int, seed: int, folder: Path, tally: Count) -> Iterator[Fault]:
+    """After a refusal the next good step goes on."""
     import fmpy
 
     unit, at = folder / "driver.fmu", 0.0
-    export_fmu(read_profile("motorway"), unit)
     described = fmpy.read_model_description(str(unit))
     one = fmpy.instantiate_fmu(fmpy.extract(str(unit), str(folder / "unit")), described, "CoSimulation")
     numbers = [v for v in described.modelVariables if v.causality == "input" and v.type == "Real"]

@@ -168,13 +168,13 @@ def fmu(
 @command(export, "c", "C99 source for a test bench.", "export c -p motorway -o driver/")
 def c_source(
     output: Annotated[Path, typer.Option("--output", "-o", metavar="FOLDER/", help="Folder of the files.")],
-    profile: Profile = "motorway", library: Library = None, quiet: Quiet = False, verbose: Verbose = False,
+    profile: Profile = "motorway", library: Library = None, force: Force = False, quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Write a driver as C99 without dependencies: header, source, numbers, a CMake file and an example loop."""
-    from xosc_lateral.files.output_paths import output_folder
     from xosc_lateral.workflows.live.c_driver import export_c
     from xosc_lateral.workflows.result import given_profile
 
-    written = export_c(given_profile(profile, library or ()), output_folder(output))
+    written = export_c(given_profile(profile, library or ()), output, force=force)
     if not quiet:
         typer.echo(f"wrote {', '.join(str(path) for path in written)}", err=True)

@@ -15,13 +15,25 @@ from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.cli import main
 from xosc_lateral.drivers.fitting.models.two_level import fit_two_level
 from xosc_lateral.drivers.model.core.autoregressive.parameters import Volatility
-from xosc_lateral.drivers.model.effects import Acts, Factor, Form, HiddenEffect, Linear, Nearness, Product, Threshold
+from xosc_lateral.drivers.model.effects import (
+    EFFECTS,
+    Acts,
+    Effect,
+    Factor,
+    Form,
+    HiddenEffect,
+    Linear,
+    Nearness,
+    Product,
+    Threshold,
+)
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import sample_offsets
 from xosc_lateral.drivers.model.seeds import child
 from xosc_lateral.drivers.model.stream import OffsetStream
 from xosc_lateral.files.profiles import read_profile, write_profile
 from xosc_lateral.workflows.live.c_driver import export_c
+from xosc_lateral.workflows.live.c_numbers import numbers_of
 
 SHIPPED = sorted(path.stem for path in (Path(__file__).resolve().parents[3] / "driver_profiles").glob("*.json"))
 
@@ -70,10 +82,26 @@ def test_shipped_profiles_give_the_offsets_of_the_batch_call(name: str, tmp_path
     assert compared(driver, profile, 400, 2**40 + 7, begin=1000.0) < TOLERANCE
 
 
+def refused(effect: Effect) -> bool:
+    """Whether C lacks an effect, which is then named."""
+    try:
+        numbers_of(replace(read_profile("rural"), effects=(effect,)))
+    except DriverProfileError as error:
+        assert repr(effect.kind) in str(error)
+        return True
+    return False
+
+
+def test_at_most_two_kinds_of_effects_are_missing_in_c() -> None:
+    assert {type(effect) for effect in EXAMPLES} == set(EFFECTS)
+    assert sum(map(refused, EXAMPLES)) <= 2
+
+
 @pytest.mark.parametrize("core", ["motorway", "two-level"])
 def test_every_effect_that_a_profile_can_hold_acts_as_in_the_batch_call(core: str, tmp_path: Path) -> None:
     base = two_level() if core == "two-level" else read_profile(core)
-    for number, effects in enumerate([(*EXAMPLES, *EVERY_FORM, *MORE), (), EXAMPLES[::-1][:7]]):
+    examples = tuple(effect for effect in EXAMPLES if not refused(effect))
+    for number, effects in enumerate([(*examples, *EVERY_FORM, *MORE), (), examples[::-1][:7]]):
         profile = replace(base, effects=effects)
         driver = CompiledDriver(profile, tmp_path / str(number))
         assert compared(driver, profile, 1500, 1) < TOLERANCE
@@ -221,6 +249,17 @@ def test_the_cmake_file_builds_it(tmp_path: Path) -> None:
     for words in (("-S", tmp_path / "c", "-B", tmp_path / "b"), ("--build", tmp_path / "b")):
         subprocess.run([program, *words], check=True, capture_output=True)
     assert subprocess.run([tmp_path / "b" / "example"], check=True, capture_output=True).stdout.count(b"\n") == 601
+
+
+def test_files_that_are_there_are_replaced_when_told_to(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["export", "c", "-p", "rural", "-o", f"{tmp_path}/c/", "-q"]
+    assert main(words) == 0
+    mine = tmp_path / "c" / "example.c"
+    mine.write_text("mine")
+    assert main(words) == 1 and "--force" in capsys.readouterr().err
+    assert mine.read_text() == "mine"
+    assert main([*words, "--force"]) == 0 and mine.read_text() != "mine"
+    assert main(["export", "c", "-o", str(mine)]) == 1 and "expected a folder" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["gcc", "clang"])

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -215,6 +216,41 @@ def test_slow_driving_and_maneuvers_are_as_of_the_unit_that_calls_python(version
     ]
     in_c, in_python = (run(unit, context, 0.05, **more) for unit in units)
     np.testing.assert_allclose(in_c, in_python, atol=1e-9, rtol=0.0)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_instances_are_their_own_and_a_reset_one_begins_anew(version: str, tmp_path: Path) -> None:
+    from fmpy import extract, instantiate_fmu
+
+    compiler()
+    unit = exported(version, tmp_path / "driver.fmu")
+    described, folder = fmpy.read_model_description(str(unit)), extract(str(unit))
+    is_2 = version == "2.0"
+    number = {variable.name: [variable.valueReference] for variable in described.modelVariables}
+    instances = [instantiate_fmu(folder, described, "CoSimulation") for _ in range(3)]
+
+    def begin(instance: Any, seed: int) -> None:
+        (instance.setInteger if is_2 else instance.setInt32)(number["seed"], [seed])
+        instance.enterInitializationMode()
+        instance.exitInitializationMode()
+
+    def step(instance: Any, k: int) -> float:
+        instance.doStep(currentCommunicationPoint=0.1 * k, communicationStepSize=0.1)
+        return float((instance.getReal if is_2 else instance.getFloat64)(number["offset"])[0])
+
+    for instance, seed in zip(instances, (1, 2, 1), strict=True):
+        begin(instance, seed)
+    first, second, third = np.array([[step(instance, k) for instance in instances] for k in range(50)]).T
+    np.testing.assert_array_equal(first, third)
+    assert np.abs(first - second).max() > 0.01
+    instances[1].reset()
+    begin(instances[1], 1)
+    np.testing.assert_array_equal([step(instances[1], k) for k in range(50)], first)
+    with pytest.raises(Exception, match="SetInt"):
+        (instances[0].setInteger if is_2 else instances[0].setInt32)(number["seed"], [5])
+    for instance in instances:
+        instance.terminate()
+        instance.freeInstance()
 
 
 WITHOUT_US = """

@@ -15,15 +15,13 @@ typedef char size_is_as_stated[(sizeof(DRIVER_state) == DRIVER_MEMORY) ? 1 : -1]
 /* ---- random numbers: numpy's SeedSequence, PCG64 and Generator ------------------------------------------------- */
 
 /* 64 bits times 64 bits: the upper half. */
-static uint64_t upper_product(uint64_t a, uint64_t b)
-{
+static uint64_t upper_product(uint64_t a, uint64_t b) {
     const uint64_t a0 = a & 0xffffffffU, a1 = a >> 32, b0 = b & 0xffffffffU, b1 = b >> 32;
     const uint64_t middle = a1 * b0 + ((a0 * b0) >> 32), other = a0 * b1 + (middle & 0xffffffffU);
     return a1 * b1 + (middle >> 32) + (other >> 32);
 }
 
-static void advance(DRIVER_random *random)
-{
+static void advance(DRIVER_random *random) {
     const uint64_t high = UINT64_C(2549297995355413924), low = UINT64_C(4865540595714422341);
     const uint64_t product = random->low * low;
     random->high = upper_product(random->low, low) + random->high * low + random->low * high;
@@ -31,8 +29,7 @@ static void advance(DRIVER_random *random)
     random->high += random->add_high + (random->low < product ? 1U : 0U);
 }
 
-static uint64_t draw(DRIVER_random *random)
-{
+static uint64_t draw(DRIVER_random *random) {
     uint64_t mixed;
     unsigned turn;
     advance(random);
@@ -41,13 +38,11 @@ static uint64_t draw(DRIVER_random *random)
     return (mixed >> turn) | (mixed << ((64U - turn) & 63U));
 }
 
-static double uniform(DRIVER_random *random)
-{
+static double uniform(DRIVER_random *random) {
     return (double)(draw(random) >> 11) * (1.0 / 9007199254740992.0);
 }
 
-static double normal(DRIVER_random *random)
-{
+static double normal(DRIVER_random *random) {
     for (;;) {
         const uint64_t bits = draw(random), size = (bits >> 9) & UINT64_C(0x000fffffffffffff);
         const unsigned layer = (unsigned)(bits & 0xffU);
@@ -70,8 +65,7 @@ static double normal(DRIVER_random *random)
     }
 }
 
-static double exponential(DRIVER_random *random)
-{
+static double exponential(DRIVER_random *random) {
     for (;;) {
         const uint64_t bits = draw(random) >> 3, size = bits >> 8;
         const unsigned layer = (unsigned)(bits & 0xffU);
@@ -89,8 +83,7 @@ static double exponential(DRIVER_random *random)
     }
 }
 
-static uint32_t hashed(uint32_t value, uint32_t *constant, uint32_t factor)
-{
+static uint32_t hashed(uint32_t value, uint32_t *constant, uint32_t factor) {
     value ^= *constant;
     *constant *= factor;
     value *= *constant;
@@ -98,8 +91,7 @@ static uint32_t hashed(uint32_t value, uint32_t *constant, uint32_t factor)
 }
 
 /* The stream below a seed with these keys. */
-static void seed_random(DRIVER_random *random, uint64_t seed, const uint32_t *keys, unsigned depth)
-{
+static void seed_random(DRIVER_random *random, uint64_t seed, const uint32_t *keys, unsigned depth) {
     uint32_t entropy[8] = {0}, pool[4], words[8], constant = 0x43b0d7e5U;
     unsigned i, k;
     entropy[0] = (uint32_t)seed;
@@ -135,8 +127,7 @@ static void seed_random(DRIVER_random *random, uint64_t seed, const uint32_t *ke
     advance(random);
 }
 
-static void child(DRIVER_random *random, uint64_t seed, uint32_t drive, uint32_t part, uint32_t index)
-{
+static void child(DRIVER_random *random, uint64_t seed, uint32_t drive, uint32_t part, uint32_t index) {
     const uint32_t keys[3] = {drive, part, index};
     seed_random(random, seed, keys, 3U);
 }
@@ -144,8 +135,7 @@ static void child(DRIVER_random *random, uint64_t seed, uint32_t drive, uint32_t
 /* ---- core movement ---------------------------------------------------------------------------------------------- */
 
 /* Values through a symmetric kernel of odd length. */
-static double convolved(const double *values, const double *kernel, int taps)
-{
+static double convolved(const double *values, const double *kernel, int taps) {
     const int half = taps / 2;
     double sum = kernel[half] * values[half];
     int k;
@@ -156,29 +146,25 @@ static double convolved(const double *values, const double *kernel, int taps)
 }
 
 /* Forget the oldest of some values, and add one. */
-static void push(double *values, int count, double value)
-{
+static void push(double *values, int count, double value) {
     memmove(values, values + 1, (size_t)(count - 1) * sizeof *values);
     values[count - 1] = value;
 }
 
-static double next_noise(DRIVER_state *driver)
-{
+static double next_noise(DRIVER_state *driver) {
     return uniform(&driver->fine_random) - 0.5;
 }
 
 #if DRIVER_TWO_LEVEL
 
-static double next_level(DRIVER_state *driver)
-{
+static double next_level(DRIVER_state *driver) {
     const double scaled = uniform(&driver->coarse_random) * DRIVER_BINS;
     const int column = (int)scaled, cell = (int)(driver->bin % DRIVER_BINS) * DRIVER_BINS + column;
     driver->bin = scaled - column < chain_keep[cell] ? column : chain_other[cell];
     return bin_centre[driver->bin];
 }
 
-static void begin_core(DRIVER_state *driver, uint64_t seed, uint32_t drive)
-{
+static void begin_core(DRIVER_state *driver, uint64_t seed, uint32_t drive) {
     DRIVER_random first;
     double place;
     int k;
@@ -202,22 +188,19 @@ static void begin_core(DRIVER_state *driver, uint64_t seed, uint32_t drive)
     }
 }
 
-static double next_coarse(DRIVER_state *driver)
-{
+static double next_coarse(DRIVER_state *driver) {
     push(driver->steps, DRIVER_STEPS, next_level(driver));
     return convolved(driver->steps, smoothing, DRIVER_STEPS);
 }
 
-static double next_fine(DRIVER_state *driver)
-{
+static double next_fine(DRIVER_state *driver) {
     push(driver->noise, DRIVER_TAPS, next_noise(driver));
     return convolved(driver->noise, fine_kernel, DRIVER_TAPS);
 }
 
 #else
 
-static uint32_t draw_half(DRIVER_random *random)
-{
+static uint32_t draw_half(DRIVER_random *random) {
     uint64_t both;
     if (random->has_half != 0U) {
         random->has_half = 0U;
@@ -230,8 +213,7 @@ static uint32_t draw_half(DRIVER_random *random)
 }
 
 /* A whole number below `end`. */
-static uint32_t draw_below(DRIVER_random *random, uint32_t end)
-{
+static uint32_t draw_below(DRIVER_random *random, uint32_t end) {
     uint64_t scaled = (uint64_t)draw_half(random) * end;
     while ((uint32_t)scaled < (UINT32_MAX - (end - 1U)) % end) {
         scaled = (uint64_t)draw_half(random) * end;
@@ -239,16 +221,14 @@ static uint32_t draw_below(DRIVER_random *random, uint32_t end)
     return (uint32_t)(scaled >> 32);
 }
 
-static void correlated(DRIVER_random *random, double *pair)
-{
+static void correlated(DRIVER_random *random, double *pair) {
     const double first = normal(random), second = normal(random);
     pair[0] = first;
     pair[1] = CORRELATION * first + OTHER_SHARE * second;
 }
 
 /* Next factor on the coarse (0) or the fine part (1); each part draws both series for itself. */
-static double next_factor(DRIVER_state *driver, int part)
-{
+static double next_factor(DRIVER_state *driver, int part) {
     DRIVER_factors *const factors = &driver->factors[part];
     double pair[2], logarithm;
     int k;
@@ -267,8 +247,7 @@ static double next_factor(DRIVER_state *driver, int part)
     return exp(logarithm - factor_offset[part]);
 }
 
-static double next_noise_of_a_factor(DRIVER_state *driver)
-{
+static double next_noise_of_a_factor(DRIVER_state *driver) {
     const int64_t row = driver->fine_row % DRIVER_EVERY;
     const double share = (double)row / DRIVER_EVERY;
     if (row == 0) {
@@ -280,8 +259,7 @@ static double next_noise_of_a_factor(DRIVER_state *driver)
 }
 
 /* One more second of the coarse movement: a step of the autoregression, brought to the model's rate. */
-static void next_block(DRIVER_state *driver)
-{
+static void next_block(DRIVER_state *driver) {
     double value = normal(&driver->coarse_random) * (COARSE_NOISE * next_factor(driver, 0));
     int k, p;
     for (k = 0; k < DRIVER_ORDER; k++) {
@@ -298,8 +276,7 @@ static void next_block(DRIVER_state *driver)
     driver->left = DRIVER_EVERY;
 }
 
-static double next_coarse(DRIVER_state *driver)
-{
+static double next_coarse(DRIVER_state *driver) {
     double value;
     int side;
     if (driver->left <= 0 || driver->left > DRIVER_EVERY) {
@@ -316,14 +293,12 @@ static double next_coarse(DRIVER_state *driver)
     return value;
 }
 
-static double next_fine(DRIVER_state *driver)
-{
+static double next_fine(DRIVER_state *driver) {
     push(driver->noise, DRIVER_TAPS, next_noise_of_a_factor(driver));
     return convolved(driver->noise, fine_kernel, DRIVER_TAPS) * driver->fine_scale;
 }
 
-static void begin_core(DRIVER_state *driver, uint64_t seed, uint32_t drive)
-{
+static void begin_core(DRIVER_state *driver, uint64_t seed, uint32_t drive) {
     uint32_t keys[4] = {0U, SEED_CORE, SEED_DRIVER, 0U};
     DRIVER_random setup;
     double coarse = 0.0, fine = 0.0, white[DRIVER_ORDER + 1];
@@ -389,8 +364,7 @@ static void begin_core(DRIVER_state *driver, uint64_t seed, uint32_t drive)
 #endif
 
 /* Coarse movement whose own time passes at a rate, between its values on Catmull-Rom cubics. */
-static double coarse_at_rate(DRIVER_state *driver, double rate)
-{
+static double coarse_at_rate(DRIVER_state *driver, double rate) {
     const int64_t knot = (int64_t)floor(driver->own_time);
     const double fraction = driver->own_time - (double)knot;
     const double *const w = driver->window;
@@ -415,8 +389,7 @@ typedef struct {
     double location, spread, rate, fine;
 } terms_t;
 
-static void act(terms_t *terms, int acts, double strength)
-{
+static void act(terms_t *terms, int acts, double strength) {
     if (acts == ON_LOCATION) {
         terms->location += strength;
     } else {
@@ -428,52 +401,25 @@ static void act(terms_t *terms, int acts, double strength)
 }
 
 /* One factor of a component of an effect's quantity; NAN: there is none. */
-static double shaped(const shape_t *shape, double x)
-{
+static double shaped(const shape_t *shape, double x) {
     const double a = shape->a, b = shape->b;
-    double result = x - a;
     switch (shape->kind) {
-    case MAGNITUDE:
-        result = fabs(x);
-        break;
-    case BEYOND:
-        result = x > a ? x - a : 0.0 * x;
-        break;
-    case SATURATING:
-        result = tanh((x - a) / b);
-        break;
-    case STEP_AT:
-        result = (x - a) * b > 0.0 ? 1.0 : 0.0;
-        break;
-    case HINGE_AT:
-        result = (x - a) * b > 0.0 ? (x - a) * b : 0.0;
-        break;
-    case EQUALS:
-        result = isnan(x) ? 0.0 : fmax(1.0 - fabs(x - a), 0.0);
-        break;
-    case PRESENCE:
-        result = isfinite(x) ? 1.0 : 0.0;
-        break;
-    case NEARNESS:
-        result = isnan(x) ? 0.0 : a / fmax(fabs(x), a);
-        break;
-    case PROXIMITY:
-        result = isnan(x) ? 0.0 : exp(-fabs(x) / a);
-        break;
-    case SINE:
-        result = sin(a * x);
-        break;
-    case COSINE:
-        result = cos(a * x);
-        break;
-    default: /* VALUE: from a */
-        break;
+    case MAGNITUDE: return fabs(x);
+    case BEYOND: return x > a ? x - a : 0.0 * x;
+    case SATURATING: return tanh((x - a) / b);
+    case STEP_AT: return (x - a) * b > 0.0 ? 1.0 : 0.0;
+    case HINGE_AT: return (x - a) * b > 0.0 ? (x - a) * b : 0.0;
+    case EQUALS: return isnan(x) ? 0.0 : fmax(1.0 - fabs(x - a), 0.0);
+    case PRESENCE: return isfinite(x) ? 1.0 : 0.0;
+    case NEARNESS: return isnan(x) ? 0.0 : a / fmax(fabs(x), a);
+    case PROXIMITY: return isnan(x) ? 0.0 : exp(-fabs(x) / a);
+    case SINE: return sin(a * x);
+    case COSINE: return cos(a * x);
+    default: return x - a; /* VALUE */
     }
-    return result;
 }
 
-static double component_of(const component_t *component, const double *columns)
-{
+static double component_of(const component_t *component, const double *columns) {
     double product = 1.0;
     int k;
     for (k = 0; k < component->shapes; k++) {
@@ -484,14 +430,12 @@ static double component_of(const component_t *component, const double *columns)
 }
 
 /* A component as many rows ago, where the driver is: before the first row it is as there. */
-static double seen(const DRIVER_state *driver, int64_t row, int component)
-{
+static double seen(const DRIVER_state *driver, int64_t row, int component) {
     return driver->history[(row > 0 ? row : 0) % DRIVER_ROWS][component];
 }
 
 /* What the effects of columns do at a row. */
-static void act_by_columns(DRIVER_state *driver, int64_t row, terms_t *terms)
-{
+static void act_by_columns(DRIVER_state *driver, int64_t row, terms_t *terms) {
     int e, i, k, n, lag = 0;
     for (e = 0; e < EFFECTS; e++) {
         const effect_t *const effect = &effects[e];
@@ -518,8 +462,7 @@ static void act_by_columns(DRIVER_state *driver, int64_t row, terms_t *terms)
     }
 }
 
-static double half_cosines(const double *sizes, int count, double share)
-{
+static double half_cosines(const double *sizes, int count, double share) {
     double sum = 0.0;
     int k;
     for (k = 0; k < count; k++) {
@@ -528,13 +471,11 @@ static double half_cosines(const double *sizes, int count, double share)
     return sum;
 }
 
-static double share_of(double time, double from, double to)
-{
+static double share_of(double time, double from, double to) {
     return fmin(fmax((time - from) / fmax(to - from, 1e-9), 0.0), 1.0);
 }
 
-static void begin_hidden(DRIVER_state *driver, uint64_t seed, uint32_t drive)
-{
+static void begin_hidden(DRIVER_state *driver, uint64_t seed, uint32_t drive) {
     int k;
     for (k = 0; k < HIDDEN; k++) {
         const double *const p = hidden_numbers + hidden[k].first;
@@ -553,8 +494,7 @@ static void begin_hidden(DRIVER_state *driver, uint64_t seed, uint32_t drive)
     }
 }
 
-static void act_hidden(DRIVER_state *driver, int64_t row, terms_t *terms)
-{
+static void act_hidden(DRIVER_state *driver, int64_t row, terms_t *terms) {
     const double elapsed = DRIVER_STEP * (double)row, time = driver->begun_at + elapsed;
     int k;
     for (k = 0; k < HIDDEN; k++) {
@@ -613,8 +553,7 @@ static void act_hidden(DRIVER_state *driver, int64_t row, terms_t *terms)
 /* ---- model steps ------------------------------------------------------------------------------------------------ */
 
 /* The curve between the samples in the middle: value, slope and second derivative by central differences. */
-static void bend_curve(DRIVER_state *driver)
-{
+static void bend_curve(DRIVER_state *driver) {
     const double *const s = driver->samples;
     const double rise = s[2] - s[1], slope = 0.5 * (s[2] - s[0]), next_slope = 0.5 * (s[3] - s[1]);
     const double bend = s[2] - 2.0 * s[1] + s[0], next_bend = s[3] - 2.0 * s[2] + s[1];
@@ -627,8 +566,7 @@ static void bend_curve(DRIVER_state *driver)
 }
 
 /* The offset at a row. [m] */
-static double sample_at(DRIVER_state *driver, int64_t row)
-{
+static double sample_at(DRIVER_state *driver, int64_t row) {
     terms_t terms = {0.0, 1.0, 1.0, 1.0};
     const double width = seen(driver, row, DRIVER_COMPONENTS), by_lane = fmin(width, WIDEST_LANE);
     const double by_hand = FINE_WIDTH > 0.0 ? FINE_WIDTH : by_lane;
@@ -641,8 +579,7 @@ static double sample_at(DRIVER_state *driver, int64_t row)
 }
 
 /* One more row of context, and the sample that it completes. */
-static void take_row(DRIVER_state *driver, const double *columns)
-{
+static void take_row(DRIVER_state *driver, const double *columns) {
     double *const latest = driver->history[driver->rows % DRIVER_ROWS];
     int64_t row;
     int k;
@@ -666,8 +603,7 @@ static void take_row(DRIVER_state *driver, const double *columns)
 /* ---- from the curve to where the vehicle is --------------------------------------------------------------------- */
 
 /* Begin to lead over from a gap that changes at a rate, within what is no corner of the path. */
-static void lead_over(DRIVER_state *driver, double gap, double rate, double speed)
-{
+static void lead_over(DRIVER_state *driver, double gap, double rate, double speed) {
     const double bound = LARGEST_TURN * fmax(fabs(speed), MINIMUM_SPEED);
     driver->from = gap;
     driver->from_rate = rate;
@@ -676,8 +612,7 @@ static void lead_over(DRIVER_state *driver, double gap, double rate, double spee
 }
 
 /* On with leading over; how fast what is left changes. */
-static double settle(DRIVER_state *driver, double passed)
-{
+static double settle(DRIVER_state *driver, double passed) {
     const double over = driver->over;
     double u, fall;
     driver->rest = 0.0;
@@ -697,8 +632,7 @@ static double settle(DRIVER_state *driver, double passed)
         + driver->from_rate * (1.0 - 18.0 * u * u + 32.0 * pow(u, 3.0) - 15.0 * pow(u, 4.0));
 }
 
-static void move(DRIVER_state *driver, double u, double passed, const DRIVER_inputs *in, DRIVER_outputs *out)
-{
+static void move(DRIVER_state *driver, double u, double passed, const DRIVER_inputs *in, DRIVER_outputs *out) {
     const double *const c = driver->curve;
     const double own = c[0] + u * (c[1] + u * (c[2] + u * (c[3] + u * (c[4] + u * c[5]))));
     const double slope = c[1] + u * (2.0 * c[2] + u * (3.0 * c[3] + u * (4.0 * c[4] + u * 5.0 * c[5])));
@@ -725,15 +659,13 @@ static void move(DRIVER_state *driver, double u, double passed, const DRIVER_inp
 
 /* ---- what others call ------------------------------------------------------------------------------------------- */
 
-static DRIVER_status refused(DRIVER_state *driver, unsigned message)
-{
+static DRIVER_status refused(DRIVER_state *driver, unsigned message) {
     driver->message = message;
     return message == 0U ? DRIVER_OK : DRIVER_REFUSED;
 }
 
 /* What is wrong with inputs, 0 if nothing is; `columns` are theirs. */
-static unsigned fault_of(const DRIVER_inputs *inputs, double *columns)
-{
+static unsigned fault_of(const DRIVER_inputs *inputs, double *columns) {
     unsigned fault = 0U;
     int k;
     memcpy(columns, inputs, COLUMNS * sizeof *columns);
@@ -759,13 +691,11 @@ static unsigned fault_of(const DRIVER_inputs *inputs, double *columns)
     return fault;
 }
 
-void DRIVER_defaults(DRIVER_inputs *inputs)
-{
+void DRIVER_defaults(DRIVER_inputs *inputs) {
     *inputs = usual_inputs;
 }
 
-DRIVER_status DRIVER_start(DRIVER_state *driver, uint64_t seed, uint32_t drive, double time, uint64_t known)
-{
+DRIVER_status DRIVER_start(DRIVER_state *driver, uint64_t seed, uint32_t drive, double time, uint64_t known) {
     int e, k;
     memset(driver, 0, sizeof *driver);
     if (!(fabs(time) <= LATEST_TIME)) {
@@ -787,8 +717,7 @@ DRIVER_status DRIVER_start(DRIVER_state *driver, uint64_t seed, uint32_t drive, 
     return DRIVER_OK;
 }
 
-DRIVER_status DRIVER_look(DRIVER_state *driver, const DRIVER_inputs *inputs)
-{
+DRIVER_status DRIVER_look(DRIVER_state *driver, const DRIVER_inputs *inputs) {
     double columns[COLUMNS];
     unsigned fault = driver->profile == PROFILE ? fault_of(inputs, columns) : FAULT_START;
     if (fault == 0U && (driver->looked >= DRIVER_LOOKS || driver->stepped != 0)) {
@@ -801,8 +730,7 @@ DRIVER_status DRIVER_look(DRIVER_state *driver, const DRIVER_inputs *inputs)
     return refused(driver, fault);
 }
 
-DRIVER_status DRIVER_step(DRIVER_state *driver, double time, const DRIVER_inputs *inputs, DRIVER_outputs *outputs)
-{
+DRIVER_status DRIVER_step(DRIVER_state *driver, double time, const DRIVER_inputs *inputs, DRIVER_outputs *outputs) {
     double columns[COLUMNS], passed;
     int64_t due;
     unsigned fault = driver->profile == PROFILE ? fault_of(inputs, columns) : FAULT_START;
@@ -832,13 +760,11 @@ DRIVER_status DRIVER_step(DRIVER_state *driver, double time, const DRIVER_inputs
     return refused(driver, 0U);
 }
 
-const char *DRIVER_message(const DRIVER_state *driver)
-{
+const char *DRIVER_message(const DRIVER_state *driver) {
     return driver->message < FAULTS ? faults[driver->message] : faults[FAULT_START];
 }
 
-static uint64_t checksum(const unsigned char *bytes)
-{
+static uint64_t checksum(const unsigned char *bytes) {
     uint64_t sum = UINT64_C(14695981039346656037);
     size_t k;
     for (k = 0; k < DRIVER_MEMORY; k++) { /* FNV-1a */
@@ -847,8 +773,7 @@ static uint64_t checksum(const unsigned char *bytes)
     return sum;
 }
 
-void DRIVER_save(const DRIVER_state *driver, unsigned char *bytes)
-{
+void DRIVER_save(const DRIVER_state *driver, unsigned char *bytes) {
     const uint64_t profile = PROFILE;
     uint64_t sum;
     memcpy(bytes, driver, DRIVER_MEMORY);
@@ -857,8 +782,7 @@ void DRIVER_save(const DRIVER_state *driver, unsigned char *bytes)
     memcpy(bytes + DRIVER_MEMORY + 8U, &sum, 8U);
 }
 
-DRIVER_status DRIVER_restore(DRIVER_state *driver, const unsigned char *bytes, size_t size)
-{
+DRIVER_status DRIVER_restore(DRIVER_state *driver, const unsigned char *bytes, size_t size) {
     const uint64_t profile = PROFILE;
     uint64_t sum = 0U;
     if (size == DRIVER_SAVED) {

@@ -3,8 +3,7 @@
 
 #include "DRIVER.h"
 
-int main(void)
-{
+int main(void) {
     static DRIVER_state driver;
     DRIVER_inputs inputs;
     DRIVER_outputs outputs;

@@ -59,8 +59,7 @@ typedef struct {
     char name[64];
 } unit_t;
 
-static status_t failed(const void *instance, const char *message)
-{
+static status_t failed(const void *instance, const char *message) {
     const unit_t *const unit = (const unit_t *)instance;
     if (unit->log != NULL) {
 #if @FMI@ == 2
@@ -72,8 +71,7 @@ static status_t failed(const void *instance, const char *message)
     return ERROR;
 }
 
-static void set_up(unit_t *unit)
-{
+static void set_up(unit_t *unit) {
     DRIVER_inputs usual;
     int k;
     memset(&unit->memory, 0, sizeof unit->memory);
@@ -85,8 +83,7 @@ static void set_up(unit_t *unit)
 }
 
 static void *new_unit(const char *name, const char *token, log_t log, void *environment,
-                      void *(*allocate)(size_t, size_t), void (*release)(void *))
-{
+                      void *(*allocate)(size_t, size_t), void (*release)(void *)) {
     unit_t *const unit = token != NULL && strcmp(token, "@TOKEN@") == 0 ? (unit_t *)allocate(1, sizeof *unit) : NULL;
     if (unit != NULL) {
         unit->log = log;
@@ -100,8 +97,7 @@ static void *new_unit(const char *name, const char *token, log_t log, void *envi
     return unit;
 }
 
-static status_t go_to(unit_t *unit, double time)
-{
+static status_t go_to(unit_t *unit, double time) {
     memory_t *const memory = &unit->memory;
     DRIVER_inputs inputs;
     DRIVER_outputs outputs;
@@ -120,8 +116,7 @@ static status_t go_to(unit_t *unit, double time)
     return OK;
 }
 
-static status_t begin(unit_t *unit)
-{
+static status_t begin(unit_t *unit) {
     memory_t *const memory = &unit->memory;
     const uint64_t seed = (uint64_t)memory->values[SEED];
     if (DRIVER_start(&memory->driver, seed, 0U, memory->values[TIME], DRIVER_ALL_KNOWN) != DRIVER_OK) {
@@ -130,8 +125,7 @@ static status_t begin(unit_t *unit)
     return go_to(unit, memory->values[TIME]);
 }
 
-static status_t step_on(unit_t *unit, double time, double length)
-{
+static status_t step_on(unit_t *unit, double time, double length) {
     memory_t *const memory = &unit->memory;
     status_t status = OK;
     if (memory->driver.profile == 0U) {
@@ -146,8 +140,7 @@ static status_t step_on(unit_t *unit, double time, double length)
 }
 
 /* Get or set variables of a kind. */
-static status_t transfer(void *instance, references_t references, size_t count, kind_t kind, void *values, int sets)
-{
+static status_t transfer(void *instance, references_t references, size_t count, kind_t kind, void *values, int sets) {
     unit_t *const unit = (unit_t *)instance;
     double *const own = unit->memory.values;
     size_t k;
@@ -177,37 +170,31 @@ static status_t transfer(void *instance, references_t references, size_t count, 
     return OK;
 }
 
-EXPORT const char *NAME(GetVersion)(void)
-{
+EXPORT const char *NAME(GetVersion)(void) {
     return "@FMI@.0";
 }
 
-EXPORT void NAME(FreeInstance)(void *unit)
-{
+EXPORT void NAME(FreeInstance)(void *unit) {
     if (unit != NULL) {
         ((unit_t *)unit)->release(unit);
     }
 }
 
-EXPORT status_t NAME(ExitInitializationMode)(void *unit)
-{
+EXPORT status_t NAME(ExitInitializationMode)(void *unit) {
     return begin((unit_t *)unit);
 }
 
-EXPORT status_t NAME(Reset)(void *unit)
-{
+EXPORT status_t NAME(Reset)(void *unit) {
     set_up((unit_t *)unit);
     return OK;
 }
 
-EXPORT status_t NAME(Terminate)(void *unit)
-{
+EXPORT status_t NAME(Terminate)(void *unit) {
     (void)unit;
     return OK;
 }
 
-EXPORT status_t NAME(Get@STATE@)(void *unit, void **state)
-{
+EXPORT status_t NAME(Get@STATE@)(void *unit, void **state) {
     *state = *state == NULL ? ((unit_t *)unit)->allocate(1, sizeof(memory_t)) : *state;
     if (*state == NULL) {
         return failed(unit, "no memory for a state");
@@ -216,29 +203,24 @@ EXPORT status_t NAME(Get@STATE@)(void *unit, void **state)
     return OK;
 }
 
-EXPORT status_t NAME(Set@STATE@)(void *unit, void *state)
-{
+EXPORT status_t NAME(Set@STATE@)(void *unit, void *state) {
     memcpy(&((unit_t *)unit)->memory, state, sizeof(memory_t));
     return OK;
 }
 
-EXPORT status_t NAME(Free@STATE@)(void *unit, void **state)
-{
+EXPORT status_t NAME(Free@STATE@)(void *unit, void **state) {
     ((unit_t *)unit)->release(*state);
     *state = NULL;
     return OK;
 }
 
-EXPORT status_t NAME(Serialized@STATE@Size)(void *unit, void *state, size_t *size)
-{
-    (void)unit;
-    (void)state;
+EXPORT status_t NAME(Serialized@STATE@Size)(void *unit, void *state, size_t *size) {
+    (void)unit; (void)state;
     *size = SERIALIZED;
     return OK;
 }
 
-EXPORT status_t NAME(Serialize@STATE@)(void *unit, void *state, unsigned char *bytes, size_t size)
-{
+EXPORT status_t NAME(Serialize@STATE@)(void *unit, void *state, unsigned char *bytes, size_t size) {
     if (size < SERIALIZED) {
         return failed(unit, "too few bytes for a serialized state");
     }
@@ -247,8 +229,7 @@ EXPORT status_t NAME(Serialize@STATE@)(void *unit, void *state, unsigned char *b
     return OK;
 }
 
-EXPORT status_t NAME(@DESERIALIZE@)(void *unit, const unsigned char *bytes, size_t size, void **state)
-{
+EXPORT status_t NAME(@DESERIALIZE@)(void *unit, const unsigned char *bytes, size_t size, void **state) {
     memory_t memory;
     if (size != SERIALIZED || DRIVER_restore(&memory.driver, bytes + REST, DRIVER_SAVED) != DRIVER_OK) {
         return failed(unit, "a serialized state that is damaged, or of another unit");
@@ -286,47 +267,34 @@ typedef struct {
 #define MORE
 #define USED
 
-EXPORT const char *NAME(GetTypesPlatform)(void)
-{
+EXPORT const char *NAME(GetTypesPlatform)(void) {
     return "default";
 }
 
 EXPORT void *NAME(Instantiate)(const char *name, int kind, const char *token, const char *resources,
-                               const callbacks_t *calls, int visible, int logs)
-{
-    (void)resources;
-    (void)visible;
+                               const callbacks_t *calls, int visible, int logs) {
+    (void)resources; (void)visible;
     (void)logs; /* errors are always said */
     return kind == 1 && calls != NULL ? new_unit(name, token, calls->log, calls->environment, calls->allocate, calls->release) : NULL;
 }
 
-EXPORT status_t NAME(SetDebugLogging)(void *unit, int on, size_t count, const char *const *categories)
-{
-    (void)unit;
-    (void)on;
-    (void)count;
-    (void)categories;
+EXPORT status_t NAME(SetDebugLogging)(void *unit, int on, size_t count, const char *const *categories) {
+    (void)unit; (void)on; (void)count; (void)categories;
     return OK;
 }
 
-EXPORT status_t NAME(SetupExperiment)(void *unit, int tolerant, double tolerance, double start, int ends, double end)
-{
-    (void)tolerant;
-    (void)tolerance;
-    (void)ends;
-    (void)end;
+EXPORT status_t NAME(SetupExperiment)(void *unit, int tolerant, double tolerance, double start, int ends, double end) {
+    (void)tolerant; (void)tolerance; (void)ends; (void)end;
     ((unit_t *)unit)->memory.values[TIME] = start;
     return OK;
 }
 
-EXPORT status_t NAME(EnterInitializationMode)(void *unit)
-{
+EXPORT status_t NAME(EnterInitializationMode)(void *unit) {
     (void)unit;
     return OK;
 }
 
-EXPORT status_t NAME(DoStep)(void *unit, double time, double length, int no_return)
-{
+EXPORT status_t NAME(DoStep)(void *unit, double time, double length, int no_return) {
     (void)no_return;
     return step_on((unit_t *)unit, time, length);
 }
@@ -346,42 +314,27 @@ UNSUPPORTED(GetRealOutputDerivatives) UNSUPPORTED(GetDirectionalDerivative)
 
 EXPORT void *NAME(InstantiateCoSimulation)(const char *name, const char *token, const char *resources, bool visible,
                                            bool logs, bool events, bool early, references_t required, size_t count,
-                                           void *environment, log_t log, void (*update)(void))
-{
-    (void)resources;
-    (void)visible;
+                                           void *environment, log_t log, void (*update)(void)) {
+    (void)resources; (void)visible;
     (void)logs; /* errors are always said */
-    (void)events;
-    (void)early;
-    (void)required;
-    (void)count;
-    (void)update;
+    (void)events; (void)early; (void)required; (void)count; (void)update;
     return new_unit(name, token, log, environment, calloc, free);
 }
 
-EXPORT status_t NAME(SetDebugLogging)(void *unit, bool on, size_t count, const char *const *categories)
-{
-    (void)unit;
-    (void)on;
-    (void)count;
-    (void)categories;
+EXPORT status_t NAME(SetDebugLogging)(void *unit, bool on, size_t count, const char *const *categories) {
+    (void)unit; (void)on; (void)count; (void)categories;
     return OK;
 }
 
 EXPORT status_t NAME(EnterInitializationMode)(void *unit, bool tolerant, double tolerance, double start, bool ends,
-                                              double end)
-{
-    (void)tolerant;
-    (void)tolerance;
-    (void)ends;
-    (void)end;
+                                              double end) {
+    (void)tolerant; (void)tolerance; (void)ends; (void)end;
     ((unit_t *)unit)->memory.values[TIME] = start;
     return OK;
 }
 
 EXPORT status_t NAME(DoStep)(void *unit, double time, double length, bool no_return, bool *event, bool *end, bool *early,
-                             double *reached)
-{
+                             double *reached) {
     const status_t status = step_on((unit_t *)unit, time, length);
     (void)no_return;
     *event = *end = *early = false;
@@ -414,13 +367,11 @@ UNSUPPORTED(SetContinuousStates) UNSUPPORTED(GetContinuousStateDerivatives) UNSU
 UNSUPPORTED(GetContinuousStates) UNSUPPORTED(GetNominalsOfContinuousStates) UNSUPPORTED(GetNumberOfEventIndicators)
 UNSUPPORTED(GetNumberOfContinuousStates)
 
-EXPORT void *NAME(InstantiateModelExchange)(void)
-{
+EXPORT void *NAME(InstantiateModelExchange)(void) {
     return NULL;
 }
 
-EXPORT void *NAME(InstantiateScheduledExecution)(void)
-{
+EXPORT void *NAME(InstantiateScheduledExecution)(void) {
     return NULL;
 }
 

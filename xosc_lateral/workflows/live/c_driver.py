@@ -12,6 +12,7 @@ from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.atomic import write_atomically
+from xosc_lateral.files.output_paths import claim, output_folder
 from xosc_lateral.workflows.live.c_numbers import inputs_of, numbers_of
 
 
@@ -20,19 +21,23 @@ def identifier(profile: DriverProfile) -> str:
     return "driver_" + re.sub(r"[^0-9A-Za-z]", "_", profile.name)
 
 
-def export_c(profile: DriverProfile, folder: str | Path) -> list[Path]:
+def export_c(profile: DriverProfile, folder: str | Path, *, force: bool = False) -> list[Path]:
     """Write a driver as C99: header, source, the profile's numbers, a CMake file and an example loop.
 
     Parameters
     ----------
     profile : DriverProfile
     folder : path
-        Made where there is none; files of the same names are replaced.
+        Made where there is none.
+    force : bool
+        Replace files of the same names.
 
-    Raises `DriverProfileError` if the profile has an effect or a core model of a plug-in.
+    Raises `DriverProfileError` if the profile has an effect or a core model of a plug-in; `FormatError` if a file is
+    there.
     """
     texts = c_sources(profile) | {name: filled(name, profile) for name in ("CMakeLists.txt", "example.c")}
-    written = [Path(folder) / name for name in texts]
+    written = [output_folder(folder) / name for name in texts]
+    claim(written, force=force)
     Path(folder).mkdir(parents=True, exist_ok=True)
     for path, text in zip(written, texts.values(), strict=True):
         write_atomically(path, text.encode())

@@ -82,24 +82,14 @@ def numbers_of(profile: DriverProfile) -> tuple[dict[str, int], list[str]]:
         f"SEED_{seed.name}": f"{int(seed)}U" for kind in (DriveSeed, AutoregressiveSeed, TwoLevelSeed) for seed in kind
     }
     constants = {
-        "DRIVER_STEP": profile.model.step,
-        "PROFILE": f"UINT64_C(0x{sampling_hash(profile)[:16]})",
-        "OWN_LANE_WIDTH": profile.lane_width,
-        "WIDEST_LANE": np.inf if measured is None else measured[1],
-        "FINE_WIDTH": fine_width,
-        "RATED": int(rated),
-        "LOG_LIMIT": LOG_LIMIT,
-        "LONGEST_PAUSE": LIVE_PAUSE.value,
-        "LATEST_TIME": TIME.value,
-        "FARTHEST_POSITION": LIVE_RANGES["offset"].high,
-        "MINIMUM_SPEED": MINIMUM_SPEED,
-        "SETTLING_TIME": SETTLING_TIME,
-        "LARGEST_TURN": paths.LEADING_OVER * paths.TURN,
-        "STEP_PEAK": paths.STEP_PEAK,
-        "STANDSTILL": paths.STANDSTILL,
-        "NEGLIGIBLE_REST": paths.NEGLIGIBLE_REST,
+        "DRIVER_STEP": profile.model.step, "PROFILE": f"UINT64_C(0x{sampling_hash(profile)[:16]})",
+        "OWN_LANE_WIDTH": profile.lane_width, "WIDEST_LANE": np.inf if measured is None else measured[1],
+        "FINE_WIDTH": fine_width, "RATED": int(rated), "LOG_LIMIT": LOG_LIMIT, "LONGEST_PAUSE": LIVE_PAUSE.value,
+        "LATEST_TIME": TIME.value, "FARTHEST_POSITION": LIVE_RANGES["offset"].high, "MINIMUM_SPEED": MINIMUM_SPEED,
+        "SETTLING_TIME": SETTLING_TIME, "LARGEST_TURN": paths.LEADING_OVER * paths.TURN, "STEP_PEAK": paths.STEP_PEAK,
+        "STANDSTILL": paths.STANDSTILL, "NEGLIGIBLE_REST": paths.NEGLIGIBLE_REST,
         **seeds,
-    }
+    }  # fmt: skip
     sizes |= core_sizes | {"HIDDEN": max(1, len(hidden))}
     return sizes, [
         f"/* Numbers of the profile, written by xosc-lateral {__version__}. */",
@@ -116,19 +106,11 @@ def numbers_of(profile: DriverProfile) -> tuple[dict[str, int], list[str]]:
 def _inputs(profile: DriverProfile) -> list[str]:
     columns = inputs_of(profile)
     usual_values = [*(usual(profile, column) for column in columns), 0.0, 1.0]
-    ranges = [context_range(column) for column in columns]
-    rows = [
-        f"{{{_number(believed.low)}, {_number(believed.high)}, {int(column in DISTANCES)}}}"
-        for column, believed in zip(columns, ranges, strict=True)
-    ]
-    texts = [
-        "",
-        *FAULTS.values(),
-        *(
-            f"{column}: not within {believed.low:g} to {believed.high:g} ({believed.reason})"
-            for column, believed in zip(columns, ranges, strict=True)
-        ),
-    ]
+    rows, texts = [], ["", *FAULTS.values()]
+    for column in columns:
+        believed = context_range(column)
+        rows.append(f"{{{_number(believed.low)}, {_number(believed.high)}, {int(column in DISTANCES)}}}")
+        texts.append(f"{column}: not within {believed.low:g} to {believed.high:g} ({believed.reason})")
     return [
         f"enum {{ LANE_WIDTH = 1, COLUMNS = {len(columns)} }};",
         "typedef struct { double low, high; int may_be_infinite; } range_t;",
@@ -186,20 +168,12 @@ def _autoregressive(model: AutoregressiveModel) -> tuple[dict[str, int], list[st
     variance = {"quick": [part.within for part in parts], "slow": [part.slow for part in parts]}
     between = np.array([part.between for part in parts])
     constants = {
-        "DRIVER_MEAN": model.mean,
-        "DRIVER_BETWEEN": model.between_drivers,
-        "DRIVER_ORDER": order,
-        "KNEE": KNEE,
-        "HEADROOM": HEADROOM,
-        "CANDIDATES": CANDIDATES,
-        "CORRELATION": model.correlation,
-        "OTHER_SHARE": np.sqrt(1.0 - model.correlation**2),
-        "VARIES_SLOWLY": int(any(variance["slow"])),
-        "COARSE_NOISE": model.coarse.scale,
-        "PHASE_STEPS": len(table),
-        "COARSE_SKIPPED": first - COARSE_EVERY * TICKS,
-        "FINE_SKIPPED": first - half,
-    }
+        "DRIVER_MEAN": model.mean, "DRIVER_BETWEEN": model.between_drivers, "DRIVER_ORDER": order, "KNEE": KNEE,
+        "HEADROOM": HEADROOM, "CANDIDATES": CANDIDATES, "CORRELATION": model.correlation,
+        "OTHER_SHARE": np.sqrt(1.0 - model.correlation**2), "VARIES_SLOWLY": int(any(variance["slow"])),
+        "COARSE_NOISE": model.coarse.scale, "PHASE_STEPS": len(table),
+        "COARSE_SKIPPED": first - COARSE_EVERY * TICKS, "FINE_SKIPPED": first - half,
+    }  # fmt: skip
     rows = ",\n    ".join("{" + ", ".join(map(_number, row)) + "}" for row in table)
     lines = [
         *(f"#define {name} {_number(value)}" for name, value in constants.items()),
@@ -331,10 +305,6 @@ def _component(effect: kinds.ColumnEffect, k: int, shapes: Sequence[Shape], colu
     return "{" + ", ".join(map(_number, numbers)) + ", {" + ", ".join(table) + "}}"
 
 
-HIDDEN = ("ADAPTED", "POPULATION", "JUMP", "TREND", "SMOOTH", "DRIFT", "CYCLE", "REGIMES")
-"""Hidden effects of C."""
-
-
 def _hidden(profile: DriverProfile, hidden: Sequence[kinds.HiddenEffect]) -> list[str]:
     rows, numbers = [], list[float]()
     for effect in hidden:
@@ -342,7 +312,7 @@ def _hidden(profile: DriverProfile, hidden: Sequence[kinds.HiddenEffect]) -> lis
         rows.append(f"{{{kind}, {len(numbers)}}}")
         numbers += values
     return [
-        "enum { " + ", ".join(HIDDEN) + f", HIDDEN = {len(hidden)} }};",
+        "enum { ADAPTED, POPULATION, JUMP, TREND, SMOOTH, DRIFT, CYCLE, REGIMES" + f", HIDDEN = {len(hidden)} }};",
         "typedef struct { int kind, first; } hidden_t;",
         _structs("hidden_t hidden", rows),
         _array("hidden_numbers", numbers),

@@ -65,8 +65,7 @@ def export_fmu(
         platform, suffix, binary = _compiled(compiler, sources, version)
         members[f"binaries/{platform}/{name}{suffix}"] = binary
         platforms.append(platform)
-    described = _description_2 if version == "2" else _description_3
-    members["modelDescription.xml"] = _xml(described(profile, _token(sources)))
+    members["modelDescription.xml"] = _xml(_description(profile, version, _token(sources)))
     if version == "3":
         members["sources/buildDescription.xml"] = _xml(_build_description(name))
     write_atomically(path, _packed(members))
@@ -134,29 +133,47 @@ def _platform(machine: str, version: str) -> tuple[str, str]:
     return f"{architecture}-{system}", suffix
 
 
-def _root(profile: DriverProfile, fmi: str, **token: str) -> Element:
-    words = {
-        "fmiVersion": fmi,
-        "modelName": identifier(profile),
+def _description(profile: DriverProfile, version: str, token: str) -> Element:
+    """The model description."""
+    is_2, name, state = version == "2", identifier(profile), STATE[version][0]
+    root = Element("fmiModelDescription", {
+        "fmiVersion": f"{version}.0", "modelName": name, "guid" if is_2 else "instantiationToken": token,
         "description": f"Driver {profile.name} of xosc-lateral {__version__}: lateral offset in the lane, positive "
         f"left. C99; profile {sampling_hash(profile)[:16]}",
-        "author": "xosc-lateral",
-        "generationTool": f"xosc-lateral {__version__}",
-        "variableNamingConvention": "flat",
-    }
-    return Element("fmiModelDescription", words | token)
-
-
-def _abilities(profile: DriverProfile, state: str) -> dict[str, str]:
+        "author": "xosc-lateral", "generationTool": f"xosc-lateral {__version__}", "variableNamingConvention": "flat",
+    })  # fmt: skip
     able = ("canHandleVariableCommunicationStepSize", f"canGetAndSet{state}", f"canSerialize{state}")
-    return {"modelIdentifier": identifier(profile), **dict.fromkeys(able, "true")}
-
-
-def _common(root: Element, profile: DriverProfile) -> None:
-    """Units, log and experiment, which both versions have at this place."""
-    add_units(root, {variable.unit for variable in variables_of(profile) if variable.unit is not None})
+    simulation = SubElement(root, "CoSimulation", {"modelIdentifier": name, **dict.fromkeys(able, "true")})
+    if is_2:
+        _list_sources(SubElement(simulation, "SourceFiles"), "File", name)
+    listed = variables_of(profile)
+    add_units(root, {variable.unit for variable in listed if variable.unit is not None})
     SubElement(SubElement(root, "LogCategories"), "Category", name="logStatusError")
     SubElement(root, "DefaultExperiment", startTime="0", stepSize="0.01")
+    variables, structure = SubElement(root, "ModelVariables"), SubElement(root, "ModelStructure")
+    for reference, variable in enumerate(listed):
+        words = {"name": variable.name, "valueReference": str(reference), "causality": variable.causality}
+        words |= {"variability": variable.variability, "description": variable.words}
+        if is_2:
+            scalar = SubElement(variables, "ScalarVariable", words)
+            SubElement(scalar, ("Real", "Boolean", "Integer")[variable.kind], _value(variable))
+        else:
+            SubElement(variables, ("Float64", "Boolean", "Int32")[variable.kind], words | _value(variable))
+    if not is_2:
+        clock = {"name": "time", "valueReference": str(len(listed)), "causality": "independent"}
+        SubElement(variables, "Float64", clock | {"variability": "continuous", "description": "Simulation time"})
+    for list_of, element in (("Outputs", "Output"), ("InitialUnknowns", "InitialUnknown")):
+        place = SubElement(structure, list_of) if is_2 else structure
+        for reference, variable in enumerate(listed):
+            if variable.causality == "output":
+                where = {"index": str(reference + 1)} if is_2 else {"valueReference": str(reference)}
+                SubElement(place, "Unknown" if is_2 else element, where)
+    return root
+
+
+def _list_sources(place: Element, element: str, name: str) -> None:
+    for file in (f"{name}.c", "fmi.c"):
+        SubElement(place, element, name=file)
 
 
 def _value(variable: Variable) -> dict[str, str]:
@@ -167,63 +184,12 @@ def _value(variable: Variable) -> dict[str, str]:
     return words
 
 
-def _kind(variable: Variable) -> int:
-    """0: real, 1: truth value, 2: whole number."""
-    return 0 if variable.unit is not None else 1 if isinstance(variable.start, bool) else 2
-
-
-def _variability(variable: Variable) -> str:
-    return ("continuous", "discrete", "fixed")[_kind(variable)]
-
-
-def _description_2(profile: DriverProfile, token: str) -> Element:
-    root = _root(profile, "2.0", guid=token)
-    simulation = SubElement(root, "CoSimulation", _abilities(profile, STATE["2"][0]))
-    listed = SubElement(simulation, "SourceFiles")
-    for name in (f"{identifier(profile)}.c", "fmi.c"):
-        SubElement(listed, "File", name=name)
-    _common(root, profile)
-    variables, structure = SubElement(root, "ModelVariables"), SubElement(root, "ModelStructure")
-    outputs, unknown = SubElement(structure, "Outputs"), SubElement(structure, "InitialUnknowns")
-    for reference, variable in enumerate(variables_of(profile)):
-        words = {"name": variable.name, "valueReference": str(reference), "causality": variable.causality}
-        words |= {"variability": _variability(variable), "description": variable.words}
-        scalar = SubElement(variables, "ScalarVariable", words)
-        SubElement(scalar, ("Real", "Boolean", "Integer")[_kind(variable)], _value(variable))
-        if variable.causality == "output":
-            for part in (outputs, unknown):
-                SubElement(part, "Unknown", index=str(reference + 1))
-    return root
-
-
-def _description_3(profile: DriverProfile, token: str) -> Element:
-    root = _root(profile, "3.0", instantiationToken=token)
-    SubElement(root, "CoSimulation", _abilities(profile, STATE["3"][0]))
-    _common(root, profile)
-    variables, structure = SubElement(root, "ModelVariables"), SubElement(root, "ModelStructure")
-    outputs, unknown = [], []
-    for reference, variable in enumerate(variables_of(profile)):
-        words = {"name": variable.name, "valueReference": str(reference), "causality": variable.causality}
-        words |= {"variability": _variability(variable), "description": variable.words}
-        SubElement(variables, ("Float64", "Boolean", "Int32")[_kind(variable)], words | _value(variable))
-        if variable.causality == "output":
-            outputs.append(Element("Output", valueReference=str(reference)))
-            unknown.append(Element("InitialUnknown", valueReference=str(reference)))
-    clock = {"name": "time", "valueReference": str(len(variables)), "causality": "independent"}
-    SubElement(variables, "Float64", clock | {"variability": "continuous", "description": "Simulation time"})
-    structure.extend([*outputs, *unknown])
-    return root
-
-
 def _build_description(name: str) -> Element:
     root = Element("fmiBuildDescription", fmiVersion="3.0")
     files = SubElement(SubElement(root, "BuildConfiguration", modelIdentifier=name), "SourceFileSet", language="C99")
-    for file in (f"{name}.c", "fmi.c"):
-        SubElement(files, "SourceFile", name=file)
-    SubElement(
-        files, "PreprocessorDefinition", name="FMI3_OVERRIDE_FUNCTION_PREFIX", optional="true",
-        description="For shared libraries: functions without a prefix",
-    )  # fmt: skip
+    _list_sources(files, "SourceFile", name)
+    words = {"optional": "true", "description": "For shared libraries: functions without a prefix"}
+    SubElement(files, "PreprocessorDefinition", words, name="FMI3_OVERRIDE_FUNCTION_PREFIX")
     return root
 
 

@@ -44,6 +44,16 @@ class Variable:
     unit: str | None = None
 
     @property
+    def kind(self) -> int:
+        """0: real, 1: truth value, 2: whole number."""
+        return 0 if self.unit is not None else 1 if isinstance(self.start, bool) else 2
+
+    @property
+    def variability(self) -> str:
+        """In the words of FMI."""
+        return ("continuous", "discrete", "fixed")[self.kind]
+
+    @property
     def words(self) -> str:
         """For the description."""
         return WORDS.get(self.name, self.name)

@@ -105,8 +105,8 @@ class Unit:
 
     package: ClassVar[str]
     fmi: ClassVar[str]
-    kinds: ClassVar[dict[str, str]]
-    """What the package calls a real and a whole number."""
+    kinds: ClassVar[tuple[str, str, str]]
+    """What the package calls real numbers, truth values and whole numbers."""
 
     script: ClassVar[str]
     base: ClassVar[Any]
@@ -125,9 +125,10 @@ class Unit:
         self._has_begun = False
         for variable in self._variables:
             setattr(self, variable.name, 0.0 if variable.start is None else variable.start)
-            self._register(variable)
-        words = "Path or name of another profile; empty: the one within."
-        self._add("String", "profile", "parameter", "fixed", description=words)
+            words = {"description": variable.words, **self._unit(variable)}
+            self._add(self.kinds[variable.kind], variable.name, variable.causality, variable.variability, **words)
+        which = "Path or name of another profile; empty: the one within."
+        self._add("String", "profile", "parameter", "fixed", description=which)
         self._add_more()
 
     def _add_more(self) -> None:
@@ -140,17 +141,6 @@ class Unit:
         made = getattr(package, kind)
         settings = {"causality": causalities[causality], "variability": variabilities[variability], **words}
         self.register_variable(made(name, **settings))  # type: ignore[attr-defined]
-
-    def _register(self, variable: Variable) -> None:
-        if variable.unit is not None:
-            kind, variability = self.kinds["real"], "continuous"
-        elif isinstance(variable.start, bool):
-            kind, variability = "Boolean", "discrete"
-        else:
-            kind, variability = self.kinds["whole"], "fixed"
-        self._add(
-            kind, variable.name, variable.causality, variability, description=variable.words, **self._unit(variable)
-        )
 
     def _unit(self, variable: Variable) -> dict[str, str]:
         """How a variable's unit is told."""
@@ -222,7 +212,7 @@ class Unit2(Unit):
     """FMI 2.0, with units and initial unknowns, which pythonfmu leaves out of the description."""
 
     package, fmi = "pythonfmu", "2"
-    kinds: ClassVar[dict[str, str]] = {"real": "Real", "whole": "Integer"}
+    kinds: ClassVar[tuple[str, str, str]] = ("Real", "Boolean", "Integer")
 
     def to_xml(self, *words: Any, **options: Any) -> Any:
         """The model description."""
@@ -251,7 +241,7 @@ class Unit3(Unit):
     """FMI 3.0, whose clock is a variable."""
 
     package, fmi = "pythonfmu3", "3"
-    kinds: ClassVar[dict[str, str]] = {"real": "Float64", "whole": "Int32"}
+    kinds: ClassVar[tuple[str, str, str]] = ("Float64", "Boolean", "Int32")
 
     def _add_more(self) -> None:
         unit = import_module("pythonfmu3").Unit
