@@ -274,7 +274,7 @@ def test_a_closed_loop_that_is_interrupted_says_what_it_was_at(capsys):
     with pytest.raises(KeyboardInterrupt), shown_progress("closing the loop", False) as progress:
         progress(0.3, "looking at the mean")
         raise KeyboardInterrupt
-    assert capsys.readouterr().err == "xosc-lateral: stopped while looking at the mean; nothing is written yet\n"
+    assert capsys.readouterr().err == "xosc-lateral: stopped at: looking at the mean; nothing is written yet\n"
 
 
 @pytest.mark.parametrize("name", ["a.csv", "a.csv.gz", "a.parquet"])

@@ -48,7 +48,7 @@ def shown_progress(title: str, quiet: bool) -> Iterator[Callable[[float, str], N
 
             yield show
     except (KeyboardInterrupt, Interrupted):
-        typer.echo(f"xosc-lateral: stopped while {phase}; nothing is written yet", err=True)
+        typer.echo(f"xosc-lateral: stopped at: {phase}; nothing is written yet", err=True)
         raise
 
 

@@ -122,7 +122,7 @@ def test_a_second_recording_gives_back_what_the_provider_took() -> None:
     expected = true_density(np.array([0.3]))[0] * np.divide(*steering_gain(np.array([25.0, REFERENCE])))
     powers = [power_at(profile, 0.3, 25.0) / expected for profile in (both, alone)]
     assert powers[0] == pytest.approx(1.0, abs=0.4)
-    assert powers[1] < 0.02
+    assert powers[1] < 0.03  # 15 dB below
     assert [band.high for band in both.validity.bands] == [0.15, 1.5]
     assert alone.validity.highest_frequency == 0.1
     by_prior = fit_profile(smoothed, name="prior", prior=fit_profile(clean, name="clean"))

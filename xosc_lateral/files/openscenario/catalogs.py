@@ -68,18 +68,10 @@ def _highest_folder(folder: Path) -> Path:
 
 @dataclass(frozen=True, slots=True)
 class Boundary:
-    """Where references of one scenario may lead.
+    """Where references of one scenario may lead."""
 
-    Parameters
-    ----------
-    folder : Path
-        The scenario's: relative references start here.
-    roots : tuple of Path
-        Real paths of the folders that they have to stay in.
-    """
-
-    folder: Path
-    roots: tuple[Path, ...]
+    folder: Path  # the scenario's: relative references start here
+    roots: tuple[Path, ...]  # real paths of the folders that they have to stay in
 
     def path(self, reference: str, place: Place) -> Path:
         """Path of a file or folder, wherever it is.
@@ -120,24 +112,13 @@ MAX_FILES_SCANNED = 200
 
 @dataclass(slots=True)
 class Catalogs:
-    """Folders of catalogs named by a scenario.
-
-    Parameters
-    ----------
-    locations : mapping of str to (str, Place)
-        ``VehicleCatalog`` ... to the folder or file as written, and where.
-    boundary : Boundary
-        Where references may lead.
-    remarks : list of Unsupported
-        Gets a line for a catalog that was not where the scenario says.
-    used : dict of Path to str
-        Files that entries were taken from so far, and their SHA-256.
-    """
+    """Folders of catalogs named by a scenario."""
 
     locations: Mapping[str, tuple[str, Place]]
-    boundary: Boundary
-    remarks: list[Unsupported]
-    used: dict[Path, str] = field(default_factory=dict)
+    """``VehicleCatalog`` ... to the folder or file as written, and where."""
+    boundary: Boundary  # where references may lead
+    remarks: list[Unsupported]  # gets a line for a catalog that was not where the scenario says
+    used: dict[Path, str] = field(default_factory=dict)  # files that entries were taken from so far, and their SHA-256
     _files: dict[str, Path] = field(default_factory=dict)
 
     def entry(self, reference: XmlElement) -> XmlElement:

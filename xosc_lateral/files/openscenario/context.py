@@ -28,35 +28,17 @@ MAX_NESTING = 20
 
 @dataclass(slots=True)
 class Context:
-    """State of one reading.
+    """State of one reading."""
 
-    Parameters
-    ----------
-    version : tuple of int
-        (major, minor) of the file.
-    catalogs : Catalogs
-    remarks : list of Unsupported
-        Collected on the way.
-    readers : mapping of type to callable
-        Own readers, of an element and this context, for what the declaration of a struct does not say.
-    entities : set of str
-        Names of scenario objects; filled before the storyboard is read.
-    selections : mapping of str to tuple of str
-        Entity selections and their members.
-    strict : bool
-        Refuse what could be replaced by something usual (a vehicle whose catalog is missing).
-    left_handed : bool
-        Written for CARLA; see `left_handed`.
-    """
-
-    version: tuple[int, int]
+    version: tuple[int, int]  # (major, minor) of the file
     catalogs: Catalogs
-    remarks: list[Unsupported]
+    remarks: list[Unsupported]  # collected on the way
     readers: Mapping[object, Reader]
-    entities: set[str] = field(default_factory=set)
-    selections: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    strict: bool = False
-    left_handed: bool = False
+    """Own readers, of an element and this context, for what the declaration of a struct does not say."""
+    entities: set[str] = field(default_factory=set)  # names of scenario objects; filled before the storyboard is read
+    selections: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # entity selections and their members
+    strict: bool = False  # refuse what could be replaced by something usual (a vehicle whose catalog is missing)
+    left_handed: bool = False  # written for CARLA; see `left_handed`
     _depth: int = 0
 
     def entity(self, element: XmlElement, name: str = "entityRef") -> str:
@@ -114,11 +96,8 @@ Reader = Callable[[XmlElement, Context], Any]
 def read_struct(kind: type[S], e: XmlElement, context: Context, /, **preset: Any) -> S:
     """A struct whose fields are read as they declare (see `Xml`), but for those that are given.
 
-    Raises
-    ------
-    FormatError
-        An attribute or a child element that is missing and has no default, or is not of its type; what the struct
-        itself refuses.
+    Raises `FormatError` for an attribute or a child element that is missing and has no default, or is not of its type,
+    and for what the struct itself refuses.
     """
     for name, reader in _readers(kind):
         if name not in preset:

@@ -44,27 +44,14 @@ MAX_REDRAWS = 1000
 
 @dataclass(slots=True)
 class LogicalScenario:
-    """A scenario file and the values that its parameters take.
+    """A scenario file and the values that its parameters take."""
 
-    Parameters
-    ----------
-    path : Path
-        The distribution file.
-    scenario_file : Path
-        The scenario that it varies.
-    distribution : Deterministic or Stochastic
-    place : Place
-        Of the distribution.
-    discarded : int
-        Parameter sets left out so far because they violate the scenario's constraint groups.
-    """
-
-    path: Path
-    scenario_file: Path
+    path: Path  # the distribution file
+    scenario_file: Path  # the scenario that it varies
     distribution: Deterministic | Stochastic
-    place: Place
+    place: Place  # of the distribution
     _scenario: XmlElement = field(repr=False)
-    discarded: int = 0
+    discarded: int = 0  # parameter sets left out so far because they violate the scenario's constraint groups
     _declared: dict[str, str] = field(init=False, repr=False)
     _constrained: list[XmlElement] = field(init=False, repr=False)
 
@@ -78,13 +65,9 @@ class LogicalScenario:
         """Parameter sets that satisfy the scenario's constraint groups, in order, made when asked for.
 
         Combinations of a deterministic distribution that violate them are left out; stochastic ones are drawn again.
+        `seed`: for a stochastic distribution without a ``randomSeed`` of its own.
 
         Raises `FormatError`: A parameter that the scenario does not declare, or constraints that nothing satisfies.
-
-        Parameters
-        ----------
-        seed : int
-            For a stochastic distribution without a ``randomSeed`` of its own.
         """
         self.discarded, begin = 0, time.monotonic()
         limit = PARAMETER_SETS if isinstance(self.distribution, Stochastic) else COMBINATIONS
@@ -139,16 +122,9 @@ class LogicalScenario:
 
 
 def read_distribution(path: Path | str, *, allowed: Iterable[Path] = ()) -> LogicalScenario:
-    """Read a ParameterValueDistribution file (1.1 and later).
+    """Read a ParameterValueDistribution file (1.1 and later); its scenario may lie in the `allowed` folders, too.
 
     Raises `FormatError` with file, line and element; user-defined distributions among others.
-
-    Parameters
-    ----------
-    path : path
-        The ``.xosc`` file.
-    allowed : iterable of path
-        Folders, besides the file's own and the two above it, that the scenario may lie in.
     """
     path = Path(path)
     document, _ = read_xml(path)

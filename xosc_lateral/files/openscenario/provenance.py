@@ -75,20 +75,10 @@ def without_provenance(data: bytes) -> bytes:
 
 
 def write_sealed(path: Path, pieces: Iterable[bytes], *, save: bool) -> tuple[str, str, bytes]:
-    """Write a document whose provenance holds `PENDING`, with the hash of its content in that place.
+    """Write a document with the hash of its content in place of `PENDING`, which its provenance holds.
 
-    Parameters
-    ----------
-    path : Path
-    pieces : iterable of bytes
-        The document; its provenance is in the first one.
-    save : bool
-        Write it, piece by piece; else it comes back.
-
-    Returns
-    -------
-    tuple of str, str, bytes
-        SHA-256 of the file and of its content; the file if it was not to be written.
+    The provenance is in the first piece. SHA-256 of the file and of its content come back, and the file itself where it
+    is not to be saved.
     """
     rest = iter(pieces)
     first = next(rest)

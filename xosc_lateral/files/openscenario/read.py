@@ -66,17 +66,10 @@ class RoadSearch(Struct, frozen=True):
     """Where a road may lie besides where the scenario says: what the user names is allowed.
 
     Raises `FormatError`: No such file, no such folder.
-
-    Parameters
-    ----------
-    file : Path or None
-        The road, whatever the scenario says.
-    folders : tuple of Path
-        Looked through for a file of the road's name.
     """
 
-    file: Path | None = None
-    folders: tuple[Path, ...] = ()
+    file: Path | None = None  # the road, whatever the scenario says
+    folders: tuple[Path, ...] = ()  # looked through for a file of the road's name
 
     def __post_init__(self) -> None:
         for folder in self.folders:

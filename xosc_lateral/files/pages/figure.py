@@ -43,8 +43,8 @@ CSS_VARIABLES: Mapping[str, str] = {
 
 FONT = "system-ui, sans-serif"
 
+# Size of texts; heights of a title, an axis' label, a row of the legend, the numbers below a panel. [pt]
 TEXT, TITLE, LABEL, LEGEND, NUMBERS = 9.0, 17.0, 14.0, 17.0, 12.0
-"""Size of texts; heights of a title, an axis' label, a row of the legend, the numbers below a panel. [pt]"""
 
 PANEL_SPACING = 9.0  # Free space between panels, and around them. [pt]
 PADDING = 0.04  # Share of an axis that is left free on either side of the data. [-]

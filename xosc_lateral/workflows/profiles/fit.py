@@ -70,17 +70,14 @@ def fit(
     left_hand : bool
         The drives are of left-hand traffic: roads with right-hand traffic get their mirror image.
     neighbours : bool, optional
-        Whether the profile holds how drivers keep away from vehicles beside them, from `left_distance` and
-        `right_distance`: of 30 drives that had somebody there, or of fewer that are taken as one driver's and say it
-        surely enough; not in the two-level model. None: where it can
-        be fitted; True: or an error says why not; False: in no case.
+        Whether the profile holds how drivers keep away from vehicles beside them; not in the two-level model. None:
+        where it can be fitted; True: or an error says why not; False: in no case.
     valid_below : float, optional
         Frequency below which drives show driving whose tables do not state it (column `valid_below`): tracks that their
         provider smoothed. [Hz]
     prior : DriverProfile, path or name, optional
-        Whose fast movement the profile has above the band that the drives show: `rural` of the library where tables
-        state a band below 0.5 Hz and no other table has one above it. Another one also where the sensor hides the
-        driver. None: none.
+        Whose fast movement the profile has above the band that the drives show: `rural` where tables state a band
+        below 0.5 Hz and no other table has one above it, another one also where the sensor hides the driver.
     library : path or paths
         Folders with further profiles.
     """

@@ -128,20 +128,20 @@ def normal_angle(angle: float) -> float:
 def find_lane(road: Road, lane: int, s: float, path: str | None = None) -> Lane:
     """A lane at s; raises `PlaybackError` naming the road, the lane and the lanes that are there. `s` in [m]."""
     section = road.section_at(s)
-    found = section.by_id.get(lane)
-    if found is None:
+    here = section.by_id.get(lane)
+    if here is None:
         there = ", ".join(str(other.id) for other in section.lanes) or "none"
         raise PlaybackError(f"road '{road.id}' has no lane {lane} at s={s:.3f} m (lanes there: {there})", path=path)
-    return found
+    return here
 
 
 def lane_pose(road: Road, lane: int, s: float, offset: float) -> Pose:
     """Pose of driving along a lane; `offset` positive to the left of travel. [m], [rad]"""
     s = 0.0 if s < 0.0 else s if s < road.length else road.length
-    found = road.section_at(s).by_id.get(lane) or find_lane(road, lane, s)
-    centre, slope, width = found.state_at(s)
-    direction = found.direction
-    return surface_pose(road, s, centre + direction * offset, slope, direction, found, centre, width)
+    here = road.section_at(s).by_id.get(lane) or find_lane(road, lane, s)
+    centre, slope, width = here.state_at(s)
+    direction = here.direction
+    return surface_pose(road, s, centre + direction * offset, slope, direction, here, centre, width)
 
 
 def surface_pose(
@@ -218,7 +218,7 @@ def lane_at(road: Road, index: int, s: float, t: float, lane_types: Collection[s
     `s`, `t` in [m].
     """
     best: tuple[float, float, float] | None = None
-    found: tuple[Lane, float] | None = None
+    nearest: tuple[Lane, float] | None = None
     for lane in road.section_at(s).lanes:
         if lane_types is not None and lane.type not in lane_types:
             continue
@@ -226,10 +226,10 @@ def lane_at(road: Road, index: int, s: float, t: float, lane_types: Collection[s
         away = abs(t - centre)
         score = (max(away - 0.5 * width, 0.0) + (1e3 if width <= 1e-6 else 0.0), away, width)
         if best is None or score < best:
-            best, found = score, (lane, centre)
-    if best is None or found is None:
+            best, nearest = score, (lane, centre)
+    if best is None or nearest is None:
         return LaneCoordinates(index, 0, s, t, t, inf)
-    lane, centre = found
+    lane, centre = nearest
     return LaneCoordinates(index, lane.id, s, lane.direction * (t - centre), t, max(best[1] - 0.5 * best[2], 0.0))
 
 

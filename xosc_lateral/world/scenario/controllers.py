@@ -34,27 +34,13 @@ _WORDS = ("nothing", "along the road", "across the road", "along and across the 
 
 
 class ControllerKind(Struct, frozen=True):
-    """What a controller is.
+    """What a controller is."""
 
-    Parameters
-    ----------
-    name : str
-        As its player calls it; as the file does where nobody knows it.
-    drives : Domains
-        It can drive these, and does in those in which it is active.
-    is_external : bool
-        A program outside of the scenario drives.
-    as_a_whole : bool
-        Active in one domain, it drives all of its own.
-    at_once : bool
-        Active from its assignment on.
-    """
-
-    name: str
-    drives: Domains = Domains.BOTH
-    is_external: bool = False
-    as_a_whole: bool = False
-    at_once: bool = False
+    name: str  # as its player calls it; as the file does where nobody knows it
+    drives: Domains = Domains.BOTH  # it can drive these, and does in those in which it is active
+    is_external: bool = False  # a program outside of the scenario drives
+    as_a_whole: bool = False  # active in one domain, it drives all of its own
+    at_once: bool = False  # active from its assignment on
 
     def active(self, asked: Domains) -> Domains:
         """What it drives where it was activated in these domains."""

@@ -54,22 +54,14 @@ _REFERENCES = frozenset({"entity_ref", "entity_refs", "master_entity_ref", "trai
 
 @dataclass(eq=False, slots=True)
 class Dependence:
-    """What depends on vehicles that are unforeseeable; see `dependence`.
+    """What depends on vehicles that are unforeseeable; see `dependence`."""
 
-    Parameters
-    ----------
-    entities : set of str
-        Whose motion does, those vehicles included.
-    begins, ends : set of tuple of str
-        Storyboard elements, by their names from the story down, whose start or end does.
-    values : set of str
-        Parameters, variables, signals and signal controllers that are set by such an event.
-    """
-
-    entities: set[str]
+    entities: set[str]  # whose motion does, those vehicles included
     begins: set[Path] = field(default_factory=set)
     ends: set[Path] = field(default_factory=set)
+    """Storyboard elements, by their names from the story down, whose start or end does."""
     values: set[str] = field(default_factory=set)
+    """Parameters, variables, signals and signal controllers that are set by such an event."""
 
     def of_trigger(self, trigger: Trigger | None) -> bool:
         """Whether a trigger depends on them."""

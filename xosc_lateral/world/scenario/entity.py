@@ -65,58 +65,26 @@ class Controller(Struct, frozen=True):
 
 
 class Entity(Struct, frozen=True):
-    """One scenario object.
+    """One scenario object."""
 
-    Parameters
-    ----------
-    name : str
-        Name of the ScenarioObject.
-    category : EntityCategory
-        Vehicle, pedestrian, miscellaneous or external.
-    place : Place
-        Of the ScenarioObject.
-    bounding_box : BoundingBox
-        `USUAL_BOX` where the file has none.
-    vehicle_category : VehicleCategory or None
-        Vehicles only.
-    performance : Performance
-        Vehicles only; else without limits.
-    axles : Axles or None
-        Vehicles only.
-    controllers : tuple of Controller
-        Assigned at the start.
-    object_name : str
-        Name of the Vehicle, Pedestrian or MiscObject (often its catalog entry).
-    kind : str
-        The file's own category code (``car``, ``wheelchair``, ``pole`` ...); empty for external objects.
-    trailer : str or None
-        Name of the entity that it pulls from the start.
-    hitch_x, coupler_x : float or None
-        Of the trailer coupling, ahead of the reference point. [m]
-    mass : float or None
-        [kg]
-    model3d : str or None
-        3D model file, as written.
-    properties : mapping of str to str
-        Vendor properties.
-    """
-
-    name: str
-    category: EntityCategory
-    place: Place
+    name: str  # name of the ScenarioObject
+    category: EntityCategory  # vehicle, pedestrian, miscellaneous or external
+    place: Place  # of the ScenarioObject
     bounding_box: Annotated[BoundingBox, Xml(default=USUAL_BOX)]
-    vehicle_category: VehicleCategory | None = None
-    performance: Performance = Performance()
-    axles: Axles | None = None
-    controllers: tuple[Controller, ...] = ()
-    object_name: str = ""
-    kind: str = ""
-    trailer: str | None = None
+    """`USUAL_BOX` where the file has none."""
+    vehicle_category: VehicleCategory | None = None  # vehicles only
+    performance: Performance = Performance()  # vehicles only; else without limits
+    axles: Axles | None = None  # vehicles only
+    controllers: tuple[Controller, ...] = ()  # assigned at the start
+    object_name: str = ""  # name of the Vehicle, Pedestrian or MiscObject (often its catalog entry)
+    kind: str = ""  # the file's own category code (``car``, ``wheelchair``, ``pole`` ...); empty for external objects
+    trailer: str | None = None  # name of the entity that it pulls from the start
     hitch_x: float | None = None
     coupler_x: float | None = None
-    mass: float | None = None
-    model3d: Annotated[str | None, called("model3d", "model")] = None
-    properties: Mapping[str, str] = field(default_factory=dict)
+    """Of the trailer coupling, ahead of the reference point. [m]"""
+    mass: float | None = None  # [kg]
+    model3d: Annotated[str | None, called("model3d", "model")] = None  # 3D model file, as written
+    properties: Mapping[str, str] = field(default_factory=dict)  # vendor properties
 
     @property
     def is_vehicle(self) -> bool:

@@ -65,21 +65,12 @@ class ExpressionError(ValueError):
 
 
 def evaluate(expression: str, resolve: Callable[[str], str]) -> str:
-    """Value of an expression as attribute text.
+    """Value of an expression, what stands between ``${`` and ``}``, as attribute text.
+
+    Numbers have 6 decimals, as the reference player writes them. `resolve`: name of a parameter to its value as text;
+    raises what it wants for unknown names.
 
     Raises `ExpressionError`: Syntax, domain (``sqrt(-1)``, division by zero) or overflow.
-
-    Parameters
-    ----------
-    expression : str
-        What stands between ``${`` and ``}``.
-    resolve : callable
-        Name of a parameter to its value as text; raises what it wants for unknown names.
-
-    Returns
-    -------
-    str
-        Numbers with 6 decimals, as the reference player writes them; ``true`` or ``false``; or the joined words.
     """
     if len(expression) > EXPRESSION.value:
         raise ExpressionError(EXPRESSION.refusal(len(expression)))

@@ -17,12 +17,8 @@ _NAME = re.compile(r"\$([A-Za-z_][\w.]*)\Z")
 class Scope:
     """Declared parameters, their values filled in when asked for, in any order of declaration.
 
-    Parameters
-    ----------
-    raw : mapping of str to str
-        Name to value as written: may refer to other parameters of this scope and of its parents.
-    parent : Scope, optional
-        Where names are looked up that are not declared here.
+    Values as written may refer to other parameters of this scope and of its parent, where names are looked up that are
+    not declared here.
     """
 
     __slots__ = ("_done", "_open", "_raw", "parent")

@@ -12,24 +12,13 @@ from xosc_lateral.base.errors import FormatError
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """File, line and element of something read.
+    """File, line and element of something read."""
 
-    Parameters
-    ----------
-    path : str
-        The file (a scenario or a catalog).
-    line : int or None
-        Line, from 1.
-    element : str
-        The element as errors name it, as in ``Event 'brake'``.
-    node : tuple of int
-        Child indices from the root element down: finds the same XML element again in a new parse of the same bytes.
-    """
-
-    path: str
-    line: int | None
-    element: str
+    path: str  # the file (a scenario or a catalog)
+    line: int | None  # line, from 1
+    element: str  # the element as errors name it, as in ``Event 'brake'``
     node: tuple[int, ...] = field(default=(), repr=False, compare=False)
+    """Child indices from the root element down: finds the same XML element again in a new parse of the same bytes."""
 
     def error(self, what: str, kind: type[FormatError] = FormatError) -> FormatError:
         """An error that names the place."""
@@ -43,48 +32,28 @@ class Content(Struct, frozen=True, kw_only=True):
 
 
 class Unsupported(Struct, frozen=True):
-    """Something that was understood to be there, but that the model holds no more of: the player names it.
+    """Something that was understood to be there, but that the model holds no more of: the player names it."""
 
-    Parameters
-    ----------
-    kind : str
-        The standard's element name, as in ``RandomRouteAction``.
-    place : Place
-        Where it stands.
-    reason : str
-        Why, if there is more to say than that it is unknown.
-    """
-
-    kind: str
-    place: Place
-    reason: str = ""
+    kind: str  # the standard's element name, as in ``RandomRouteAction``
+    place: Place  # where it stands
+    reason: str = ""  # why, if there is more to say than that it is unknown
 
 
 class Xml(Struct, frozen=True):
     """How a field is written in a file, where its name and type don't say so.
 
     Without it an attribute is called like its field (``entityRef`` for `entity_ref`), an element like its type.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Attributes, or child elements, of which the first that is there counts; ``Sun/azimuth`` is in a child element.
-        An empty tuple where the name is the usual one, ``("",)`` for the element itself.
-    default : object
-        What is read where it is missing, if the field itself has no default: lenient reading, not the standard.
-    finite : bool
-        Infinity is refused.
-    is_entity : bool
-        The name of an entity that has to be there; of a tuple, those that EntityRef elements stand for.
-    is_parameter : bool
-        The name of a parameter, which files also write with a ``$``.
     """
 
     names: tuple[str, ...] = ()
+    """Attributes, or child elements, of which the first that is there counts; ``Sun/azimuth`` is in a child element. An
+    empty tuple where the name is the usual one, ``("",)`` for the element itself."""
     default: object = UNSET
-    finite: bool = True
+    """What is read where it is missing, if the field itself has no default: lenient reading, not the standard."""
+    finite: bool = True  # infinity is refused
     is_entity: bool = False
-    is_parameter: bool = False
+    """The name of an entity that has to be there; of a tuple, those that EntityRef elements stand for."""
+    is_parameter: bool = False  # the name of a parameter, which files also write with a ``$``
 
 
 def called(*names: str, default: object = UNSET) -> Xml:

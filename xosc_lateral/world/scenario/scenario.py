@@ -64,43 +64,25 @@ class TrafficSignalController(Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """One concrete scenario.
+    """One concrete scenario."""
 
-    Parameters
-    ----------
-    path : Path
-        The file, as given.
-    header : FileHeader
-    parameters, variables : mapping of name to Parameter
-        Global ones; a player starts from these values.
-    catalog_locations : mapping of str to Path
-        Catalog element name (``VehicleCatalog``) to its folder or file.
-    road_file : Path or None
-        RoadNetwork/LogicFile, resolved against the scenario's folder; None: no road.
-    traffic_signal_controllers : tuple
-    entities : tuple of Entity
-        In file order; a trailer described inside its tractor follows it as an entity of its own.
-    storyboard : Storyboard
-    remarks : tuple of Unsupported
-        What was read over because motion does not depend on it, or is replaced (a controller whose catalog is missing).
-    input_hashes : mapping of Path to str
-        Every file that was parsed, the scenario first, and the SHA-256 of the bytes that were.
-    source : bytes
-        The scenario file's bytes: the writer parses them again.
-    """
-
-    path: Path
+    path: Path  # the file, as given
     header: FileHeader
     parameters: Mapping[str, Parameter]
     variables: Mapping[str, Parameter]
-    catalog_locations: Mapping[str, Path]
-    road_file: Path | None
+    """Global ones; a player starts from these values."""
+    catalog_locations: Mapping[str, Path]  # catalog element name (``VehicleCatalog``) to its folder or file
+    road_file: Path | None  # roadNetwork/LogicFile, resolved against the scenario's folder; None: no road
     traffic_signal_controllers: tuple[TrafficSignalController, ...]
     entities: tuple[Entity, ...]
+    """In file order; a trailer described inside its tractor follows it as an entity of its own."""
     storyboard: Storyboard
     remarks: tuple[Unsupported, ...] = ()
+    """What was read over because motion does not depend on it, or is replaced (a controller whose catalog is
+    missing)."""
     input_hashes: Mapping[Path, str] = field(default_factory=dict)
-    source: bytes = field(default=b"", repr=False)
+    """Every file that was parsed, the scenario first, and the SHA-256 of the bytes that were."""
+    source: bytes = field(default=b"", repr=False)  # the scenario file's bytes: the writer parses them again
 
     @property
     def input_files(self) -> tuple[Path, ...]:

@@ -52,28 +52,15 @@ class Trigger(Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """One action, of init (then without a name) or of an event.
+    """One action, of init (then without a name) or of an event."""
 
-    Parameters
-    ----------
-    name : str
-        Empty in init.
-    content : one of `Content`
-        What it does.
-    place : Place
-        Of the Action, PrivateAction, GlobalAction or UserDefinedAction element.
-    is_private : bool
-        Acts once for each actor; else once.
-    scope : mapping of str to str
-        Parameters of story, maneuver or catalog that the element may refer to, with their values: whoever moves the
-        element to another place has to fill them in.
-    """
-
-    name: str
-    content: Content | Unsupported
-    place: Place
-    is_private: bool
+    name: str  # empty in init
+    content: Content | Unsupported  # what it does
+    place: Place  # of the Action, PrivateAction, GlobalAction or UserDefinedAction element
+    is_private: bool  # acts once for each actor; else once
     scope: Mapping[str, str] = field(default_factory=dict, repr=False, compare=False)
+    """Parameters of story, maneuver or catalog that the element may refer to, with their values: whoever moves the
+    element to another place has to fill them in."""
 
 
 class Event(Struct, frozen=True):

@@ -197,19 +197,12 @@ ColumnsOf = Callable[[slice], Sequence[FloatArray]]
 
 
 class TimedVertices(Struct, frozen=True, eq=False):
-    """Vertices of one trajectory.
+    """Vertices of one trajectory."""
 
-    Parameters
-    ----------
-    count : int
-        How many they are.
-    columns_of : callable
-        Gives, for some of them, time [s], x, y, z [m], heading, pitch, roll [rad] and, where vertices have a motion,
-        speed [m/s] and acceleration [m/s2]; shape (n,) each.
-    """
-
-    count: int
+    count: int  # how many they are
     columns_of: ColumnsOf
+    """Gives, for some of them, time [s], x, y, z [m], heading, pitch, roll [rad] and, where vertices have a motion,
+    speed [m/s] and acceleration [m/s2]; shape (n,) each."""
 
     def text(self, indent: str, unit: str) -> Iterator[str]:
         """XML of the vertices, set out at `indent`, each level below by `unit` more; the first without its indent."""
@@ -236,10 +229,7 @@ class TimedVertices(Struct, frozen=True, eq=False):
 class Vertices:
     """Polylines of a document, and where in it they go.
 
-    Parameters
-    ----------
-    source : bytes
-        The document before: no mark of ours can be in it by chance or by malice, for its hash is part of the mark.
+    No mark of ours can be in the document before, `source`, by chance or by malice: its hash is part of the mark.
     """
 
     def __init__(self, source: bytes) -> None:

@@ -132,13 +132,7 @@ def _moments(item: Moving, pieces: Sequence[PathPiece], begin: float) -> FloatAr
 
 
 def fit_carla(losses: Losses, draft: Draft, converted: Sequence[str]) -> None:
-    """Make a written scenario of version 1.0 one that ScenarioRunner plays.
-
-    Raises
-    ------
-    FormatError
-        No road: it would not know where to play.
-    """
+    """Make a written scenario of version 1.0 one that ScenarioRunner plays; `FormatError` where it has no road."""
     root, scenario, motion = draft.root, draft.scenario, draft.motion
     if not any(item.get("filepath") for item in root.iter("{*}LogicFile")):
         losses.refuse(root, "scenarios without a road", hint="; name one in RoadNetwork/LogicFile")

@@ -25,19 +25,8 @@ from xosc_lateral.world.scenario.place import Unsupported
 class Draft:
     """The scenario's tree, changed step by step into the output's.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        As read: its bytes are the starting point, so that comments, catalogs and vendor extensions survive.
-    motion : NominalMotion
-        The run.
-    target : TargetPlayer
-        Player and version that it is made for.
-
-    Raises
-    ------
-    FormatError
-        The scenario was converted before; a `PlaybackError` for a run of 0 s.
+    The bytes of the scenario are the starting point, so that comments, catalogs and vendor extensions survive. Raises
+    `FormatError` for a scenario that was converted before, `PlaybackError` for a run of 0 s.
     """
 
     def __init__(self, scenario: Scenario, motion: NominalMotion, target: TargetPlayer = STANDARD) -> None:
@@ -119,29 +108,13 @@ def global_scope(scenario: Scenario) -> Scope:
 
 @dataclass(frozen=True, slots=True)
 class WrittenScenario:
-    """What was written.
-
-    Parameters
-    ----------
-    path : Path
-    sha256 : str
-        Of the file's bytes.
-    content_sha256 : str
-        Of the file without its provenance.
-    converted : tuple of str
-        Entities that move otherwise than in the input.
-    removed : tuple of Unsupported
-        Controllers and actions that are no longer in the file although they are no motion, with reasons.
-    data : bytes
-        The file's bytes; empty if they were written.
-    notes : tuple of str
-        What the version or the player that it was made for lacks, a line each.
-    """
+    """What was written."""
 
     path: Path
-    sha256: str
-    content_sha256: str
-    converted: tuple[str, ...]
+    sha256: str  # of the file's bytes
+    content_sha256: str  # of the file without its provenance
+    converted: tuple[str, ...]  # entities that move otherwise than in the input
     removed: tuple[Unsupported, ...]
-    data: bytes
-    notes: tuple[str, ...] = ()
+    """Controllers and actions that are no longer in the file although they are no motion, with reasons."""
+    data: bytes  # the file's bytes; empty if they were written
+    notes: tuple[str, ...] = ()  # what the version or the player that it was made for lacks, a line each

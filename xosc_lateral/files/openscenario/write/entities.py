@@ -59,10 +59,7 @@ def note_controllers(draft: Draft, converted: Collection[str]) -> None:
 def rewrite_init(draft: Draft, starts: Mapping[str, tuple[build.Pose, float] | None]) -> None:
     """Replace what moves the converted entities in init by a place and a speed; lights, visibility and others stay.
 
-    Parameters
-    ----------
-    starts : mapping of str to (pose, speed), or None
-        Converted entities; None leaves init as it is: the entity is not there at the start.
+    A start of None leaves init as it is: the entity is not there at the start.
     """
     actions = draft.init_actions
     done: set[str] = set()
@@ -118,17 +115,10 @@ def is_replaced(action: Action, actor: str | None, converted: Collection[str]) -
 def add_kept_actions(
     story: etree._Element, name: str, draft: Draft, played: Sequence[PlayedAction], poses: Mapping[int, build.Pose]
 ) -> None:
-    """Add an act with one event for each action, in the order of the run; none for no actions.
+    """Add an act with one event for each action that is not replaced, in the order of the run; none for no actions.
 
-    Parameters
-    ----------
-    story : element
-        Gets an act of that name, with a maneuver group for each run of actions with the same actor, so that the order
-        holds across actors, too.
-    played : sequence of PlayedAction
-        Actions of events that are not replaced.
-    poses : mapping of int to tuple
-        For an AddEntityAction, by index in `played`: where the entity appears on its written path.
+    Each run of actions with the same actor has a maneuver group, so that the order holds across actors, too.
+    `poses`: of an AddEntityAction, by index in `played`: where the entity appears on its written path.
     """
     if not played:
         return

@@ -22,19 +22,10 @@ from xosc_lateral.world.scenario.expressions import ExpressionError
 
 
 def fit(draft: Draft, converted: Sequence[str] | None) -> None:
-    """Change what the target does not know, and note it.
+    """Change what the target does not know, and note it; `FormatError` for what the scenario can't do without.
 
-    Parameters
-    ----------
-    draft : Draft
-        Its file references still as seen from the scenario.
-    converted : sequence of str, optional
-        Entities that follow trajectories; None: maneuvers are still maneuvers.
-
-    Raises
-    ------
-    FormatError
-        For what the target does not know and the scenario can't do without.
+    Its file references are still as seen from the scenario; `converted`: entities that follow trajectories; None:
+    maneuvers are still maneuvers.
     """
     target, scenario = draft.target, draft.scenario
     losses = Losses(draft.root, scenario.path, f"version {named(draft.version)}", converted is None, draft.notes)
@@ -138,13 +129,7 @@ _STOPS_AT = {
 
 
 def fit_esmini(losses: Losses) -> None:
-    """Take out what stops esmini.
-
-    Raises
-    ------
-    FormatError
-        In a condition, an entity, or a maneuver of a scenario that stays reactive.
-    """
+    """Take out what stops esmini; `FormatError` in a condition, an entity, or a maneuver that stays reactive."""
     for item in list(losses.root.iter("{*}*")):
         parent = item.getparent()
         if parent is None or (local_name(parent), local_name(item)) not in _STOPS_AT:

@@ -35,10 +35,7 @@ def in_scope(item: etree._Element, path: Path, scope: Scope) -> Iterator[tuple[e
 def fill_in(losses: Losses, scope: Scope, *, parameters: bool) -> None:
     """Write values in place of expressions and, if wanted, of parameters; declarations stay.
 
-    Raises
-    ------
-    FormatError
-        One that has no value.
+    Raises `FormatError` for one that has no value.
     """
     for item, within in in_scope(losses.root, losses.path, scope):
         for name, value in item.attrib.items():

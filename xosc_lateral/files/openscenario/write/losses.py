@@ -29,28 +29,15 @@ _MEANINGLESS = frozenset(
 
 @dataclass(slots=True)
 class Losses:
-    """What is taken out of a scenario, and why.
+    """What is taken out of a scenario, and why."""
 
-    Parameters
-    ----------
-    root : element
-        Changed in place.
-    path : Path
-        Of the scenario, for errors.
-    target : str
-        What lacks things, as in ``version 1.0``.
-    reactive : bool
-        Maneuvers and conditions still decide on what happens: those can't be taken out, and events stay for others to
-        refer to.
-    notes : list of str
-        A line each, in order, once.
-    """
-
-    root: etree._Element
-    path: Path
-    target: str
+    root: etree._Element  # changed in place
+    path: Path  # of the scenario, for errors
+    target: str  # what lacks things, as in ``version 1.0``
     reactive: bool
-    notes: list[str] = field(default_factory=list)
+    """Maneuvers and conditions still decide on what happens: those can't be taken out, and events stay for others to
+    refer to."""
+    notes: list[str] = field(default_factory=list)  # a line each, in order, once
 
     def note(self, text: str) -> None:
         """Say something once."""

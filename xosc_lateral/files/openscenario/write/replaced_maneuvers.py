@@ -138,15 +138,7 @@ def _kept_conditions(scenario: Scenario, gone: Collection[Group]) -> list[Storyb
 
 
 class ReplacedManeuvers:
-    """What is to be taken out of a draft: found before anything in it is changed.
-
-    Parameters
-    ----------
-    draft : Draft
-        As yet unchanged.
-    moving : mapping of str to Moving
-        Entities that follow trajectories.
-    """
+    """What is to be taken out of a draft, found before anything in it is changed: `moving` follow trajectories."""
 
     def __init__(self, draft: Draft, moving: Mapping[str, Moving]) -> None:
         self._draft, self._moving = draft, moving

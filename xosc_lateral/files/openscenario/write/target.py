@@ -26,22 +26,10 @@ class Player(StrEnum):
 
 
 class TargetPlayer(Struct, frozen=True):
-    """Player and version.
-
-    Parameters
-    ----------
-    player : Player
-    version : tuple of int, optional
-        (1, 0) to (1, 4). Without: the input's own, or the only one that the player reads.
-
-    Raises
-    ------
-    ValueError
-        A version that can't be written, or that the player does not read.
-    """
+    """Player and version; `ValueError` for a version that can't be written, or that the player does not read."""
 
     player: Player = Player.STANDARD
-    version: Version | None = None
+    version: Version | None = None  # (1, 0) to (1, 4). Without: the input's own, or the only one that the player reads.
 
     def __post_init__(self) -> None:
         if self.version is not None and self.version not in VERSIONS:
@@ -69,13 +57,7 @@ STANDARD = TargetPlayer()
 
 
 def target(player: str = Player.STANDARD.value, version: str | None = None) -> TargetPlayer:
-    """From the words of a user: a player's name, and a version such as "1.2".
-
-    Raises
-    ------
-    ValueError
-        As `TargetPlayer`, and for words that are neither.
-    """
+    """From a user's words: a player's name, and a version such as "1.2"; `ValueError` for words that are neither."""
     if version is None:
         return TargetPlayer(Player(player))
     known = {named(one): one for one in VERSIONS}

@@ -162,17 +162,7 @@ def _replace_stop_trigger(draft: Draft) -> None:
 def motion_unknown_to(
     version: build.Version, scenario: Scenario, motion: NominalMotion, entities: Collection[str]
 ) -> dict[str, str]:
-    """Entities with a maneuver that a version does not know, and which.
-
-    Parameters
-    ----------
-    version : Version
-    scenario : Scenario
-    motion : NominalMotion
-        Its run.
-    entities : collection of str
-        Those to look at.
-    """
+    """Those of some entities with a maneuver in this run that a version does not know, and which."""
     if version >= scenario.header.version:
         return {}
     root = parse_xml(scenario.source, scenario.path)

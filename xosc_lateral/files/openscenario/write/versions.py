@@ -42,19 +42,9 @@ def additions(minor: int, kind: str) -> Mapping[str, Any]:
 
 
 def fit_version(losses: Losses, source: Version, version: Version) -> None:
-    """Make a scenario one of another version.
+    """Make a scenario one of another version; parts that were made for it are left as they are.
 
-    Parameters
-    ----------
-    losses : Losses
-        Its root is changed.
-    source, version : Version
-        Of the input, of the output. Parts that were made for the output's are left as they are.
-
-    Raises
-    ------
-    FormatError
-        A condition or, if the scenario is reactive, a maneuver that the version does not know.
+    Raises `FormatError`: a condition or, if the scenario is reactive, a maneuver that the version does not know.
     """
     _orientations(losses.root, source, version)
     if version[1] >= _STRICT_SINCE_MINOR:

@@ -18,6 +18,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from msgspec.structs import replace
+from numpy.lib.stride_tricks import sliding_window_view
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import NotEnoughDataError
@@ -42,10 +43,12 @@ MAXIMUM_LOG_POWER_CHANGE = 2e-3
 """Largest change of the coarse movement's log power that rounding may make at any frequency: 0.01 dB. Coefficients of
 an autoregression nearly add up to one, and what they lack of it decides how far a driver wanders. [-]"""
 
-LIMIT_SPREADS = 4.0
-"""Standard deviations from the mean to the limits at least: the extremes of few drivers' minutes lie nearer, and their
-drivers would sit at them (17.7 % of two-minute runs for 3 s and more; so 0.7 %). Of a driver whose movement is volatile
-more, by the exponential of its log variance: his tails are heavier. The markings bound either. [-]"""
+HELD, HELD_WITHIN, HELD_SHARE = 3.0, 120.0, 0.01
+"""Limits lie where coarse movement stays beyond for so long in so long a drive with this chance: extremes of few
+drivers' minutes lie nearer, and their drivers would sit at them (17.7 % of two-minute runs). [s], [s], [-]"""
+
+HELD_DRIVES = 500
+"""Simulated for that: a standard error of 0.4 % for the share of 1 %. [-]"""
 
 MOST_DIGITS = 17
 """That a number has. [-]"""
@@ -81,13 +84,18 @@ def _tidy_volatility(part: Volatility) -> Volatility:
     return Volatility(*all_significant((part.between, part.within, part.correlation_time, part.slow), DIGITS))
 
 
-def _limits(offsets: FloatArray, mean: float, spreads: float) -> tuple[float, float]:
-    """What was recorded, so many standard deviations at least, the markings at most. [lane widths]"""
-    reach = max(spreads * float(offsets.std()), 1e-3)
-    return (
-        min(max(-0.5, min(float(offsets.min()), mean - reach)), mean - 1e-3),
-        max(min(0.5, max(float(offsets.max()), mean + reach)), mean + 1e-3),
-    )
+def _limits(offsets: FloatArray, mean: float, reach: float = 0.0) -> tuple[float, float]:
+    """What was recorded, so far from the mean at least, the markings at most. [lane widths]"""
+    low, high = max(-0.5, min(float(offsets.min()), mean - reach)), min(0.5, max(float(offsets.max()), mean + reach))
+    return min(low, mean - 1e-3), max(high, mean + 1e-3)
+
+
+def _held_reach(model: AutoregressiveModel, settings: FitSettings) -> float:
+    """Distance from the mean beyond which free coarse movement is held so seldom that a limit there is hardly seen."""
+    free = replace(model, limits=(-1.0, 1.0)).stream(np.random.SeedSequence(settings.seed), drivers=HELD_DRIVES)
+    away = np.abs(free.take(round(HELD_WITHIN / model.step))[0] - model.mean)
+    held = sliding_window_view(away, round(HELD / model.step), axis=0).min(axis=-1).max(axis=0)
+    return float(np.quantile(held, 1.0 - HELD_SHARE))
 
 
 def fit_autoregressive(
@@ -118,10 +126,9 @@ def fit_autoregressive(
         coarse_volatility=Volatility(),
         fine_volatility=Volatility(),
         correlation=0.0,
-        limits=_limits(everything, mean, LIMIT_SPREADS),
+        limits=_limits(everything, mean),
         step=settings.step,
     )
     model = with_volatility(model, bands, len(set(drives)) > 1, settings)
-    varying = model.coarse_volatility.within + model.coarse_volatility.slow
-    model = replace(model, limits=_limits(everything, mean, LIMIT_SPREADS * float(np.exp(varying))))
-    return rounded(matched(model, runs, settings))
+    model = matched(replace(model, limits=_limits(everything, mean, _held_reach(model, settings))), runs, settings)
+    return rounded(replace(model, limits=_limits(everything, mean, _held_reach(model, settings))))
