@@ -26,13 +26,13 @@ from xosc_lateral.drivers.loop import (
     column_search,
     dictionary,
     feedback,
-    innovations,
+    model,
     refinement,
     regression,
     selection,
 )
+from xosc_lateral.drivers.loop.dictionary import Search
 from xosc_lateral.drivers.loop.identify import usable_columns
-from xosc_lateral.drivers.loop.search import Search
 from xosc_lateral.drivers.loop.terms import spread
 from xosc_lateral.drivers.loop.terms.spread import SlowSpreadTerm
 from xosc_lateral.drivers.loop.timeline import Coarse, join_drives
@@ -76,9 +76,7 @@ def without_kinds(*kinds: type) -> list[Any]:
 PARTS: dict[str, Callable[[], list[Any]]] = {
     "the whole": lambda: [],
     "3 cm of noise": lambda: [patch.object(regression, "MEASUREMENT_NOISE", 0.0)],
-    "responses smoothed as seen": lambda: [
-        patch.object(innovations, "smoothed_as_seen", lambda moved, seen, *rest: seen)
-    ],
+    "responses smoothed as seen": lambda: [patch.object(model, "smoothed_as_seen", lambda moved, seen, *rest: seen)],
     "slow spread": lambda: without_kinds(SlowSpreadTerm),
     "second look at what acts": lambda: [patch.object(column_search, "ROUNDS", 1)],
     "tested again": lambda: [patch.object(selection, "_tested_again", lambda search, found, one: found)],

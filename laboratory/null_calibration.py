@@ -20,10 +20,10 @@ from laboratory.identification_cases import PROTOCOL
 from laboratory.identification_drives import long_drive, smoothed_tracks
 from laboratory.identification_oracle import coarse_of
 from laboratory.outcome_lines import append_outcome, read_outcomes
-from xosc_lateral.drivers.loop import dictionary
+from xosc_lateral.drivers.loop import significance
+from xosc_lateral.drivers.loop.dictionary import Search
 from xosc_lateral.drivers.loop.identify import usable_columns
 from xosc_lateral.drivers.loop.regression import fit_model
-from xosc_lateral.drivers.loop.search import Search
 from xosc_lateral.drivers.loop.selection import ERROR_BUDGET, STAGES
 
 FIRST_SEED = 310_000
@@ -54,7 +54,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--drives", type=int, default=560)
     parser.add_argument(
-        "--block", type=int, default=dictionary.BLOCK_S, help="length of what is dealt anew, in seconds"
+        "--block", type=int, default=significance.BLOCK_S, help="length of what is dealt anew, in seconds"
     )
     parser.add_argument("--part", default="0/1", help="K/N: every N-th drive from the K-th on")
     parser.add_argument("-o", "--output", type=Path)
@@ -63,7 +63,7 @@ def main() -> None:
     if args.table is not None:
         print(table(read_outcomes(args.table)))
         return
-    dictionary.BLOCK_S = args.block
+    significance.BLOCK_S = args.block
     protocol = tomllib.loads(PROTOCOL.read_text(encoding="utf-8"))
     movements = protocol["movements"]["design_9"]
     part, parts = map(int, args.part.split("/"))

@@ -26,11 +26,10 @@ from laboratory.outcome_lines import append_outcome, read_outcomes
 from tests.kit.simulated import preview_driver
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.drivers.loop.close import close_loop
-from xosc_lateral.drivers.loop.dictionary import beside, orthonormal
-from xosc_lateral.drivers.loop.identify import usable_columns
-from xosc_lateral.drivers.loop.innovations import CLIP
+from xosc_lateral.drivers.loop.dictionary import Search, beside, orthonormal
+from xosc_lateral.drivers.loop.identify import name_time_beside, usable_columns
+from xosc_lateral.drivers.loop.model import CLIP
 from xosc_lateral.drivers.loop.regression import fit_model
-from xosc_lateral.drivers.loop.search import Search
 from xosc_lateral.drivers.loop.selection import ERROR_BUDGET, Accepted, select
 from xosc_lateral.drivers.loop.terms.course import RESPONSE_S, CourseTerm
 from xosc_lateral.drivers.model.effects import Acts, Linear
@@ -83,7 +82,8 @@ def verdict(accepted: Sequence[Accepted], act: preview_driver.Act) -> dict[str, 
         columns = set(one.term.columns)
         named = planted and (columns == set(act.columns) if act.columns else one.term.component.startswith("time_"))
         of_bends = bool(columns) and columns <= BENDS
-        named |= not columns and act.columns in one.term.alike  # which of the two it is, other drives decide
+        # a column, or a change with time: which of the two it is, other drives decide
+        named |= planted and (act.columns or ("time",)) in one.term.alike and not (columns and act.columns)
         hit |= named
         name = f"{one.term.component} {'*'.join(one.term.columns)}"
         wrong += [] if named or of_bends else [name]
@@ -108,7 +108,8 @@ def study(kind: str, seed: int, *, whole: bool) -> dict[str, Any]:
         coarse = coarse_of(drive.table)
         usable = usable_columns(coarse.timeline)
         with threadpool_limits(1, user_api="blas"):
-            accepted = select(Search.over(coarse, usable.columns, np.random.SeedSequence(1), ERROR_BUDGET)).accepted
+            search = Search.over(coarse, usable.columns, np.random.SeedSequence(1), ERROR_BUDGET)
+            accepted = name_time_beside(search, select(search)).accepted
     dismissed = {item.column for item in usable.feedback} & {"curvature", "crossfall", "grade"}
     outcome = {"kind": kind, "seed": seed, "z": oracle_z(drive, seed), **verdict(accepted, drive.act)}
     return outcome | {"dismissed": sorted(dismissed)} | more

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.loop.dictionary import Search
 from xosc_lateral.drivers.loop.identify import usable_columns
-from xosc_lateral.drivers.loop.search import Search
 from xosc_lateral.drivers.loop.selection import ERROR_BUDGET, Selection, select
 from xosc_lateral.drivers.loop.timeline import Coarse, join_drives
 

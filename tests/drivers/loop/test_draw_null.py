@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import lfilter
 
-from xosc_lateral.drivers.loop.dictionary import BLOCK_S, draw_null, in_another_order
-from xosc_lateral.drivers.loop.significance import MANY_DRIVES, effective_number
+from xosc_lateral.drivers.loop.significance import BLOCK_S, MANY_DRIVES, draw_null, effective_number, in_another_order
 
 N = 3000
 

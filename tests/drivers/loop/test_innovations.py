@@ -7,7 +7,7 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 
 from tests.kit.coarse import wander
-from xosc_lateral.drivers.loop.innovations import innovations, smoothed_as_seen
+from xosc_lateral.drivers.loop.model import innovations, smoothed_as_seen
 
 N = 3000
 VALID, DRIVE, SCALE = np.ones(N, dtype=bool), np.zeros(N, dtype=np.intp), np.ones(N)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.drivers.loop.innovations import CLIP, OWN_LEVEL_S, own_levels
+from xosc_lateral.drivers.loop.model import CLIP, OWN_LEVEL_S, own_levels
 from xosc_lateral.drivers.loop.regression import MOST_LOG_SCALE, bounded, covariance_of_log_sizes, scoring_step
-from xosc_lateral.drivers.loop.squares import Squares, log_sizes
+from xosc_lateral.drivers.loop.terms.spread import Squares, log_sizes
 
 
 def test_log_sizes_are_those_of_a_gamma_regression() -> None:

@@ -15,9 +15,9 @@ from tests.kit.coarse import coarse_of, movement
 from xosc_lateral.base.plugins import defined_in
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.loop import selection, terms
+from xosc_lateral.drivers.loop.dictionary import Search
 from xosc_lateral.drivers.loop.held_out import removal_of
 from xosc_lateral.drivers.loop.model import Stage, Term
-from xosc_lateral.drivers.loop.search import Search
 from xosc_lateral.drivers.loop.selection import STAGES, TERMS, in_stages, shared_among
 from xosc_lateral.drivers.loop.significance import BUDGET
 from xosc_lateral.drivers.loop.timeline import Coarse

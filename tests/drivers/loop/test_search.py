@@ -8,7 +8,7 @@ import numpy as np
 
 from tests.kit.coarse import coarse_of, movement, wander
 from xosc_lateral.drivers.loop.columns import Column, Values
-from xosc_lateral.drivers.loop.search import KEPT_DICTIONARIES, Search
+from xosc_lateral.drivers.loop.dictionary import KEPT_DICTIONARIES, Search
 from xosc_lateral.drivers.loop.selection import ERROR_BUDGET
 
 

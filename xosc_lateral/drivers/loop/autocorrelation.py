@@ -95,20 +95,8 @@ def moving_sum(weights: FloatArray, values: FloatArray) -> FloatArray:
 def fit_autoregression(
     values: FloatArray, valid: BoolArray, order: int, *, longest: int | None = None, noise: float = 0.0
 ) -> MovementProcess:
-    """Least squares over all rows that have the whole memory in their own run.
-
-    Parameters
-    ----------
-    values : array, shape (n,)
-        Mean about zero.
-    valid : bool array, shape (n,)
-    order : int
-        Past values that have a coefficient each; lowered when the runs are too short for it.
-    longest : int, optional
-        Past values that are seen as means of stretches that double in length; `order` without.
-    noise : float
-        Standard deviation of white noise that the process has beside what `values` show. In regressions it is a ridge.
-    """
+    """Least squares over rows that have the whole memory in their run: `order` past values, means of doubling stretches
+    up to `longest`, beside white `noise` of a standard deviation, which is a ridge."""
     position = positions_in_run(valid)
     rows_in_all = max(1, int((position >= 0).sum()))
     order = max(1, order)
@@ -166,13 +154,8 @@ def _stepped_down(lags: FloatArray, variance: float) -> MovementProcess:
 
 
 def start_factors(rows: FloatArray, valid: BoolArray, order: int) -> FloatArray:
-    """Factor on the errors of the first rows of runs, shape (order + 1,), beside those of rows with the whole memory.
-
-    The process says how well a row is predicted from the few before it, if the run is a piece of a stationary movement.
-    Runs begin where something ended, a lane change for one: their first rows may be off by more.
-
-    `rows`, shape (n,): whitened; `valid`, shape (n,).
-    """
+    """Factor on the errors of the first rows of runs, shape (order + 1,): a run begins where something ended, and its
+    first whitened `rows` may be off by more than a stationary movement's."""
     position = positions_in_run(valid)
     early, late = (position >= 0) & (position < order), position >= order
     usual = float(np.mean(rows[late] ** 2)) if late.any() else 1.0
@@ -191,12 +174,8 @@ def start_factors(rows: FloatArray, valid: BoolArray, order: int) -> FloatArray:
 def unbiased(
     process: MovementProcess, valid: BoolArray, drive: IndexArray, order: int, *, longest: int | None = None
 ) -> MovementProcess:
-    """A process fitted to `valid` rows less each drive's level, freed of what those levels do to it in short drives.
-
-    A level takes part of the slow movement with it, so that the process looks less persistent than it is (Nickell's
-    bias: the errors of effects in runs of a minute come out an eighth too small). The same is done to drives simulated
-    from the fitted process, and the difference taken off: indirect inference for panels [3]_.
-    """
+    """A process freed of what each short drive's level does to it (Nickell's bias, errors an eighth too small), by
+    indirect inference [3]_."""
     if process.order == 0:
         return process
     rng = np.random.default_rng(BIAS_SEED)
@@ -209,11 +188,13 @@ def unbiased(
             return process
         lags += again.lags[-1] / BIAS_DRAWS
         log_variance += 2.0 * float(np.log(again.deviations[-1])) / BIAS_DRAWS
-    own = 2.0 * float(np.log(process.deviations[-1]))
+    log_variance_fitted = 2.0 * float(np.log(process.deviations[-1]))
     for share in (1.0, 0.5, 0.25):
         better = process.lags[-1] + share * (process.lags[-1] - lags)
         if np.abs(_reflections(better)).max() < MAX_REFLECTION:
-            return _stepped_down(better, float(np.exp(own + share * (own - log_variance))))
+            return _stepped_down(
+                better, float(np.exp(log_variance_fitted + share * (log_variance_fitted - log_variance)))
+            )
     return process
 
 
@@ -249,8 +230,8 @@ class Whitener:
         return np.searchsorted(self.drive, np.arange(int(self.drive.max()) + 1)).astype(np.intp)
 
     def by_position(self, values: FloatArray) -> FloatArray:
-        """What belongs to a row by its place in its run, shape (n,); `values`: shape (order + 1,), the last for all
-        later rows."""
+        """What belongs to a row by its place in its run, shape (n,), from `values`, shape (order + 1,), the last for
+        all later."""
         return values[np.clip(positions_in_run(self.valid), 0, self.process.order)]
 
     @property

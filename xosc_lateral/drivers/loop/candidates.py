@@ -85,10 +85,8 @@ class Candidate:
 
 
 def candidates_of(columns: Sequence[Column], context: Mapping[str, FloatArray], *, most: int) -> list[Candidate]:
-    """All candidates; `context` holds the road-following rows alone.
-
-    Beyond `most` columns, products are of those whose role is known before any others.
-    """
+    """All candidates, from the road-following rows of `context`; beyond `most` columns products are of those of known
+    role."""
     known_first = sorted(columns, key=lambda column: column.role is Role.UNKNOWN)[:most]
     paired = [column for column in columns if column in known_first]
     factors = {column.name: _factors(column, context[column.name]) for column in columns}
@@ -101,11 +99,11 @@ def candidates_of(columns: Sequence[Column], context: Mapping[str, FloatArray], 
             for pair in _pairs(first, second, factors)
         ],
     }
-    found = []
+    candidates = []
     for family, effects in families.items():
         members = [(effect, contrast) for effect in effects for contrast in _contrasts(effect, context)]
-        found += [Candidate(effect, family, 2.0 * float(np.log(len(members))), one) for effect, one in members]
-    return found
+        candidates += [Candidate(effect, family, 2.0 * float(np.log(len(members))), one) for effect, one in members]
+    return candidates
 
 
 def _contrasts(effect: ColumnEffect, context: Mapping[str, FloatArray]) -> list[tuple[float, ...]]:
@@ -118,8 +116,8 @@ def _contrasts(effect: ColumnEffect, context: Mapping[str, FloatArray]) -> list[
 def shapes_of(
     column: Column, values: FloatArray, *, curves: bool
 ) -> tuple[list[ColumnEffect], list[ColumnEffect], float]:
-    """Plain shapes of one column, bent ones with a fine choice of limits and scales, and how many times as many bent
-    ones as the dictionary has; `values` on the road-following rows alone."""
+    """Plain shapes of one column, bent ones with fine limits and scales, and how many times as many as the dictionary
+    has."""
     bent = _unique((*_bent(column, values, FINE_LIMITS), *_fading(column, values)))
     bent += _curves(column, values) if curves else []
     return _unique(_plain(column, values)), bent, len(bent) / max(1, len(_unique(_bent(column, values))))
@@ -200,18 +198,15 @@ def _factors(column: Column, values: FloatArray) -> list[Factor]:
 
 
 def _pairs(first: Column, second: Column, factors: Mapping[str, list[Factor]]) -> Iterator[tuple[Factor, Factor]]:
-    for one, other in product(factors[first.name], factors[second.name]):
+    for factor, other in product(factors[first.name], factors[second.name]):
         if Values.ANGLE in (first.values, second.values):  # a vector's component: speed counts from its own zero
-            one, other = (Factor(column=f.column) if f.form is Form.VALUE else f for f in (one, other))
-        yield one, other
+            factor, other = (Factor(column=f.column) if f.form is Form.VALUE else f for f in (factor, other))
+        yield factor, other
 
 
 def _quantiles(seen: FloatArray, shares: Sequence[float]) -> FloatArray:
-    """Quantiles, shape (n,) like `shares`, of what a column is while it is not one of the values that it mostly has.
-
-    A crossfall is -2.5 % or 2.5 % for nine tenths of the time: nearly all of its quantiles are one of the two, and what
-    a driver does in between, or on either side of level, would have no candidate. [the column's unit]
-    """
+    """Quantiles of a column while it is not one of the few values that it mostly has, a crossfall of 2.5 % either way,
+    say."""
     while True:
         values = np.quantile(seen, shares)
         known, times = np.unique(values, return_counts=True)
@@ -222,10 +217,7 @@ def _quantiles(seen: FloatArray, shares: Sequence[float]) -> FloatArray:
 
 
 def _scale(values: FloatArray, share: float) -> float:
-    """Quantile of the size of what is there and not zero: overlapping vehicles have distance 0 and tell no scale.
-
-    0 for what never comes near, as a leader's speed: nearness to it is whether there is a leader, and no more.
-    """
+    """Quantile of the size of what is there and not zero; 0 for what never comes near, as a leader's speed."""
     size = np.abs(values[np.isfinite(values)])
     size = size[size > 0.0]
     if not len(size) or float(np.quantile(size, 0.05)) > NEAR_SHARE * float(np.median(size)):

@@ -10,14 +10,8 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.drivers.drives.drive import Drive
-from xosc_lateral.drivers.loop.core_model import (
-    DriverVariance,
-    SpectrumShape,
-    compare_spectrum_shapes,
-    test_population,
-)
+from xosc_lateral.drivers.loop.core_model import DriverVariance, SpectrumShape, compare_spectrum_shapes, test_population
 from xosc_lateral.drivers.loop.cross_validation import Progress, folds_of, held_out_words
-from xosc_lateral.drivers.loop.explained import Explained, explained_share
 from xosc_lateral.drivers.loop.held_out import (
     HeldOut,
     Scorecard,
@@ -29,7 +23,7 @@ from xosc_lateral.drivers.loop.held_out import (
 )
 from xosc_lateral.drivers.loop.identify import Identified, identify, initial_terms
 from xosc_lateral.drivers.loop.model import Description, Fitted, Term
-from xosc_lateral.drivers.loop.omnibus import Omnibus, check_remainder
+from xosc_lateral.drivers.loop.omnibus import Explained, Omnibus, check_remainder, explained_share
 from xosc_lateral.drivers.loop.refinement import Alternatives
 from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.residual import LackOfFit, lack_of_fit_of, size_of
@@ -71,10 +65,18 @@ def _finding(size: Description, scored: HeldOut, **about: Any) -> Finding:
     return Finding(error_before=before, error_after=after, **described, **about)
 
 
-def describe_finding(one: Accepted, key: str, effects: tuple[Effect, ...], fitted: Fitted, scored: HeldOut) -> Finding:
+def describe_finding(
+    accepted: Accepted, key: str, effects: tuple[Effect, ...], fitted: Fitted, scored: HeldOut
+) -> Finding:
     """Put sizes and errors to what was accepted."""
-    term = one.term
-    about = {"kind": term.kind, "columns": term.columns, "alike": term.alike, "p_value": one.p_value, "gain": one.gain}
+    term = accepted.term
+    about = {
+        "kind": term.kind,
+        "columns": term.columns,
+        "alike": term.alike,
+        "p_value": accepted.p_value,
+        "gain": accepted.gain,
+    }
     return _finding(term.describe(fitted, effects, key), scored, effects=effects, **about)
 
 
@@ -179,29 +181,29 @@ def close_loop(
     progress(0.0, "reading the drives")
     timeline = join_drives(drives)
     coarse, everything = Coarse.of(timeline), np.ones(len(timeline), dtype=np.bool_)
-    given = base is not None
+    is_given = base is not None
     paper = base is not None and base.model.kind == ModelKind.TWO_LEVEL.value
     kind = ModelKind.TWO_LEVEL if paper else ModelKind.AUTOREGRESSIVE
     if base is None:
         progress(0.02, "fitting the base profile")
         base = fit_without(fit_model(coarse, ()), everything, kind, f"{name}-base", provenance)
     # the loop's own base knows what class, lane and speed do as `fit` has it; what acts is found, not begun with
-    initial = initial_terms(base, timeline) if given else ()
-    found = identify(coarse, root, initial=initial, excluded=excluded, roles=roles, progress=progress)
+    initial = initial_terms(base, timeline) if is_given else ()
+    identified = identify(coarse, root, initial=initial, excluded=excluded, roles=roles, progress=progress)
     lacks: list[SpectrumShape | DriverVariance] = []
     if paper:  # what the two-level model lacks is found once, by replacing it: the autoregressive one has both
-        final = found.selection.final
+        final = identified.selection.final
         tested = compare_spectrum_shapes(base, timeline, root), test_population(final, between_shift(final))
         lacks = [lack for lack in tested if lack is not None and lack.is_found]
     setting = Setting(
-        coarse, base if given and not in_sample else None, kind, ModelKind.AUTOREGRESSIVE if lacks else kind, root
+        coarse, base if is_given and not in_sample else None, kind, ModelKind.AUTOREGRESSIVE if lacks else kind, root
     )
-    found, scored = _that_helps(setting, found, progress)
-    selection = found.selection
+    identified, scored = _that_helps(setting, identified, progress)
+    selection = identified.selection
     progress(0.95, "refitting on everything")
     refined = base
-    if selection.accepted or not given or lacks:
-        began_with = base if given else None
+    if selection.accepted or not is_given or lacks:
+        began_with = base if is_given else None
         refined = fit_refined(selection.final, setting.refined_kind, name, provenance, began_with)
     findings = [describe_finding(*one, selection.final, scored) for one in _accepted(selection)]
     findings += [_finding(lack.described(), scored, kind=lack.KIND, p_value=lack.p_value) for lack in lacks]
@@ -210,68 +212,65 @@ def close_loop(
     return LoopResult(
         base=base,
         refined=refined,
-        given=given,
-        in_sample=given and in_sample,
+        given=is_given,
+        in_sample=is_given and in_sample,
         findings=tuple(findings),
         coarse=coarse,
-        identified=found,
+        identified=identified,
         scored=scored,
         lack_of_fit=lack_of_fit_of(scored.real, scored.before, scored.after, scored.halves),
-        explained=_explained(setting, found),
-        remainder=check_remainder(selection.final, found.quantities, root),
+        explained=_explained(setting, identified),
+        remainder=check_remainder(selection.final, identified.quantities, root),
         scores=score_runs(timeline, scored.runs_before, scored.runs_after, setting.blocks, rng),
         seed=seed,
     )
 
 
-def _that_helps(setting: Setting, found: Identified, progress: Progress) -> tuple[Identified, HeldOut]:
+def _that_helps(setting: Setting, identified: Identified, progress: Progress) -> tuple[Identified, HeldOut]:
     """Less what makes held-out blocks look less like the profile, the worst first; and how the rest is scored."""
     while True:
-        scored = score_held_out(setting, found.selection, found.nested, found.usable.columns, progress)
+        scored = score_held_out(setting, identified.selection, identified.nested, identified.usable.columns, progress)
         before, after = scored.errors
-        if not found.selection.accepted:
-            return found, scored
-        harmful = _most_harmful(found.selection, scored)
+        if not identified.selection.accepted:
+            return identified, scored
+        harmful = _most_harmful(identified.selection, scored)
         if harmful is not None:
-            found = found.without([harmful], HARMFUL)
+            identified = identified.without([harmful], HARMFUL)
         elif setting.kind is setting.refined_kind and after > NO_WORSE * before and scored.surely_worse:
             why = f"with the effects that were found the held-out error rises from {before:.4f} to {after:.4f} m"
-            found = found.without([one.term for one in found.selection.accepted], why)
+            identified = identified.without([one.term for one in identified.selection.accepted], why)
         else:
-            return found, scored
+            return identified, scored
 
 
 def _most_harmful(selection: Selection, scored: HeldOut) -> Term | None:
-    """The accepted term with which held-out mean or spread by its own quantity differ most from what is measured.
-
-    Of those that are not sure to gain likelihood there, and by more than half samples differ: an error grows by chance
-    as well.
-    """
+    """The accepted term, not sure to gain, whose own held-out mean or spread is worst predicted, beyond what halves
+    differ."""
     worst: tuple[float, Term | None] = (1.0, None)
-    for one, key, effects in _accepted(selection):
-        if one.gain is not None and one.gain.interval[0] > 0.0:
+    for accepted, key, effects in _accepted(selection):
+        if accepted.gain is not None and accepted.gain.interval[0] > 0.0:
             continue
-        own = {f"{what} by effect: {key}" for what in ("mean", "spread")} & set(scored.real)
-        for group in own or {one.term.describe(selection.final, effects, key).statistic} & set(scored.real):
+        groups = {f"{what} by effect: {key}" for what in ("mean", "spread")} & set(scored.real)
+        for group in groups or {accepted.term.describe(selection.final, effects, key).statistic} & set(scored.real):
             before, after = scored.error_of(group)
             chance = np.mean([size_of({"": half[group]}) ** 2 for half in scored.halves])
             loss = (after**2 - before**2) / max(float(chance), 1e-300)
-            worst = max(worst, (loss, one.term), key=lambda pair: pair[0])
+            worst = max(worst, (loss, accepted.term), key=lambda pair: pair[0])
     return worst[1]
 
 
-def _explained(setting: Setting, found: Identified) -> Explained | None:
+def _explained(setting: Setting, identified: Identified) -> Explained | None:
     """Share of the explainable; where nothing is kept, the effects explain nothing."""
     coarse, blocks = setting.coarse, coarse_middle(setting.blocks)[: len(setting.coarse)]
-    if found.nested is not None:
-        folds = found.nested.scored
+    if identified.nested is not None:
+        folds = identified.nested.scored
         starts, finals = [one.start for one in folds], [one.final for one in folds]
     else:
-        number, terms = folds_of(blocks), found.selection.start.terms
+        number, terms = folds_of(blocks), identified.selection.start.terms
         if number < 2:
             return None
         starts = finals = [fit_model(coarse.only(blocks % number != fold), terms) for fold in range(number)]
-    return explained_share(starts, finals, found.quantities, coarse, blocks)
+    return explained_share(starts, finals, identified.quantities, coarse, blocks)
 
 
 def _accepted(selection: Selection) -> list[tuple[Accepted, str, tuple[Effect, ...]]]:

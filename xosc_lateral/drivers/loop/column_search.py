@@ -13,8 +13,8 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.loop.autocorrelation import Problem
 from xosc_lateral.drivers.loop.dictionary import (
     CROSS_BASIS,
-    NULL_DRAWS,
     Dictionary,
+    Search,
     beside_parts,
     build_dictionary,
     orthonormal,
@@ -24,8 +24,7 @@ from xosc_lateral.drivers.loop.model import Fitted, Outcome
 from xosc_lateral.drivers.loop.omnibus import courses
 from xosc_lateral.drivers.loop.refinement import Refined, Refinement
 from xosc_lateral.drivers.loop.regression import fit_model
-from xosc_lateral.drivers.loop.search import Search
-from xosc_lateral.drivers.loop.significance import LoopSeed, upper_tail
+from xosc_lateral.drivers.loop.significance import NULL_DRAWS, LoopSeed, upper_tail
 from xosc_lateral.drivers.loop.terms.column import ColumnTerm, of_kind
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect
 from xosc_lateral.drivers.model.seeds import generator
@@ -92,11 +91,8 @@ class _Scored:
         return self.dictionary.timed(self.best), upper_tail(float(self.scores[self.best]), self.maxima)
 
     def contenders(self) -> list[int]:
-        """Best entry of each of the best sets of columns, and of each single column in the best of them.
-
-        A product of a column and what is nearly constant wherever it acts is that column: refined, the cheaper one
-        wins.
-        """
+        """Best entry of the best sets of columns, and of each column of the best: of a product with what hardly varies,
+        one factor."""
         scores, columns = self.scores, [candidate.columns for candidate in self.dictionary.candidates]
         order = np.argsort(-scores, kind="stable")
         best: dict[tuple[str, ...], int] = {}
@@ -121,22 +117,18 @@ class ColumnSearch:
     def outcome(self) -> Outcome | None:
         """Best candidate; None: there is no candidate.
 
-        The p-value is that of a score test [1]_: data and null are whitened alike, by what is left *without* the
+        The p-value is that of a score test (Rao 1948): data and null are whitened alike, by what is left *without* the
         candidate. To whiten again with it in would give a slow column credit for the memory that it has just explained
         away, which no rotation gets: on drives without an effect such p-values fall below 0.005 seven times as often as
         they should.
-
-        References
-        ----------
-        .. [1] C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948.
         """
         refused = {term.columns for term in of_kind(self.fitted, self.kind)}  # one column, one finding
         there = len(refused)
         scored = self._scored_once()
         while scored is not None:
-            found, p_value = scored.likeliest()
+            likeliest, p_value = scored.likeliest()
             if not self.kind.passes(self.search, p_value, self.fitted):  # refined, it would not be accepted either
-                return Outcome(None, found.columns, p_value)
+                return Outcome(None, likeliest.columns, p_value)
             term, after = self._term(scored, refused)
             if not grows(self.fitted, after) and after.log_likelihood >= self.fitted.log_likelihood - ROUNDING:
                 return Outcome(term, term.columns, p_value, after)
@@ -145,16 +137,12 @@ class ColumnSearch:
         return Outcome(None, min(refused), 1.0) if len(refused) > there else None
 
     def probability_of(self, columns: tuple[str, ...]) -> float:
-        """p-value of the best candidate of given columns, against the same null as in `outcome`.
-
-        The fit is one without a term of these columns. Where it has a product with one of them, that product is known
-        as it is, not with every shape of its factors: nothing would be left to test.
-        """
+        """p-value of the best candidate of given columns by the null of `outcome`, in a fit without a term of them."""
         scored = self._scored(self.kind.problem(self.fitted), spared=columns)
         if scored is None:
             return 1.0
-        own = [i for i, candidate in enumerate(scored.dictionary.candidates) if candidate.columns == columns]
-        return upper_tail(float(scored.scores[own].max()), scored.maxima) if own else 1.0
+        members = [i for i, candidate in enumerate(scored.dictionary.candidates) if candidate.columns == columns]
+        return upper_tail(float(scored.scores[members].max()), scored.maxima) if members else 1.0
 
     def likely_response(self, level: float) -> tuple[FloatArray, float]:
         """Response of the best candidate and its p-value, shape (n, 1) where that is at most `level`; else (n, 0)."""
@@ -169,8 +157,8 @@ class ColumnSearch:
             taken = {term.columns for term in of_kind(self.fitted, self.kind)}
             return self._scored(self.kind.problem(self.fitted), refused=taken)
 
-        found: _Scored | None = self.search.once(self.kind, self.fitted, make)
-        return found
+        scored: _Scored | None = self.search.once(self.kind, self.fitted, make)
+        return scored
 
     def _scored(
         self,
@@ -181,11 +169,8 @@ class ColumnSearch:
         draws: int = NULL_DRAWS,
         spared: tuple[str, ...] = (),
     ) -> _Scored | None:
-        """Score what is neither barred nor refused; None: nothing is left.
-
-        Known is what the model has already, and the whole cross-basis of its columns, but for one set that is `spared`:
-        nothing may be blamed on their likes.
-        """
+        """Score what is neither barred nor refused beside the model and the cross-basis of its columns, but for those
+        `spared`."""
         kind, search = self.kind, self.search
         if dictionary is None:
             dictionary = build_dictionary(search.quantities, problem.whitener)
@@ -270,13 +255,9 @@ class ColumnSearch:
 def grows(before: Fitted, after: Fitted) -> bool:
     """Whether the movement that is left is larger with a term than without it, beyond chance.
 
-    Generalised and ordinary least squares agree on a quantity that moves the driver [1]_. What was sized on a few odd
-    seconds alone, as those after a lane change or around a jump of the camera, does not lie in between the rest of the
-    time: taken out, it puts in more than was there, and an autoregression close to a unit root lets it.
-
-    References
-    ----------
-    .. [1] J. Hausman, "Specification tests in econometrics", Econometrica 46, 1978.
+    Generalised and ordinary least squares agree on a quantity that moves the driver (Hausman 1978). What was sized on a
+    few odd seconds alone, as those after a lane change or around a jump of the camera, does not lie in between the rest
+    of the time: taken out, it puts in more than was there, and an autoregression close to a unit root lets it.
     """
     rows = np.flatnonzero(before.coarse.valid)
     saved = np.square(before.movement * before.scale)[rows] - np.square(after.movement * after.scale)[rows]

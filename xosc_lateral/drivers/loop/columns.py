@@ -88,31 +88,26 @@ def proposed_role(column: str) -> Role:
 
 
 def roles_of(timeline: Timeline, names: Iterable[str], declared: Mapping[str, str]) -> dict[str, Assigned]:
-    """Role of each column of a table.
-
-    `declared`: column -> role. Raises `FormatError` for a role that there is not, or a column that the table lacks.
-    """
+    """Role of each column; refuses a `declared` role that there is not, or of a column that the table lacks
+    (`FormatError`)."""
     names = list(names)
     for column, word in declared.items():
         if word not in set(Role):
             raise FormatError(f"role of {column}: {word!r} is none of {', '.join(Role)}")
         if column not in names:
             raise FormatError(f"role of {column}: the table has no such column")
-    found = {}
+    roles = {}
     for column in names:
         role = Role(declared[column]) if column in declared else proposed_role(column)
         source = "declared" if column in declared else "name" if role is not Role.UNKNOWN else ""
         if not source.startswith("d") and not role.is_exogenous and is_clock(timeline, column):
             role, source = Role.TIME, source if role is Role.TIME else "data"
-        found[column] = Assigned(column, role, source)
-    return found
+        roles[column] = Assigned(column, role, source)
+    return roles
 
 
 def is_clock(timeline: Timeline, column: str) -> bool:
-    """Whether a column goes one way as long as a drive lasts: a counter, an odometer, a state of charge.
-
-    Only drives of ten minutes and more can tell.
-    """
+    """Whether a column goes one way through drives of ten minutes: a counter, an odometer, a state of charge."""
     values = timeline.context.get(column, timeline.lane_width)
     rows = round(60.0 / timeline.step)
     long = [span for span in timeline.spans if span.stop - span.start >= (CLOCK_MINUTES + 1) * rows]
@@ -153,24 +148,20 @@ class Column:
 
 
 def known_columns(timeline: Timeline) -> tuple[list[Column], dict[str, str]]:
-    """Columns worth looking at, in alphabetical order, and why the others aren't.
-
-    `lane_width` is always among them: it follows from the measured distances.
-    """
-    found, unused = [], {}
+    """Columns worth looking at, `lane_width` among them, in alphabetical order, and why the others aren't."""
+    columns, unused = [], {}
     context = {"lane_width": timeline.lane_width, **timeline.context}
     for name in sorted(context):
         column = read_column(name, context[name][timeline.valid], timeline.periods.get(name, 0.0))
         if isinstance(column, str):
             unused[name] = column
         else:
-            found.append(column)
-    return found, unused
+            columns.append(column)
+    return columns, unused
 
 
 def read_column(name: str, seen: FloatArray, period: float) -> Column | str:
-    """What a column holds, from its values while road-following, shape (n,), and its full circle; or why it tells
-    nothing."""
+    """What a column holds, from its road-following values and its full circle; or why it tells nothing."""
     there = np.isfinite(seen)
     share = float(there.mean())
     if share < MIN_SHARE:

@@ -35,10 +35,8 @@ DRIVERS_LEVEL = 0.002  # Probability of a false finding.
 
 @dataclass(frozen=True, eq=False)
 class SpectrumShape:
-    """Profile over drives, by bands up to `bands_s` [s], of the movement's size in each over its overall size.
-
-    `p_value`: that both have the same spectrum shape (Hotelling's test [1]_ over blocks of a minute).
-    """
+    """Profile over drives, by bands up to `bands_s` [s], of the movement's size over its overall size, with Hotelling's
+    test [1]_."""
 
     KIND: ClassVar[str] = "memory"
     bands_s: tuple[float, ...]
@@ -65,11 +63,11 @@ def compare_spectrum_shapes(profile: DriverProfile, timeline: Timeline, seed: np
 
     runs = simulated_runs(profile, timeline, child(seed, LoopSeed.SPECTRUM), runs=N_RUNS)
     real = _shapes(timeline.offset, timeline)
-    own = np.concatenate([_shapes(run, timeline) for run in runs])
+    sampled = np.concatenate([_shapes(run, timeline) for run in runs])
     if len(real) < 2 * len(TIMES_S) + 4:
         return SpectrumShape(TIMES_S, np.ones(len(TIMES_S)), 1.0)
-    difference = own.mean(axis=0) - real.mean(axis=0)
-    covariance = np.cov(real.T) / len(real) + np.cov(own.T) / len(own)
+    difference = sampled.mean(axis=0) - real.mean(axis=0)
+    covariance = np.cov(real.T) / len(real) + np.cov(sampled.T) / len(sampled)
     k, n = len(difference), len(real)
     statistic = float(difference @ np.linalg.pinv(covariance) @ difference)
     p_value = float(f.sf(statistic * (n - k) / (k * (n - 1)), k, n - k))
@@ -91,10 +89,8 @@ def _shapes(offset: FloatArray, timeline: Timeline) -> FloatArray:
 
 @dataclass(frozen=True, slots=True)
 class DriverVariance:
-    """Scatter between drives that are long enough, noise taken out: standard deviation of their means and log spreads.
-
-    `shift` in [m], `log_spread` [-]; `p_value`: that all are of one driver, by the stronger of both.
-    """
+    """Standard deviation between drives of means [m] and log spreads, noise taken out, and the p-value that all are
+    alike."""
 
     KIND: ClassVar[str] = "population"
     drives: int
@@ -115,18 +111,15 @@ class DriverVariance:
 
 
 def test_population(fitted: Fitted, known: FloatArray) -> DriverVariance | None:
-    """Analysis of variance with every drive's halves as the noise; None with too few drives.
-
-    Halves of a drive are as far apart in time as a drive is long: what drifts slowly counts as noise, not as a driver.
-    `known`, shape (drives,): where the drives keep by effects between them. [m]
-    """
+    """Analysis of variance with drives' halves as the noise, so that slow drift counts as noise; None with too few
+    drives."""
     whitener = fitted.whitener
     offset = fitted.movement * whitener.scale + (fitted.levels - known)[whitener.drive]
     halves = []
     for index in range(len(fitted.levels)):
-        own = offset[whitener.valid & (whitener.drive == index)]
-        if len(own) >= 2 * MIN_SECONDS:
-            halves.append((own[: len(own) // 2], own[len(own) // 2 :]))
+        series = offset[whitener.valid & (whitener.drive == index)]
+        if len(series) >= 2 * MIN_SECONDS:
+            halves.append((series[: len(series) // 2], series[len(series) // 2 :]))
     if len(halves) < MIN_DRIVES:
         return None
     shift, p_shift = _scatter(np.array([[half.mean() for half in pair] for pair in halves]))

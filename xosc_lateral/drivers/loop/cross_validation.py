@@ -17,10 +17,9 @@ import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.drivers.loop.autocorrelation import Whitener
-from xosc_lateral.drivers.loop.innovations import CLIP, own_levels
-from xosc_lateral.drivers.loop.model import Fitted, Term
+from xosc_lateral.drivers.loop.dictionary import Search
+from xosc_lateral.drivers.loop.model import CLIP, Fitted, Term, own_levels
 from xosc_lateral.drivers.loop.regression import design_of, fit_model
-from xosc_lateral.drivers.loop.search import Search
 from xosc_lateral.drivers.loop.selection import Gain, Selection, select
 from xosc_lateral.drivers.loop.terms.time import StepTerm
 from xosc_lateral.drivers.loop.timeline import Coarse, Timeline, coarse_middle
@@ -69,8 +68,6 @@ def held_out_gain(fitted: Fitted, rest: Fitted, coarse: Coarse, held: BoolArray)
     autoregression fitted beside a term differs by what the term takes out of the movement, and is judged by *every*
     held-out row, also where the term does nothing: on the motorway recording it cost 0.3 to 0.5 nat a vehicle, as much
     as the neighbour on the right gains. The held-out rows' own levels of place and spread are taken from themselves.
-
-    `fitted` and `rest`: without the held-out rows; `coarse`: with the held-out rows valid; `held`, shape (n,).
     """
     return _log_likelihood(fitted, fitted, coarse, held) - _log_likelihood(rest, fitted, coarse, held)
 
@@ -84,10 +81,10 @@ def _log_likelihood(fitted: Fitted, noise: Fitted, coarse: Coarse, held: BoolArr
     squares = np.square(whitener.rows(np.where(rows, coarse.offset - columns @ fitted.sizes, 0.0)))
     typical = max(float(squares[rows].mean()), 1e-300) if rows.any() else 1.0
     level = own_levels(np.minimum(squares, CLIP * typical), rows, coarse.drive) * typical
-    own = level[coarse.drive]
+    variance = level[coarse.drive]
     factor = whitener.by_position(noise.starts)
-    deviation = np.sqrt(own) * factor * whitener.deviations
-    return np.where(rows, -0.5 * np.minimum(squares / (own * factor**2), CLIP) - np.log(deviation), 0.0)
+    deviation = np.sqrt(variance) * factor * whitener.deviations
+    return np.where(rows, -0.5 * np.minimum(squares / (variance * factor**2), CLIP) - np.log(deviation), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,9 +112,9 @@ class Nested:
         """What one accepted term gains: each fold's own version of it, in or out; nothing where it was not chosen."""
         pairs: list[tuple[Fitted, Fitted] | None] = []
         for final in (selection.final for selection in self.selections):
-            own = next((one for one in final.terms if one.matches(term)), None)
-            rest = [one for one in final.terms if one is not own]
-            pairs.append(None if own is None else (final, fit_model(final.coarse, rest)))
+            version = next((one for one in final.terms if one.matches(term)), None)
+            rest = [one for one in final.terms if one is not version]
+            pairs.append(None if version is None else (final, fit_model(final.coarse, rest)))
         return self._gain(pairs, sum(pair is not None for pair in pairs))
 
     def together(self, terms: Sequence[Term]) -> Gain:
@@ -125,8 +122,8 @@ class Nested:
         pairs: list[tuple[Fitted, Fitted] | None] = []
         for selection in self.selections:
             start = selection.start
-            own = [one.term for one in selection.accepted if _any_matches(one.term, terms)]
-            pairs.append((fit_model(start.coarse, (*start.terms, *own)), start) if own else None)
+            chosen = [one.term for one in selection.accepted if _any_matches(one.term, terms)]
+            pairs.append((fit_model(start.coarse, (*start.terms, *chosen)), start) if chosen else None)
         return self._gain(pairs, len(pairs))
 
     def _gain(self, pairs: Sequence[tuple[Fitted, Fitted] | None], folds: int) -> Gain:
@@ -148,7 +145,7 @@ def gain_over(rows: FloatArray, blocks: IntArray, valid: BoolArray, folds: int) 
 def nest(
     search: Search,
     initial: Sequence[Term],
-    found: Sequence[Term],
+    accepted: Sequence[Term],
     progress: Callable[[float], None] = lambda _: None,
 ) -> Nested:
     """Select anew without each fold: by the table's levels, and then at least as many terms as were `found` there."""
@@ -157,17 +154,17 @@ def nest(
     coarse, blocks = search.coarse, hold_out_blocks(search.coarse.timeline)
     seconds, folds = coarse_middle(blocks)[: len(coarse)], folds_of(blocks)
     # what happened once can't be found without the block in which it happened: what judges the others knows when
-    once = tuple(term for term in found if term.component == StepTerm.component)
-    wanted = Counter(term.component for term in found if term not in once)
+    once = tuple(term for term in accepted if term.component == StepTerm.component)
+    wanted = Counter(term.component for term in accepted if term not in once)
 
     def selected(fold: int) -> tuple[Selection, Selection]:
         part = coarse.only(seconds % folds != fold) if folds > 1 else coarse
-        own = replace(search, coarse=part, progress=lambda _: None)
-        scored = select(own, initial)
+        part_of_search = replace(search, coarse=part, progress=lambda _: None)
+        scored = select(part_of_search, initial)
         there = Counter(one.term.component for one in scored.accepted)
         if not once and all(there[component] >= number for component, number in wanted.items()):
             return scored, scored
-        return scored, select(replace(own, wanted=wanted), (*initial, *once))
+        return scored, select(replace(part_of_search, wanted=wanted), (*initial, *once))
 
     pairs = []
     # threads: the work is in compiled code that lets others run, and all folds read the same candidates

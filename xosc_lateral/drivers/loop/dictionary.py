@@ -9,8 +9,8 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.drivers.loop.autocorrelation import Whitener
-from xosc_lateral.drivers.loop.candidates import Candidate
-from xosc_lateral.drivers.loop.significance import MANY_DRIVES
-from xosc_lateral.drivers.loop.timeline import Timeline, coarse_mean, coarse_middle, start_anew
+from xosc_lateral.drivers.loop.candidates import Candidate, candidates_of
+from xosc_lateral.drivers.loop.columns import Column
+from xosc_lateral.drivers.loop.significance import NULL_DRAWS, draw_null
+from xosc_lateral.drivers.loop.timeline import Coarse, Timeline, coarse_mean, coarse_middle, start_anew
 from xosc_lateral.drivers.model.effects import ColumnEffect
 
 SingleArray = NDArray[np.float32]
@@ -32,9 +33,6 @@ Reals = NDArray[np.floating[Any]]
 TIMINGS: Mapping[float, tuple[int, ...]] = {1.0: (-3, -2, -1, 0, 1, 2), 4.0: (-4, -2, 0, 2)}
 # The same for products, of which there are many more. [s]
 PRODUCT_TIMINGS: Mapping[float, tuple[int, ...]] = {2.0: (-2, -1, 0, 1)}
-NULL_DRAWS = 400  # Rotated or re-signed residuals that the null is taken from.
-LEAST_SHIFT_S = 60  # No rotation is shorter: a driver's response must be out of reach. [s]
-BLOCK_S = 300  # Length of the blocks that are dealt in random order: three times the memory that whitening sees. [s]
 # A quantity that rests on fewer seconds than this is not tested: anything may have happened just then. [s]
 MIN_SUPPORT_S = 45.0
 LEFT_OVER = 0.05  # A candidate of which less than this share is left beside what is known is not tested. [-]
@@ -132,10 +130,7 @@ def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:
 
 
 def respond_by_second(values: Reals, response_s: float, drive: IndexArray) -> FloatArray:
-    """Means over each second of a first-order lag of gain 1, settled where a drive starts; like `values`, (n, k).
-
-    Exact for values that stay the same for the second. `drive`: of each row, shape (n,), increasing.
-    """
+    """Means over each second of a first-order lag of gain 1, settled where a drive starts; shape (n, k)."""
     from scipy.signal import lfilter
 
     keep = float(np.exp(-1.0 / response_s))
@@ -156,22 +151,8 @@ def score_entries(
     draws: int = NULL_DRAWS,
     of_mean: bool = True,
 ) -> tuple[FloatArray, FloatArray]:
-    """Squared score of every entry less its cost, -inf if barred, and the largest of each of the null's residuals.
-
-    Parameters
-    ----------
-    residual : array, shape (seconds,)
-        Whitened, valid seconds only.
-    known : array, shape (seconds, k)
-        Orthonormal; partialled out of residual and entries.
-    barred : bool array, shape (entries,)
-    drive : int array, shape (seconds,)
-        Drive that each row is of.
-    draws : int
-        Of the null; without any, no maxima.
-    of_mean : bool
-        Entries shift the mean, so that loudness where they act is no evidence; of a spread it is all there is.
-    """
+    """Squared score of every entry less its cost, -inf if barred, and the largest of each of the null's residuals;
+    beside `known`, orthonormal columns. Loudness where entries act is evidence of a spread, not of a mean."""
     left = beside(known, residual)
     left = left / max(float(np.sqrt(np.mean(left**2))), 1e-300)
     if len(dictionary) == 0 or barred.all():
@@ -200,20 +181,18 @@ def score_entries(
 def _beside_loud_stretches(
     scores: FloatArray, dictionary: Dictionary, left: FloatArray, basis: SingleArray
 ) -> FloatArray:
-    """Scores of the best entries beside the squares of the very rows that they rest on, where these are larger [2]_.
-
-    The null deals residuals anew, and loses that they are larger where the column is: in bends, say.
-    """
+    """Scores of the best entries beside the squares of the very rows that they rest on [2]_: the null loses where they
+    are large."""
     order = np.argsort(-scores)[:ROBUST]
     order = order[np.isfinite(scores[order])]
     rows = dictionary.rows[order].astype(np.float64)
     rows -= (rows @ basis) @ basis.T
     columns = [frozenset(dictionary.candidates[index].effect.columns) for index in order]
     rest = np.empty_like(rows)
-    for own in set(columns):  # what some response to the same columns explains is not loudness
-        alike = [k for k, others in enumerate(columns) if others <= own or own <= others][:RESPONSES]
+    for read in set(columns):  # what some response to the same columns explains is not loudness
+        alike = [k for k, others in enumerate(columns) if others <= read or read <= others][:RESPONSES]
         span = orthonormal(rows[alike].T)
-        rest[[others == own for others in columns]] = beside(span, left)
+        rest[[others == read for others in columns]] = beside(span, left)
     power = np.maximum(np.square(rows).sum(axis=1), TINY)
     weights = np.square(rows) / power[:, None]
     scatter = (weights * np.square(rest)).sum(axis=1)
@@ -235,21 +214,8 @@ def beside_parts(
     spans: Callable[[str], FloatArray],
     within: float,
 ) -> FloatArray:
-    """Scores of products beside all that either column does alone, where that is less: they have to give more.
-
-    Of those alone that may be within a distance of the best. A number that goes with an angle is a vector's component,
-    one quantity and no product of two.
-
-    Parameters
-    ----------
-    scores : array, shape (entries,)
-        As `score_entries` gives them.
-    residual, known
-        As `score_entries` got them.
-    spans : callable
-        Column -> rows that it may explain alone, shape (seconds, k).
-    within : float
-    """
+    """Scores of products, where that is less, beside all that either column does alone (`spans`); not of a vector's
+    components."""
     left = beside(known, residual)
     left = left / max(float(np.sqrt(np.mean(left**2))), 1e-300)
     members: dict[tuple[str, ...], list[int]] = {}
@@ -259,50 +225,17 @@ def beside_parts(
             members.setdefault(candidate.columns, []).append(int(index))
     scores, open_pairs = scores.copy(), set(members)
     while open_pairs:
-        pair = max(open_pairs, key=lambda one: float(scores[members[one]].max()))
+        pair = max(open_pairs, key=lambda columns: float(scores[members[columns]].max()))
         if float(scores[members[pair]].max()) < float(scores.max()) - within:
             break
         open_pairs.remove(pair)
-        own = members[pair]
+        entries = members[pair]
         span = orthonormal(np.concatenate([known, *(spans(column) for column in pair)], axis=1), CROSS_BASIS)
-        rows = beside(span, dictionary.rows[own].astype(np.float64).T)
+        rows = beside(span, dictionary.rows[entries].astype(np.float64).T)
         power = np.square(rows).sum(axis=0)
-        gains = np.square(beside(span, left) @ rows) / np.maximum(power, TINY) - dictionary.costs[own]
-        scores[own] = np.where(power > LEFT_OVER, np.minimum(scores[own], gains), -np.inf)
+        gains = np.square(beside(span, left) @ rows) / np.maximum(power, TINY) - dictionary.costs[entries]
+        scores[entries] = np.where(power > LEFT_OVER, np.minimum(scores[entries], gains), -np.inf)
     return scores
-
-
-def draw_null(residual: FloatArray, drive: IndexArray, rng: np.random.Generator, draws: int = NULL_DRAWS) -> FloatArray:
-    """Residuals whose tie to the columns is broken, shape (seconds, draws).
-
-    Few long drives: rotated by at least `LEAST_SHIFT_S`, cut into blocks, and these dealt in random order. Rotations
-    alone are few: a column that changes within a minute sees no more than fifty of them in a drive of fifty minutes.
-    Many short drives: the sign of each whole drive drawn anew (a wild cluster bootstrap [1]_). Drives are independent,
-    and what an autoregression fitted to runs of a minute leaves in a drive's slow movement and first rows stays beside
-    the columns of that very drive; rotation would spread it evenly.
-
-    References
-    ----------
-    .. [1] A. C. Cameron, J. B. Gelbach, D. L. Miller, "Bootstrap-based improvements for inference with clustered
-       errors", Review of Economics and Statistics 90, 2008.
-    """
-    seconds = len(residual)
-    names, own = np.unique(drive, return_inverse=True)
-    if len(names) >= MANY_DRIVES:
-        return np.asarray(residual[:, None] * rng.choice([-1.0, 1.0], size=(len(names), draws))[own])
-    low = min(LEAST_SHIFT_S, seconds // 4)
-    # in order: where there is but one block, neighbours are alike, and how much so tells how many there are in truth
-    shifts = np.sort(rng.integers(low, max(low + 1, seconds - low), size=draws))
-    drawn = np.empty((seconds, draws))
-    for draw, shift in enumerate(shifts):
-        drawn[:, draw] = in_another_order(np.roll(residual, -shift), BLOCK_S, rng)
-    return drawn
-
-
-def in_another_order(values: FloatArray, length: int, rng: np.random.Generator) -> FloatArray:
-    """Blocks of about a length, dealt in random order, shape (n,) like `values`."""
-    blocks = np.array_split(values, max(1, round(len(values) / length)))
-    return np.concatenate([blocks[index] for index in rng.permutation(len(blocks))])
 
 
 def orthonormal(columns: FloatArray, share: float = 1e-6) -> FloatArray:
@@ -318,3 +251,62 @@ def orthonormal(columns: FloatArray, share: float = 1e-6) -> FloatArray:
 def beside(basis: FloatArray, rows: FloatArray) -> FloatArray:
     """Rows, shape (n,) or (n, k), without what an orthonormal basis, shape (n, rank), explains of them."""
     return np.asarray(rows - basis @ (basis.T @ rows))
+
+
+# Products are tried among so many columns at most, those whose role is known first: sixty more columns must not cost
+# twenty times as much.
+MAX_PRODUCT_COLUMNS = 24
+# Scored dictionaries that are kept, each of tens of megabytes: of the mean and of the spread beside the same fit.
+KEPT_DICTIONARIES = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """What stays the same while terms are selected: columns, candidates before whitening, random streams."""
+
+    coarse: Coarse
+    columns: Mapping[str, Column]  # That may act.
+    quantities: Quantities
+    seed: np.random.SeedSequence
+    levels: Mapping[str, float]  # Family-wise p-value up to which the best of each component counts as found.
+    progress: Callable[[str], None]  # Gets what is being done, in a few words.
+    # How many terms a component has in the table that this is a part of: so many are added, best first, whatever their
+    # p-values, and components that have none are not tested. None: this is the table.
+    wanted: Mapping[str, int] | None = None
+    _kept: dict[tuple[object, int], tuple[object, Any]] = field(default_factory=dict, init=False, repr=False)
+
+    @classmethod
+    def over(
+        cls,
+        coarse: Coarse,
+        columns: list[Column],
+        seed: np.random.SeedSequence,
+        levels: Mapping[str, float],
+        progress: Callable[[str], None] = lambda _: None,
+    ) -> Search:
+        """Evaluate all candidates once."""
+        inside = coarse.timeline.valid
+        seen = {column.name: coarse.context[column.name][inside] for column in columns}
+        candidates = candidates_of(columns, seen, most=MAX_PRODUCT_COLUMNS)
+        quantities = Quantities.of(candidates, coarse.timeline, coarse.context, coarse.valid)
+        return cls(coarse, {column.name: column for column in columns}, quantities, seed, levels, progress)
+
+    def once(self, kind: object, fitted: object, make: Callable[[], Any]) -> Any:
+        """What is worked out once for one kind of term beside one fit; the last few are kept, for one thread."""
+        key = (kind, id(fitted))
+        if key not in self._kept:
+            self._kept[key] = (fitted, make())  # the fit is kept with it: no other has its id meanwhile
+            for old in list(self._kept)[:-KEPT_DICTIONARIES]:
+                del self._kept[old]
+        return self._kept[key][1]
+
+    def cross_basis(self, columns: Collection[str]) -> FloatArray:
+        """What columns can do in any shape, at any lag and response, at 1 Hz, orthonormal, shape (n, rank)."""
+        known = frozenset(columns)
+        members = np.array([known.issuperset(one.columns) for one in self.quantities.candidates], dtype=np.bool_)
+        seconds, valid = np.arange(len(self.coarse)), self.coarse.valid[:, None]
+        blocks = []
+        for response_s, lags in TIMINGS.items():
+            response = self.quantities.responses(np.flatnonzero(members), response_s)
+            blocks += [response[np.clip(seconds - lag, 0, len(seconds) - 1)] * valid for lag in lags]
+        return orthonormal(np.concatenate(blocks, axis=1).astype(np.float64), CROSS_BASIS)

@@ -86,7 +86,7 @@ def find_feedback(
     spectra = {name: segments.spectra(values) for name, values in moved.items()}
     rows = _rows_with_past(timeline.valid, max(OWN_PAST, MOVED_PAST))
     chance = CHANCE / max(1, len(segments.starts))
-    found = []
+    feedback = []
     for column in columns:
         assigned = roles.get(column.name, Assigned(column.name, Role.UNKNOWN, ""))
         if assigned.declared and assigned.role.is_exogenous:
@@ -95,31 +95,35 @@ def find_feedback(
         known = np.isfinite(values)
         values = np.where(known, values, np.median(values[timeline.valid & known]))
         seen, size = (segments.spectra(one) for one in (values, np.abs(values - np.median(values[timeline.valid]))))
-        shared = {name: segments.coherence(seen, own) for name, own in spectra.items()}
+        shared = {name: segments.coherence(seen, is_movement) for name, is_movement in spectra.items()}
         for name in ("size of the offset", "excess of the offset"):
             shared[name] = max(shared[name], segments.coherence(size, spectra[name]))
-        given = {
+        by_function = {
             name: segments.coherence(seen, segments.spectra(_mean_given(values, moved[name], timeline)))
             for name in ("offset", "lateral speed")
         }
         # a switch has hardly any changes that could be predicted
         changes = column.values in (Values.NUMBER, Values.ANGLE)
         predicted = _predicted_share(values, moved, rows) if changes else 0.0
-        of, coherence, function = max(shared, key=lambda name: shared[name]), max(shared.values()), max(given.values())
+        of, coherence, function = (
+            max(shared, key=lambda name: shared[name]),
+            max(shared.values()),
+            max(by_function.values()),
+        )
         is_function = function >= max(FUNCTION, chance)
         clear = predicted >= PREDICTED or (
             coherence >= max(FEEDBACK_COHERENCE, chance) and predicted >= NEGLIGIBLE_SHARE
         )
         doubtful = coherence >= max(DOUBTFUL_COHERENCE, chance) or predicted >= DOUBTFUL_SHARE
         if is_function and not clear:
-            of = max(given, key=lambda name: given[name])
+            of = max(by_function, key=lambda name: by_function[name])
         if assigned.role.is_exogenous:  # a name alone is overruled where both marks are strong
             clear, doubtful = predicted >= PREDICTED and coherence >= max(DOUBTFUL_COHERENCE, chance), False
-        own = assigned.role is Role.OWN
-        if own or clear or is_function or doubtful:
-            sure, source = own or clear or is_function, assigned.source if own else ""
-            found.append(Feedback(column.name, coherence, predicted, function, of, not sure, source))
-    return found
+        is_movement = assigned.role is Role.OWN
+        if is_movement or clear or is_function or doubtful:
+            sure, source = is_movement or clear or is_function, assigned.source if is_movement else ""
+            feedback.append(Feedback(column.name, coherence, predicted, function, of, not sure, source))
+    return feedback
 
 
 def _mean_given(values: FloatArray, movement: FloatArray, timeline: Timeline) -> FloatArray:
@@ -128,11 +132,11 @@ def _mean_given(values: FloatArray, movement: FloatArray, timeline: Timeline) ->
     half = (np.arange(len(values)) // round(PARTS_S / timeline.step)) % 2
     usual, size = float(values[timeline.valid].mean()), int(part.max()) + 1
     result = np.full(len(values), usual)
-    for own in (0, 1):
-        other = timeline.valid & (half != own)
+    for part_of_two in (0, 1):
+        other = timeline.valid & (half != part_of_two)
         count = np.bincount(part[other], minlength=size)
         sums = np.bincount(part[other], values[other], minlength=size)
-        result[half == own] = ((sums + usual) / (count + 1.0))[part[half == own]]
+        result[half == part_of_two] = ((sums + usual) / (count + 1.0))[part[half == part_of_two]]
     return result
 
 
@@ -156,10 +160,10 @@ def _predicted_share(values: FloatArray, moved: Mapping[str, FloatArray], rows: 
     if len(rows) < ROWS_EACH * (1 + OWN_PAST + len(moved) * len(range(0, MOVED_PAST + 1, 2))):
         return 0.0
     now = values[rows]
-    own = [np.ones(len(rows)), *(values[rows - lag] for lag in range(1, OWN_PAST + 1))]
+    past = [np.ones(len(rows)), *(values[rows - lag] for lag in range(1, OWN_PAST + 1))]
     other = [series[rows - lag] for series in moved.values() for lag in range(0, MOVED_PAST + 1, 2)]
-    alone, together = (_left(now, np.stack(design, axis=1)) for design in (own, own + other))
-    freedom = len(rows) / max(1, len(rows) - len(own) - len(other))
+    alone, together = (_left(now, np.stack(design, axis=1)) for design in (past, past + other))
+    freedom = len(rows) / max(1, len(rows) - len(past) - len(other))
     return max(0.0, 1.0 - freedom * together / max(alone, 1e-300)) if alone > 1e-12 * float(np.var(now)) else 0.0
 
 

@@ -60,10 +60,7 @@ def removal_of(fitted: Fitted) -> Removal:
 
 
 def runs_without(timeline: Timeline, removal: Removal, used: BoolArray) -> list[Run]:
-    """Runs of the movement [m] without effects, from the valid rows in `used`, shape (n,); at least `MIN_RUN` long.
-
-    They know class, lane and speed, as far as the table does: what these do to a population is fitted with its base.
-    """
+    """Runs of the movement without effects, from the valid rows in `used`, with what a population is fitted by."""
     runs: list[Run] = []
     known = {name: timeline.context[name] for name in KNOWN_TO_THE_BASE if name in timeline.context}
     for index, name in enumerate(timeline.names):
@@ -122,11 +119,8 @@ class HeldOut:
 
     @property
     def surely_worse(self) -> bool:
-        """Whether the error after is the larger one for whatever drives of this driver might have been measured.
-
-        Half samples less the whole vary about it as the whole does about the truth: added to what was measured, they
-        are other drives of the same length.
-        """
+        """Whether the error after is the larger one for other drives, too: half samples less the whole, added to what
+        was measured."""
         rises = []
         for half in self.halves:
             other = {name: values + np.nan_to_num(half[name]) for name, values in self.real.items()}
@@ -184,11 +178,8 @@ def _held_out_runs(
 def fit_without(
     fitted: Fitted, used: BoolArray, kind: ModelKind, name: str, provenance: Provenance | None
 ) -> DriverProfile:
-    """Base model of what is left without the effects, and the effects.
-
-    Of a population the base holds what class, lane and speed do to the rest, as `fit` has it; the paper's has not.
-    What neighbours do is for the loop to find.
-    """
+    """Base model of what is left without the effects, a population's with class, lane and speed as `fit` has it, and
+    the effects."""
     runs = runs_without(fitted.coarse.timeline, removal_of(fitted), used)
     if not runs:
         raise NotEnoughDataError("closing the loop: no run of 10 s is left to fit the base model on")
@@ -228,8 +219,8 @@ def _quantities(fitted: Fitted, columns: list[Column]) -> dict[str, FloatArray]:
             angle = 2.0 * np.pi / column.period * quantities.pop(column.name)
             quantities |= {f"sin({column.name})": np.sin(angle), f"cos({column.name})": np.cos(angle)}
     for key, (term, effects) in fitted.estimates.items():
-        if (own := term.quantity(coarse, effects)) is not None:
-            quantities[f"effect: {key}"] = own
+        if (quantity := term.quantity(coarse, effects)) is not None:
+            quantities[f"effect: {key}"] = quantity
     return quantities
 
 
@@ -266,8 +257,10 @@ def score_runs(
             sampled = (snippet_metrics(runs[split % len(before)][rows[~half]]) for runs in (before, after))
             gathered.append([metric_distances(real[half], metrics) for metrics in (*sampled, real[~half])])
     far = [mean_distances(list(several)) for several in zip(*gathered, strict=True)]
-    own, other, floor = far or (None, None, None)
-    return Scorecard(own, other, floor, real, snippet_metrics(before[0][rows]), snippet_metrics(after[0][rows]))
+    before_distances, other, floor = far or (None, None, None)
+    return Scorecard(
+        before_distances, other, floor, real, snippet_metrics(before[0][rows]), snippet_metrics(after[0][rows])
+    )
 
 
 def _starts(timeline: Timeline) -> IntArray:

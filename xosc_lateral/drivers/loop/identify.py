@@ -11,11 +11,10 @@ from msgspec import structs
 
 from xosc_lateral.drivers.loop.columns import Assigned, Column, Role, known_columns, roles_of
 from xosc_lateral.drivers.loop.cross_validation import Nested, Progress, nest
-from xosc_lateral.drivers.loop.dictionary import Quantities
+from xosc_lateral.drivers.loop.dictionary import Quantities, Search
 from xosc_lateral.drivers.loop.feedback import Feedback, find_feedback
 from xosc_lateral.drivers.loop.model import Term
 from xosc_lateral.drivers.loop.regression import fit_model
-from xosc_lateral.drivers.loop.search import Search
 from xosc_lateral.drivers.loop.selection import ERROR_BUDGET, Gain, Rejected, Selection, select
 from xosc_lateral.drivers.loop.terms.between import BetweenTerm, is_between
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
@@ -76,18 +75,15 @@ def identify(
     roles: Mapping[str, str] = MappingProxyType({}),
     progress: Progress = lambda share, what: None,
 ) -> Identified:
-    """Select terms, and keep those that predict blocks on which they were neither selected nor sized.
-
-    `initial` terms are in the model already, `excluded` columns are not tested; `roles` are what columns are declared
-    to be, see `columns.roles_of`.
-    """
+    """Select terms beside the `initial` ones, and keep those that predict blocks on which they were neither selected
+    nor sized."""
     from threadpoolctl import threadpool_limits
 
     usable = usable_columns(coarse.timeline, excluded, roles)
     # products of small matrices gain nothing from threads, and lose a factor of ten to them where all cores are busy
     with threadpool_limits(1, user_api="blas"):
         search = Search.over(coarse, usable.columns, seed, ERROR_BUDGET, lambda what: progress(0.1, what))
-        selection = _beside_time(search, select(search, initial))
+        selection = name_time_beside(search, select(search, initial))
         if not selection.accepted:
             return Identified(usable, selection, search.quantities)
         accepted = [one.term for one in selection.accepted]
@@ -99,20 +95,22 @@ def identify(
         return _worst_first(Identified(usable, selection, search.quantities, nested))
 
 
-def _beside_time(search: Search, selection: Selection) -> Selection:
+def name_time_beside(search: Search, selection: Selection) -> Selection:
     """Columns that changed as a change with time would, which explains about as much: either may be why."""
-    for one in selection.accepted:
-        if not isinstance(one.term, MeanTerm | SpreadTerm) or not search.coarse.lasts:
+    for accepted_term in selection.accepted:
+        if not isinstance(accepted_term.term, MeanTerm | SpreadTerm) or not search.coarse.lasts:
             continue
-        without = selection.without([one.term], "").final
-        test = (StepTerm if isinstance(one.term, MeanTerm) else TimeSpreadTerm).test(search, without)
+        without = selection.without([accepted_term.term], "").final
+        test = (StepTerm if isinstance(accepted_term.term, MeanTerm) else TimeSpreadTerm).test(search, without)
         if test is None or test.term is None or not test.term.passes(search, test.p_value, without):
             continue
         by_time = fit_model(search.coarse, (*without.terms, test.term))
         if by_time.log_likelihood > selection.final.log_likelihood - AS_LIKELY:
-            term = replace(one.term, alike=(*one.term.alike, ("time",)))
-            accepted = tuple(replace(other, term=term) if other is one else other for other in selection.accepted)
-            terms = [term if other is one.term else other for other in selection.final.terms]
+            term = replace(accepted_term.term, alike=(*accepted_term.term.alike, ("time",)))
+            accepted = tuple(
+                replace(other, term=term) if other is accepted_term else other for other in selection.accepted
+            )
+            terms = [term if other is accepted_term.term else other for other in selection.final.terms]
             selection = replace(selection, accepted=accepted, final=fit_model(search.coarse, terms))
     return selection
 
@@ -134,10 +132,7 @@ def usable_columns(
 
 
 def initial_terms(base: DriverProfile, timeline: Timeline) -> tuple[Term, ...]:
-    """The base's own effects as far as the table has their columns: they are refitted, not found anew.
-
-    The loop knows responses by one first-order lag, so that several in a row become one that is as late.
-    """
+    """The base's own effects as far as the table has their columns, refitted, several lags in a row as one as late."""
     there = {"lane_width", *timeline.context}
     terms: list[Term] = []
     for effect in base.effects:
@@ -166,26 +161,28 @@ def _same_throughout(effect: ColumnEffect, timeline: Timeline) -> bool:
     return all(np.ptp(own, axis=0).max() == 0.0 for own in inside if len(own))
 
 
-def _worst_first(found: Identified) -> Identified:
+def _worst_first(identified: Identified) -> Identified:
     """Less what loses on blocks that it was not chosen on, the worst first; or nothing, if all together loses."""
-    while found.nested is not None:
-        terms = [one.term for one in found.selection.accepted]
+    while identified.nested is not None:
+        terms = [one.term for one in identified.selection.accepted]
         # each beside those that are kept, and nothing else: a fold's misfit would be blamed on what is right
-        nested = found.nested.only(terms)
+        nested = identified.nested.only(terms)
         gains = [nested.of(term) if term.predictable else None for term in terms]
-        found = replace(found, nested=nested)
+        identified = replace(identified, nested=nested)
         fallen = [(gain.mean, term) for term, gain in zip(terms, gains, strict=True) if gain and not gain.stands]
         if fallen:
-            found = found.without([min(fallen, key=lambda pair: pair[0])[1]], VETOED)
+            identified = identified.without([min(fallen, key=lambda pair: pair[0])[1]], VETOED)
             continue
-        accepted = tuple(replace(one, gain=gain) for one, gain in zip(found.selection.accepted, gains, strict=True))
-        found = replace(found, selection=replace(found.selection, accepted=accepted))
+        accepted = tuple(
+            replace(one, gain=gain) for one, gain in zip(identified.selection.accepted, gains, strict=True)
+        )
+        identified = replace(identified, selection=replace(identified.selection, accepted=accepted))
         if any(gains):
             total = nested.together([term for term, gain in zip(terms, gains, strict=True) if gain])
-            found = replace(found, total=total)
+            identified = replace(identified, total=total)
             if not total.stands:
                 low, high = total.interval
                 why = f"the effects found gain {total.mean:.2f} nat a held-out block ({low:.2f} to {high:.2f})"
-                found = found.without(terms, why)
+                identified = identified.without(terms, why)
         break
-    return found
+    return identified

@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.drivers.loop.autocorrelation import Whitener, fit_autoregression
 from xosc_lateral.drivers.loop.dictionary import beside, orthonormal
-from xosc_lateral.drivers.loop.innovations import MAXIMUM_ORDER, ORDER
-from xosc_lateral.drivers.loop.model import Fitted
+from xosc_lateral.drivers.loop.model import MAXIMUM_ORDER, ORDER, Fitted
 from xosc_lateral.drivers.loop.significance import MINIMUM_P, upper_tail
 from xosc_lateral.drivers.loop.timeline import MIN_DRIFT_S, Coarse
 from xosc_lateral.drivers.model.effects.hidden import half_cosines
@@ -58,29 +57,23 @@ def slow_rows(fitted: Fitted) -> tuple[FloatArray, Whitener]:
 
 
 def low_frequencies(values: FloatArray, coarse: Coarse, valid: BoolArray, shortest_s: float) -> FloatArray:
-    """Cosine transform of each drive that lasts, without the mean and what is quicker, shape (frequencies, k).
-
-    `values` of shape (n, k); the drives one after the other. Of white rows all are independent and of one variance.
-    """
+    """Cosine transform of each drive that lasts, without the mean and what is quicker, shape (frequencies, k)."""
     from scipy.fft import dct
 
-    found = []
+    coefficients = []
     for index in range(coarse.drives):
-        own = values[valid & (coarse.drive == index)]
-        if len(own) >= MIN_DRIFT_S:
-            number = max(round(2.0 * len(own) / shortest_s), max(ORDERS) + LEAST_OTHERS)
-            found.append(dct(own, type=2, norm="ortho", axis=0)[1 : number + 1])
-    return np.concatenate(found) if found else np.zeros((0, values.shape[1]))
+        series = values[valid & (coarse.drive == index)]
+        if len(series) >= MIN_DRIFT_S:
+            number = max(round(2.0 * len(series) / shortest_s), max(ORDERS) + LEAST_OTHERS)
+            coefficients.append(dct(series, type=2, norm="ortho", axis=0)[1 : number + 1])
+    return np.concatenate(coefficients) if coefficients else np.zeros((0, values.shape[1]))
 
 
 def smooth_probabilities(rows: FloatArray, columns: FloatArray, orders: Sequence[int]) -> dict[int, float]:
-    """p-value of the first so many columns, shape (frequencies, k), by an F test at low frequencies alone.
-
-    What is left there says how much chance does, a long-run variance by cosines [1]_: rows need not be white beyond.
-    """
+    """p-value of the first so many columns by F tests at low frequencies alone, which tell what chance does [1]_."""
     from scipy.stats import f
 
-    found = {}
+    p_values = {}
     for order in orders:
         basis = orthonormal(columns[:, :order])
         others = len(rows) - basis.shape[1]
@@ -88,8 +81,8 @@ def smooth_probabilities(rows: FloatArray, columns: FloatArray, orders: Sequence
             explained = float(np.sum(np.square(basis.T @ rows)))
             left = max(float(rows @ rows) - explained, 1e-300)
             ratio = explained / basis.shape[1] / (left / others)
-            found[order] = max(float(f.sf(ratio, basis.shape[1], others)), MINIMUM_P)
-    return found
+            p_values[order] = max(float(f.sf(ratio, basis.shape[1], others)), MINIMUM_P)
+    return p_values
 
 
 def step_moments(coarse: Coarse) -> NDArray[np.intp]:
@@ -100,10 +93,7 @@ def step_moments(coarse: Coarse) -> NDArray[np.intp]:
 
 
 def mean_probability(rows: FloatArray, waves: FloatArray, jumps: FloatArray, rng: np.random.Generator) -> float:
-    """p-value of the best of all smooths and steps at low frequencies: the least p of F tests, against white rows.
-
-    `rows`, shape (frequencies,); `waves` and `jumps`, shape (frequencies, k), may have no columns.
-    """
+    """p-value of the best of all smooths and steps at low frequencies: the least p of F tests, against white rows."""
     from scipy.stats import f
 
     bases = [orthonormal(waves[:, :order]) for order in ORDERS if order <= waves.shape[1]]
@@ -114,11 +104,11 @@ def mean_probability(rows: FloatArray, waves: FloatArray, jumps: FloatArray, rng
         total = np.square(drawn).sum(axis=1)
         tests = [(np.square(drawn @ basis).sum(axis=1), basis.shape[1]) for basis in bases if basis.shape[1]]
         tests += [(np.square(drawn @ unit).max(axis=1), 1)] if unit.shape[1] else []
-        found = []
+        log_p_values = []
         for explained, degrees in tests:
             ratio = explained / degrees / ((total - explained) / (len(rows) - degrees))
-            found.append(-f.logsf(ratio, degrees, len(rows) - degrees))
-        return np.asarray(np.max(found, axis=0))
+            log_p_values.append(-f.logsf(ratio, degrees, len(rows) - degrees))
+        return np.asarray(np.max(log_p_values, axis=0))
 
     # of the logarithm of a least p the tail is exponential, whatever the tests have in common
     return upper_tail(float(surest(rows[None])[0]), surest(rng.normal(size=(STEP_DRAWS, len(rows)))), least_excess=1.0)

@@ -1,35 +1,32 @@
-"""Whether anything is left for the columns to explain: one check over all of them, at all delays, after the search.
+"""What columns can explain of the mean by any course over time: of what is left after the search, and at all.
 
-What the refined profile leaves of the drives, white, is regressed on every column's distributed lag [1]_ in turn. The
-search asks for one delay and one time constant; this asks for any course over time.
+The check regresses what the refined profile leaves of the drives, white, on every column's distributed lag [1]_ in
+turn; it asks for the mean alone, not for the spread. The share of the explainable sets what the effects predict of
+blocks that nothing was chosen or fitted on against a free linear response: every column's course at once, each column's
+weights shrunk by the variance under which they are likeliest [3]_. It names nothing.
 
 References
 ----------
 .. [1] A. Gasparrini, B. Armstrong, M. G. Kenward, "Distributed lag non-linear models", Statistics in Medicine 29, 2010.
 .. [2] H. White, "A heteroskedasticity-consistent covariance matrix estimator", Econometrica 48, 1980.
+.. [3] D. J. C. MacKay, "Bayesian interpolation", Neural Computation 4, 1992: groups' variances by evidence.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray, IntArray
+from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.drivers.loop.autocorrelation import Whitener, positions_in_run
 from xosc_lateral.drivers.loop.candidates import Family
-from xosc_lateral.drivers.loop.dictionary import (
-    CROSS_BASIS,
-    MIN_SUPPORT_S,
-    NULL_DRAWS,
-    Quantities,
-    beside,
-    draw_null,
-    orthonormal,
-)
-from xosc_lateral.drivers.loop.model import Fitted
-from xosc_lateral.drivers.loop.significance import LoopSeed, as_one_degree, upper_tail
+from xosc_lateral.drivers.loop.dictionary import CROSS_BASIS, MIN_SUPPORT_S, Quantities, beside, orthonormal
+from xosc_lateral.drivers.loop.model import Fitted, latent_path
+from xosc_lateral.drivers.loop.significance import NULL_DRAWS, LoopSeed, as_one_degree, draw_null, upper_tail
+from xosc_lateral.drivers.loop.timeline import Coarse
 from xosc_lateral.drivers.model.seeds import generator
 
 # Delays between which a course over time is linear: from what a driver sees ahead to where a bend has long ended. [s]
@@ -52,18 +49,15 @@ class Omnibus:
 
 
 def weights_of(delays: tuple[float, ...]) -> FloatArray:
-    """Of whole seconds, from the first delay to the last, in kernels that rise to each delay from the one before and
-    fall to the next, each of gain 1; shape (delays, seconds). [-]"""
+    """Of whole seconds in kernels of gain 1 that rise to each delay from the one before and fall to the next, shape
+    (delays, n)."""
     seconds = np.arange(delays[0], delays[-1] + 1.0)
     weights = np.stack([np.interp(seconds, delays, unit) for unit in np.eye(len(delays))])
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
 
 def tents(values: FloatArray, delays: tuple[float, ...], drive: IndexArray) -> FloatArray:
-    """Values by the second [any unit], shape (n,), through the kernels of `weights_of`; shape (n, delays).
-
-    Before the first and after the last row of a drive its outermost row holds.
-    """
+    """Values by the second, shape (n,), through the kernels of `weights_of`, outermost rows held; shape (n, delays)."""
     first, last = np.searchsorted(drive, drive, side="left"), np.searchsorted(drive, drive, side="right") - 1
     rows, reach = np.arange(len(values)), np.arange(int(delays[0]), int(delays[-1]) + 1)
     shifted = np.stack([values[np.clip(rows - late, first, last)] for late in reach], axis=1)
@@ -77,11 +71,8 @@ def smooth_covariance(number: int) -> FloatArray:
 
 
 def amid_runs(valid: BoolArray) -> BoolArray:
-    """Rows whose delays stay within their own run, shape (n,).
-
-    Runs begin and end with a lane change, say, and so do courses of what changes with it; what a car does just then is
-    its end, and no response.
-    """
+    """Rows whose delays stay within their run, shape (n,): what a car does where a run ends in a lane change is no
+    response."""
     before = positions_in_run(valid)
     after = positions_in_run(valid[::-1])[::-1]
     return np.asarray((before >= DELAYS[-1]) & (after >= -DELAYS[0]))
@@ -91,15 +82,15 @@ def courses(
     quantities: Quantities, whitener: Whitener, amid: BoolArray, only: tuple[str, ...] = ()
 ) -> dict[tuple[str, ...], FloatArray]:
     """What plain shapes of every column, or of one, can do over time: white, orthonormal, shape (rows amid, rank)."""
-    found: dict[tuple[str, ...], list[FloatArray]] = {}
+    responses: dict[tuple[str, ...], list[FloatArray]] = {}
     compact, valid = whitener.compact, whitener.valid
     for candidate, values in zip(quantities.candidates, quantities.values, strict=True):
         if candidate.family is Family.PLAIN and (not only or candidate.columns == only):
             moved = tents(values.astype(np.float64), DELAYS, quantities.drive)[valid]
             rows, power = compact.rows(moved)[amid[valid]], float(np.square(moved).sum())
             if float(np.square(rows).sum()) > 1e-9 * power:  # it varies within drives
-                found.setdefault(candidate.columns, []).append(rows)
-    return {columns: orthonormal(np.concatenate(rows, axis=1), CROSS_BASIS) for columns, rows in found.items()}
+                responses.setdefault(candidate.columns, []).append(rows)
+    return {columns: orthonormal(np.concatenate(rows, axis=1), CROSS_BASIS) for columns, rows in responses.items()}
 
 
 def check_remainder(
@@ -110,10 +101,8 @@ def check_remainder(
     *,
     only: tuple[str, ...] = (),
 ) -> Omnibus:
-    """Whether any column predicts what a fit leaves better than the same innovations in another order.
-
-    But for those `taken`; `only`: of the null all columns, of the innovations as they are this one.
-    """
+    """Whether any column not `taken`, or `only` one, predicts what a fit leaves better than the innovations in another
+    order."""
     whitener, coarse = fitted.whitener, fitted.coarse
     amid = amid_runs(whitener.valid)
     if amid.sum() < MIN_SUPPORT_S:
@@ -138,11 +127,106 @@ def check_remainder(
 
 
 def _beside_loud_rows(basis: FloatArray, rows: FloatArray) -> float:
-    """Squares that an orthonormal basis explains, or, if that is less, beside the squares of the rows it rests on [2]_.
-
-    The null keeps how large innovations are, not where.
-    """
+    """Squares that an orthonormal basis explains, or less, beside the squares of the rows it rests on [2]_."""
     scores = basis.T @ rows
     left = rows - basis @ scores
     weighed = basis * (left / max(float(np.sqrt(np.mean(left**2))), 1e-300))[:, None]
     return min(float(scores @ scores), float(scores @ np.linalg.pinv(weighed.T @ weighed) @ scores))
+
+
+ROUNDS = 30  # Of variances and weights by turns.
+VARIANCE_LIMITS = (1e-6, 1e3)  # Within which a column's variance is kept, for whitened rows of variance 1. [-]
+
+
+@dataclass(frozen=True, slots=True)
+class Explained:
+    """Gains of the mean in log score over the base, per held-out block. [nat]"""
+
+    after: float  # Of the effects that each fold found.
+    free: float  # Of the free linear response.
+    free_error: float  # Standard error of it.
+    share: float  # The one over the other. [-]
+    error: float  # Standard error of the share. [-]
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval of the share. [-]"""
+        return self.share - NORMAL_95 * self.error, self.share + NORMAL_95 * self.error
+
+    @property
+    def is_known(self) -> bool:
+        """Whether there is anything to explain: the free response surely gains."""
+        return self.free > NORMAL_95 * self.free_error
+
+
+def explained_share(
+    starts: Sequence[Fitted], finals: Sequence[Fitted], quantities: Quantities, coarse: Coarse, blocks: IntArray
+) -> Explained | None:
+    """What each fold's effects, and its free response, predict of rows that it was not fitted on; None if nothing can
+    be held out."""
+    courses = _courses(quantities)
+    if len(finals) < 2 or not courses.shape[1]:
+        return None
+    gains = np.zeros((2, len(blocks)))
+    for fold, (start, final) in enumerate(zip(starts, finals, strict=True)):
+        held = (blocks % len(finals) == fold) & coarse.valid
+        whitener = final.whitener
+        free = courses @ _free_weights(courses, start, whitener)
+        paths = (_path(start), _path(final), _path(start) + free)
+        before, *better = (_squares(whitener, final.coarse.offset - path, held) for path in paths)
+        gains += 0.5 * (before - np.asarray(better)) / max(float(before[held].mean()) if held.any() else 1.0, 1e-300)
+    numbers = np.unique(blocks[coarse.valid])
+    by_effects, by_columns = (np.bincount(blocks, rows)[numbers] for rows in gains)
+    number, total = len(numbers), float(by_columns.sum())
+    share = float(by_effects.sum()) / total if total else 0.0
+    scatter = float(np.sqrt(number / max(number - 1, 1) * np.sum(np.square(by_effects - share * by_columns))))
+    error = float(np.std(by_columns, ddof=1) / np.sqrt(number)) if number > 1 else np.inf
+    return Explained(
+        float(by_effects.mean()), float(by_columns.mean()), error, share, scatter / max(abs(total), 1e-300)
+    )
+
+
+def _path(fitted: Fitted) -> FloatArray:
+    """Mean by the terms that say where a car is on rows that they were not fitted on, shape (n,). [m]"""
+    paths = [latent_path(term, fitted) for term in fitted.terms if term.seen_held_out]
+    return np.asarray(np.sum([np.zeros(len(fitted.coarse)), *paths], axis=0))
+
+
+def _courses(quantities: Quantities) -> FloatArray:
+    """All columns' plain shapes at all delays, shape (n, columns * delays), such that smooth weights are white."""
+    root = np.linalg.cholesky(smooth_covariance(len(DELAYS)))
+    plain = [
+        values.astype(np.float64)
+        for candidate, values in zip(quantities.candidates, quantities.values, strict=True)
+        if candidate.family is Family.PLAIN
+    ]
+    blocks = [tents(values, DELAYS, quantities.drive) @ root for values in plain]
+    return np.concatenate([np.zeros((len(quantities.drive), 0)), *blocks], axis=1)
+
+
+def _free_weights(courses: FloatArray, start: Fitted, whitener: Whitener) -> FloatArray:
+    """Weights of the free response, shape (columns * delays,), from the rows that a fold is fitted on. [m]"""
+    valid = whitener.valid
+    known = orthonormal(whitener.rows(start.columns)[valid])
+    rows = beside(known, whitener.rows(start.coarse.offset - start.columns @ start.sizes)[valid])
+    noise = max(float(np.sqrt(np.mean(rows**2))), 1e-300)
+    design = beside(known, whitener.rows(courses)[valid])
+    gram, products = design.T @ design, design.T @ (rows / noise)
+    size = len(DELAYS)
+    variance = np.full(len(products) // size, 1.0 / max(float(np.trace(gram)), 1e-300))
+    scale = 1.0 / max(float(np.trace(gram)) / len(products), 1e-300)
+    weights = np.zeros(len(products))
+    for _ in range(ROUNDS):
+        inverse = np.linalg.inv(gram + np.diag(np.repeat(1.0 / variance, size)))
+        weights = inverse @ products
+        left = np.diag(inverse).reshape(-1, size).sum(axis=1)
+        known_part = size - left / variance  # of its weights, how many the rows know
+        variance = np.square(weights).reshape(-1, size).sum(axis=1) / np.maximum(known_part, 1e-9)
+        variance = np.clip(variance, scale * VARIANCE_LIMITS[0], scale * VARIANCE_LIMITS[1])
+    return np.asarray(weights * noise)
+
+
+def _squares(whitener: Whitener, values: FloatArray, held: BoolArray) -> FloatArray:
+    """Whitened squares where held, shape (n,), else 0; levels are the held rows' own. [-]"""
+    there = Whitener(whitener.process, held, whitener.drive, whitener.scale)
+    return np.where(held, np.square(there.rows(np.where(held, values, 0.0))), 0.0)

@@ -18,10 +18,8 @@ LONGEST_S = 60.0  # Where a column stays for longer, all that there is to see is
 
 @dataclass(frozen=True, eq=False)
 class Passage:
-    """A column that goes from its usual value to a high one and back, and where the car is meanwhile.
-
-    The column is on the 0.2 s grid, the path by the second; both begin `BEFORE_S` before the column changes.
-    """
+    """A column, on the 0.2 s grid, that goes from its usual value to a high one and back, and the car's path by the
+    second."""
 
     column: FloatArray = field(repr=False)  # shape (fine n,), in its own unit.
     usual: float
@@ -57,11 +55,8 @@ class Passage:
 
 
 def typical_passage(coarse: Coarse, effect: ColumnEffect) -> Passage:
-    """From the median of an effect's only column to its 95 % quantile, or to the 5 % one if that is twice as far.
-
-    It lasts as long as stretches beyond half the way do in the median, and rises and falls as steeply as they. Of a
-    column that is empty where there is none, from none to the median.
-    """
+    """From a column's median to its farther 95 % or 5 % quantile, or from none to the median, as long and steep as in
+    the median."""
     timeline = coarse.timeline
     values = coarse.context[effect.columns[0]]
     known = timeline.valid & np.isfinite(values)

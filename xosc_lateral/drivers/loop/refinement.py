@@ -36,13 +36,12 @@ LAG_LIMIT = 5.0  # Longest lag either way. [s]
 
 
 def explains_as_much(chosen: FloatArray, other: FloatArray, observed: FloatArray, cluster: IntArray) -> bool:
-    """Whether squared residuals of two regressions differ by no more than they scatter from cluster to cluster.
-
-    Neither has to be true, nor one a part of the other. `chosen` and `other`, shape (n, k) and (n, j): white columns;
-    `observed`, shape (n,): white; `cluster`, shape (n,): rows of one cluster are not independent.
-    """
-    one, two = (np.square(observed - own @ np.linalg.lstsq(own, observed, rcond=None)[0]) for own in (chosen, other))
-    sums = np.bincount(np.unique(cluster, return_inverse=True)[1], two - one)
+    """Whether squared residuals of two white regressions, nested or not, differ by no more than they scatter by
+    cluster."""
+    first, second = (
+        np.square(observed - own @ np.linalg.lstsq(own, observed, rcond=None)[0]) for own in (chosen, other)
+    )
+    sums = np.bincount(np.unique(cluster, return_inverse=True)[1], second - first)
     return len(sums) < 2 or float(sums.sum()) <= CLEARLY * float(np.sqrt(len(sums)) * np.std(sums, ddof=1))
 
 
@@ -56,10 +55,8 @@ class Refined:
 
 
 class Refinement:
-    """Scores effects beside everything known, many at once.
-
-    `known`, shape (seconds, k), is orthonormal, and partialled out; `costs` are those of a member of each family.
-    """
+    """Scores many effects at once beside everything `known` (orthonormal, shape (seconds, k)), with each family's
+    `costs`."""
 
     def __init__(self, coarse: Coarse, problem: Problem, known: FloatArray, costs: Mapping[Family, float]) -> None:
         self._coarse, self._problem, self._costs = coarse, problem, costs
@@ -88,8 +85,8 @@ class Refinement:
 
     def as_good(self, chosen: ColumnEffect, other: ColumnEffect) -> bool:
         """Whether another effect would explain as much, as far as the rows can tell."""
-        one, two = (self._rows(self._response(effect)).astype(np.float64) for effect in (chosen, other))
-        return explains_as_much(one, two, self._left, self._coarse.cluster[self._problem.whitener.valid])
+        first, second = (self._rows(self._response(effect)).astype(np.float64) for effect in (chosen, other))
+        return explains_as_much(first, second, self._left, self._coarse.cluster[self._problem.whitener.valid])
 
     def _rows(self, responses: FloatArray) -> FloatArray:
         """White, beside what is known; in single precision, which tells responses apart as well in half the time."""
@@ -107,10 +104,8 @@ class Refinement:
         return float(np.square(unit.T @ self._left).sum() - (rows.shape[1] - 1) * np.log(len(self._left)))
 
     def _response(self, effect: ColumnEffect) -> FloatArray:
-        """Response at 1 Hz, standardised, shape (n, k); on the fine grid, as the fit has it, and in whole steps of it.
-
-        Responding at 1 Hz is another filter, whose best time constant is too short and whose size is too small.
-        """
+        """Response at 1 Hz, standardised, shape (n, k), by the fine grid, as the fit has it: at 1 Hz a lag is another
+        filter."""
         timeline, shape = self._coarse.timeline, structs.replace(effect, lag_s=0.0, response_s=0.0)
         if shape not in self._quantities:
             values = shape.response(timeline.step, self._coarse.context)
@@ -130,10 +125,8 @@ class Refinement:
         return Refined(several[at][0], float(scores[at]), several[at][1]) if scores[at] > best.score else best
 
     def _shapes(self, effect: ColumnEffect, columns: Mapping[str, Column]) -> Iterator[Priced]:
-        """Other shapes of the same column, and other scales and centres of a product's factors, with what each costs.
-
-        A finer choice than the dictionary's makes the family as many times as large.
-        """
+        """Other shapes of the column, scales and centres of a product's factors, each with its price: a finer choice
+        costs more."""
         if isinstance(effect, Product):
             others = [*other_scales(effect, FINE_SCALES), *other_centres(effect, self._coarse)]
             price = self._costs.get(Family.PRODUCT, 0.0) + 2.0 * float(np.log(max(1, len(others))))

@@ -17,8 +17,7 @@ import numpy as np
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.drivers.fitting.regression import clustered_least_squares, small_sample_factor
 from xosc_lateral.drivers.loop.autocorrelation import Whitener, fit_autoregression, start_factors, unbiased
-from xosc_lateral.drivers.loop.innovations import CLIP, MAXIMUM_ORDER, ORDER, own_levels
-from xosc_lateral.drivers.loop.model import Fitted, Term, joined
+from xosc_lateral.drivers.loop.model import CLIP, MAXIMUM_ORDER, ORDER, Fitted, Term, joined, own_levels
 from xosc_lateral.drivers.loop.timeline import CLUSTER_S, Coarse, means_by_drive
 
 # White noise that the model of a drive has beside what it shows: no table knows the lane better (in the motorway
@@ -32,8 +31,7 @@ ROUNDS = 4  # Turns of sizes, autoregression and scale; they settle in three.
 
 
 def design_of(coarse: Coarse, terms: Sequence[Term]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Columns of the mean and of the log scale, term by term, shape (n, k) and (n, j), and the log scale that terms
-    know as a whole, shape (n,). [-]"""
+    """Columns of the mean and of the log scale, shape (n, k) and (n, j), and the log scale known as a whole."""
     columns = joined([term.mean_columns(coarse) for term in terms], len(coarse))
     scales = joined([term.scale_columns(coarse) for term in terms], len(coarse))
     known = [scale for term in terms if (scale := term.known_scale(coarse)) is not None]
@@ -80,10 +78,7 @@ def fit_model(coarse: Coarse, terms: Sequence[Term]) -> Fitted:
 
 
 def _sizes_of(design: FloatArray, observed: FloatArray, cluster: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Sizes, shape (k,), and their covariance, shape (k, k).
-
-    Loud seconds come together, and a column may come with them; and what whitening leaves of the memory counts too.
-    """
+    """Sizes, shape (k,), and their covariance, shape (k, k), clustered: loud seconds come in groups, as columns do."""
     sizes, covariance = clustered_least_squares(design, observed, cluster)
     clusters = len(np.unique(cluster[design.any(axis=1)]))
     return sizes, covariance * small_sample_factor(clusters, *design.shape)

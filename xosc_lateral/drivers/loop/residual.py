@@ -59,31 +59,31 @@ class SummaryStatistics:
         used = used & timeline.valid
         slow = local_mean(offset, timeline.valid, LOCAL_S, timeline.step)
         fast = offset - slow
-        found: dict[str, FloatArray] = {}
+        statistics: dict[str, FloatArray] = {}
         for name, label in self.labels.items():
             mean, spread = _by_bin(offset, label, used), np.sqrt(_by_bin(fast**2, label, used))
             if name != "time":
-                found[f"mean by {name}"] = mean
-            found[f"spread by {name}"] = spread
-        found["movement by band"] = _bands(offset, used, timeline)
+                statistics[f"mean by {name}"] = mean
+            statistics[f"spread by {name}"] = spread
+        statistics["movement by band"] = _bands(offset, used, timeline)
         if self.oscillation is not None:
-            found[OSCILLATION] = np.array([_amplitude(offset, used, timeline, self.oscillation)])
+            statistics[OSCILLATION] = np.array([_amplitude(offset, used, timeline, self.oscillation)])
         local = np.sqrt(local_mean(fast**2, timeline.valid, LOCAL_S, timeline.step))
         inside = local[used]
-        found["quantiles of local spread"] = (
+        statistics["quantiles of local spread"] = (
             np.quantile(inside, LOCAL_QUANTILES) if len(inside) else np.full(len(LOCAL_QUANTILES), np.nan)
         )
-        return found
+        return statistics
 
     def shares(self, half: BoolArray) -> dict[str, FloatArray]:
         """Share of each bin's rows that are in a part of them, shape (n,), by group of statistics. [-]"""
-        found = {}
+        shares = {}
         for name, label in self.labels.items():
             inside, size = self.timeline.valid & (label >= 0), int(label.max()) + 1
             total = np.bincount(label[inside], minlength=size)
             share = np.bincount(label[inside & half], minlength=size) / np.maximum(total, 1)
-            found[f"mean by {name}"] = found[f"spread by {name}"] = share
-        return found
+            shares[f"mean by {name}"] = shares[f"spread by {name}"] = share
+        return shares
 
 
 def statistics_of(
@@ -110,10 +110,7 @@ def simulated_runs(
     runs: int | None = None,
     held: BoolArray | None = None,
 ) -> FloatArray:
-    """Free runs [m] of a profile under the drives' context, shape (runs, n); 0 outside the drives.
-
-    With `held`, shape (n,), drives that have no such row are left out.
-    """
+    """Free runs of a profile under the drives' context, shape (runs, n) [m]; without drives that have no row `held`."""
     if runs is None:
         runs = FEW_RUNS if len(timeline.names) >= MANY_DRIVES else N_RUNS
     result = np.zeros((runs, len(timeline)))
@@ -151,21 +148,20 @@ def error_between(first: Mapping[str, FloatArray], second: Mapping[str, FloatArr
 def half_samples(
     statistics: SummaryStatistics, offset: FloatArray, blocks: IntArray, rng: np.random.Generator, draws: int = DRAWS
 ) -> list[dict[str, FloatArray]]:
-    """Random halves of the blocks less all of them: their variance is that of all of them about the truth [2]_.
-
-    `offset`, shape (n,) [m]: measured, less the effects on the mean that are known: where the car should be is no
-    chance. `blocks`, shape (n,): what is drawn, as a whole.
-    """
+    """Random halves of the blocks less all of them, which vary as all about the truth [2]_; of offsets less the mean's
+    effects."""
     valid = statistics.timeline.valid
     numbers, whole = np.unique(blocks[valid]), statistics.describe(offset, valid)
-    found = []
+    differences = []
     for _ in range(draws):
         rows = np.isin(blocks, rng.permutation(numbers)[: len(numbers) // 2])
         half, shares = statistics.describe(offset, rows), statistics.shares(rows)
         # a share p of the rows less all of them has a variance of (1 - p) / p times that of all
         odds = {name: share / np.maximum(1.0 - share, 1e-9) for name, share in shares.items()}
-        found.append({name: (values - whole[name]) * np.sqrt(odds.get(name, 1.0)) for name, values in half.items()})
-    return found
+        differences.append(
+            {name: (values - whole[name]) * np.sqrt(odds.get(name, 1.0)) for name, values in half.items()}
+        )
+    return differences
 
 
 def size_of(differences: Mapping[str, FloatArray]) -> float:
@@ -191,11 +187,8 @@ class GroupError:
 
 @dataclass(frozen=True, eq=False)
 class LackOfFit:
-    """What is left after the loop, beside the sampling error of what is measured, in [m].
-
-    `floors`: standard error of every statistic; `floor`: mean distance of half samples; `unexplained`: part of the
-    error after that it does not cover; `p_value`: share of half samples that are as far off as the refined profile.
-    """
+    """What is left after the loop beside the sampling error of what is measured [m], and the share of half samples as
+    far off."""
 
     floors: Mapping[str, FloatArray]
     groups: tuple[GroupError, ...]

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.base.plugins import defined_in
 from xosc_lateral.drivers.loop import terms
+from xosc_lateral.drivers.loop.dictionary import Search
 from xosc_lateral.drivers.loop.model import Fitted, Stage, Term
 from xosc_lateral.drivers.loop.regression import fit_model
-from xosc_lateral.drivers.loop.search import Search
 from xosc_lateral.drivers.loop.significance import BUDGET
 
 # Every term that a file of `terms` defines, by the file's name.
@@ -24,11 +24,7 @@ def in_stages(kinds: tuple[type[Term], ...]) -> tuple[tuple[type[Term], ...], ..
 
 
 def shared_among(kinds: tuple[type[Term], ...]) -> dict[str, float]:
-    """Part of the error budget of every component, by the terms' own weights; those of one component share a part.
-
-    Where nothing can be asked of a component, its part is not spent: a table on which something acts is searched again
-    beside it, at the same levels.
-    """
+    """Part of the error budget of every component, by the terms' own weights; those of one component share a part."""
     weights = {kind.component: kind.weight for kind in kinds}
     return {component: BUDGET * weight / sum(weights.values()) for component, weight in weights.items()}
 
@@ -53,14 +49,11 @@ class Gain:
 
     @property
     def stands(self) -> bool:
-        """Whether the held-out blocks leave a significant term standing: no loss by a standard error [1]_.
+        """Whether the held-out blocks leave a significant term standing: no loss by a standard error (Breiman et al.
+        1984).
 
         They are a veto, not a second proof: beside a gain of 12 nat over all blocks chance alone gives 6 either way,
         and what a fold gets wrong of lag, shape and size is lost on top. What no fold found again does not stand.
-
-        References
-        ----------
-        .. [1] L. Breiman, J. Friedman, R. Olshen, C. Stone, "Classification and Regression Trees", 1984, section 3.4.3.
         """
         return self.mean + self.error > 0.0
 
@@ -132,30 +125,30 @@ def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
                     rejected[component] = Rejected(component, test.columns, test.p_value, why)
             if not passed:
                 break
-            p_value, new, test = min(passed, key=lambda one: one[0])
-            former = [one for one in accepted if one.term is test.instead_of]
-            accepted = [one for one in accepted if one not in former]
-            accepted += [Accepted(term, min([p_value, *(one.p_value for one in former)])) for term in new]
+            p_value, new, test = min(passed, key=lambda candidate: candidate[0])
+            former = [candidate for candidate in accepted if candidate.term is test.instead_of]
+            accepted = [candidate for candidate in accepted if candidate not in former]
+            accepted += [Accepted(term, min([p_value, *(candidate.p_value for candidate in former)])) for term in new]
             seen_at = {}
             fitted = test.after or fit_model(search.coarse, (*fitted.terms, *new))
     selection = Selection(tuple(accepted), tuple(rejected.values()), start, fitted)
-    for one in accepted:
-        selection = _tested_again(search, selection, one)
+    for candidate in accepted:
+        selection = _tested_again(search, selection, candidate)
     return selection
 
 
-def _tested_again(search: Search, selection: Selection, one: Accepted) -> Selection:
+def _tested_again(search: Search, selection: Selection, candidate: Accepted) -> Selection:
     """The same without a term that no longer stands beside what was found after it.
 
     Rotations keep how loud the movement is, not where: a column that goes along with loud stretches scores on the mean.
     And what no column explained may be explained by one that was found later.
     """
-    if one not in selection.accepted:
+    if candidate not in selection.accepted:
         return selection
-    later = [other.term for other in selection.accepted[selection.accepted.index(one) + 1 :]]
-    if not any(one.term.may_be_explained_by(term, search.coarse) for term in later):
+    later = [other.term for other in selection.accepted[selection.accepted.index(candidate) + 1 :]]
+    if not any(candidate.term.may_be_explained_by(term, search.coarse) for term in later):
         return selection
-    without = selection.without([one.term], "what was found after it explains it")
-    search.progress(f"looking at {one.term.component.replace('_', ' ')} again")
-    p_value = one.term.probability_beside(search, without.final)
-    return selection if one.term.passes(search, p_value, without.final) else without
+    without = selection.without([candidate.term], "what was found after it explains it")
+    search.progress(f"looking at {candidate.term.component.replace('_', ' ')} again")
+    p_value = candidate.term.probability_beside(search, without.final)
+    return selection if candidate.term.passes(search, p_value, without.final) else without

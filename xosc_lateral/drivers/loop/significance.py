@@ -6,7 +6,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.arrays import FloatArray, IndexArray
 
 
 class LoopSeed(IntEnum):
@@ -45,22 +45,9 @@ def upper_tail(
     """Probability, `MINIMUM_P` to 1, that chance gives `score` or more. [-]
 
     What many independent draws reach has their share. Beyond, the null's tail falls as an exponential, whose scale is
-    known from no more than the draws in it: integrated over what it may be, the tail is a power [1]_, which an
-    exponential of the mean excess would put too low by a factor of 2 at 1e-3, of 4 at 1e-4, for 25 draws.
-
-    Parameters
-    ----------
-    score : float
-    null : array, shape (n,)
-        Scores under the null. Draws that resemble each other, as those of neighbouring rotations do, are neighbours.
-    tail_share : float
-        Share of the null that its tail is fitted on.
-    least_excess : float
-        The tail's scale is no smaller, in the scores' unit.
-
-    References
-    ----------
-    .. [1] J. Aitchison, I. R. Dunsmore, "Statistical Prediction Analysis", Cambridge 1975, chapter 2.
+    known from no more than the draws in it: integrated over what it may be, the tail is a power (Aitchison, Dunsmore
+    1975), which an exponential of the mean excess would put too low by a factor of 2 at 1e-3, of 4 at 1e-4, for 25
+    draws.
     """
     if len(null) == 0:
         return 1.0
@@ -75,15 +62,7 @@ def upper_tail(
 
 
 def effective_number(draws: FloatArray) -> float:
-    """Independent draws that tell as much about a mean as these do, by their autocorrelation [1]_; 1 to n.
-
-    `draws`, shape (n,): in an order in which those that resemble each other are neighbours.
-
-    References
-    ----------
-    .. [1] C. J. Geyer, "Practical Markov chain Monte Carlo", Statistical Science 7, 1992: sums of two neighbouring lags
-       up to the first that is not positive.
-    """
+    """Independent draws that tell as much about a mean as these do, by their autocorrelation (Geyer 1992); 1 to n."""
     n = len(draws)
     left = draws - draws.mean()
     power = float(left @ left)
@@ -102,3 +81,40 @@ def as_one_degree(chi_square: FloatArray | float, degrees: int) -> FloatArray:
     from scipy.stats import chi2
 
     return np.asarray(chi2.isf(np.maximum(chi2.sf(chi_square, degrees), MINIMUM_P), 1))
+
+
+NULL_DRAWS = 400  # Rotated or re-signed residuals that the null is taken from.
+
+
+LEAST_SHIFT_S = 60  # No rotation is shorter: a driver's response must be out of reach. [s]
+
+
+BLOCK_S = 300  # Length of the blocks that are dealt in random order: three times the memory that whitening sees. [s]
+
+
+def draw_null(residual: FloatArray, drive: IndexArray, rng: np.random.Generator, draws: int = NULL_DRAWS) -> FloatArray:
+    """Residuals whose tie to the columns is broken, shape (seconds, draws).
+
+    Few long drives: rotated by at least `LEAST_SHIFT_S`, cut into blocks, and these dealt in random order. Rotations
+    alone are few: a column that changes within a minute sees no more than fifty of them in a drive of fifty minutes.
+    Many short drives: the sign of each whole drive drawn anew (a wild cluster bootstrap; Cameron, Gelbach, Miller
+    2008). Drives are independent, and what an autoregression fitted to runs of a minute leaves in a drive's slow
+    movement and first rows stays beside the columns of that very drive; rotation would spread it evenly.
+    """
+    seconds = len(residual)
+    names, drive_number = np.unique(drive, return_inverse=True)
+    if len(names) >= MANY_DRIVES:
+        return np.asarray(residual[:, None] * rng.choice([-1.0, 1.0], size=(len(names), draws))[drive_number])
+    low = min(LEAST_SHIFT_S, seconds // 4)
+    # in order: where there is but one block, neighbours are alike, and how much so tells how many there are in truth
+    shifts = np.sort(rng.integers(low, max(low + 1, seconds - low), size=draws))
+    drawn = np.empty((seconds, draws))
+    for draw, shift in enumerate(shifts):
+        drawn[:, draw] = in_another_order(np.roll(residual, -shift), BLOCK_S, rng)
+    return drawn
+
+
+def in_another_order(values: FloatArray, length: int, rng: np.random.Generator) -> FloatArray:
+    """Blocks of about a length, dealt in random order, shape (n,) like `values`."""
+    blocks = np.array_split(values, max(1, round(len(values) / length)))
+    return np.concatenate([blocks[index] for index in rng.permutation(len(blocks))])

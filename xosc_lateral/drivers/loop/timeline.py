@@ -73,10 +73,8 @@ class Timeline:
         return [slice(int(first), int(last)) for first, last in pairwise(edges)]
 
     def respond(self, values: FloatArray, lag_s: float, response_s: float) -> FloatArray:
-        """`effects.response.respond` drive by drive: shape of `values`, (n,) or (n, k), in their unit.
-
-        A lag of a minute would outlast the pad between two drives, so that one would respond to what the other met.
-        """
+        """`effects.response.respond` drive by drive, of `values`, shape (n,) or (n, k): a lag of a minute outlasts the
+        pad."""
         response = respond(values, self.step, lag_s, response_s)
         if response_s <= 0.0:
             return response
@@ -94,10 +92,7 @@ class Timeline:
 
 
 def missing_throughout(values: FloatArray, timeline: Timeline) -> BoolArray:
-    """Rows of drives of ten minutes and more without a single value, shape (n,), while other drives have some.
-
-    Ten minutes without meeting anybody are no road: the column was not measured, which says which drive it is.
-    """
+    """Rows of drives of ten minutes and more without a single value: what was not measured says which drive it is."""
     there, gone = np.isfinite(values) & timeline.valid, np.zeros(len(values), dtype=np.bool_)
     for span in timeline.spans:
         lasting = timeline.valid[span].sum() * timeline.step >= MIN_DRIFT_S
@@ -116,10 +111,7 @@ def unsized(effect: ColumnEffect) -> ColumnEffect:
 
 
 def join_drives(drives: Sequence[Drive], rules: CutRules = TRACE_RULES) -> Timeline:
-    """Put drives on one grid.
-
-    Raises `NotEnoughDataError` when less than two minutes of road-following are left.
-    """
+    """Put drives on one grid; refuses less than two minutes of road-following (`NotEnoughDataError`)."""
     kept, periods = grid_drives(drives, rules, pad=PAD, multiple=COARSE)
     valid_s = STEP * sum(float(part.valid.sum()) for part in kept)
     if valid_s < MIN_VALID_S:
@@ -176,16 +168,9 @@ def means_by_drive(values: FloatArray, valid: BoolArray, drive: IntArray) -> Flo
 def start_anew(
     response: FloatArray, values: NDArray[np.floating[Any]], keep: float, drive: NDArray[np.intp]
 ) -> FloatArray:
-    """A first-order lag over drives in a row, less what it carries over: settled where each drive starts.
-
-    What is constant within drives must stay so: a threshold or a cell's edge would tell what is left of the drive
-    before.
-
-    `response`, shape (n,) or (n, k): of the lag, to `values` of the same shape; `keep`: what the lag keeps of itself
-    from row to row; `drive`, shape (n,): increasing.
-    """
-    _, starts, own = np.unique(drive, return_index=True, return_inverse=True)
-    first = starts[own]
+    """A first-order lag over drives in a row, settled anew where each starts: what is constant in drives stays so."""
+    _, starts, drive_number = np.unique(drive, return_index=True, return_inverse=True)
+    first = starts[drive_number]
     left = keep ** (np.arange(len(values)) - first).astype(values.dtype)
     return np.asarray(response - (response - values)[first] * (left[:, None] if values.ndim == 2 else left))
 

@@ -78,31 +78,31 @@ def close_loop(
     from xosc_lateral.files.mapping import as_mapping
 
     base = None if profile is None else given_profile(profile, library)
-    given = given_drives(drives, columns)
+    inputs = given_drives(drives, columns)
     # a mapping file serves many tables: what it says of columns that these lack is no mistake
-    there = {"lane_width"}.union(*(drive.context for drive in given.drives))
+    there = {"lane_width"}.union(*(drive.context for drive in inputs.drives))
     of_file = {name: role for name, role in as_mapping(columns).roles.items() if name in there}
-    with naming(given):
+    with naming(inputs):
         result = close.close_loop(
-            given.drives,
+            inputs.drives,
             base,
             seed=seed,
-            in_sample=base is not None and _is_of(base, given),
+            in_sample=base is not None and _is_of(base, inputs),
             name=name,
-            provenance=Provenance(source=", ".join(given.inputs), inputs=dict(given.inputs)),
+            provenance=Provenance(source=", ".join(inputs.inputs), inputs=dict(inputs.inputs)),
             excluded=list(leave_out),
             roles={**of_file, **(roles or {})},
             progress=progress or (lambda share, what: None),
         )
     if base is not None:
         result = replace(result, refined=with_fields(result.refined, left_hand=base.left_hand))
-    return ClosedLoop(result, given)
+    return ClosedLoop(result, inputs)
 
 
-def _is_of(base: DriverProfile, given: GivenDrives) -> bool:
+def _is_of(base: DriverProfile, inputs: GivenDrives) -> bool:
     """Whether a profile was fitted on these very drives, and on no others."""
     fitted = set(base.provenance.inputs.values())
-    return bool(fitted) and fitted <= set(given.inputs.values())
+    return bool(fitted) and fitted <= set(inputs.inputs.values())
 
 
 class ClosedLoop(Result):
@@ -110,8 +110,8 @@ class ClosedLoop(Result):
 
     __slots__ = ("_given", "_proofs", "_result")
 
-    def __init__(self, result: LoopResult, given: GivenDrives) -> None:
-        self._result, self._given = result, given
+    def __init__(self, result: LoopResult, inputs: GivenDrives) -> None:
+        self._result, self._given = result, inputs
         self._proofs: tuple[str, ...] | None = None
 
     @property
@@ -135,8 +135,8 @@ class ClosedLoop(Result):
         from xosc_lateral.workflows.conversion.proof import proofs_of
 
         if self._proofs is None:
-            found = [effect for effect in self.profile.effects if effect not in self.base.effects]
-            self._proofs = tuple(map(str, proofs_of(self.profile, found)))
+            added = [effect for effect in self.profile.effects if effect not in self.base.effects]
+            self._proofs = tuple(map(str, proofs_of(self.profile, added)))
         return self._proofs
 
     @property
@@ -156,9 +156,9 @@ class ClosedLoop(Result):
 
     def headline(self) -> str:
         """One line."""
-        found = ", ".join(self.findings) or "no effect added"
+        names = ", ".join(self.findings) or "no effect added"
         error = f"error {self.error_before:.4f} -> {self.error_after:.4f} m"
-        return f"{found}; {error} ({self.floor:.4f} m between halves of the drives)"
+        return f"{names}; {error} ({self.floor:.4f} m between halves of the drives)"
 
     def __str__(self) -> str:
         from xosc_lateral.workflows.profiles.loop_page import loop_text

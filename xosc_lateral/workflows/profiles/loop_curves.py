@@ -45,10 +45,10 @@ def curve_of(result: LoopResult, effect: ColumnEffect) -> Curve:
     nothing = np.zeros(0)
     if effect.acts is Acts.RATE:
         return Curve(over, strength, error, nothing, nothing, nothing)
-    where, own = _driving(result, effect)
+    where, strengths = _driving(result, effect)
     inside = result.coarse.valid & np.isfinite(where)
     blocks = coarse_middle(hold_out_blocks(result.coarse.timeline))
-    seen, mean, spread, fitted = _binned(where, _values(result, effect, inside), own, blocks, inside)
+    seen, mean, spread, fitted = _binned(where, _values(result, effect, inside), strengths, blocks, inside)
     if effect.acts is not Acts.LOCATION:
         mean, spread = 0.5 * np.log(np.maximum(mean, 1e-9)), 0.5 * spread / np.maximum(mean, 1e-9)
     # where the curve is zero is a matter of taste, so the points are shifted onto it as a whole
@@ -91,13 +91,13 @@ def _ends(values: FloatArray) -> tuple[float, float]:
 def _driving(result: LoopResult, effect: ColumnEffect) -> tuple[FloatArray, FloatArray]:
     """Column (or product) as the driver responds to it, where that can be said, and the effect's strength; at 1 Hz."""
     coarse = result.coarse
-    own = coarse.strength(effect)
+    strength = coarse.strength(effect)
     if isinstance(effect, Product):
-        return coarse_mean(coarse.fine_response(effect)[:, 0]), coarse_mean(own)
+        return coarse_mean(coarse.fine_response(effect)[:, 0]), coarse_mean(strength)
     column = coarse.context[effect.columns[0]]
     if isinstance(effect, Angular) or not np.isfinite(column).all():  # neither angles nor "none" can be averaged
-        return coarse_middle(column), coarse_mean(own)
-    return coarse_mean(coarse.timeline.respond(column, effect.lag_s, effect.response_s)), coarse_mean(own)
+        return coarse_middle(column), coarse_mean(strength)
+    return coarse_mean(coarse.timeline.respond(column, effect.lag_s, effect.response_s)), coarse_mean(strength)
 
 
 def _alone(result: LoopResult, effect: ColumnEffect) -> FloatArray:
@@ -116,7 +116,7 @@ def _fast(offset: FloatArray, timeline: Timeline) -> FloatArray:
 
 
 def _binned(
-    where: FloatArray, values: FloatArray, own: FloatArray, blocks: IndexArray, inside: BoolArray
+    where: FloatArray, values: FloatArray, strength: FloatArray, blocks: IndexArray, inside: BoolArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Mean place, mean value, its standard error with blocks as the independent pieces, mean of the fit, per bin."""
     low, high = _ends(where[inside])
@@ -129,7 +129,7 @@ def _binned(
         mean = float(values[own_rows].mean())
         together = np.bincount(blocks[own_rows], values[own_rows] - mean)
         error = float(np.sqrt(np.sum(together**2))) / len(own_rows)
-        rows.append((float(where[own_rows].mean()), mean, error, float(own[own_rows].mean())))
+        rows.append((float(where[own_rows].mean()), mean, error, float(strength[own_rows].mean())))
     columns = np.asarray(rows).reshape(-1, 4).T
     return columns[0], columns[1], columns[2], columns[3]
 
@@ -173,8 +173,8 @@ def _moving(result: LoopResult, statistic: Callable[[FloatArray], FloatArray]) -
 def hidden_mean(result: LoopResult) -> FloatArray:
     """Step, drift and oscillation as fitted, about their mean; 0: none. [m] Shape as a `MovingStatistic`'s times."""
     coarse, fitted = result.coarse, result.final
-    own = [latent_path(term, fitted) for term in fitted.terms if not term.columns]
-    hidden = np.sum([np.zeros(len(coarse)), *own], axis=0)
+    paths = [latent_path(term, fitted) for term in fitted.terms if not term.columns]
+    hidden = np.sum([np.zeros(len(coarse)), *paths], axis=0)
     return np.asarray((hidden - hidden[coarse.valid].mean())[_longest_run(result)])
 
 

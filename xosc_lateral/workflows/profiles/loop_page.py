@@ -165,8 +165,8 @@ def _add_findings(page: Page, result: LoopResult, proofs: Sequence[str]) -> None
         },
     )
     if proofs:
-        said = "The same stretch converted with an effect and without it, four seeds; the shift is measured there."
-        page.table([{"in a scenario": one} for one in proofs], said)
+        caption = "The same stretch converted with an effect and without it, four seeds; the shift is measured there."
+        page.table([{"in a scenario": one} for one in proofs], caption)
     applied = (
         "`sample --context` and `convert` apply it where the context has the columns, and name the columns that are "
         "missing."

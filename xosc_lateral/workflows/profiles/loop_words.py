@@ -190,18 +190,18 @@ def feedback_words(item: Feedback) -> str:
 
 def outcome(result: LoopResult) -> str:
     """What was found and what became of it, in sentences that are true of every outcome."""
-    found, back = result.findings, result.identified.taken_back
+    findings, back = result.findings, result.identified.taken_back
     words = []
-    if found:
-        names = "; ".join(f"{finding.effect} ({size_words(finding)})" for finding in found)
-        words.append(f"{len(found)} effect{'s' * (len(found) > 1)} found and added to the profile: {names}.")
+    if findings:
+        names = "; ".join(f"{finding.effect} ({size_words(finding)})" for finding in findings)
+        words.append(f"{len(findings)} effect{'s' * (len(findings) > 1)} found and added to the profile: {names}.")
     elif not back:
         words.append("No significant effect was found, and none was added.")
     if back:
         names = "; ".join(f"{taken_back_words(item)}, p = {item.p_value:.1e}: {item.why}" for item in back)
-        number = f"{len(back)} {'more ' * bool(found)}" + ("effects were" if len(back) > 1 else "effect was")
+        number = f"{len(back)} {'more ' * bool(findings)}" + ("effects were" if len(back) > 1 else "effect was")
         words.append(f"{number} found and taken back ({names}).")
-        words += [] if found else ["Nothing was added: the base profile is returned."]
+        words += [] if findings else ["Nothing was added: the base profile is returned."]
     return " ".join(words)
 
 
@@ -274,8 +274,8 @@ def _remainder_words(result: LoopResult) -> str:
 def group_words(name: str, result: LoopResult) -> str:
     """A group of cells as a reader would call it."""
     for finding in result.findings:
-        own = finding.statistic.partition(" by effect: ")[2]
-        if own and name.endswith(f" by effect: {own}"):
+        key = finding.statistic.partition(" by effect: ")[2]
+        if key and name.endswith(f" by effect: {key}"):
             return f"{name.partition(' by ')[0]} by the effect of {' and '.join(finding.columns) or finding.effect}"
     return _PLAIN_GROUPS.get(name, name)
 

@@ -8,8 +8,8 @@ from threadpoolctl import threadpool_limits
 
 from tests.kit.coarse import STEP, coarse_of, movement, wander
 from xosc_lateral.drivers.loop.columns import Column, Values
+from xosc_lateral.drivers.loop.dictionary import Search
 from xosc_lateral.drivers.loop.passage import BEFORE_S, typical_passage
-from xosc_lateral.drivers.loop.search import Search
 from xosc_lateral.drivers.loop.selection import ERROR_BUDGET, Selection, select
 from xosc_lateral.drivers.loop.terms.course import CourseTerm
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm

@@ -11,6 +11,7 @@ from scipy import stats
 from tests.kit.coarse import coarse_of, movement
 from tests.kit.profiles import whole_terms
 from xosc_lateral.drivers.loop.columns import Column, Values
+from xosc_lateral.drivers.loop.dictionary import Search
 from xosc_lateral.drivers.loop.low_frequencies import (
     SHORTEST_S,
     SPREAD_ORDERS,
@@ -21,7 +22,6 @@ from xosc_lateral.drivers.loop.low_frequencies import (
 )
 from xosc_lateral.drivers.loop.model import Fitted, Removal
 from xosc_lateral.drivers.loop.regression import fit_model
-from xosc_lateral.drivers.loop.search import Search
 from xosc_lateral.drivers.loop.selection import ERROR_BUDGET
 from xosc_lateral.drivers.loop.terms.time import StepTerm, TimeMeanTerm, TimeSpreadTerm, penalised_cosines
 from xosc_lateral.drivers.loop.timeline import Coarse

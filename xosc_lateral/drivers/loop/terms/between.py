@@ -17,10 +17,9 @@ import numpy as np
 from msgspec import structs
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
-from xosc_lateral.drivers.loop.dictionary import NULL_DRAWS, beside
+from xosc_lateral.drivers.loop.dictionary import Search, beside
 from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage
-from xosc_lateral.drivers.loop.search import Search
-from xosc_lateral.drivers.loop.significance import MANY_DRIVES, LoopSeed, as_one_degree, upper_tail
+from xosc_lateral.drivers.loop.significance import MANY_DRIVES, NULL_DRAWS, LoopSeed, as_one_degree, upper_tail
 from xosc_lateral.drivers.loop.terms.column import ColumnTerm, of_kind
 from xosc_lateral.drivers.loop.timeline import missing_throughout
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect, Linear
@@ -92,8 +91,8 @@ class BetweenTerm(ColumnTerm):
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """Weighted least squares over drives, all such terms jointly."""
         sizes, errors = _Places.of(fitted).sizes()
-        own = [term is self for term in of_kind(fitted, BetweenTerm)]
-        return (self.sized(fitted.coarse, Acts.LOCATION, sizes[own], errors[own]),)
+        is_self = [term is self for term in of_kind(fitted, BetweenTerm)]
+        return (self.sized(fitted.coarse, Acts.LOCATION, sizes[is_self], errors[is_self]),)
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Change between drives; it has no lag."""
@@ -123,13 +122,8 @@ class _Places:
 
     @classmethod
     def of(cls, fitted: Fitted) -> _Places:
-        """Weights at which the weighed squares add up to their degrees of freedom [1]_, by Newton's method.
-
-        References
-        ----------
-        .. [1] R. Paule, J. Mandel, "Consensus values and weighting factors", J. Research of the National Bureau of
-               Standards 87, 1982.
-        """
+        """Weights at which the weighed squares add up to their degrees of freedom (Paule, Mandel 1982), by Newton's
+        method."""
         coarse, groups = fitted.coarse, fitted.coarse.drives
         seconds = np.bincount(coarse.drive, coarse.valid.astype(float), minlength=groups)
         power = fitted.whitener.power
@@ -169,23 +163,8 @@ def best_of_drives(
     columns: Sequence[str],
     rng: np.random.Generator,
 ) -> tuple[tuple[int, ...], float]:
-    """One candidate or two, whichever gain most in chi-square less what their choice costs, and the p-value.
-
-    A pair's gain is the chi-square that is as rare with one degree of freedom. The null: drives dealt anew.
-
-    Parameters
-    ----------
-    left : array, shape (drives,)
-        What is not explained, of variance 1. [-]
-    counted : bool array, shape (drives,)
-        Drives that are long enough.
-    quantities : array, shape (drives, k)
-        Candidates, free of what is known, of length 1.
-    costs : array, shape (k,)
-        Of choosing each among its family.
-    columns : sequence of str
-        Each candidate's; the two of a pair are of different columns.
-    """
+    """One candidate or two of different columns that gain most in chi-square less their `costs`, against drives dealt
+    anew; `left`, shape (drives,), and `quantities`, shape (drives, k), are free of what is known."""
     rows = np.flatnonzero(counted)
     draws = np.zeros((NULL_DRAWS + 1, len(left)))
     draws[0] = left

@@ -73,11 +73,8 @@ class ColumnTerm(Term):
         )
 
     def ends(self, coarse: Coarse) -> tuple[FloatArray, FloatArray]:
-        """Lowest and highest response that counts, about the mean response, shape (k,) each.
-
-        All that was seen, for a shift. For what multiplies the movement the 5 % and 95 % quantile: a log-linear factor
-        would be anything at a column's few extremes.
-        """
+        """Lowest and highest response that counts: all seen, for a shift; 5 % and 95 % quantile for a factor. Shape
+        (k,) each."""
         response = coarse.response(self.effect, keep=True)[coarse.valid]
         least, most = response.min(axis=0), response.max(axis=0)
         if self.acts is Acts.LOCATION:
@@ -124,12 +121,8 @@ def columns_on_size(fitted: Fitted) -> frozenset[str]:
 
 
 def driving_range(coarse: Coarse, effect: ColumnEffect) -> tuple[FloatArray, FloatArray]:
-    """Quantity [own unit] at the low and at the high end of what drives the effect, shape (k,) each.
-
-    That is the 5 % and the 95 % quantile while road-following: of the column, where a single number drives it; of the
-    product; of the strength, for angles and levels. The extremes where both quantiles are the same (a switch that is on
-    for less than 5 % of the time).
-    """
+    """The 5 % and 95 % quantile, or extremes if they are one, of column, product or strength: as quantities, shape (k,)
+    each."""
     inside = coarse.timeline.valid
     if isinstance(effect, Linear | Threshold | Saturating | Piecewise):
         seen = coarse.context[effect.column][inside]

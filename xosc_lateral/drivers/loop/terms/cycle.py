@@ -13,9 +13,9 @@ from typing import ClassVar, Self
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.drivers.loop.dictionary import Search
 from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage, Term
 from xosc_lateral.drivers.loop.residual import OSCILLATION
-from xosc_lateral.drivers.loop.search import Search
 from xosc_lateral.drivers.loop.significance import MINIMUM_P
 from xosc_lateral.drivers.loop.timeline import MIN_DRIFT_S, Coarse
 from xosc_lateral.drivers.model.effects import Cycle, Effect
@@ -92,10 +92,10 @@ def _line(rows: FloatArray, width: int) -> tuple[float, float, int]:
     power = np.abs(np.fft.rfft(rows)) ** 2 / max(float(rows @ rows), 1e-12)
     frequency = np.fft.rfftfreq(len(rows))
     band = (frequency >= 1.0 / PERIODS_S[1]) & (frequency <= 1.0 / PERIODS_S[0])
-    own, gap = np.ones(width), 2 * width + 11
+    window, gap = np.ones(width), 2 * width + 11
     around = np.convolve(power, np.ones(2 * SURROUNDINGS + 1), "same") - np.convolve(power, np.ones(gap), "same")
     others = 2 * SURROUNDINGS + 1 - gap
-    ratio = np.where(band, np.convolve(power, own, "same") / np.maximum(around / others, 1e-12), 0.0)
+    ratio = np.where(band, np.convolve(power, window, "same") / np.maximum(around / others, 1e-12), 0.0)
     at = int(np.argmax(ratio))
     single = float(f.sf(ratio[at] / width, 2 * width, 2 * others))
     return max(single * int(band.sum()), MINIMUM_P), float(frequency[at]), width

@@ -96,38 +96,29 @@ class MeanTerm(SearchedTerm):
 def widening(fitted: Fitted, effect: ColumnEffect, part: slice) -> float:
     """Factor on the standard errors of an effect on the mean, at least 1.
 
-    How far the profile-likelihood interval [1]_ of the change over the driving range reaches from the estimate with
-    lag and time constant free, or the shape of its column, or the distances over which its product fades, over how far
-    it reaches with all of them known. The likelihood is that of independent rows, scaled to the variance that stretches
-    of a minute show [2]_.
-
-    `effect`: with coefficients; `part`: its columns of the mean.
-
-    References
-    ----------
-    .. [1] D. Venzon, S. Moolgavkar, "A method for computing profile-likelihood-based confidence intervals", Applied
-       Statistics 37, 1988.
-    .. [2] R. E. Chandler, S. Bate, "Inference for clustered data using the independence loglikelihood", Biometrika 94,
-       2007.
+    How far the profile-likelihood interval (Venzon, Moolgavkar 1988) of the change over the driving range reaches from
+    the estimate with lag and time constant free, or the shape of its column, or the distances over which its product
+    fades, over how far it reaches with all of them known. The likelihood is that of independent rows, scaled to the
+    variance that stretches of a minute show (Chandler, Bate 2007).
     """
     low, high = driving_range(fitted.coarse, effect)
     contrast = high - low
     white = fitted.whitener.rows
     others, _ = np.linalg.qr(white(np.delete(fitted.columns, np.r_[part], axis=1)))
     left = beside(others, white(fitted.coarse.offset))
-    own = beside(others, white(fitted.columns[:, part]))
-    estimated = _profile(own, left, contrast)
-    found = [estimated]
+    rows_known = beside(others, white(fitted.columns[:, part]))
+    estimated = _profile(rows_known, left, contrast)
+    profiles = [estimated]
     for response in _timed(fitted, effect):
         rows = beside(others, white(response.reshape(len(response), -1)))
         width = len(contrast)
-        found += [_profile(rows[:, at : at + width], left, contrast) for at in range(0, rows.shape[1], width)]
+        profiles += [_profile(rows[:, at : at + width], left, contrast) for at in range(0, rows.shape[1], width)]
     for shape in _shapes(fitted.coarse, effect):
         low, high = driving_range(fitted.coarse, shape)
         rows = beside(others, white(fitted.coarse.response(shape)))
-        alike = np.sign(float(np.sum(own * rows)))  # nearness falls where distance rises
-        found.append(_profile(rows, left, alike * (high - low)))
-    gain, size, variance = np.asarray(found).T
+        alike = np.sign(float(np.sum(rows_known * rows)))  # nearness falls where distance rises
+        profiles.append(_profile(rows, left, alike * (high - low)))
+    gain, size, variance = np.asarray(profiles).T
     noise = float(left @ left - gain.max()) / max(1, int(fitted.coarse.valid.sum()))
     clustered = float(contrast @ fitted.covariance[part, part] @ contrast)
     room = CHI_SQUARE * clustered / max(noise * estimated[2], 1e-300) - (gain.max() - gain) / noise

@@ -21,12 +21,19 @@ import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.lazy import njit
-from xosc_lateral.drivers.loop.dictionary import beside, in_another_order
+from xosc_lateral.drivers.loop.dictionary import Search, beside
 from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Removal, Stage, Term
-from xosc_lateral.drivers.loop.search import Search
-from xosc_lateral.drivers.loop.significance import HEAVY_TAIL_SHARE, LoopSeed, upper_tail
-from xosc_lateral.drivers.loop.squares import SLOW_S, fine_squares, log_sizes, quick_squares, slow_squares
-from xosc_lateral.drivers.loop.terms.spread import known_log_scale, what_a_column_may_do, what_columns_do
+from xosc_lateral.drivers.loop.significance import HEAVY_TAIL_SHARE, LoopSeed, in_another_order, upper_tail
+from xosc_lateral.drivers.loop.terms.spread import (
+    SLOW_S,
+    fine_squares,
+    known_log_scale,
+    log_sizes,
+    quick_squares,
+    slow_squares,
+    what_a_column_may_do,
+    what_columns_do,
+)
 from xosc_lateral.drivers.loop.timeline import Coarse, on_fine_grid
 from xosc_lateral.drivers.model.effects import Effect, Regimes
 from xosc_lateral.drivers.model.seeds import generator
@@ -172,11 +179,8 @@ class RegimesTerm(Term):
 def probability_of_persistence(
     squares: FloatArray, valid: BoolArray, known: FloatArray, rng: np.random.Generator
 ) -> float:
-    """Probability that loudness which lasts for no longer than `CLUSTER_S` shows as much persistence.
-
-    `squares`, shape (n,): of white rows, one per second, mean 0; 0 where invalid; `known`, shape (n, k): what is known
-    to go with the size; taken out of the squares.
-    """
+    """Probability that loudness of at most `CLUSTER_S`, without what is `known` to go with it, shows as much
+    persistence."""
     if known.shape[1]:
         basis = np.linalg.qr((known - known[valid].mean(axis=0)) * valid[:, None])[0]
         squares = beside(basis, squares)

@@ -19,6 +19,7 @@ from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.loop.candidates import Family
+from xosc_lateral.drivers.loop.dictionary import Search
 from xosc_lateral.drivers.loop.low_frequencies import (
     MEAN_SHORTEST_S,
     ORDERS,
@@ -38,12 +39,19 @@ from xosc_lateral.drivers.loop.low_frequencies import (
 from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Removal, Stage, Term
 from xosc_lateral.drivers.loop.refinement import Alternatives
 from xosc_lateral.drivers.loop.regression import fit_model
-from xosc_lateral.drivers.loop.search import Search
 from xosc_lateral.drivers.loop.significance import LoopSeed
-from xosc_lateral.drivers.loop.squares import SLOW_S, fine_squares, log_sizes, quick_squares, slow_squares
 from xosc_lateral.drivers.loop.terms.column import ColumnTerm
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
-from xosc_lateral.drivers.loop.terms.spread import SpreadTerm, what_a_column_may_do, what_columns_do
+from xosc_lateral.drivers.loop.terms.spread import (
+    SLOW_S,
+    SpreadTerm,
+    fine_squares,
+    log_sizes,
+    quick_squares,
+    slow_squares,
+    what_a_column_may_do,
+    what_columns_do,
+)
 from xosc_lateral.drivers.loop.timeline import COARSE, Coarse
 from xosc_lateral.drivers.model.effects import Effect, Step, TimeSmooth
 from xosc_lateral.drivers.model.seeds import generator
@@ -90,12 +98,7 @@ class StepTerm(_MeanByTime):
 
     @classmethod
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
-        """Step or smooth, whichever is likelier, each parameter at Schwarz's price [1]_.
-
-        References
-        ----------
-        .. [1] G. Schwarz, "Estimating the dimension of a model", Annals of Statistics 6, 1978.
-        """
+        """Step or smooth, whichever is likelier, each parameter at Schwarz's price (Annals of Statistics 6, 1978)."""
         coarse = fitted.coarse
         if not coarse.lasts or any(isinstance(term, _MeanByTime) for term in fitted.terms):
             return None
@@ -112,20 +115,20 @@ class StepTerm(_MeanByTime):
         unit = jumps / np.maximum(np.linalg.norm(jumps, axis=0), 1e-12)
         step = cls(moment_of(rows, whitener, int(moments[np.argmax(np.abs(unit.T @ slow[:, 0]))])))
         smooth = smooth_probabilities(slow[:, 0], waves, ORDERS)
-        order = min(smooth, key=lambda one: smooth[one])
+        order = min(smooth, key=smooth.__getitem__)
         settling = [TimeMeanTerm(1, settling_s=seconds) for seconds in SETTLING_S]
         forms = {
             "step": _priced(fitted, step, STEP_PARAMETERS),
             "smooth": _priced(fitted, TimeMeanTerm(order), order),
             "settling": max(_priced(fitted, form, STEP_PARAMETERS) for form in settling),
         }
-        best = max(forms, key=lambda one: forms[one])
+        best = max(forms, key=forms.__getitem__)
         others = tuple(one for one in forms if one != best and forms[one] > forms[best] - AS_LIKELY)
-        found: StepTerm | TimeMeanTerm = TimeMeanTerm(form=best, others=others)
-        found = replace(step, others=others) if best == "step" else found
+        change: StepTerm | TimeMeanTerm = TimeMeanTerm(form=best, others=others)
+        change = replace(step, others=others) if best == "step" else change
         if cls.passes(search, p_value, fitted):
-            found = replace(found, alike=_columns_as_likely(search, fitted, MeanTerm, forms[best]))
-        return Outcome(found, (), p_value)
+            change = replace(change, alike=_columns_as_likely(search, fitted, MeanTerm, forms[best]))
+        return Outcome(change, (), p_value)
 
     def matches(self, other: Self) -> bool:
         """About the same moment."""
@@ -235,13 +238,13 @@ class TimeSpreadTerm(Term):
         columns = half_cosines_of(fitted.coarse, max(SPREAD_ORDERS))
 
         def best_beside(known: FloatArray) -> tuple[float, bool] | None:
-            found = []
+            tested = []
             for slow, squares in enumerate((quick_squares(fitted), slow_squares(fitted))):
-                own, basis = without_known(known, squares.standardised, columns, squares.valid)
-                own, basis = (low_frequencies(one, fitted.coarse, squares.valid, SHORTEST_S) for one in (own, basis))
-                tests = smooth_probabilities(own[:, 0], basis, SPREAD_ORDERS)
-                found += [(p_value, bool(slow)) for p_value in tests.values()]
-            return (min(1.0, min(found)[0] * len(found)), min(found)[1]) if found else None
+                rows, basis = without_known(known, squares.standardised, columns, squares.valid)
+                rows, basis = (low_frequencies(one, fitted.coarse, squares.valid, SHORTEST_S) for one in (rows, basis))
+                tests = smooth_probabilities(rows[:, 0], basis, SPREAD_ORDERS)
+                tested += [(p_value, bool(slow)) for p_value in tests.values()]
+            return (min(1.0, min(tested)[0] * len(tested)), min(tested)[1]) if tested else None
 
         best = best_beside(known)
         if best is not None and best[0] > SURER * p_column:
@@ -316,24 +319,22 @@ def _columns_as_likely(search: Search, fitted: Fitted, kind: type[ColumnTerm], b
 
 def penalised_cosines(sizes: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Sizes of half cosines and their errors, shape (k,), given that rougher ones are smaller beforehand."""
-    found, known = penalised(sizes, covariance, np.diag(np.arange(1, len(sizes) + 1, dtype=np.float64) ** -4.0))
-    return found, np.sqrt(np.diag(known))
+    estimates, known = penalised(sizes, covariance, np.diag(np.arange(1, len(sizes) + 1, dtype=np.float64) ** -4.0))
+    return estimates, np.sqrt(np.diag(known))
 
 
 def penalised(sizes: FloatArray, covariance: FloatArray, prior: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Sizes, shape (k,), given how they vary beforehand but for a scale, shape (k, k), and their covariance.
-
-    The prior's scale is the one under which the sizes are likeliest (restricted maximum likelihood).
-    """
+    """Sizes, shape (k,), given how they vary beforehand but for a scale, that of restricted maximum likelihood, and
+    covariance."""
     largest = float(np.max(np.square(sizes) / np.diag(prior), initial=1e-300))
-    best, found = -np.inf, np.zeros_like(prior)
+    best, scaled_prior = -np.inf, np.zeros_like(prior)
     for scale in largest * np.geomspace(1e-6, 10.0, 60):
         total = covariance + scale * prior
         sign, volume = np.linalg.slogdet(total)
         likelihood = -0.5 * float(sizes @ np.linalg.solve(total, sizes)) - 0.5 * volume if sign > 0 else -np.inf
         if likelihood > best:
-            best, found = likelihood, scale * prior
-    gain = np.linalg.solve(covariance + found, found).T
+            best, scaled_prior = likelihood, scale * prior
+    gain = np.linalg.solve(covariance + scaled_prior, scaled_prior).T
     return gain @ sizes, gain @ covariance
 
 
