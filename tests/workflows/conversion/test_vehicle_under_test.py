@@ -338,3 +338,16 @@ def test_a_vehicle_that_is_added_later_moves_from_then_on(tmp_path: Path) -> Non
     made = xl.convert(path, tmp_path / "out.xosc", mode="lane-offset", seed=1)
     assert made.modes == {"Late": "lane-offset"}
     assert _moves_on(tmp_path / "out.xosc", "Late", 6, 12, 20) == [True, True, True]
+
+
+def test_a_vehicle_that_steadily_is_slow_moves_although_its_speed_may_change(tmp_path: Path) -> None:
+    text = scenario_text(
+        entities=entity("Ego", controller=EXTERNAL) + entity("A"),
+        init=private("Ego") + private("A", teleport("200"), speed_action("12")),
+        stories=stories(
+            ("A", event("change", at(3.0), CHANGE) + event("late", headway("Ego", "A"), speed_action("12")))
+        ),
+        stop=time_condition(25),
+    )
+    xl.convert(write_scenario(tmp_path, text), tmp_path / "out.xosc", mode="lane-offset", seed=1)
+    assert _moves_on(tmp_path / "out.xosc", "A", 8, 14, 20) == [True, True, True]

@@ -81,7 +81,10 @@ class Compared:
     @property
     def differences(self) -> dict[tuple[str, str], list[Difference]]:
         """What each pair differs by, of the drives that both were fitted on, else of drives sampled from both."""
-        return {(one.profile.name, two.profile.name): _between(one, two) for one, two in combinations(self.profiles, 2)}
+        return {
+            (first.profile.name, second.profile.name): _between(first, second)
+            for first, second in combinations(self.profiles, 2)
+        }
 
     @property
     def groups(self) -> tuple[tuple[str, ...], ...]:
@@ -94,10 +97,10 @@ class Compared:
         return tuple(tuple(names[k] for k in np.flatnonzero(labels == label)) for label in dict.fromkeys(labels))
 
 
-def _between(one: ComparedProfile, two: ComparedProfile) -> list[Difference]:
-    if one.measured is not None and two.measured is not None:
-        return differences(one.measured, two.measured)
-    return differences(one.sampled, two.sampled)
+def _between(first: ComparedProfile, second: ComparedProfile) -> list[Difference]:
+    if first.measured is not None and second.measured is not None:
+        return differences(first.measured, second.measured)
+    return differences(first.sampled, second.sampled)
 
 
 def compare(profiles: Sequence[DriverProfile], seed: int) -> Compared:
@@ -151,5 +154,5 @@ def _from_itself(drivers: Sequence[FloatArray], fitted: int, scale: FloatArray, 
     return distances[int(np.argsort(means)[round(HALVING_COUNT_AND_SHARE * (HALVINGS - 1))])]
 
 
-def _per_metric(one: FloatArray, other: FloatArray) -> FloatArray:
-    return np.array([wasserstein(one[:, k], other[:, k]) for k in range(one.shape[1])])
+def _per_metric(first: FloatArray, other: FloatArray) -> FloatArray:
+    return np.array([wasserstein(first[:, k], other[:, k]) for k in range(first.shape[1])])

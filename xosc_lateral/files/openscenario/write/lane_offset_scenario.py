@@ -15,16 +15,16 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from lxml import etree
 
 from xosc_lateral.files.openscenario.write import build
-from xosc_lateral.files.openscenario.write.draft import Draft, WrittenScenario
+from xosc_lateral.files.openscenario.write.draft import STANDARD, Draft, TargetPlayer, WrittenScenario
 from xosc_lateral.files.openscenario.write.fit import finish
 from xosc_lateral.files.openscenario.write.lateral_actions import LateralAction, changing_speed, lateral_actions
 from xosc_lateral.files.openscenario.write.literal import inline_maneuvers, name_literally
 from xosc_lateral.files.openscenario.write.moving import moving_entities
 from xosc_lateral.files.openscenario.write.replaced_maneuvers import ReplacedManeuvers
-from xosc_lateral.files.openscenario.write.target import STANDARD, TargetPlayer
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_chain import REST, Move, OffsetChain, OffsetPath, Ring
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
@@ -40,6 +40,8 @@ FIRST = 0.12
 """The first move waits so long, two such frames: what is to stop it may begin with the act. [s]"""
 MOVING_SPEED = 15.0
 """A car whose speed changes begins a move above it alone: braking with 4 m/s2, it is over before it is slow. [m/s]"""
+SLOW_SHARE = 0.9
+"""Of its least nominal speed, above which one begins that never is that fast, nor near to where moves end. [-]"""
 HALTING_SPEED = 8.0
 """Below it, a move under way ends: a car that brakes harder does not slide sideways when it stands. [m/s]"""
 REPEATED = 3
@@ -130,6 +132,7 @@ class _Acts:
     ) -> None:
         self._story, self._chain, self._items, self._version = story, chain, items, draft.version
         self._changes_speed = changes_speed
+        self._moving_speed = _moving_speed(draft.motion, chain)
         self._runs = sum(one.path == chain.after and one.actor == chain.entity for one in draft.motion.actions)
 
     def add(self) -> None:
@@ -214,7 +217,7 @@ class _Acts:
         group = build.sub(event, "StartTrigger/ConditionGroup")
         build.state_condition(group, kind, reference, state, delay)
         if self._changes_speed:
-            _add_speed(group, self._chain.entity, MOVING_SPEED, "none")
+            _add_speed(group, self._chain.entity, self._moving_speed, "none")
 
     def _add_halt(self, act: etree._Element, name: str, path: etree._Element | None) -> None:
         """Sideways by nothing, at once: what ends a move under way; a path is no move."""
@@ -243,6 +246,15 @@ class _Acts:
             state = "runningState" if item.steers is None else "startTransition"
             build.state_condition(group, item.kind, item.reference, state, 0.0)
             build.state_condition(group, "act", name, "runningState", LOOKING)
+
+
+def _moving_speed(motion: NominalMotion, chain: OffsetChain) -> float:
+    """Above which an entity whose speed may change begins a move: below `MOVING_SPEED` where it steadily is slower."""
+    entity = next(entity for entity in motion.entities if entity.name == chain.entity)
+    ends = [played.end for played in motion.actions if played.path == chain.after and played.end is not None]
+    rows = entity.time >= (0.0 if chain.after is None else min(ends, default=np.inf))
+    slowest = SLOW_SHARE * float(entity.speed[rows].min(initial=np.inf))
+    return slowest if HALTING_SPEED < slowest < MOVING_SPEED else MOVING_SPEED
 
 
 def leading(ring: Ring) -> Move:
