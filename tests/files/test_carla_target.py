@@ -25,7 +25,7 @@ from tests.kit.scenario_files import (
 )
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.openscenario.read import read_scenario
-from xosc_lateral.files.openscenario.write.target import target
+from xosc_lateral.files.openscenario.write.draft import target
 from xosc_lateral.files.openscenario.write.trajectory_scenario import write_trajectory_scenario
 
 SIGNAL = (

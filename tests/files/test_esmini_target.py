@@ -11,8 +11,8 @@ from tests.files.test_versions import tree, written
 from tests.kit.scenario_files import action, event, speed_action, story
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.openscenario.read import read_scenario
+from xosc_lateral.files.openscenario.write.draft import target
 from xosc_lateral.files.openscenario.write.lane_offset_scenario import write_lane_offset_scenario
-from xosc_lateral.files.openscenario.write.target import target
 
 RANDOM = "<PrivateAction><RoutingAction><RandomRouteAction/></RoutingAction></PrivateAction>"
 ANGLE = (

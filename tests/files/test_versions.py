@@ -30,10 +30,9 @@ from tests.kit.scenario_files import (
 )
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.openscenario.read import read_scenario
-from xosc_lateral.files.openscenario.write.draft import WrittenScenario
+from xosc_lateral.files.openscenario.write.draft import WrittenScenario, target
 from xosc_lateral.files.openscenario.write.lane_offset_scenario import write_lane_offset_scenario
 from xosc_lateral.files.openscenario.write.literal import name_literally
-from xosc_lateral.files.openscenario.write.target import target
 from xosc_lateral.files.openscenario.write.trajectory_scenario import write_trajectory_scenario
 from xosc_lateral.files.openscenario.write.versions import additions as table_of_additions
 from xosc_lateral.world.scenario.parameters import Scope

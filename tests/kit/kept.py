@@ -22,8 +22,8 @@ from tests.kit.made.scenario import made
 from tests.kit.places import VALID, hand_written, random_places
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.openscenario.read import read_scenario
+from xosc_lateral.files.openscenario.write.draft import target
 from xosc_lateral.files.openscenario.write.lane_offset_scenario import write_lane_offset_scenario
-from xosc_lateral.files.openscenario.write.target import target
 from xosc_lateral.files.openscenario.write.trajectory_scenario import write_trajectory_scenario
 from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.world.motion.nominal import EntityMotion

@@ -24,7 +24,7 @@ from xosc_lateral.cli.words import (
     warn,
     write_stdout,
 )
-from xosc_lateral.files.openscenario.write.target import Player
+from xosc_lateral.files.openscenario.write.draft import Player
 from xosc_lateral.workflows.conversion.settings import ConvertSettings, OutputMode
 
 if TYPE_CHECKING:

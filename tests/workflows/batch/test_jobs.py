@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from xosc_lateral.base.errors import DriverProfileError, FormatError
-from xosc_lateral.files.openscenario.write.target import Player
+from xosc_lateral.files.openscenario.write.draft import Player
 from xosc_lateral.files.profiles import SHIPPED
 from xosc_lateral.workflows.batch.jobs import Batch, plan_batch
 from xosc_lateral.workflows.batch.request import DocumentKind, Request, document_kind

@@ -13,7 +13,7 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import verb
 from xosc_lateral.cli.words import SHARED
 from xosc_lateral.files.configuration import SETTINGS
-from xosc_lateral.files.openscenario.write.target import Player
+from xosc_lateral.files.openscenario.write.draft import Player
 from xosc_lateral.workflows.conversion.options import options_of
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.conversion.settings import OPTIONS, ConvertKeywords, ConvertSettings, OutputMode

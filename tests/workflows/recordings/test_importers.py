@@ -24,7 +24,7 @@ from xosc_lateral.workflows.recordings.importers.levelx import import_levelx
 from xosc_lateral.workflows.recordings.importers.table import Imported
 from xosc_lateral.workflows.recordings.lane_graph import REACH, find_neighbours
 from xosc_lateral.workflows.recordings.lanes_from_tracks import fit_lane_centre
-from xosc_lateral.world.road.road_from_tracks import fit_reference_line
+from xosc_lateral.world.road.reference_line import fit_reference_line
 
 # ---- neighbours and cuts ---------------------------------------------------------------------------------------------
 

@@ -12,7 +12,7 @@ from xosc_lateral.files.opendrive import read_opendrive
 from xosc_lateral.files.opendrive.write import WrittenLane, WrittenRoad, curved_plan
 from xosc_lateral.workflows.recordings.recorded import place_tracks
 from xosc_lateral.workflows.recordings.recordings import format_of, read_recording
-from xosc_lateral.world.road.road_from_tracks import ReferenceLine
+from xosc_lateral.world.road.reference_line import ReferenceLine
 
 
 def test_a_road_out_of_nothing_but_tracks_has_their_lanes(tmp_path):

@@ -7,7 +7,7 @@ import pytest
 
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.world.road.geometry import simplify
-from xosc_lateral.world.road.road_from_tracks import fit_reference_line
+from xosc_lateral.world.road.reference_line import fit_reference_line
 
 RADIUS = 4000.0
 """[m]"""

@@ -9,8 +9,7 @@ import pytest
 from xosc_lateral.world.scenario.entity import BoundingBox, Entity
 from xosc_lateral.world.scenario.enums import EntityCategory
 from xosc_lateral.world.scenario.place import Place
-from xosc_lateral.world.scenario.scenario import FileHeader, Scenario
-from xosc_lateral.world.scenario.storyboard import Init, Storyboard
+from xosc_lateral.world.scenario.scenario import FileHeader, Init, Scenario, Storyboard
 
 PLACE = Place("f.xosc", 3, "ScenarioObject 'a'")
 

@@ -9,7 +9,7 @@ import pytest
 
 from xosc_lateral.world.motion import gaps
 from xosc_lateral.world.motion.gaps import BoxPath, smallest_gaps
-from xosc_lateral.world.surroundings.nearby import pairs_within
+from xosc_lateral.world.surroundings.around import pairs_within
 
 
 def paths(count: int, seed: int, turn: float) -> tuple[list[np.ndarray], list[np.ndarray]]:

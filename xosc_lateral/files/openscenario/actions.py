@@ -58,7 +58,7 @@ from xosc_lateral.world.scenario.private_actions import (
     TransitionDynamics,
     VisibilityAction,
 )
-from xosc_lateral.world.scenario.storyboard import (
+from xosc_lateral.world.scenario.scenario import (
     Action,
     Actors,
     Event,

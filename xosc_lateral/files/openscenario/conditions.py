@@ -34,7 +34,7 @@ from xosc_lateral.world.scenario.conditions import (
 )
 from xosc_lateral.world.scenario.enums import EntityCategory
 from xosc_lateral.world.scenario.place import Unsupported
-from xosc_lateral.world.scenario.storyboard import Condition, ConditionGroup, Trigger, TriggeringEntities
+from xosc_lateral.world.scenario.scenario import Condition, ConditionGroup, Trigger, TriggeringEntities
 
 
 def read_trigger(element: XmlElement, context: Context) -> Trigger:

@@ -31,7 +31,7 @@ from xosc_lateral.world.scenario.enums import (
     StoryboardElementType,
 )
 from xosc_lateral.world.scenario.private_actions import AbsoluteTargetSpeed, SpeedAction, TransitionDynamics
-from xosc_lateral.world.scenario.storyboard import Act, Actors, Condition, ConditionGroup
+from xosc_lateral.world.scenario.scenario import Act, Actors, Condition, ConditionGroup
 
 CHANGE_AT = 1.0
 """When an ego begins to drive faster or slower than in the nominal run. [s]"""

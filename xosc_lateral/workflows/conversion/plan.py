@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from xosc_lateral.base.errors import FormatError, locate
+from xosc_lateral.files.openscenario.write.draft import Player
 from xosc_lateral.files.openscenario.write.replaced_maneuvers import replaced_groups, separable
-from xosc_lateral.files.openscenario.write.target import Player
 from xosc_lateral.files.openscenario.write.trajectory_scenario import motion_unknown_to
 from xosc_lateral.files.output_paths import refuse_outputs
 from xosc_lateral.files.tables import ContextTable, read_context
@@ -30,7 +30,7 @@ from xosc_lateral.world.scenario.dependence import (
 )
 from xosc_lateral.world.scenario.enums import DynamicsShape
 from xosc_lateral.world.scenario.private_actions import LaneChangeAction
-from xosc_lateral.world.scenario.storyboard import Condition
+from xosc_lateral.world.scenario.scenario import Condition
 
 LEAST_EXTENSION, LARGEST_EXTENSION = 1.3, 2.0
 """A vehicle under test may be later at what ends the run, or never come to it: others follow trajectories for so

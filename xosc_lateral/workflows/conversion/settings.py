@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypedDict
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.configuration import SETTINGS, configuration
 from xosc_lateral.files.openscenario.read import RoadSearch
-from xosc_lateral.files.openscenario.write.target import Player, TargetPlayer, target
+from xosc_lateral.files.openscenario.write.draft import Player, TargetPlayer, target
 from xosc_lateral.workflows.conversion import options as say
 from xosc_lateral.workflows.conversion.options import Option, PathLike, Paths, ProfileLike, option
 from xosc_lateral.workflows.conversion.result import LaneChanges, Neighbours

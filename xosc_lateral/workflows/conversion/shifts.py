@@ -33,7 +33,7 @@ from xosc_lateral.world.scenario.private_actions import (
     LaneOffsetAction,
     LateralDistanceAction,
 )
-from xosc_lateral.world.scenario.storyboard import Condition, Trigger
+from xosc_lateral.world.scenario.scenario import Condition, Trigger
 
 EVENT_TOLERANCE = 0.05
 """By which an event may be earlier or later beyond what is explained: a frame of a coarse player. [s]"""

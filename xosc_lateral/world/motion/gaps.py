@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.rows import BLOCK
-from xosc_lateral.world.surroundings.nearby import stretches_within
+from xosc_lateral.world.surroundings.around import stretches_within
 
 MAXIMUM_GAP = 30.0
 """Boxes farther apart than this at all times are no pair worth naming. [m]"""

@@ -3,22 +3,20 @@
 from xosc_lateral.world.scenario.entity import BoundingBox, Entity, Performance
 from xosc_lateral.world.scenario.place import Place, Unsupported
 from xosc_lateral.world.scenario.scenario import (
-    FileHeader,
-    Parameter,
-    Scenario,
-    TrafficSignalController,
-)
-from xosc_lateral.world.scenario.storyboard import (
     Act,
     Action,
     Condition,
     Event,
+    FileHeader,
     Init,
     Maneuver,
     ManeuverGroup,
+    Parameter,
     Private,
+    Scenario,
     Story,
     Storyboard,
+    TrafficSignalController,
     Trigger,
 )
 

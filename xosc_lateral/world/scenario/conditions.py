@@ -31,7 +31,7 @@ from xosc_lateral.world.scenario.place import (
     called,
 )
 from xosc_lateral.world.scenario.position import Position
-from xosc_lateral.world.scenario.storyboard import Condition, ConditionGroup, Trigger
+from xosc_lateral.world.scenario.scenario import Condition, ConditionGroup, Trigger
 
 DistanceType = called("relativeDistanceType")
 

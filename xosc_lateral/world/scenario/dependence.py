@@ -34,8 +34,7 @@ from xosc_lateral.world.scenario.private_actions import (
     AssignControllerAction,
     TeleportAction,
 )
-from xosc_lateral.world.scenario.scenario import Scenario
-from xosc_lateral.world.scenario.storyboard import Act, Action, Condition, Event, ManeuverGroup, Trigger
+from xosc_lateral.world.scenario.scenario import Act, Action, Condition, Event, ManeuverGroup, Scenario, Trigger
 
 Path = tuple[str, ...]
 

@@ -33,8 +33,8 @@ from xosc_lateral.world.surroundings.around import (
     free_space,
     lane_path,
     see_along,
+    stretches_within,
 )
-from xosc_lateral.world.surroundings.nearby import stretches_within
 
 STEERING = 1.0
 """Standard deviation of the kernel over which roads are seen and by which drivers respond: steering takes a second or

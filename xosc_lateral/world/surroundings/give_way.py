@@ -25,10 +25,9 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.rows import empty, put, stored
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.surroundings.around import smooth_step
+from xosc_lateral.world.surroundings.around import pairs_now, smooth_step, stretches_within
 from xosc_lateral.world.surroundings.context import CELLS, STEERING
 from xosc_lateral.world.surroundings.moment import Places
-from xosc_lateral.world.surroundings.nearby import pairs_now, stretches_within
 
 GAPS = (
     np.array([-0.68, -0.05, 0.37, 0.76, 1.29, 1.65, 3.0]),

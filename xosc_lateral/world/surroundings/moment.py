@@ -13,9 +13,17 @@ import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.surroundings.around import IN_SIGHT, Around, Extent, Reach, free_space, lane_path, see_along
+from xosc_lateral.world.surroundings.around import (
+    IN_SIGHT,
+    Around,
+    Extent,
+    Reach,
+    free_space,
+    lane_path,
+    pairs_now,
+    see_along,
+)
 from xosc_lateral.world.surroundings.context import lanes_beside, road_columns, spread_out
-from xosc_lateral.world.surroundings.nearby import pairs_now
 
 
 class Roads(Protocol):

@@ -12,10 +12,9 @@ from xosc_lateral.files.openscenario.provenance import mark, write_sealed
 from xosc_lateral.files.openscenario.read import is_town
 from xosc_lateral.files.openscenario.write.build import named
 from xosc_lateral.files.openscenario.write.carla import fit_carla
-from xosc_lateral.files.openscenario.write.draft import Draft, WrittenScenario
+from xosc_lateral.files.openscenario.write.draft import Draft, Player, WrittenScenario
 from xosc_lateral.files.openscenario.write.literal import fill_in, inline_catalogs
 from xosc_lateral.files.openscenario.write.losses import Losses
-from xosc_lateral.files.openscenario.write.target import Player
 from xosc_lateral.files.openscenario.write.versions import fit_version
 from xosc_lateral.world.scenario import Scenario
 from xosc_lateral.world.scenario.expressions import ExpressionError

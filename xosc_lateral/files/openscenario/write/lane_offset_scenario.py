@@ -19,13 +19,12 @@ import numpy as np
 from lxml import etree
 
 from xosc_lateral.files.openscenario.write import build
-from xosc_lateral.files.openscenario.write.draft import Draft, WrittenScenario
+from xosc_lateral.files.openscenario.write.draft import STANDARD, Draft, TargetPlayer, WrittenScenario
 from xosc_lateral.files.openscenario.write.fit import finish
 from xosc_lateral.files.openscenario.write.lateral_actions import LateralAction, changing_speed, lateral_actions
 from xosc_lateral.files.openscenario.write.literal import inline_maneuvers, name_literally
 from xosc_lateral.files.openscenario.write.moving import moving_entities
 from xosc_lateral.files.openscenario.write.replaced_maneuvers import ReplacedManeuvers
-from xosc_lateral.files.openscenario.write.target import STANDARD, TargetPlayer
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_chain import REST, Move, OffsetChain, OffsetPath, Ring
 from xosc_lateral.world.motion.trajectory import WorldTrajectory

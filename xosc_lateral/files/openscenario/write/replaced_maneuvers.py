@@ -32,7 +32,7 @@ from xosc_lateral.world.scenario.dependence import actors_of, conditions_of, ref
 from xosc_lateral.world.scenario.enums import StoryboardElementState
 from xosc_lateral.world.scenario.global_actions import AddEntityAction, DeleteEntityAction
 from xosc_lateral.world.scenario.private_actions import ConnectTrailerAction
-from xosc_lateral.world.scenario.storyboard import Condition
+from xosc_lateral.world.scenario.scenario import Condition
 
 STORY = "xosc-lateral trajectories"
 UNREACHED_TIME = 1e9

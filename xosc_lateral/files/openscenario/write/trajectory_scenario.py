@@ -11,7 +11,14 @@ from lxml import etree
 from xosc_lateral.files.openscenario.element import child_of
 from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.carla import add_drives, start_of
-from xosc_lateral.files.openscenario.write.draft import Draft, WrittenScenario, source_of
+from xosc_lateral.files.openscenario.write.draft import (
+    STANDARD,
+    Draft,
+    Player,
+    TargetPlayer,
+    WrittenScenario,
+    source_of,
+)
 from xosc_lateral.files.openscenario.write.entities import (
     add_kept_actions,
     dropped_reason,
@@ -22,7 +29,6 @@ from xosc_lateral.files.openscenario.write.entities import (
 )
 from xosc_lateral.files.openscenario.write.fit import finish
 from xosc_lateral.files.openscenario.write.moving import Moving, add_trajectories, moving_entities
-from xosc_lateral.files.openscenario.write.target import STANDARD, Player, TargetPlayer
 from xosc_lateral.files.openscenario.write.versions import newer_than
 from xosc_lateral.files.xml import parse_xml
 from xosc_lateral.world.motion.nominal import NominalMotion, PlayedAction

@@ -46,7 +46,7 @@ from xosc_lateral.workflows.recordings.cuts import (
 from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
 from xosc_lateral.workflows.recordings.lane_graph import find_neighbours
 from xosc_lateral.workflows.recordings.lanes_from_tracks import LaneCentreLine, fit_lane_centre
-from xosc_lateral.world.road.road_from_tracks import ReferenceLine, fit_reference_line
+from xosc_lateral.world.road.reference_line import ReferenceLine, fit_reference_line
 
 LANES = 2  # through lanes per direction of the A39 there; ramps and their merging lanes are left out
 STEP = 0.05  # [s]
