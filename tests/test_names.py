@@ -48,6 +48,32 @@ def test_names_are_not_vague(path: Path) -> None:
     assert not vague
 
 
+# ---- names inside functions ----
+RIDDLES = frozenset(["found", "one", "own", "said", "told", "given", "who", "nobody"])
+"""Nobody knows what these hold; for the variable of a comprehension they will do."""
+
+STORED = frozenset([("response.py", "given")])
+"""Fields that lie in saved states under their names."""
+
+
+def _local_names(tree: ast.Module) -> list[tuple[str, int]]:
+    """Variables, fields and arguments, besides those of comprehensions, with their lines."""
+    comprehensions = (node for node in ast.walk(tree) if isinstance(node, ast.comprehension))
+    short_lived = {id(name) for node in comprehensions for name in ast.walk(node.target)}
+    nodes = [node for node in ast.walk(tree) if id(node) not in short_lived]
+    names = [node for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)]
+    arguments = [(node.arg, node.lineno) for node in nodes if isinstance(node, ast.arg)]
+    return [*((node.id, node.lineno) for node in names), *arguments]
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(PACKAGE).as_posix())
+def test_local_names_are_no_riddles(path: Path) -> None:
+    named = _local_names(ast.parse(path.read_text(encoding="utf-8")))
+    riddles = [f"{path.name}:{line}: {name}" for name, line in named
+               if name.strip("_") in RIDDLES and (path.name, name) not in STORED]  # fmt: skip
+    assert not riddles
+
+
 # ---- names in docstrings and comments ----
 DOTTED = re.compile(r"`(?:xosc_lateral\.)?((?:[a-z_]+\.)+(?!csv|html|json|toml|xosc)[A-Za-z_]\w*)`")
 """`a.b` or `a.b.C` in backticks."""

@@ -188,21 +188,21 @@ def columns(n: int, parts: Iterable[Sequence[NDArray[Any]]]) -> list[NDArray[Any
     parts : iterable of sequence of array
         The same columns each time, shape (rows of the block,) each.
     """
-    found: list[NDArray[Any]] = []
+    made: list[NDArray[Any]] = []
     begin = 0
     for part in parts:
         end = begin + len(part[0])
-        found = found or [stored(values) if end == n else values[:1].copy() for values in part]
+        made = made or [stored(values) if end == n else values[:1].copy() for values in part]
         for k, values in enumerate(part if end - begin < n else ()):
-            if len(found[k]) == 1 and not _is_all(values, found[k]):
+            if len(made[k]) == 1 and not _is_all(values, made[k]):
                 column = empty(n, values.dtype)
                 for rows in blocks(begin):
-                    put(column, rows, np.broadcast_to(found[k], rows.stop - rows.start))
-                found[k] = column
-            if len(found[k]) == n:
-                put(found[k], slice(begin, end), values)
+                    put(column, rows, np.broadcast_to(made[k], rows.stop - rows.start))
+                made[k] = column
+            if len(made[k]) == n:
+                put(made[k], slice(begin, end), values)
         begin = end
-    return [values if len(values) == n else np.broadcast_to(values, n) for values in found]
+    return [values if len(values) == n else np.broadcast_to(values, n) for values in made]
 
 
 def _is_all(values: NDArray[Any], first: NDArray[Any]) -> bool:
@@ -220,8 +220,8 @@ def blocks(n: int, begin: int = 0) -> Iterator[slice]:
 
 def rows_where(n: int, holds: Callable[[slice], NDArray[np.bool_]], begin: int = 0) -> NDArray[np.intp]:
     """Rows from `begin` to n where something holds, which is asked block by block."""
-    found = [np.flatnonzero(holds(rows)) + rows.start for rows in blocks(n, begin)]
-    return np.concatenate(found) if found else np.empty(0, dtype=np.intp)
+    parts = [np.flatnonzero(holds(rows)) + rows.start for rows in blocks(n, begin)]
+    return np.concatenate(parts) if parts else np.empty(0, dtype=np.intp)
 
 
 def true_slices(mask: NDArray[np.bool_]) -> list[slice]:
@@ -237,11 +237,11 @@ def true_slices(mask: NDArray[np.bool_]) -> list[slice]:
 
 def slices_where(n: int, holds: Callable[[slice], NDArray[np.bool_]], begin: int = 0) -> list[slice]:
     """The longest slices of rows from `begin` to n where something holds, which is asked block by block."""
-    found: list[slice] = []
+    stretches: list[slice] = []
     for rows in blocks(n, begin):
         for part in true_slices(holds(rows)):
             first, stop = rows.start + part.start, rows.start + part.stop
-            if found and found[-1].stop == first:
-                first = found.pop().start
-            found.append(slice(first, stop))
-    return found
+            if stretches and stretches[-1].stop == first:
+                first = stretches.pop().start
+            stretches.append(slice(first, stop))
+    return stretches

@@ -93,7 +93,7 @@ class LoopResult:
 
     base: DriverProfile
     refined: DriverProfile
-    given: bool  # Whether the base was given; else it was fitted first.
+    base_given: bool  # Whether the base was given; else it was fitted first.
     in_sample: bool  # Whether it was given, and fitted on these very drives.
     findings: tuple[Finding, ...]
     coarse: Coarse
@@ -212,7 +212,7 @@ def close_loop(
     return LoopResult(
         base=base,
         refined=refined,
-        given=is_given,
+        base_given=is_given,
         in_sample=is_given and in_sample,
         findings=tuple(findings),
         coarse=coarse,

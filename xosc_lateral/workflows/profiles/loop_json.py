@@ -30,7 +30,7 @@ def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
     error = {"before": result.error_before, "after": result.error_after, "floor": result.floor}
     return {
         "drives": list(result.names),
-        "base_profile": _profile(result.base) | {"given": result.given, "in_sample": result.in_sample},
+        "base_profile": _profile(result.base) | {"given": result.base_given, "in_sample": result.in_sample},
         "refined_profile": _profile(result.refined),
         "held_out": result.held_out,
         "columns": [column_record(column, result) for column in sorted(result.identified.usable.roles)],

@@ -146,7 +146,7 @@ HOW_TO_READ = (
 def _add_findings(page: Page, result: LoopResult, proofs: Sequence[str]) -> None:
     page.section("What the profile lacked")
     if not result.findings:
-        stays = "stays as it was given" if result.given else "is the base that was fitted to these drives"
+        stays = "stays as it was given" if result.base_given else "is the base that was fitted to these drives"
         page.text(f"Nothing was added: the profile {stays}.")
         return
     for finding in result.findings:
