@@ -63,7 +63,8 @@ def sampled_gaps(profile: DriverProfile, source: Path, pairs: pd.DataFrame, seed
     tracks = dlr_ht.read_tracks(source)
     by_vehicle = imported.assign(late=tracks["time"] - imported["time"]).groupby(tracks["vehicle"])[["drive", "late"]]
     known = by_vehicle.first()
-    drives = drives_of_table(imported.drop(columns=["state", "following_run", "vehicle_class"]), {})
+    whole = imported.assign(following_run=0).drop(columns=["state", "vehicle_class"])  # an import knows its units
+    drives = drives_of_table(whole, {})
     time = pairs["frame"].to_numpy() // 2 * 0.05
 
     def at(vehicle: pd.Series, made: dict[str, tuple[FloatArray, FloatArray]]) -> FloatArray:

@@ -39,8 +39,7 @@ from xosc_lateral.drivers.evaluation.snippets import sample_runs, snippets_of
 from xosc_lateral.drivers.evaluation.spectra import spectrum
 from xosc_lateral.drivers.fitting.bands import measured, with_fast_movement
 from xosc_lateral.drivers.fitting.fast_part import FastPart, fast_part_of_runs
-from xosc_lateral.drivers.fitting.fitting import fit_population, fit_profile, fit_runs
-from xosc_lateral.drivers.fitting.sensor.runs import driver_runs
+from xosc_lateral.drivers.fitting.fitting import driver_runs, fit_population, fit_profile, fit_runs
 from xosc_lateral.drivers.model.profile import POPULATION as ANSWERS
 from xosc_lateral.drivers.model.profile import DriverProfile, Metadata, Provenance
 from xosc_lateral.drivers.model.sensor import SensorModel

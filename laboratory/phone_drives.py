@@ -35,9 +35,8 @@ from xosc_lateral.drivers.drives.cuts import cut_runs
 from xosc_lateral.drivers.drives.drive import Drive, Run
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.evaluation.profile_comparison import compare
-from xosc_lateral.drivers.fitting.fitting import fit_population, fit_profile
+from xosc_lateral.drivers.fitting.fitting import driver_runs, fit_population, fit_profile
 from xosc_lateral.drivers.fitting.sensor import likelihood
-from xosc_lateral.drivers.fitting.sensor.runs import driver_runs
 from xosc_lateral.drivers.loop.close import close_loop
 from xosc_lateral.drivers.model.drivability import drivable, strain
 from xosc_lateral.drivers.model.profile import DriverProfile

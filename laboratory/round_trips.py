@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from laboratory.markers import show
 from xosc_lateral.drivers.drives.resampling import STEP
-from xosc_lateral.drivers.fitting.models.autoregressive.fit import fit_autoregressive
+from xosc_lateral.drivers.fitting.models.autoregressive_fit import fit_autoregressive
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
 from xosc_lateral.files.profiles import find_profile, read_profile
 

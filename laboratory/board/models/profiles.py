@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.drives.drive import Drive, Run
 from xosc_lateral.drivers.evaluation.snippets import sample_recorded, sensor_noise
-from xosc_lateral.drivers.fitting.fitting import fit_population, fit_runs
-from xosc_lateral.drivers.fitting.sensor.runs import driver_runs
+from xosc_lateral.drivers.fitting.fitting import driver_runs, fit_population, fit_runs
 from xosc_lateral.drivers.model.core.base import ModelKind
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import sample_offsets

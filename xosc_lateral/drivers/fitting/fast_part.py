@@ -33,14 +33,14 @@ from xosc_lateral.base.numbers import all_significant, significant
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.filters import Detrend, filtered, low_pass_between, periodograms
 from xosc_lateral.drivers.drives.resampling import STEP
-from xosc_lateral.drivers.fitting.models.autoregressive.fit import rounded
-from xosc_lateral.drivers.fitting.models.autoregressive.fit_coarse import (
+from xosc_lateral.drivers.fitting.models.autoregressive_coarse import (
     FitSettings,
     coarse_power,
     scaled_spectrum,
     shaped,
 )
-from xosc_lateral.drivers.fitting.models.autoregressive.fit_matching import autocovariance, fit_volatility, log_power
+from xosc_lateral.drivers.fitting.models.autoregressive_fit import rounded
+from xosc_lateral.drivers.fitting.models.autoregressive_matching import autocovariance, fit_volatility, log_power
 from xosc_lateral.drivers.fitting.sensor.vehicle_bound import KNOTS, interpolation
 from xosc_lateral.drivers.model.core.autoregressive.coarse import BORDER, COARSE_EVERY, FREQUENCIES
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel

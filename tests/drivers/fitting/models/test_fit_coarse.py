@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from xosc_lateral.drivers.fitting.models.autoregressive.fit_coarse import (
+from xosc_lateral.drivers.fitting.models.autoregressive_coarse import (
     DEFAULT_SETTINGS,
     _far_covariance,
     _restored,

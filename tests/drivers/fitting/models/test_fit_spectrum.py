@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from scipy.signal import welch
 
 from tests.kit.core_models import STEADY
-from xosc_lateral.drivers.fitting.models.autoregressive.fit_coarse import (
+from xosc_lateral.drivers.fitting.models.autoregressive_coarse import (
     DEFAULT_SETTINGS,
     _typical_power,
     fit_spectrum,

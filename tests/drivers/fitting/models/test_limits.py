@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.fitting.models.autoregressive.fit import fit_autoregressive
+from xosc_lateral.drivers.fitting.models.autoregressive_fit import fit_autoregressive
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
 from xosc_lateral.files.profiles import read_profile
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from tests.drivers.fitting.sensor.test_likelihood import COLOURED, driver_density, measured
-from xosc_lateral.drivers.fitting.sensor.explanations import explanations
-from xosc_lateral.drivers.fitting.sensor.likelihood import Colour, Measured
+from xosc_lateral.drivers.fitting.sensor.likelihood import Colour, Measured, explanations
 from xosc_lateral.drivers.fitting.sensor.periodogram import Periodogram
 
 

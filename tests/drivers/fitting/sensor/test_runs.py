@@ -10,8 +10,8 @@ from tests.kit.runs import made_run
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.drives.cuts import cut_runs
 from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.fitting.fitting import driver_runs, durations_of, rows_of
 from xosc_lateral.drivers.fitting.sensor.periodogram import WINDOWS
-from xosc_lateral.drivers.fitting.sensor.runs import driver_runs, durations_of, rows_of
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampled_offsets import known_sensor, sensor_error
 from xosc_lateral.drivers.model.sensor import SensorModel

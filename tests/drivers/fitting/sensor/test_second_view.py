@@ -12,8 +12,8 @@ from scipy.signal import butter, lfilter, sosfilt
 from tests.kit.runs import made_run
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.drives.drive import Drive, MarkingShares, Run
-from xosc_lateral.drivers.fitting.sensor.runs import driver_runs, half_widths_of
-from xosc_lateral.drivers.fitting.sensor.second_view import KNOTS, SecondView, second_view
+from xosc_lateral.drivers.fitting.fitting import driver_runs, half_widths_of
+from xosc_lateral.drivers.fitting.sensor.periodogram import KNOTS, SecondView, second_view
 from xosc_lateral.drivers.fitting.sensor.separation import Separation, separate
 from xosc_lateral.drivers.model.sensor import SensorModel
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from xosc_lateral.base.errors import DriverProfileError
-from xosc_lateral.drivers.fitting.models.autoregressive.fit_coarse import fit_autoregression
+from xosc_lateral.drivers.fitting.models.autoregressive_coarse import fit_autoregression
 from xosc_lateral.drivers.model.core.autoregressive.coarse import Autoregression, stabilise
 from xosc_lateral.drivers.model.linear_filters import recur
 

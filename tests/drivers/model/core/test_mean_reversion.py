@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from xosc_lateral.drivers.model.core.mean_reversion import ClockState, take_at_rate
+from xosc_lateral.drivers.model.core.base import ClockState, take_at_rate
 
 FloatArray = NDArray[np.float64]
 

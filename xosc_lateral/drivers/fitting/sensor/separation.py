@@ -18,19 +18,28 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.numbers import NORMAL_95, all_significant
 from xosc_lateral.drivers.drives.filters import scale_frequencies
-from xosc_lateral.drivers.fitting.sensor.explanations import Explanation, explanations
-from xosc_lateral.drivers.fitting.sensor.likelihood import Colour, Known, Measured, Solution, solve
+from xosc_lateral.drivers.fitting.sensor.likelihood import (
+    Colour,
+    Explanation,
+    Known,
+    Measured,
+    Solution,
+    explanations,
+    solve,
+)
 from xosc_lateral.drivers.fitting.sensor.periodogram import (
     COARSEST,
+    LEVEL_SD,
     PASSED,
     Periodogram,
+    SecondView,
     periodogram,
     quantisation_step,
     rounding_density,
+    second_view,
     uniform_variance,
     windows_of,
 )
-from xosc_lateral.drivers.fitting.sensor.second_view import LEVEL_SD, SecondView, second_view
 from xosc_lateral.drivers.fitting.sensor.vehicle_bound import density
 from xosc_lateral.drivers.model.sensor import SensorModel
 

@@ -1,1 +1,1 @@
-"""Core models: one package each, what they share in `base`, `mean_reversion` and `noise`, the list in `registry`."""
+"""Core models: one package each, what they share in `base` and `noise`, the list in `registry`."""

@@ -41,7 +41,7 @@ def _fit_two_level(rel_offsets: Sequence[FloatArray], drives: Sequence[str]) -> 
 
 
 def _fit_autoregressive(rel_offsets: Sequence[FloatArray], drives: Sequence[str]) -> CoreModel:
-    from xosc_lateral.drivers.fitting.models.autoregressive.fit import fit_autoregressive
+    from xosc_lateral.drivers.fitting.models.autoregressive_fit import fit_autoregressive
 
     return fit_autoregressive(rel_offsets, drives)
 

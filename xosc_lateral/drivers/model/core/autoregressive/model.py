@@ -40,8 +40,7 @@ from xosc_lateral.drivers.model.core.autoregressive.parts import (
     FineState,
     begin_factors,
 )
-from xosc_lateral.drivers.model.core.base import Start
-from xosc_lateral.drivers.model.core.mean_reversion import ClockState, take_at_rate
+from xosc_lateral.drivers.model.core.base import ClockState, Start, take_at_rate
 from xosc_lateral.drivers.model.seeds import AutoregressiveSeed, generator
 
 KNEE = 0.8

@@ -20,8 +20,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.drives.resampling import STEP
-from xosc_lateral.drivers.model.core.base import CoreModel, Start
-from xosc_lateral.drivers.model.core.mean_reversion import ClockState, take_at_rate
+from xosc_lateral.drivers.model.core.base import ClockState, CoreModel, Start, take_at_rate
 from xosc_lateral.drivers.model.core.noise import KERNEL_TAPS, N_KNOTS, ShapedNoise
 from xosc_lateral.drivers.model.core.two_level.markov import N_BINS, AliasTable, MarkovChain, bin_of
 from xosc_lateral.drivers.model.linear_filters import JitKernel, convolve

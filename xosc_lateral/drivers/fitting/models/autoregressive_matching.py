@@ -19,7 +19,7 @@ from msgspec.structs import replace
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.drives.filters import Detrend, periodograms
-from xosc_lateral.drivers.fitting.models.autoregressive.fit_coarse import FitSettings, rise, scaled_spectrum, window_of
+from xosc_lateral.drivers.fitting.models.autoregressive_coarse import FitSettings, rise, scaled_spectrum, window_of
 from xosc_lateral.drivers.model.core.autoregressive.coarse import (
     BORDER,
     COARSE_EVERY,

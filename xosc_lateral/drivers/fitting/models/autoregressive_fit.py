@@ -23,13 +23,13 @@ from numpy.lib.stride_tricks import sliding_window_view
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.base.numbers import all_significant, significant
-from xosc_lateral.drivers.fitting.models.autoregressive.fit_coarse import (
+from xosc_lateral.drivers.fitting.models.autoregressive_coarse import (
     DEFAULT_SETTINGS,
     FitSettings,
     fit_coarse,
     fit_spectrum,
 )
-from xosc_lateral.drivers.fitting.models.autoregressive.fit_matching import matched, with_volatility
+from xosc_lateral.drivers.fitting.models.autoregressive_matching import matched, with_volatility
 from xosc_lateral.drivers.model.core.autoregressive.coarse import FREQUENCIES, Autoregression, largest_root, split_bands
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
 from xosc_lateral.drivers.model.core.autoregressive.parameters import Volatility

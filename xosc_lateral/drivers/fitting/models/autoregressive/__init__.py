@@ -1,1 +1,0 @@
-"""Fits the autoregressive core model: coarse part, match of spectra, settings."""
