@@ -75,7 +75,8 @@ def derive(base: DriverProfile, asked: Asked, name: str, *, preset: Preset | Non
 
     def measured(handles: Adapted, seed: int) -> tuple[LaneKeeping, FloatArray]:
         drives = highway_drives(plain.with_effects(handles), seed, speed=speed, drives=count)
-        return lane_keeping(drives, plain.lane_width, plain.model.step, half_width=half_width), drives
+        step, simulated = plain.model.step, (drives.size * plain.model.step, len(drives))
+        return lane_keeping(drives, plain.lane_width, step, half_width=half_width, recorded=simulated), drives
 
     known, drives = measured(adapted, DESIGN)
     if asked.sdlp_change is not None:
@@ -96,6 +97,7 @@ def derive(base: DriverProfile, asked: Asked, name: str, *, preset: Preset | Non
     if missed:
         raise DriverProfileError(f"{base.name} can't have these together: {'; '.join(missed)}")
     _check_drivable(drives, plain, speed)
+    reached = replace(reached, errors={})  # the simulation's, which say nothing of drivers
     return Derived(_described(plain.with_effects(handles), base, asked, reached, speed, preset), asked, reached)
 
 
