@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -178,9 +179,15 @@ def _held_out_runs(
 def fit_without(
     fitted: Fitted, used: BoolArray, kind: ModelKind, name: str, provenance: Provenance | None
 ) -> DriverProfile:
-    """Base model of what is left without the effects, a population's with class, lane and speed as `fit` has it, and
-    the effects."""
+    """Base model of what is left in these rows without the effects, and the effects."""
     runs = runs_without(fitted.coarse.timeline, removal_of(fitted), used)
+    return _with_effects(fitted, runs, kind, name, provenance)
+
+
+def _with_effects(
+    fitted: Fitted, runs: Sequence[Run], kind: ModelKind, name: str, provenance: Provenance | None
+) -> DriverProfile:
+    """Base model of runs, a population's with class, lane and speed as `fit` has it, and the effects."""
     if not runs:
         raise NotEnoughDataError("closing the loop: no run of 10 s is left to fit the base model on")
     if kind is ModelKind.TWO_LEVEL:
@@ -202,8 +209,8 @@ def fit_refined(
     has above it what the base has that one began with, as with `fit --prior`; without a base, nothing.
     """
     everything = np.ones(len(fitted.coarse.timeline), dtype=np.bool_)
-    profile = fit_without(fitted, everything, kind, name, provenance)
     runs = runs_without(fitted.coarse.timeline, removal_of(fitted), everything)
+    profile = _with_effects(fitted, runs, kind, name, provenance)
     if fitted.coarse.timeline.valid_below is None:
         return structs.replace(profile, validity=measured(runs))
     prior = base if base is not None and base.model.kind == ModelKind.AUTOREGRESSIVE else None
