@@ -19,6 +19,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray, IndexArray
 from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.fitting.regression import cluster_sums
 
 QUANTITIES = ("mean offset", "slow movement", "fast movement")  # Of the movements the standard deviation.
 # Averaging times between which movement is fast, and beyond which it is slow. [s]
@@ -99,10 +100,10 @@ def _measured(parts: Sequence[tuple[str, FloatArray]], step: float) -> tuple[Flo
 def _error(scores: FloatArray, cluster: IndexArray) -> FloatArray:
     """Standard errors from clusters, shape (3,), as wide as Student's distribution; 0 of a single one."""
     number = int(cluster.max()) + 1
-    sums = np.stack([np.bincount(cluster, column, number) for column in scores.T])
+    sums = cluster_sums(scores, cluster)
     freedom = max(number - 1, 1)
     wider = freedom / (freedom - 2) if freedom > 2 else 1.0
-    error = np.sqrt(np.square(sums).sum(axis=1) * number / freedom * wider)
+    error = np.sqrt(np.square(sums).sum(axis=0) * number / freedom * wider)
     return np.asarray(error if number > 1 else np.zeros(len(error)))
 
 
