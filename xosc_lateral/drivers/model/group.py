@@ -17,16 +17,13 @@ from xosc_lateral.base.segment import FADES
 from xosc_lateral.drivers.model.effects import Acts, EffectTerms
 from xosc_lateral.drivers.model.effects.base import terms_of
 from xosc_lateral.drivers.model.effects.response import Response, ResponseState
-from xosc_lateral.drivers.model.linear_filters import extrapolate, piece
+from xosc_lateral.drivers.model.linear_filters import SAMPLES_AHEAD, extrapolate, piece
 from xosc_lateral.drivers.model.process import DriveProcess, Movement, combine, offsets_of
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.records import plain, read_as
 
 BLOCK = 64
 """Model steps drawn at once for a driver. [-]"""
-
-_NEIGHBOURS = 2
-"""Samples ahead that the curve between two samples needs. [-]"""
 
 _PARTS = ("coarse", "fine", *(f"hidden_{name}" for name in ("location", "spread", "rate", "fine")))
 """What is drawn ahead: of the movement [lane widths], then factors of hidden effects (location: [m])."""
@@ -75,7 +72,7 @@ class OffsetGroup:
     @property
     def preview(self) -> float:
         """By how much later drivers respond than those who know what lies ahead. [s]"""
-        return (self._ahead + _NEIGHBOURS) * self.profile.model.step
+        return (self._ahead + SAMPLES_AHEAD) * self.profile.model.step
 
     def add(self, seeds: Sequence[np.random.SeedSequence]) -> None:
         """More drivers, whose drives begin with the next `advance`, at 0 s of their own clocks."""

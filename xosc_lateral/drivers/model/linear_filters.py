@@ -177,6 +177,9 @@ def convolve(values: FloatArray, kernel: FloatArray) -> FloatArray:
 
 Number = TypeVar("Number", float, FloatArray)
 
+SAMPLES_AHEAD = 2
+"""Samples from the beginning of a piece on that have to be known. [-]"""
+
 
 def piece(before: Number, here: Number, there: Number, behind: Number) -> tuple[Number, ...]:
     """Six coefficients in u, from 0 at `here` to 1 at `there`, lowest power first; of one piece or of many."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.model.effects import Acts
-from xosc_lateral.drivers.model.linear_filters import extrapolate, piece
+from xosc_lateral.drivers.model.linear_filters import SAMPLES_AHEAD, extrapolate, piece
 from xosc_lateral.drivers.model.plausibility import check_context
 from xosc_lateral.drivers.model.process import DriveProcess, ResponseStream, ResponseStreamState, combine
 from xosc_lateral.drivers.model.profile import DriverProfile, sampling_hash
@@ -24,9 +24,6 @@ from xosc_lateral.drivers.model.records import plain, read_as
 
 BLOCK = 64
 """Model steps drawn at once. [-]"""
-
-_NEIGHBOURS = 2
-"""Samples ahead that the curve between two samples needs. [-]"""
 
 
 FORMAT = "xosc-lateral offset stream"
@@ -123,7 +120,7 @@ class OffsetStream:
         self._process.begin_at(state.time)
         self._responses = tuple(ResponseStream(effect, profile.model.step) for effect in self._process.columned)
         self._ahead = max([0, *(response.ahead for response in self._responses)]) + (
-            _NEIGHBOURS if state.factor > 1 else 0
+            SAMPLES_AHEAD if state.factor > 1 else 0
         )
 
     @property

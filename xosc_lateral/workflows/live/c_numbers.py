@@ -22,13 +22,11 @@ from xosc_lateral.drivers.model.core.autoregressive.parameters import CANDIDATES
 from xosc_lateral.drivers.model.core.two_level.model import TwoLevelModel
 from xosc_lateral.drivers.model.effects.base import LOG_LIMIT
 from xosc_lateral.drivers.model.effects.response import split_shift
+from xosc_lateral.drivers.model.linear_filters import SAMPLES_AHEAD
 from xosc_lateral.drivers.model.profile import DriverProfile, sampling_hash
 from xosc_lateral.drivers.model.seeds import AutoregressiveSeed, DriveSeed, TwoLevelSeed
 from xosc_lateral.workflows.live import paths
 from xosc_lateral.world.motion.deviation import SETTLING_TIME
-
-NEIGHBOURS = 2
-"""Samples ahead that the curve between two samples needs. [-]"""
 
 USUAL = {"speed": 30.0, "lane_count": 2.0, "friction": 1.0}
 """Inputs that nobody sets; others are 0, of distances that nobody is there."""
@@ -274,7 +272,7 @@ def _effects(profile: DriverProfile, columned: Sequence[kinds.ColumnEffect]) -> 
         shifts += late
         lags += order * len(quantity)
     rows = ahead - min([0, *(whole for whole, _, _ in shifts)]) + 1
-    sizes = {"LOOKS": ahead + NEIGHBOURS, "COMPONENTS": max(1, len(components)), "ROWS": rows, "LAGS": max(1, lags)}
+    sizes = {"LOOKS": ahead + SAMPLES_AHEAD, "COMPONENTS": max(1, len(components)), "ROWS": rows, "LAGS": max(1, lags)}
     shift_rows = [f"{{{whole}, {_number(share)}, {_number(weight)}}}" for whole, share, weight in shifts]
     return sizes, [
         "enum { " + ", ".join(SHAPES) + " };",
