@@ -153,3 +153,10 @@ class RunningPrivateAction(RunningAction):
         """The actor was put so far away at once [m]: up to here and from here on, its path is another one."""
         if abs(distance) > JUMP:
             self.actor.activity |= Activity.TELEPORTED
+
+
+class RunningToTarget(RunningPrivateAction):
+    """One whose target is absolute, or relative to another entity."""
+
+    def _prepare(self) -> None:
+        self._reference = self._referred(self.content.target)

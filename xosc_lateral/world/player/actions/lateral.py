@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import atan, atan2, copysign, inf, pi, sqrt
 
 from xosc_lateral.world.motion.nominal import Activity
-from xosc_lateral.world.player.actions.base import Domain, Maker, RunningPrivateAction
+from xosc_lateral.world.player.actions.base import Domain, Maker, RunningToTarget
 from xosc_lateral.world.player.distances import is_turned
 from xosc_lateral.world.player.drive import move_along_lane
 from xosc_lateral.world.player.positions.resolve import beside
@@ -15,7 +15,7 @@ from xosc_lateral.world.scenario.enums import DynamicsDimension, DynamicsShape
 from xosc_lateral.world.scenario.private_actions import AbsoluteTargetLane, LaneChangeAction, LaneOffsetAction
 
 
-class RunningLaneChange(RunningPrivateAction):
+class RunningLaneChange(RunningToTarget):
     """From the present lateral position to the target lane, while moving on.
 
     The lateral position is measured from the centre of the target lane: its width and course are thereby followed. The
@@ -25,9 +25,6 @@ class RunningLaneChange(RunningPrivateAction):
 
     domains = Domain.LATERAL
     content: LaneChangeAction
-
-    def _prepare(self) -> None:
-        self._reference = self._referred(self.content.target)
 
     def _begin(self) -> None:
         state = self.actor
@@ -143,7 +140,7 @@ DEFAULT_LATERAL_ACCELERATION = 0.5
 """Where the file has none; the standard says as fast as can be, the reference player has this value. [m/s2]"""
 
 
-class RunningLaneOffset(RunningPrivateAction):
+class RunningLaneOffset(RunningToTarget):
     """Sideways within the lane, or beyond, while the default driver (or an action) moves ahead.
 
     The duration follows from the lateral acceleration; a relative target is read once. Each frame has the offset of its
@@ -152,9 +149,6 @@ class RunningLaneOffset(RunningPrivateAction):
 
     domains = Domain.LATERAL
     content: LaneOffsetAction
-
-    def _prepare(self) -> None:
-        self._reference = self._referred(self.content.target)
 
     def _begin(self) -> None:
         state = self.actor

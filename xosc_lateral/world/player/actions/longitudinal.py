@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import copysign, inf, sqrt
 
-from xosc_lateral.world.player.actions.base import Domain, Maker, RunningPrivateAction
+from xosc_lateral.world.player.actions.base import Domain, Maker, RunningPrivateAction, RunningToTarget
 from xosc_lateral.world.player.actions.speed_profile import limits_of
 from xosc_lateral.world.player.distances import Measure, ahead_and_left
 from xosc_lateral.world.player.drive import drive
@@ -25,7 +25,7 @@ from xosc_lateral.world.scenario.private_actions import (
 )
 
 
-class RunningSpeed(RunningPrivateAction):
+class RunningSpeed(RunningToTarget):
     """Speed along a transition over time, within the performance of the entity.
 
     A transition over a distance is turned into one over the time that it takes at the mean of both speeds. A relative
@@ -35,9 +35,6 @@ class RunningSpeed(RunningPrivateAction):
 
     domains = Domain.LONGITUDINAL
     content: SpeedAction
-
-    def _prepare(self) -> None:
-        self._reference = self._referred(self.content.target)
 
     def _begin(self) -> None:
         state = self.actor
