@@ -9,7 +9,7 @@ import numpy as np
 import xosc_lateral as xl
 from xosc_lateral.files.pages.chart import MUTED, ORANGE
 from xosc_lateral.files.pages.figure import Figure
-from xosc_lateral.world.motion.offset_chain import GRID, REST, closed, ring_along
+from xosc_lateral.world.motion.offset_chain import GRID, REST_TIME, closed, ring_along
 
 SHOWN_S = 40.0
 
@@ -30,7 +30,7 @@ def picture(path: str) -> None:
     moments, places = [0.0], [ring.origin]
     for move in ring.moves:
         share = np.linspace(0.0, 1.0, 40)
-        moments += (moments[-1] + move.wait + REST + share * move.duration).tolist()
+        moments += (moments[-1] + move.wait + REST_TIME + share * move.duration).tolist()
         places += (places[-1] + move.change * 0.5 * (1.0 - np.cos(np.pi * share))).tolist()
     until = int(np.searchsorted(moments, SHOWN_S))
     panel.line(moments[:until], places[:until], ORANGE, label="moves")

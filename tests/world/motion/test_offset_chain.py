@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.world.motion.offset_chain import GRID, REST, Ring, closed, joints_of, ring_along
+from xosc_lateral.world.motion.offset_chain import GRID, REST_TIME, Ring, closed, joints_of, ring_along
 
 FRAME = 0.01
 
@@ -14,7 +14,7 @@ def followed(ring: Ring) -> np.ndarray:
     """One turn of a ring in a player's frames: each move stands still in the first and begins two after the last."""
     path = [ring.origin]
     for move in ring.moves:
-        path += [path[-1]] * round((move.wait + REST) / FRAME)
+        path += [path[-1]] * round((move.wait + REST_TIME) / FRAME)
         share = FRAME * np.arange(1, round(move.duration / FRAME) + 1) / move.duration
         path += (path[-1] + move.change * 0.5 * (1.0 - np.cos(np.pi * share))).tolist()
     return np.array(path)

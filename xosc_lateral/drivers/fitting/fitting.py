@@ -19,7 +19,7 @@ from xosc_lateral.drivers.evaluation.sizes import sizes_of_runs
 from xosc_lateral.drivers.fitting.bands import in_bands, split_by_band
 from xosc_lateral.drivers.fitting.neighbours import answer_effects, measure_beside
 from xosc_lateral.drivers.fitting.place import LEAST_DRIVES, fit_place, without_place
-from xosc_lateral.drivers.fitting.sensor.periodogram import PASSED, WINDOWS
+from xosc_lateral.drivers.fitting.sensor.periodogram import PASSED_FREQUENCY, WINDOWS
 from xosc_lateral.drivers.fitting.sensor.separation import separate
 from xosc_lateral.drivers.model.core.base import CoreModel, ModelKind
 from xosc_lateral.drivers.model.core.registry import model_named
@@ -160,7 +160,7 @@ def driver_runs(
     """
     if max(map(len, runs), default=0) * STEP < WINDOWS[-1]:
         return list(runs), None
-    highest = min(run.valid_below or PASSED for run in runs)
+    highest = min(run.valid_below or PASSED_FREQUENCY for run in runs)
     if highest < LEAST_BAND:
         variance = float(np.concatenate([run.offset for run in runs]).var())
         return list(runs), SensorModel(0.0, driver_variance=significant(variance, 7), driver_share=(1.0, 1.0))

@@ -29,7 +29,7 @@ COLUMNS = ("is_truck", "lane_index", "speed")
 PIECE = 10.0
 """Snippets whose mean and spread are explained, the paper's. [s]"""
 
-WITHIN = (0.05, 0.95)
+STRAIGHT_QUANTILES = (0.05, 0.95)
 """Quantiles of the speed within which its effect is a straight line; beyond, it stays as it is there. [-]"""
 
 LEAST_DRIVES = 30
@@ -128,7 +128,7 @@ def _shapes(runs: Sequence[Run]) -> list[ColumnEffect]:
     if "lane_index" in varying:
         kept.append(Levels(acts=Acts.LOCATION, column="lane_index", levels=(RIGHTMOST,)))
     if "speed" in varying:
-        low, high = all_significant(np.quantile(columns["speed"], WITHIN), 3)
+        low, high = all_significant(np.quantile(columns["speed"], STRAIGHT_QUANTILES), 3)
         if high > low:
             kept.append(Piecewise(acts=Acts.LOCATION, column="speed", knots=(low, high)))
     return kept

@@ -30,7 +30,7 @@ from xosc_lateral.drivers.model.effects import Acts, ColumnEffect
 from xosc_lateral.drivers.model.seeds import generator
 
 CONTENDERS = 4  # Sets of columns that are refined, at most.
-WITHIN = 12.0  # Sets of columns that score lower than the best by more than this are not. [squared score]
+LIKELIHOOD_MARGIN = 12.0  # Sets of columns that score lower than the best by more than this are not. [squared score]
 # A term may lower the likelihood of the rows that it is fitted to by so much. More, and the model contradicts it: a
 # factor on the movement that changes faster than the movement does, say, which its innovations alone allow. [nat]
 ROUNDING = 1e-6
@@ -39,7 +39,7 @@ ROUNDING = 1e-6
 CLUSTER_S = 120
 # Standard errors by which the movement must have grown. A term of the right size lowers it by as much as one of twice
 # the right size leaves it the same: a true one is lost in at most 2 % of the tables, however weak it is. [-]
-GROWN = 2.0
+GROWTH_ERRORS = 2.0
 ROUNDS = 2  # Times that the candidates are scored beside what was found before; the first changes most.
 
 
@@ -97,7 +97,7 @@ class _Scored:
         order = np.argsort(-scores, kind="stable")
         best: dict[tuple[str, ...], int] = {}
         for index in order:
-            if scores[index] < scores[self.best] - WITHIN or len(best) == CONTENDERS:
+            if scores[index] < scores[self.best] - LIKELIHOOD_MARGIN or len(best) == CONTENDERS:
                 break
             best.setdefault(columns[index], int(index))
         for index in order[np.isfinite(scores[order])]:
@@ -199,7 +199,7 @@ class ColumnSearch:
             both = [dictionary.rows[rows].astype(np.float64).T, *course.values()]
             return orthonormal(np.concatenate(both, axis=1), CROSS_BASIS)
 
-        scores = beside_parts(scores, dictionary, problem.observed, known, span, WITHIN)
+        scores = beside_parts(scores, dictionary, problem.observed, known, span, LIKELIHOOD_MARGIN)
         return _Scored(problem, dictionary, known, scores, maxima)
 
     def _term(self, scored: _Scored, refused: Collection[tuple[str, ...]]) -> tuple[SearchedTerm, Fitted]:
@@ -263,4 +263,4 @@ def grows(before: Fitted, after: Fitted) -> bool:
     saved = np.square(before.movement * before.scale)[rows] - np.square(after.movement * after.scale)[rows]
     cluster = rows // CLUSTER_S
     sums = np.bincount(cluster, saved)[np.unique(cluster)]
-    return len(sums) > 1 and float(sums.sum()) < -GROWN * float(np.std(sums, ddof=1)) * np.sqrt(len(sums))
+    return len(sums) > 1 and float(sums.sum()) < -GROWTH_ERRORS * float(np.std(sums, ddof=1)) * np.sqrt(len(sums))

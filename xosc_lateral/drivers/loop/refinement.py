@@ -25,7 +25,7 @@ from xosc_lateral.drivers.model.effects.product import Form
 Alternatives = tuple[tuple[str, ...], ...]  # Columns of each effect that explains as much.
 Priced = tuple[ColumnEffect, float]  # An effect, and what its family and a finer choice within it take from its score.
 # Standard errors by which the better of two has to be better: 5 %, one-sided; the better is known to be it. [-]
-CLEARLY = 1.645
+CLEAR_ERRORS = 1.645
 RESPONSES = (0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)  # Time constants that are tried. [s]
 # And in the end, a fifth apart: with a time constant half as long again the size is 15 % off. [s]
 FINE_RESPONSES = tuple(np.round(np.geomspace(0.3, 8.0, 19), 2).tolist())
@@ -42,7 +42,7 @@ def explains_as_much(chosen: FloatArray, other: FloatArray, observed: FloatArray
         np.square(observed - own @ np.linalg.lstsq(own, observed, rcond=None)[0]) for own in (chosen, other)
     )
     sums = np.bincount(np.unique(cluster, return_inverse=True)[1], second - first)
-    return len(sums) < 2 or float(sums.sum()) <= CLEARLY * float(np.sqrt(len(sums)) * np.std(sums, ddof=1))
+    return len(sums) < 2 or float(sums.sum()) <= CLEAR_ERRORS * float(np.sqrt(len(sums)) * np.std(sums, ddof=1))
 
 
 @dataclass(frozen=True, eq=False)

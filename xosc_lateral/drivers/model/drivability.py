@@ -21,7 +21,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.drives.filters import filtered
-from xosc_lateral.drivers.fitting.sensor.periodogram import COARSEST, uniform_variance
+from xosc_lateral.drivers.fitting.sensor.periodogram import COARSE_STEP_RATIO, uniform_variance
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import sample_offsets
 
@@ -157,7 +157,8 @@ def _coarse_steps(profile: DriverProfile) -> list[str]:
     sensor = profile.sensor
     if sensor is None or sensor.driver_share != (0.0, 1.0):
         return []
-    if sensor.rounding <= COARSEST * np.sqrt(sensor.driver_variance + sensor.sensor_variance):  # little data, not steps
+    deviation = np.sqrt(sensor.driver_variance + sensor.sensor_variance)
+    if sensor.rounding <= COARSE_STEP_RATIO * deviation:  # little data, not steps
         return []
     return [
         f"the offsets are rounded to {sensor.rounding:.3g} m, too coarse to show how far the driver of {profile.name} "

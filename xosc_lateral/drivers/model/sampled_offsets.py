@@ -168,7 +168,7 @@ def recorded_offsets(
     return sample_offsets(profile, segment, seed, start=begin) + error
 
 
-PAST, FUTURE = 30.0, 10.0
+PAST_CONTEXT, FUTURE_CONTEXT = 30.0, 10.0
 """Context before and after a snippet that effects may look at. [s]"""
 
 
@@ -218,8 +218,8 @@ def segment_of(run: Run, rows: slice | None = None) -> Segment:
     Columns that are empty all along stay in the context: there is none, which is not the same as not being known.
     """
     first, last = (0, len(run)) if rows is None else (rows.start, rows.stop)
-    begin = max(0, first - round(PAST / STEP))
-    end = min(len(run), last + round(FUTURE / STEP))
+    begin = max(0, first - round(PAST_CONTEXT / STEP))
+    end = min(len(run), last + round(FUTURE_CONTEXT / STEP))
     cut = slice(begin, end)
     speed = np.full(end - begin, np.nan) if run.speed is None else run.speed[cut]
     return Segment(

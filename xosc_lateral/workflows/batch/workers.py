@@ -26,7 +26,7 @@ from xosc_lateral.workflows.batch.guard import let_worker_die
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
-AHEAD = 2
+TASKS_AHEAD = 2
 """Tasks handed out per worker: one at work, one to begin with at once."""
 
 LONG_TRY = 60.0
@@ -103,7 +103,7 @@ class _LocalProcesses(Pool):
         self._executor.shutdown(wait=True, kill_workers=raised[1] is not None)
 
     def capacity(self) -> int:
-        return AHEAD * self._count
+        return TASKS_AHEAD * self._count
 
     def submit(self, work: Callable[[Task], Result], task: Task) -> Future[Result]:
         with _safe_path():
@@ -210,7 +210,7 @@ class _Cluster(Pool):
 
     def capacity(self) -> int:
         # of the workers that there are now; they may come and go
-        return AHEAD * max(1, sum(map(int, self._client.nthreads().values())))
+        return TASKS_AHEAD * max(1, sum(map(int, self._client.nthreads().values())))
 
     def submit(self, work: Callable[[Task], Result], task: Task) -> Future[Result]:
         self.recover()

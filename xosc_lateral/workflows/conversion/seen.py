@@ -19,7 +19,7 @@ from xosc_lateral.base.rows import blocks, stored
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.fitting.neighbours import basis_of
 from xosc_lateral.drivers.model.profile import COLUMNS, SIDES, Basis, DriverProfile
-from xosc_lateral.drivers.model.sampled_offsets import FUTURE, PAST
+from xosc_lateral.drivers.model.sampled_offsets import FUTURE_CONTEXT, PAST_CONTEXT
 from xosc_lateral.drivers.model.sampling import Responses, responses_to
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
@@ -133,8 +133,8 @@ def _segment(
 ) -> Segment:
     """The segment on its knots, with context before and after as far as the entity's motion is one piece."""
     entity = motion.entities[index]
-    start = max(0, knots[0] - every * round(PAST / SAMPLE_STEP))
-    stop = min(len(entity.time), knots[-1] + every * round(FUTURE / SAMPLE_STEP) + 1)
+    start = max(0, knots[0] - every * round(PAST_CONTEXT / SAMPLE_STEP))
+    stop = min(len(entity.time), knots[-1] + every * round(FUTURE_CONTEXT / SAMPLE_STEP) + 1)
     earlier, later = (
         np.flatnonzero(((activity & Activity.TELEPORTED) != 0) | ((activity & Activity.ACTIVE) == 0))
         for activity in (entity.activity[start : knots[0] + 1], entity.activity[knots[-1] + 1 : stop])

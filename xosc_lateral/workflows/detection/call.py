@@ -22,14 +22,14 @@ from xosc_lateral.workflows.result import PathLike, Paths, as_paths
 if TYPE_CHECKING:
     pass
 
-ALL = "all"
+ALL_RULES = "all"
 TRAINED = "logistic"
 
 
 def detect(
     sources: Paths,
     *,
-    detectors: str | Sequence[str] = (ALL,),
+    detectors: str | Sequence[str] = (ALL_RULES,),
     ego: str | None = None,
     variants: int = 0,
     profiles: str | Sequence[str] = ("motorway",),
@@ -124,7 +124,7 @@ def detect(
 def _read_detector(word: str, threshold: float, answer_time: float) -> Detector | float | None:
     """A rule or command; the threshold of one that is still to be trained; None: all of them."""
     name, _, options = word.partition(":")
-    if word == ALL:
+    if word == ALL_RULES:
         return None
     if name == TRAINED:
         return read_numbers(options, {"threshold": (1e-6, 1.0 - 1e-6)}, TRAINED).get("threshold", 0.5)

@@ -14,7 +14,7 @@ from xosc_lateral.workflows.detection.tracks import STEP, Scene, Track, Truth, t
 RATE_WINDOW = 0.5
 """Lateral speed is the change of position over the last so many seconds, lateral acceleration that of the lateral
 speed: what is known of one second, as a tracker knows it. [s]"""
-REACH = 150.0
+WATCHED_DISTANCE = 150.0
 """Vehicles farther ahead are not watched: 5 s at 30 m/s, as in `recordings.encounters`. [m]"""
 ACROSS = 30.0
 """Vehicles of different roads farther apart across are on other carriageways. [m]"""
@@ -180,7 +180,7 @@ def _observer(scene: Scene, track: Track, side: int, taken: IntArray) -> Observe
         same_way = np.cos(a.heading[mine] - b.heading[theirs]) > 0.5
         beside = b.lane_index[theirs] - a.lane_index[mine] == side
         near = (a.road[mine] == b.road[theirs]) | (across < ACROSS)
-        better = same_way & beside & near & (ahead > -lengths) & (ahead < np.minimum(nearest[mine], REACH))
+        better = same_way & beside & near & (ahead > -lengths) & (ahead < np.minimum(nearest[mine], WATCHED_DISTANCE))
         rows = np.flatnonzero(better)
         at = mine.start + rows
         nearest[at] = ahead[rows]

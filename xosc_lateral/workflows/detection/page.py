@@ -23,7 +23,7 @@ NEAR_DISTANCE = 120.0
 """Vehicles farther from the case's are left out. [m]"""
 VEHICLE_HEIGHT = 1.5
 """Nobody sees it from above. [m]"""
-AROUND = 6.0
+CASE_MARGIN = 6.0
 """Of a case, before and after its moment. [s]"""
 
 
@@ -90,7 +90,7 @@ def curves_figure(curves: Sequence[Curve]) -> Figure:
 def _case_figure(case: Case) -> Figure:
     """Offset towards the lane over time, with the alarm."""
     track = case.view.track
-    rows = np.flatnonzero(np.abs(track.time - case.time) <= AROUND)
+    rows = np.flatnonzero(np.abs(track.time - case.time) <= CASE_MARGIN)
     time, base = track.time[rows], track.base[rows[0]]
     figure = Figure(1, 1, height=90.0)
     panel = figure.row(0)[0]
@@ -112,7 +112,7 @@ def clip_scene(case: Case) -> str | None:
     if network is None:
         return None
     middle = round(case.time / STEP)
-    half = round(AROUND / STEP)
+    half = round(CASE_MARGIN / STEP)
     instants = np.arange(middle - half, middle + half + 1)
     watched = case.view.track
     rows = (instants - watched.first).clip(0, len(watched) - 1)

@@ -169,11 +169,11 @@ def _lane_change(track: Track, begin: int, end: int, side: int) -> LaneChange:
     return LaneChange(side, begin, begin + int(np.argmax(reached)) if reached.any() else centre, centre, end)
 
 
-STILL = 0.01
+STILL_SPEED = 0.01
 """Lateral speed that nobody drives at throughout; played maneuvers come down to rounding. [m/s]"""
 
 
 def moves_in_lane(track: Track, truth: Truth) -> bool:
     """Whether a vehicle moves sideways while it keeps its lane."""
     rate = np.abs(np.diff(track.rows.offset, prepend=track.rows.offset[:1])) / STEP
-    return bool((rate[truth.keeping] > STILL).any())
+    return bool((rate[truth.keeping] > STILL_SPEED).any())

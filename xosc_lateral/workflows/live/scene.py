@@ -31,7 +31,7 @@ KINDS = {
 """Vehicle class of SUMO -> category of OpenSCENARIO; a car for the rest. SUMO's ``trailer`` is a truck with one."""
 
 
-SEEN = ("x", "y", "z", "heading", "pitch", "roll", "speed", "s", "offset")
+MOTION_COLUMNS = ("x", "y", "z", "heading", "pitch", "roll", "speed", "s", "offset")
 """Of `EntityMotion`, what the rows of a run say."""
 
 
@@ -52,7 +52,7 @@ def motion_of(rows: pd.DataFrame, scene: Scene, network: RoadNetwork) -> Nominal
     motions = []
     for entity in scene.entities:
         part = rows[rows["name"] == entity.name].rename(columns={"h": "heading"})
-        seen: dict[str, Any] = {name: part[name].to_numpy(dtype=np.float64) for name in SEEN}
+        seen: dict[str, Any] = {name: part[name].to_numpy(dtype=np.float64) for name in MOTION_COLUMNS}
         seen["road"] = [index.get(str(road), -1) for road in part["road"]]
         seen["lane"] = part["lane"].to_numpy(dtype=np.int32)
         if scene.is_road:  # a player says inertial places, a motion those of the road's file
@@ -62,7 +62,7 @@ def motion_of(rows: pd.DataFrame, scene: Scene, network: RoadNetwork) -> Nominal
         elif len(part):
             there = network.world_to_lane(*(seen[name] for name in ("x", "y", "z", "heading")))
             seen |= {"road": there.road, "lane": there.lane, "s": there.s}
-        columns: dict[str, Any] = {name: np.zeros(len(times)) for name in (*SEEN, "heading_relative")}
+        columns: dict[str, Any] = {name: np.zeros(len(times)) for name in (*MOTION_COLUMNS, "heading_relative")}
         columns |= {name: np.zeros(len(times), dtype=np.int32) for name in ("road", "lane")}
         columns["activity"] = np.zeros(len(times), dtype=np.uint8)
         at = np.searchsorted(times, part["time"])

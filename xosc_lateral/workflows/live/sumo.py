@@ -30,13 +30,13 @@ from xosc_lateral.world.surroundings.around import SIGHT_DISTANCE, Reach
 from xosc_lateral.world.surroundings.context import TRUCKS
 from xosc_lateral.world.surroundings.moment import Places
 
-HOLD = 0.5
+HOLD_TIME = 0.5
 """A lane change is over when SUMO has wanted none for so long, and moves the vehicle no more. [s]"""
 
-ELSEWHERE = 0.3
+MOVED_DISTANCE = 0.3
 """A vehicle this far from where its driver wants it was moved by SUMO: its driver goes on from there. [m]"""
 
-_STILL = 0.05
+_STILL_SPEED, _STILL_OVERHANG = 0.05, 0.05
 """Lateral speed of a vehicle that SUMO does not move [m/s], and how far it may stick out of its lane then. [m]"""
 
 _REASONS, _SIDES, _BLOCKED = 8 | 16 | 32 | 64, 2 | 4, 512 | 1024 | 2048 | 4096
@@ -296,12 +296,14 @@ class SumoTraffic:
         wants = any(wish & _REASONS and wish & _SIDES and not wish & _BLOCKED for wish in wishes)
         changed = before != lane and before.rpartition("_")[0] == lane.rpartition("_")[0]
         wanted, steered = self.moves.get(name, (offset, False))
-        if wants or changed or (steered and abs(wanted - offset) > ELSEWHERE):
-            vehicle.busy_until = now + HOLD
+        if wants or changed or (steered and abs(wanted - offset) > MOVED_DISTANCE):
+            vehicle.busy_until = now + HOLD_TIME
         if vehicle.busy_until is None:
             return True
-        sticks_out = abs(offset) + 0.5 * vehicle.width > 0.5 * self.roads.width[self.roads.place[lane]] + _STILL
-        if now < vehicle.busy_until or sticks_out or abs(float(vehicles.getLateralSpeed(name))) > _STILL:
+        sticks_out = (
+            abs(offset) + 0.5 * vehicle.width > 0.5 * self.roads.width[self.roads.place[lane]] + _STILL_OVERHANG
+        )
+        if now < vehicle.busy_until or sticks_out or abs(float(vehicles.getLateralSpeed(name))) > _STILL_SPEED:
             return False
         vehicle.busy_until = None
         return True

@@ -42,9 +42,9 @@ LEAST_ACTIVITY = 1e-6
 """Slower than 1 mm/s nobody moves. [m2/s2]"""
 DRIFT_TIME = 2.0
 """By how much of a lateral speed's way in it a place is off. [s]"""
-REST = 0.03
+REST_TIME = 0.03
 """A move is over that long before the next begins: a frame of the player, and one to start. [s]"""
-STILL = 0.01
+STILL_TIME = 0.01
 """A lane offset action stands still in its first frame. [s]"""
 CLOSING_TIME = 12.0
 """In which a ring's end is led to where it began. [s]"""
@@ -203,8 +203,8 @@ def _activity(path: FloatArray) -> FloatArray:
 
 def _shares(steps: int, reach: int) -> FloatArray:
     """How much of a move over so many steps is done after 0 to `reach` of them. [-]"""
-    duration = steps * GRID - REST
-    done = np.clip((GRID * np.arange(reach + 1) - STILL) / duration, 0.0, 1.0)
+    duration = steps * GRID - REST_TIME
+    done = np.clip((GRID * np.arange(reach + 1) - STILL_TIME) / duration, 0.0, 1.0)
     return np.asarray(0.5 - 0.5 * np.cos(np.pi * done))
 
 
@@ -243,6 +243,6 @@ def _moves(joints: IntArray, rows: int, places: FloatArray) -> tuple[Move, ...]:
         if change == 0.0:
             wait += GRID * steps
             continue
-        moves.append(Move(wait, GRID * steps - REST, change))
+        moves.append(Move(wait, GRID * steps - REST_TIME, change))
         wait = 0.0
     return tuple(moves)

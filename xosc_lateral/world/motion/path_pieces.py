@@ -28,7 +28,7 @@ VERTEX_SPACING = 0.105
 """Least distance between vertices: the player's 0.1 m and a margin for rounding. [m]"""
 LEAST_SPACING = VERTEX_SPACING - 1e-6
 """What counts as that far, rounding aside. [m]"""
-FARTHEST = 4.0
+VERTEX_DISTANCE = 4.0
 """Distance between vertices: the player turns cars within 2 m of one, more sharply where they are farther apart. [m]"""
 TOLERANCE = 0.01
 """Where straight motion between two vertices is further off than this, a vertex is added. [m]"""
@@ -276,7 +276,7 @@ def _head(time: FloatArray, way: FloatArray, until: float, step: float) -> Float
         # As long as neither bound counts many at once, the more the longer that holds.
         even = np.add.accumulate(np.array([times[-1][-1], *[step] * count]))
         at = np.interp(even[:-1], time, way)
-        nearest, farthest = (np.interp(at + far, way, time, right=np.inf) for far in (VERTEX_SPACING, FARTHEST))
+        nearest, farthest = (np.interp(at + far, way, time, right=np.inf) for far in (VERTEX_SPACING, VERTEX_DISTANCE))
         following = np.minimum(np.maximum(even[1:], nearest), farthest)
         count = 1 + int(np.argmax(np.append(following != even[1:], True)))
         following = following[:count]

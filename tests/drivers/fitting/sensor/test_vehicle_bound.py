@@ -8,7 +8,7 @@ import pytest
 from xosc_lateral.drivers.fitting.sensor.vehicle_bound import (
     BEND_SD,
     BRISKER_SD,
-    BRISKEST,
+    BRISKEST_CORNER,
     FREE_BELOW,
     KNOTS,
     LAGS,
@@ -55,7 +55,7 @@ def test_knots_are_close_enough_for_the_bends_between_the_corners() -> None:
 
 
 def test_corners_of_the_prior_lie_between_knots_of_either_side() -> None:
-    for corner in (FREE_BELOW, BRISKEST, LAGS):
+    for corner in (FREE_BELOW, BRISKEST_CORNER, LAGS):
         assert np.count_nonzero(corner - 1e-12 > KNOTS) >= 2
         assert np.count_nonzero(corner + 1e-12 < KNOTS) >= 2
 
@@ -69,7 +69,9 @@ def slope_at(frequency: float, shift: float = 0.0) -> float:
 
 def test_the_slope_is_that_of_keeping_a_lane_below_and_of_two_integrations_and_more_above() -> None:
     assert slope_at(1e-3) == pytest.approx(-1.0, abs=1e-4)
-    assert slope_at(BRISKEST) == pytest.approx(-3.5 - 3.0 * BRISKEST**2 / (1.0 + BRISKEST**2), abs=1e-6)
+    assert slope_at(BRISKEST_CORNER) == pytest.approx(
+        -3.5 - 3.0 * BRISKEST_CORNER**2 / (1.0 + BRISKEST_CORNER**2), abs=1e-6
+    )
     assert slope_at(LAGS) == pytest.approx(-6.0 - 1.5, abs=0.01)
     assert slope_at(1e3) == pytest.approx(-9.0, abs=1e-4)  # -4 - 2 - 3
 
@@ -77,8 +79,8 @@ def test_the_slope_is_that_of_keeping_a_lane_below_and_of_two_integrations_and_m
 def test_the_corner_moves_with_its_shift_and_the_lags_stay() -> None:
     shift = np.log(0.5)
     lags = lambda f: 3.0 * f**2 / (1.0 + f**2)  # noqa: E731
-    assert slope_at(0.5 * BRISKEST, shift) + lags(0.5 * BRISKEST) == pytest.approx(
-        slope_at(BRISKEST) + lags(BRISKEST), abs=1e-6
+    assert slope_at(0.5 * BRISKEST_CORNER, shift) + lags(0.5 * BRISKEST_CORNER) == pytest.approx(
+        slope_at(BRISKEST_CORNER) + lags(BRISKEST_CORNER), abs=1e-6
     )
     assert slope_at(1e3, shift) == pytest.approx(slope_at(1e3), abs=1e-4)
 

@@ -38,7 +38,7 @@ RIDGE = 1e-7
 LEAST_RESIDUAL = 0.1
 """Share of a driver's mean square residual that his mean never takes. [-]"""
 
-WILD = 9.0
+WILD_SQUARE_RATIO = 9.0
 """Mean square residual over the median driver's beyond which a driver is wild: three times as far. Drivers on a
 motorway differ by less (standard deviation of the logarithm 0.3, so that 1 in 10 000 is). [-]"""
 
@@ -79,7 +79,7 @@ def fit_autoregression(
     for _ in range(PASSES):
         # Only outliers are weighed: what a calm driver's short run shows of his memory is biased by what made it calm.
         usual = np.median(variances)
-        sizes = np.where(variances > WILD * usual, variances, usual)
+        sizes = np.where(variances > WILD_SQUARE_RATIO * usual, variances, usual)
         normal, right = np.zeros((order, order)), np.zeros(order)
         for past, value, size in zip(pasts, nexts, sizes[whose], strict=True):
             normal += (past.T @ past - len(value) * between) / size
@@ -97,7 +97,7 @@ def fit_autoregression(
 TURNS = 20
 """Of fitting both in turn at most: each leaves less than a third of the last one's error on runs of a minute. [-]"""
 
-SETTLED = 1e-3
+SHARE_TOLERANCE = 1e-3
 """Change of the drivers' share of the variance at which they end. [-]"""
 
 HALF_GAIN = 0.5
@@ -125,7 +125,7 @@ def fit_coarse(
         share = float(np.average(remembered[lags] / remembered[0], weights=pairs))
         before, between = between, (covariance - share * variance) / (1.0 - share)
         between = float(np.clip(between, 0.0, 0.9 * variance))
-        if abs(between - before) < SETTLED * variance:
+        if abs(between - before) < SHARE_TOLERANCE * variance:
             break
     return _restored(coarse, settings.step), between
 

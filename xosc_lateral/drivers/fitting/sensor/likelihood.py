@@ -18,7 +18,7 @@ from xosc_lateral.base.numbers import significant
 from xosc_lateral.drivers.fitting.sensor.periodogram import LEVEL_SD, Periodogram, SecondView, climb
 from xosc_lateral.drivers.fitting.sensor.vehicle_bound import KNOTS, N_KNOTS, N_STATE, interpolation, prior
 
-ABOVE = 1.0
+NOISE_FREQUENCY = 1.0
 """No driver is seen above this in a sensor worth splitting: where white noise is estimated at first. [Hz]"""
 
 TOP_SHARE = 0.8
@@ -121,7 +121,7 @@ class _Problem:
         self.integral = colour.integral(0.5 * known.rate) if colour.is_there and known else 0.0
         self.size = N_STATE + 1 + colour.is_there
         self.is_seen, self.is_low_passed = colour.view is not None, colour.order > 0
-        high = data.frequency > min(ABOVE, TOP_SHARE * float(data.frequency[-1]))
+        high = data.frequency > min(NOISE_FREQUENCY, TOP_SHARE * float(data.frequency[-1]))
         self.top = float(np.log(np.average(data.density[high], weights=data.weight[high])))
         self.corner, self.alone = colour.corner, colour.alone
 

@@ -27,10 +27,10 @@ MINIMUM_PIECES = 16
 INDEPENDENT = 0.53
 """Independent windows per Hann window at half overlap (Welch 1967, eq. for the variance at 50 % overlap). [-]"""
 
-FAINTEST = 1e-12
+LEAST_DENSITY = 1e-12
 """Added everywhere, so that values that stand still have a density. [m2/Hz]"""
 
-PASSED = 1.5
+PASSED_FREQUENCY = 1.5
 """Resampling to 5 Hz keeps what is slower than this. [Hz]"""
 
 BINS_FROM, BIN = 0.12, 0.05
@@ -68,11 +68,11 @@ def windows_of(runs: Sequence[FloatArray], step: float) -> tuple[FloatArray, Flo
     if longest < size:
         raise NotEnoughDataError(f"no run of {size * step:g} s; the longest lasts {longest * step:g} s")
     powers = np.concatenate([periodograms(run, size, detrend=Detrend.MEAN) for run in runs])
-    density = 2.0 * step * powers + FAINTEST
+    density = 2.0 * step * powers + LEAST_DENSITY
     return np.asarray(np.fft.rfftfreq(size, step), dtype=np.float64), density
 
 
-def periodogram(frequency: FloatArray, windows: FloatArray, highest: float = PASSED) -> Periodogram:
+def periodogram(frequency: FloatArray, windows: FloatArray, highest: float = PASSED_FREQUENCY) -> Periodogram:
     """Mean over windows, binned, from the second frequency (Hann smears the mean into the first) to a highest [Hz].
 
     `frequency` [Hz] of shape (n,), `windows` [m2/Hz] of shape (k, n).
@@ -124,7 +124,7 @@ def climb(
 LEAST_STEP = 0.004
 """Finer steps add less than 2e-6 m2, below any sensor's own noise. [m]"""
 
-COARSEST = 2.0
+COARSE_STEP_RATIO = 2.0
 """Steps of so many standard deviations of the rows show the driver's variance within 10 %, wider ones do not: where
 values come in such, driver and rounding are not separated (docs/design/sensor.md). [-]"""
 
@@ -149,7 +149,7 @@ def uniform_variance(step: float) -> float:
 LAGS = 60.0
 """Beyond it the error of rounding has forgotten: drivers have moved by many steps, or stood still throughout. [s]"""
 
-DENSE = 20.0
+DENSE_RATE = 20.0
 """What drivers do hardly shows between lags of this rate: of faster rows it is interpolated. [Hz]"""
 
 ORDERS = 59
@@ -191,7 +191,7 @@ def rounding_density(
     power = driver(frequency) * spacing
     power *= variance / power.sum()
     lag = np.arange(1, max(round(LAGS * rate), 1) + 1) / rate
-    known = np.arange(round(LAGS * min(rate, DENSE)) + 2) / min(rate, DENSE)
+    known = np.arange(round(LAGS * min(rate, DENSE_RATE)) + 2) / min(rate, DENSE_RATE)
     moved = np.sqrt(2.0 * (1.0 - np.cos(2.0 * np.pi * np.outer(known, frequency))) @ power)
     structure = np.interp(lag, known, moved) ** 2 + 2.0 * noise
     order = np.arange(1, ORDERS + 1)[:, None]

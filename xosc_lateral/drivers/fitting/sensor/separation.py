@@ -28,9 +28,9 @@ from xosc_lateral.drivers.fitting.sensor.likelihood import (
     solve,
 )
 from xosc_lateral.drivers.fitting.sensor.periodogram import (
-    COARSEST,
+    COARSE_STEP_RATIO,
     LEVEL_SD,
-    PASSED,
+    PASSED_FREQUENCY,
     Periodogram,
     SecondView,
     periodogram,
@@ -43,7 +43,7 @@ from xosc_lateral.drivers.fitting.sensor.periodogram import (
 from xosc_lateral.drivers.fitting.sensor.vehicle_bound import density
 from xosc_lateral.drivers.model.sensor import SensorModel
 
-PLAUSIBLE = 6.0
+CRITERION_MARGIN = 6.0
 """Explanations whose information criterion is within this of the best count for the interval: e^-3 as likely. [-]"""
 
 BLOCKS = 8
@@ -98,7 +98,7 @@ def separate(
     sensor_noise: float | None = None,
     half_widths: Sequence[FloatArray] | None = None,
     one_camera: bool = False,
-    highest: float = PASSED,
+    highest: float = PASSED_FREQUENCY,
 ) -> Separation:
     """Separate driver and sensor.
 
@@ -132,7 +132,9 @@ def separate(
             f"a sensor error of {sensor_noise:g} m is more than all that was measured: offsets vary by "
             f"{np.sqrt(variance):.2g} m (standard deviation)"
         )
-    too_coarse = grain > COARSEST * np.sqrt(variance) or len(np.unique(np.concatenate(measured))) < LEAST_LEVELS
+    too_coarse = (
+        grain > COARSE_STEP_RATIO * np.sqrt(variance) or len(np.unique(np.concatenate(measured))) < LEAST_LEVELS
+    )
     is_rounded = grain > 0.0 and not too_coarse
     rounding = _rounding(data, grain, variance, per_second) if is_rounded else _no_density
     rounded_off = uniform_variance(grain) if is_rounded else 0.0
@@ -147,7 +149,7 @@ def separate(
     driver = float(np.concatenate([result.driver_part(run, step) for run in runs]).var())
     error = _in_band(best, colour, data)
     share = min(driver, max(variance - error, 0.0)) / variance if variance > 0.0 else 1.0
-    plausible = [(one.solution, one.colour) for one in candidates if one.criterion < least.criterion + PLAUSIBLE]
+    plausible = [(one.solution, one.colour) for one in candidates if one.criterion < least.criterion + CRITERION_MARGIN]
     if colour.view is not None:
         plausible += [(solve(asked, one, best), one) for one in _other_views(colour, colour.view)]
     interval = (0.0, 1.0) if too_coarse else _interval(of_windows, windows, least, asked, plausible, share)
@@ -159,7 +161,9 @@ def _taken(candidates: Sequence[Explanation]) -> Explanation:
     """The best by its criterion, or that of the plausible ones which another measurement supports."""
     least = min(candidates, key=lambda each: each.criterion)
     seen = [
-        each for each in candidates if each.colour.view is not None and each.criterion < least.criterion + PLAUSIBLE
+        each
+        for each in candidates
+        if each.colour.view is not None and each.criterion < least.criterion + CRITERION_MARGIN
     ]
     return min(seen, key=lambda each: each.criterion, default=least)
 

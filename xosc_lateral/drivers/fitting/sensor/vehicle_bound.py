@@ -12,10 +12,10 @@ The logarithm of the driver's power density is a polygon over the logarithm of f
 - Muscles and vehicle follow the command with lags that add up to a corner of about 1 Hz [1]_ [3]_: up to -3 more where
   the sensor is good enough to see it.
 
-How brisk corrections are differs from driver to driver, so that the corner is fitted with the rest: at `BRISKEST` or
-below. Where noise hides the driver, his spectrum goes on as the part of it that is seen lets expect. A corner that were
-as free upwards would make a driver of every low-passed error; and beside such an error, whose own corner is estimated,
-it is `BRISKEST`: a slower driver and a slower error are one spectrum.
+How brisk corrections are differs from driver to driver, so that the corner is fitted with the rest: at
+`BRISKEST_CORNER` or below. Where noise hides the driver, his spectrum goes on as the part of it that is seen lets
+expect. A corner that were as free upwards would make a driver of every low-passed error; and beside such an error,
+whose own corner is estimated, it is `BRISKEST_CORNER`: a slower driver and a slower error are one spectrum.
 
 The prior is a normal one, of standard deviation `SLOPE_SD` on each slope and `BEND_SD` on the change from one to the
 next: data with little noise override it.
@@ -43,14 +43,14 @@ FREE_BELOW = 0.1
 LAGS = 1.0
 """Corners: of lane keeping at will, of muscles and vehicle. [Hz]"""
 
-BRISKEST = 0.27
+BRISKEST_CORNER = 0.27
 """Corner of the briskest corrections: that of drive tables whose sensor is good enough to see it. [Hz]"""
 
-BELOW, BEYOND, MOST_LAG = 1.0, 6.0, 3.0
+POWER_BELOW, POWER_BEYOND, MOST_LAG = 1.0, 6.0, 3.0
 """Powers of the frequency by which the density falls below the corner, beyond it, and more beyond that of the lags."""
 
 SLOWER_SD, BRISKER_SD = 0.5, 0.05
-"""Of the logarithm of the corner over `BRISKEST`, below it and above. [-]"""
+"""Of the logarithm of the corner over `BRISKEST_CORNER`, below it and above. [-]"""
 
 SLOPE_SD, BEND_SD, FREE_BEND_SD = 0.9, 1.0, 1.5
 """Of log power over log frequency. [-] `docs/design/sensor.md` shows how little the split depends on them."""
@@ -62,23 +62,23 @@ _LOG = np.log(KNOTS)
 N_KNOTS = len(KNOTS)
 
 N_STATE = N_KNOTS + 1
-"""Knots, then the logarithm of the corner over `BRISKEST`: what the prior is on."""
+"""Knots, then the logarithm of the corner over `BRISKEST_CORNER`: what the prior is on."""
 
 
 def expected_log_density(frequency: FloatArray, shift: float = 0.0) -> FloatArray:
     """Mean of the prior on log power, up to its level. Shape as `frequency` [Hz]. [-]
 
-    `shift` is the logarithm of the corner over `BRISKEST`.
+    `shift` is the logarithm of the corner over `BRISKEST_CORNER`.
     """
-    steps = BEYOND - BELOW
-    bend = np.logaddexp(0.0, steps * (np.log(frequency / BRISKEST) - shift))
-    return np.asarray(-BELOW * np.log(frequency) - bend - 0.5 * MOST_LAG * np.log1p((frequency / LAGS) ** 2))
+    steps = POWER_BEYOND - POWER_BELOW
+    bend = np.logaddexp(0.0, steps * (np.log(frequency / BRISKEST_CORNER) - shift))
+    return np.asarray(-POWER_BELOW * np.log(frequency) - bend - 0.5 * MOST_LAG * np.log1p((frequency / LAGS) ** 2))
 
 
 def _change_with_corner(frequency: FloatArray, shift: float) -> FloatArray:
     """Derivative of `expected_log_density` with respect to the shift. [-]"""
-    steps = BEYOND - BELOW
-    return np.asarray(steps / (1.0 + np.exp(-steps * (np.log(frequency / BRISKEST) - shift))))
+    steps = POWER_BEYOND - POWER_BELOW
+    return np.asarray(steps / (1.0 + np.exp(-steps * (np.log(frequency / BRISKEST_CORNER) - shift))))
 
 
 def _slopes() -> FloatArray:
@@ -119,7 +119,7 @@ def _of_slopes(values: FloatArray) -> FloatArray:
 def prior(state: FloatArray, *, is_corner_free: bool = True) -> tuple[FloatArray, FloatArray]:
     """Residuals of a state, shape (m,), each standard normal by the prior, and their Jacobian, shape (m, N_STATE).
 
-    Where the corner is not free, the slopes expected are those of `BRISKEST`, whatever the state says.
+    Where the corner is not free, the slopes expected are those of `BRISKEST_CORNER`, whatever the state says.
     """
     knots, excess = state[:N_KNOTS], float(state[N_KNOTS])
     shift, deviation = excess if is_corner_free else 0.0, SLOWER_SD if excess < 0.0 else BRISKER_SD

@@ -30,7 +30,7 @@ USUAL_S = 60.0
 MIN_SECONDS = 10  # Of road-following in a drive that is counted. [s]
 # Rounds of Newton's method at most, and the share of the variance that the last one may change it by: the sum of
 # squares falls and is convex in the variance, so that rounds from zero approach the root from below.
-ROUNDS, SETTLED = 50, 1e-9
+ROUNDS, VARIANCE_TOLERANCE = 50, 1e-9
 MIN_SUPPORT = 8.0  # A quantity that rests on fewer drives than this is not tested.
 # Share of either member's variance that the other of a pair must leave: below, the two are one quantity twice. [-]
 LEAST_APART = 0.1
@@ -137,7 +137,7 @@ class _Places:
             squares = np.square(places.left(fitted.levels))
             excess = float(squares.sum()) - max(int(counted.sum()) - known.shape[1], 1)
             change = excess / max(float(squares @ places.weight), 1e-300)
-            settled = abs(change) <= SETTLED * scatter or (change < 0.0 and scatter == 0.0)
+            settled = abs(change) <= VARIANCE_TOLERANCE * scatter or (change < 0.0 and scatter == 0.0)
             scatter = max(scatter + change, 0.0)
             if settled:
                 break

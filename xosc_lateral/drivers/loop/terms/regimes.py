@@ -75,7 +75,7 @@ def forward_backward(squares, valid, quiet, loud, go, leave):  # type: ignore[no
 
 ITERATIONS = 60  # Of expectation maximisation; converges well before.
 # Factor between the regimes and mean length [s] that the fit starts from; the likelier end is kept.
-STARTS = ((1.6, 15.0), (2.2, 40.0))
+FIT_STARTS = ((1.6, 15.0), (2.2, 40.0))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -93,7 +93,7 @@ class RegimeFit:
 def fit_regimes(rows: FloatArray, valid: BoolArray) -> RegimeFit:
     """Fit to white rows [-], shape (n,), by expectation maximisation; cut-out seconds say nothing about the regime."""
     squares, fits = rows**2, []
-    for factor, length in STARTS:
+    for factor, length in FIT_STARTS:
         quiet = float(np.sqrt(np.mean(squares[valid]) / (0.7 + 0.3 * factor**2)))
         loud, go, leave = quiet * factor, 1.0 / (2.0 * length), 1.0 / length
         for _ in range(ITERATIONS):

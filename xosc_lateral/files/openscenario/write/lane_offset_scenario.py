@@ -26,7 +26,7 @@ from xosc_lateral.files.openscenario.write.literal import inline_maneuvers, name
 from xosc_lateral.files.openscenario.write.moving import moving_entities
 from xosc_lateral.files.openscenario.write.replaced_maneuvers import ReplacedManeuvers
 from xosc_lateral.world.motion.nominal import NominalMotion
-from xosc_lateral.world.motion.offset_chain import REST, Move, OffsetChain, OffsetPath, Ring
+from xosc_lateral.world.motion.offset_chain import REST_TIME, Move, OffsetChain, OffsetPath, Ring
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.scenario import Scenario
 from xosc_lateral.world.scenario.enums import Priority
@@ -36,7 +36,7 @@ TURNS = 10000
 """Turns of a ring: as good as for ever. [-]"""
 LOOKING = 0.06
 """So long after an act has begun its conditions look at what is, not at what has been: a frame of up to 0.05 s. [s]"""
-FIRST = 0.12
+FIRST_WAIT = 0.12
 """The first move waits so long, two such frames: what is to stop it may begin with the act. [s]"""
 MOVING_SPEED = 15.0
 """A car whose speed changes begins a move above it alone: braking with 4 m/s2, it is over before it is slow. [m/s]"""
@@ -179,7 +179,7 @@ class _Acts:
         build.sub(follow, "TimeReference/None")
         build.sub(follow, "TrajectoryFollowingMode", followingMode="position")
         group = build.sub(event, "StartTrigger/ConditionGroup")
-        build.state_condition(group, "act", name, "runningState", FIRST)
+        build.state_condition(group, "act", name, "runningState", FIRST_WAIT)
         return event
 
     def _add_ring(self, act: etree._Element, name: str, path: etree._Element | None) -> None:
@@ -189,7 +189,7 @@ class _Acts:
         if self._chain.placed_t is None and ring.origin != 0.0:
             group = build.maneuver_group(act, f"{name} lead", entity)
             lead = self._event(build.sub(group, "Maneuver", name=f"{name} lead"), f"{name} lead event", leading(ring))
-            self._begin(lead, "act", name, "runningState", FIRST)
+            self._begin(lead, "act", name, "runningState", FIRST_WAIT)
         group = build.maneuver_group(act, f"{name} ring", entity)
         group.set("maximumExecutionCount", str(TURNS))
         maneuver = build.sub(group, "Maneuver", name=f"{name} ring")
@@ -197,9 +197,9 @@ class _Acts:
         for number, move in enumerate(ring.moves, start=1):
             event = self._event(maneuver, f"{name}.{number}", move)
             if before is None:
-                self._begin(event, "act", name, "runningState", FIRST + move.wait)
+                self._begin(event, "act", name, "runningState", FIRST_WAIT + move.wait)
             else:
-                self._begin(event, "event", str(before.get("name")), "completeState", max(move.wait - REST, 0.0))
+                self._begin(event, "event", str(before.get("name")), "completeState", max(move.wait - REST_TIME, 0.0))
             before = event
 
     def _event(self, maneuver: etree._Element, name: str, move: Move) -> etree._Element:
