@@ -28,7 +28,7 @@ from xosc_lateral.files.openscenario.write.trajectory_scenario import write_traj
 from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.world.motion.nominal import EntityMotion
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
-from xosc_lateral.world.road import RoadNetwork
+from xosc_lateral.world.road.network import RoadNetwork
 
 FOLDER = Path(__file__).parents[1] / "data" / "kept"
 

@@ -7,8 +7,7 @@ from math import atan2, cos, hypot, inf, nan, pi, sin
 
 from xosc_lateral.world.player.state import NO_ROAD, EntityState, free
 from xosc_lateral.world.player.transition import EPSILON
-from xosc_lateral.world.road import LaneLink
-from xosc_lateral.world.road.positions import wrap
+from xosc_lateral.world.road.positions import LaneLink, wrap
 
 _TIGHT = 1e-3
 """Beyond this share of the radius, the centre of a curve is so near that lengths beside the line say nothing. [-]"""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.segment import FADES
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario import BoundingBox
+from xosc_lateral.world.scenario.entity import BoundingBox
 
 SIGHT_DISTANCE = 200.0
 """How far a driver looks for others [m]; beyond it there is none (about what a series radar sees)."""
