@@ -238,11 +238,6 @@ BLOCK = 64
 """Rows that one box around a vehicle's path covers: 1.3 s at 50 Hz, 40 m on a motorway. [-]"""
 
 
-def pairs_within(x: Iterable[FloatArray], y: Iterable[FloatArray], reach: float) -> list[tuple[int, int]]:
-    """`stretches_within` over all rows at once."""
-    return sorted({pair for _, pairs in stretches_within(x, y, reach) for pair in pairs})
-
-
 def stretches_within(
     x: Iterable[FloatArray], y: Iterable[FloatArray], reach: float, blocks: int = 16
 ) -> Iterator[tuple[slice, list[tuple[int, int]]]]:

@@ -18,7 +18,7 @@ from xosc_lateral.world.player.state import NO_ROAD, EntityState
 from xosc_lateral.world.player.storyboard import EntityCheck, EntityChecks
 from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.player.values import holds
-from xosc_lateral.world.road.network import DRIVING
+from xosc_lateral.world.road import DRIVING
 from xosc_lateral.world.road.positions import difference
 from xosc_lateral.world.scenario.conditions import (
     CollisionCondition,
