@@ -29,8 +29,8 @@ ALONGSIDE = 10.0
 """A vehicle in the next lane counts half as alongside at this free space lengthwise, wholly at half of it. [m]"""
 
 INFLUENCE_DISTANCE = 40.0
-"""Free space over which the influence of others fades to 37 %, as in `fitting.neighbours`: with so much more free space
-for each factor e that less of a body lies in the lane, its influence is the product of both. [m]"""
+"""Free space over which the influence of others fades to 37 %, as in `fitting.context_effects`: with so much more free
+space for each factor e that less of a body lies in the lane, its influence is the product of both. [m]"""
 
 
 class Reach(NamedTuple):
