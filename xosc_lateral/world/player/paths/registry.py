@@ -27,10 +27,7 @@ VERTEX_RADIUS = 0.1
 
 
 class Layout(Struct, frozen=True):
-    """What laying out a path may depend on, besides the world: who follows it, how, and how fast it comes. [m/s]
-
-    `closes`: it goes on from its end to its start.
-    """
+    """What laying out a path depends on: who follows it, how, how fast [m/s], whether it goes on at its start."""
 
     simulation: Simulation
     locate: Callable[[positions.Position, Simulation], Pose]
