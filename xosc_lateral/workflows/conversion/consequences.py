@@ -18,7 +18,7 @@ from xosc_lateral.world.motion.segments import SegmentKind
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.player.player import play
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario import Scenario
+from xosc_lateral.world.scenario.scenario import Scenario
 
 GAP_STEP = 0.1
 """Between rows that gaps are measured on. [s]"""

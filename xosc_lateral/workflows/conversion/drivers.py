@@ -19,9 +19,10 @@ from xosc_lateral.workflows.conversion.settings import AUTO, ConvertSettings
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.world.motion.segments import SegmentSpan
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario import Entity, Scenario
 from xosc_lateral.world.scenario.dependence import Control
+from xosc_lateral.world.scenario.entity import Entity
 from xosc_lateral.world.scenario.enums import VehicleCategory
+from xosc_lateral.world.scenario.scenario import Scenario
 
 AUTO_PROFILE = "motorway"
 """What "auto" chooses: it gives every class, lane and speed its own. Motorcycles ride like cars for want of measured

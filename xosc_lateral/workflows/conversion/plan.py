@@ -18,7 +18,6 @@ from xosc_lateral.workflows.conversion.load import Loaded, Played, play_until
 from xosc_lateral.workflows.conversion.meaning import meaning_of
 from xosc_lateral.workflows.conversion.result import LaneChanges
 from xosc_lateral.workflows.conversion.settings import ConvertSettings, OutputMode
-from xosc_lateral.world.scenario import Scenario
 from xosc_lateral.world.scenario.dependence import (
     Control,
     Dependence,
@@ -30,7 +29,7 @@ from xosc_lateral.world.scenario.dependence import (
 )
 from xosc_lateral.world.scenario.enums import DynamicsShape
 from xosc_lateral.world.scenario.private_actions import LaneChangeAction
-from xosc_lateral.world.scenario.scenario import Condition
+from xosc_lateral.world.scenario.scenario import Condition, Scenario
 
 LEAST_EXTENSION, LARGEST_EXTENSION = 1.3, 2.0
 """A vehicle under test may be later at what ends the run, or never come to it: others follow trajectories for so

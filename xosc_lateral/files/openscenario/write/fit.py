@@ -16,8 +16,8 @@ from xosc_lateral.files.openscenario.write.draft import Draft, Player, WrittenSc
 from xosc_lateral.files.openscenario.write.literal import fill_in, inline_catalogs
 from xosc_lateral.files.openscenario.write.losses import Losses
 from xosc_lateral.files.openscenario.write.versions import fit_version
-from xosc_lateral.world.scenario import Scenario
 from xosc_lateral.world.scenario.expressions import ExpressionError
+from xosc_lateral.world.scenario.scenario import Scenario
 
 
 def fit(draft: Draft, converted: Sequence[str] | None) -> None:

@@ -28,8 +28,8 @@ from xosc_lateral.files.openscenario.write.replaced_maneuvers import ReplacedMan
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_chain import REST_TIME, Move, OffsetChain, OffsetPath, Ring
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
-from xosc_lateral.world.scenario import Scenario
 from xosc_lateral.world.scenario.enums import Priority
+from xosc_lateral.world.scenario.scenario import Scenario
 
 CHAIN = "xosc-lateral offsets"
 TURNS = 10000
