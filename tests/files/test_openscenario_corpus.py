@@ -16,7 +16,7 @@ from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.openscenario.write.fit import write_converted
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion, PlayedAction
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
-from xosc_lateral.world.scenario import Scenario
+from xosc_lateral.world.scenario.scenario import Scenario
 
 XSD = Path(__file__).parents[1] / "data" / "xsd"
 FILES = {(1, 0): "1.0.0", (1, 1): "1.1.1", (1, 2): "1.2.0", (1, 3): "1.3.0"}

@@ -39,9 +39,9 @@ from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_chain import OffsetChain, OffsetPath, ring_along
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.player.player import play
-from xosc_lateral.world.scenario import Scenario
 from xosc_lateral.world.scenario.position import Polyline, WorldPosition
 from xosc_lateral.world.scenario.private_actions import FollowTrajectoryAction
+from xosc_lateral.world.scenario.scenario import Scenario
 
 XSD = Path(__file__).parents[1] / "data" / "xsd"
 STEP = 0.02

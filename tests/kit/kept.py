@@ -27,7 +27,7 @@ from xosc_lateral.files.openscenario.write.fit import write_converted
 from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.world.motion.nominal import EntityMotion
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
-from xosc_lateral.world.road import RoadNetwork
+from xosc_lateral.world.road.network import RoadNetwork
 
 FOLDER = Path(__file__).parents[1] / "data" / "kept"
 
@@ -54,11 +54,12 @@ def road_answers(name: str) -> dict[str, Any]:
         "poses": _rows(*poses),
         "along": _rows(*along),
         "found": _rows(*back),
-        "across": _rows(network.offset_to_t(road, lane, s, offset), network.t_to_offset(road, lane, s, offset),
+        "across": _rows(network.offset_to_t(road, lane, s, offset),
+                        network.travel_directions(road, lane) * (offset - network.lane_centre_t(road, lane, s)),
                         network.lane_centre_t(road, lane, s), network.lane_width(road, lane, s)),
         "beside": _rows(*network.lane_index(road, lane, s), network.speed_limit(road, lane, s)),
         "shape": _rows(network.curvature(road, s), network.lane_curvature(road, lane, s, offset),
-                       network.crossfall(road, lane, s), network.grade(road, lane, s)),
+                       *network.lean(road, lane, s)),
         "sections": [_plain(network.section_at(int(r), float(at))) for r, at in zip(road, s, strict=True)],
         "lanes": [[info.id for info in network.lanes_at(int(r), float(at))] for r, at in zip(road, s, strict=True)],
         "links": list(_links(network)),

@@ -26,7 +26,7 @@ from xosc_lateral.workflows.conversion.write import Written, write, write_with
 from xosc_lateral.workflows.result import PAGE_SUFFIXES, PathLike
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_chain import OffsetChain
-from xosc_lateral.world.scenario import Scenario
+from xosc_lateral.world.scenario.scenario import Scenario
 
 SCENARIO_SUFFIXES = (".xosc",)
 SUPPLY = 60.0

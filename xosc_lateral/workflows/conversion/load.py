@@ -14,7 +14,7 @@ from xosc_lateral.workflows.conversion.settings import STEP
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.player.player import play
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario import Scenario
+from xosc_lateral.world.scenario.scenario import Scenario
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -26,7 +26,6 @@ from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.world.motion.offset_chain import OffsetChain, Size, resized
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.player.player import play
-from xosc_lateral.world.scenario import Action, Event, Maneuver, ManeuverGroup, Scenario, Story
 from xosc_lateral.world.scenario.conditions import StoryboardElementStateCondition, at_time
 from xosc_lateral.world.scenario.enums import (
     ConditionEdge,
@@ -37,7 +36,18 @@ from xosc_lateral.world.scenario.enums import (
     StoryboardElementType,
 )
 from xosc_lateral.world.scenario.private_actions import AbsoluteTargetSpeed, SpeedAction, TransitionDynamics
-from xosc_lateral.world.scenario.scenario import Act, Actors, Condition, ConditionGroup
+from xosc_lateral.world.scenario.scenario import (
+    Act,
+    Action,
+    Actors,
+    Condition,
+    ConditionGroup,
+    Event,
+    Maneuver,
+    ManeuverGroup,
+    Scenario,
+    Story,
+)
 
 CHANGE_AT = 1.0
 """When an ego begins to drive faster or slower than in the nominal run. [s]"""

@@ -25,7 +25,6 @@ from xosc_lateral.workflows.conversion.result import Drivers, LaneChanges
 from xosc_lateral.workflows.conversion.settings import AUTO, AUTO_PROFILE, ConvertSettings, OutputMode
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario import Entity, Scenario
 from xosc_lateral.world.scenario.dependence import (
     Control,
     Dependence,
@@ -35,9 +34,10 @@ from xosc_lateral.world.scenario.dependence import (
     dependence,
     vehicles_under_test,
 )
+from xosc_lateral.world.scenario.entity import Entity
 from xosc_lateral.world.scenario.enums import DynamicsShape, VehicleCategory
 from xosc_lateral.world.scenario.private_actions import LaneChangeAction
-from xosc_lateral.world.scenario.scenario import Condition
+from xosc_lateral.world.scenario.scenario import Condition, Scenario
 
 LEAST_EXTENSION, LARGEST_EXTENSION = 1.3, 2.0
 """A vehicle under test may be later at what ends the run, or never come to it: others follow trajectories for so

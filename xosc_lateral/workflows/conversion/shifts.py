@@ -23,7 +23,6 @@ from xosc_lateral.workflows.conversion.result import EventShift
 from xosc_lateral.world.motion.gaps import gaps_of
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion, PlayedAction
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario import Scenario
 from xosc_lateral.world.scenario.conditions import StoryboardElementStateCondition
 from xosc_lateral.world.scenario.dependence import conditions_of, entity_references, refers_to
 from xosc_lateral.world.scenario.enums import DynamicsDimension, StoryboardElementState
@@ -33,7 +32,7 @@ from xosc_lateral.world.scenario.private_actions import (
     LaneOffsetAction,
     LateralDistanceAction,
 )
-from xosc_lateral.world.scenario.scenario import Condition, Trigger
+from xosc_lateral.world.scenario.scenario import Condition, Scenario, Trigger
 
 EVENT_TOLERANCE = 0.05
 """By which an event may be earlier or later beyond what is explained: a frame of a coarse player. [s]"""

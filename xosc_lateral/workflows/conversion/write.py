@@ -32,7 +32,7 @@ from xosc_lateral.world.motion.deviation import (
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.motion.offset_chain import GRID, RESOLUTION, OffsetChain, OffsetPath, Ring, ring_along
 from xosc_lateral.world.motion.trajectory import distance_driven
-from xosc_lateral.world.road import RoadNetwork
+from xosc_lateral.world.road.network import RoadNetwork
 
 LONGEST_TURN = 300.0
 """Of a ring: a run that is stopped by something that never happens lasts an hour. [s]"""

@@ -15,8 +15,7 @@ from xosc_lateral.workflows.recordings.motion_fits import APART, SpeedProfile, T
 from xosc_lateral.workflows.recordings.recorded import RecordedVehicle, Recording
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario import Entity
-from xosc_lateral.world.scenario.entity import BoundingBox
+from xosc_lateral.world.scenario.entity import BoundingBox, Entity
 from xosc_lateral.world.scenario.enums import EntityCategory
 from xosc_lateral.world.scenario.place import Place
 

@@ -97,14 +97,15 @@ def road_columns(
     Shape (n,) each.
     """
     lane_index, lane_count = network.lane_index(road, lane, s)
+    crossfall, grade = network.lean(road, lane, s)
     lane_seen = np.where(along > 0, lane_index, lane_count - 1 - lane_index)
     return {
         "curvature": along * network.lane_curvature(road, lane, s, offset),
         "lane_width": network.lane_width(road, lane, s),
         "lane_index": np.where(lane_index >= 0, lane_seen, np.nan).astype(np.float64),
         "lane_count": lane_count.astype(np.float64),
-        "crossfall": along * network.crossfall(road, lane, s),
-        "grade": along * network.grade(road, lane, s),
+        "crossfall": along * crossfall,
+        "grade": along * grade,
     }
 
 

@@ -18,9 +18,9 @@ from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.build import Version, Vertices, named
 from xosc_lateral.files.xml import parse_xml, read_document
 from xosc_lateral.world.motion.nominal import NominalMotion
-from xosc_lateral.world.scenario import Action, Scenario
 from xosc_lateral.world.scenario.parameters import Scope
 from xosc_lateral.world.scenario.place import Unsupported
+from xosc_lateral.world.scenario.scenario import Action, Scenario
 
 VERSIONS: tuple[Version, ...] = ((1, 0), (1, 1), (1, 2), (1, 3), (1, 4))
 """That can be written."""

@@ -7,11 +7,11 @@ from collections.abc import Iterator, Mapping
 
 from msgspec import Struct
 
-from xosc_lateral.world.scenario import Action, Scenario
 from xosc_lateral.world.scenario.controllers import Domains, gives_lateral
 from xosc_lateral.world.scenario.dependence import actors_of, controlled_entities
 from xosc_lateral.world.scenario.global_actions import AddEntityAction
 from xosc_lateral.world.scenario.private_actions import LATERAL, LONGITUDINAL, TeleportAction
+from xosc_lateral.world.scenario.scenario import Action, Scenario
 
 
 class LateralAction(Struct, frozen=True):

@@ -23,11 +23,11 @@ from xosc_lateral.files.openscenario.write.versions import newer_than
 from xosc_lateral.files.xml import parse_xml
 from xosc_lateral.world.motion.nominal import NominalMotion, PlayedAction
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
-from xosc_lateral.world.scenario import Scenario
 from xosc_lateral.world.scenario.conditions import SimulationTimeCondition
 from xosc_lateral.world.scenario.dependence import conditions_of
 from xosc_lateral.world.scenario.global_actions import AddEntityAction
 from xosc_lateral.world.scenario.private_actions import MOTION, ConnectTrailerAction
+from xosc_lateral.world.scenario.scenario import Scenario
 
 STORY = "xosc-lateral"
 TRAILERS_SINCE = (1, 3)
