@@ -146,9 +146,10 @@ class Rows:
             offset *= direction
             if len(looked_up) and network.road_ids:
                 height = free[unknown, 2] if self._knows_height else None
-                located = network.world_to_lane(*free[unknown, :2].T, height, lane_types=self.state.lane_types)
-                for column, values in zip(where, located, strict=False):
-                    column[looked_up] = values
+                x, y, lane_types = free[unknown, 0], free[unknown, 1], self.state.lane_types
+                located = network.world_to_lane(x, y, height, lane_types=lane_types)
+                road[looked_up], lane[looked_up] = located.road, located.lane
+                s[looked_up], offset[looked_up] = located.s, located.offset
                 direction[looked_up] = network.travel_directions(located.road, located.lane)
             elif len(looked_up):
                 road[looked_up] = NO_ROAD

@@ -163,7 +163,7 @@ def _together(meeting: Sequence[tuple[int, int]], n: int) -> Iterator[tuple[IntA
 
 
 def _rows_near(tables: Sequence[NDArray[Any]], length: FloatArray, vehicle: IntArray, other: IntArray) -> BoolArray:
-    """Where pairs of vehicles are near enough for `moved_aside`, shape (pairs, n); `tables`: x, y ... of all vehicles."""
+    """Where pairs of vehicles are near enough for `moved_aside`, shape (pairs, n); `tables`: x, y ... of all."""
     x, y, present = tables[0], tables[1], tables[-1]
     reach = (FADES + 0.5 * (length[vehicle] + length[other]) + MARGIN)[:, None]
     away = (x[other] - x[vehicle]) ** 2 + (y[other] - y[vehicle]) ** 2
@@ -198,9 +198,9 @@ class Response(NamedTuple):
 def moved_aside(vehicle: Frame, other: Frame, response: Response, left_hand: bool | BoolArray) -> FloatArray:
     """By how much each moves aside for another that is near, positive left, shape (n,). [m]
 
-    By itself `motorway` moves 0.209 m from whom it overtakes and 0.083 m from who overtakes it, where real vehicles move
-    0.239 and 0.045 m: the second has done more than its part already. One whose answer is known of the driver alone has
-    no part at all.
+    By itself `motorway` moves 0.209 m from whom it overtakes and 0.083 m from who overtakes it, where real vehicles
+    move 0.239 and 0.045 m: the second has done more than its part already. One whose answer is known of the driver
+    alone has no part at all.
     """
     ahead_x, ahead_y = other.x - vehicle.x, other.y - vehicle.y
     cos, sin = np.cos(vehicle.heading), np.sin(vehicle.heading)
