@@ -17,9 +17,8 @@ from xosc_lateral.world.motion.nominal import PlayedAction
 from xosc_lateral.world.scenario.controllers import named
 from xosc_lateral.world.scenario.dependence import assigned_controllers, controlled_entities
 from xosc_lateral.world.scenario.enums import Priority
-from xosc_lateral.world.scenario.expressions import ExpressionError
 from xosc_lateral.world.scenario.global_actions import ParameterModifyAction, ParameterSetAction
-from xosc_lateral.world.scenario.parameters import Scope
+from xosc_lateral.world.scenario.parameters import ExpressionError, Scope
 from xosc_lateral.world.scenario.place import Place, Unsupported
 from xosc_lateral.world.scenario.private_actions import CONTROLLER, MOTION
 from xosc_lateral.world.scenario.scenario import Action, Scenario
