@@ -8,25 +8,21 @@ The series of a clothoid about its middle is derived in docs/design/clothoids.md
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import NotEnoughDataError
-
-if TYPE_CHECKING:
-    from scipy.interpolate import BSpline
-
-from collections.abc import Sequence
-from typing import NamedTuple
-
 from xosc_lateral.world.road.geometry import SERIES_TERMS, ClothoidPiece, ParamCubic
 from xosc_lateral.world.road.piecewise import IndexLike, Lookup
 from xosc_lateral.world.road.road import Road
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 
 class Frame(NamedTuple):
