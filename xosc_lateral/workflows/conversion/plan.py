@@ -49,7 +49,7 @@ class Plan:
     """One conversion, decided."""
 
     settings: ConvertSettings
-    variant: int
+    variant_index: int  # from 0: each has other offsets
     source: Path
     output: Path  # where it goes; it is written there if it `saves`
     saves: bool
@@ -62,7 +62,7 @@ class Plan:
     depends: Dependence  # on either
     is_replay: bool  # everything happens by the clock of the nominal run, whoever drives
     drivers: Drivers
-    through: frozenset[str]  # whose movement goes on through lane changes: they follow trajectories
+    continuous: frozenset[str]  # whose movement goes on through lane changes: they may follow trajectories
     context: ContextTable | None
     # unwritable: entities whose maneuvers the target does not know, so that only a trajectory is left, and why
     unwritable: Mapping[str, str]
@@ -106,7 +106,7 @@ def decide(
     settings: ConvertSettings,
     *,
     output: Path,
-    variant: int = 0,
+    variant_index: int = 0,
     report: Path | None = None,
     saves: bool = True,
 ) -> Plan:
@@ -128,11 +128,11 @@ def decide(
         inputs[settings.context] = context.sha256
     refuse_outputs([output if saves else None, report], inputs)
     drivers = choose_drivers(scenario, settings, egos, controllers if target.player is Player.CARLA else {})
-    through = _on_trajectories(scenario, settings, depends, frozenset(drivers))
+    continuous = _on_trajectories(scenario, settings, depends, frozenset(drivers))
     version = target.version_for(scenario)
     plan = Plan(
         settings,
-        variant,
+        variant_index,
         scenario.path,
         output,
         saves,
@@ -145,13 +145,13 @@ def decide(
         depends,
         _is_replay(settings, depends),
         _without_proving_grounds(drivers, played.motion, played.network, settings.entity),
-        through,
+        continuous,
         context,
         _unwritable(played, settings, version, {*egos, *controllers}),
         LateralActions.of(scenario),
     )
     if settings.lane_changes is LaneChanges.LIFELIKE:
-        _refuse_steps(scenario, through)
+        _refuse_steps(scenario, continuous)
     return plan
 
 

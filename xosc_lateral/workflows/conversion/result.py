@@ -173,6 +173,11 @@ class Enriched:
             gap for gap in self.gaps_after if gap.touches and not (gap.names in before and before[gap.names].touches)
         )
 
+    @property
+    def trouble(self) -> int:
+        """Contacts and lane departures that nominally are none. [-]"""
+        return len(self.new_contacts) + len(self.departures)
+
     def warnings(self) -> tuple[str, ...]:
         """What a user has to know, a line each."""
         lines = [
