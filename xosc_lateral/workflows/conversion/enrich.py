@@ -31,11 +31,16 @@ from xosc_lateral.workflows.conversion.result import (
 )
 from xosc_lateral.workflows.conversion.seen import NOTHING_SEEN, SAMPLE_STEP, Contexts, Seen, going_on, seen_by
 from xosc_lateral.world.motion.crossings import Crossing, beside_written, crossings
-from xosc_lateral.world.motion.deviation import SETTLING_TIME, SampledDeviation, deviation_through
 from xosc_lateral.world.motion.gaps import gaps_of
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.motion.segments import SegmentKind, SegmentSpan, cut_segments, movement_runs
-from xosc_lateral.world.motion.trajectory import displace, distance_driven
+from xosc_lateral.world.motion.trajectory import (
+    SETTLING_TIME,
+    SampledDeviation,
+    deviation_through,
+    displace,
+    distance_driven,
+)
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.surroundings.give_way import SampledVehicle, give_way
 

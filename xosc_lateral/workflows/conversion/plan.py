@@ -13,9 +13,9 @@ from xosc_lateral.base.errors import FormatError, did_you_mean, locate
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.openscenario.write.build import Version
 from xosc_lateral.files.openscenario.write.draft import Player
-from xosc_lateral.files.openscenario.write.lateral_actions import LateralActions
+from xosc_lateral.files.openscenario.write.lane_offset_scenario import LateralActions
 from xosc_lateral.files.openscenario.write.replaced_maneuvers import replaced_groups, separable
-from xosc_lateral.files.openscenario.write.trajectory_scenario import motion_unknown_to
+from xosc_lateral.files.openscenario.write.replay import motion_unknown_to
 from xosc_lateral.files.output_paths import refuse_outputs
 from xosc_lateral.files.profiles import SHIPPED, find_profile, read_profile
 from xosc_lateral.files.tables import ContextTable, read_context

@@ -16,7 +16,7 @@ from xosc_lateral.files.openscenario.provenance import PENDING
 from xosc_lateral.files.openscenario.write.build import named
 from xosc_lateral.files.openscenario.write.draft import WrittenScenario
 from xosc_lateral.files.openscenario.write.fit import write_converted
-from xosc_lateral.files.openscenario.write.lateral_actions import LateralAction
+from xosc_lateral.files.openscenario.write.lane_offset_scenario import LateralAction
 from xosc_lateral.files.profiles import profile_hash
 from xosc_lateral.workflows.conversion.plan import Plan, WrittenAs
 from xosc_lateral.workflows.conversion.result import (
@@ -27,17 +27,17 @@ from xosc_lateral.workflows.conversion.result import (
     SampledSegment,
 )
 from xosc_lateral.workflows.conversion.settings import OutputMode, relative
-from xosc_lateral.world.motion.deviation import (
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
+from xosc_lateral.world.motion.offset_chain import GRID, RESOLUTION, OffsetChain, OffsetPath, Ring, ring_along
+from xosc_lateral.world.motion.trajectory import (
     SETTLING_TIME,
     NaturalSpline,
     SampledDeviation,
     deviation_through,
+    distance_driven,
     settle,
     smoother_step,
 )
-from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
-from xosc_lateral.world.motion.offset_chain import GRID, RESOLUTION, OffsetChain, OffsetPath, Ring, ring_along
-from xosc_lateral.world.motion.trajectory import distance_driven
 from xosc_lateral.world.road.network import RoadNetwork
 
 LONGEST_TURN = 300.0
