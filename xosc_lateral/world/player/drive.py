@@ -7,9 +7,7 @@ from math import atan2, cos, hypot, inf, nan, pi, sin
 
 from xosc_lateral.world.player.state import NO_ROAD, EntityState, free
 from xosc_lateral.world.player.transition import EPSILON
-from xosc_lateral.world.road import LaneLink
-from xosc_lateral.world.road.links import most_turning
-from xosc_lateral.world.road.positions import wrap
+from xosc_lateral.world.road.positions import LaneLink, wrap
 
 _TIGHT = 1e-3
 """Beyond this share of the radius, the centre of a curve is so near that lengths beside the line say nothing. [-]"""
@@ -125,7 +123,7 @@ def _choose(state: EntityState, options: Sequence[LaneLink]) -> LaneLink:
     if state.route is not None:
         return state.route.choose(state.road, options) or first
     if first.direction != network.travel_direction(first.road, first.lane):
-        return most_turning(network.roads, options)
+        return network.most_turning(options)
     return network.straightest(options)
 
 

@@ -23,10 +23,10 @@ from xosc_lateral.world.player.simulation import Simulation
 from xosc_lateral.world.player.state import NO_ROAD, EntityState
 from xosc_lateral.world.player.storyboard_builder import build_storyboard, init_actions
 from xosc_lateral.world.player.transition import EPSILON
-from xosc_lateral.world.road import RoadNetwork
-from xosc_lateral.world.scenario import Scenario
+from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.enums import StoryboardElementState
 from xosc_lateral.world.scenario.private_actions import FollowTrajectoryAction, TeleportAction
+from xosc_lateral.world.scenario.scenario import Scenario
 
 _LATERAL = int(Activity.LATERAL)  # plain: arithmetic of flags takes ten times as long
 

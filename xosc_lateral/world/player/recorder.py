@@ -15,7 +15,7 @@ from xosc_lateral.base.errors import PlaybackError
 from xosc_lateral.base.rows import BLOCK, columns, stored
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
 from xosc_lateral.world.player.state import NO_ROAD, EntityState
-from xosc_lateral.world.road import RoadNetwork
+from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.road.tables import turned_in_surface
 
 NO_LANE = "none"

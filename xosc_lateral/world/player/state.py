@@ -9,12 +9,12 @@ from typing import NamedTuple, Protocol
 
 from xosc_lateral.world.motion.nominal import Activity
 from xosc_lateral.world.player.paths.base import PathProgress
-from xosc_lateral.world.road import LaneLink, Pose, RoadNetwork, RouteStep
 from xosc_lateral.world.road.lanes import DRIVING, WALKED
-from xosc_lateral.world.road.positions import difference, is_forward, wrap
+from xosc_lateral.world.road.network import RoadNetwork
+from xosc_lateral.world.road.positions import LaneLink, Pose, RouteStep, difference, is_forward, wrap
 from xosc_lateral.world.road.road import turn_for_heading, turned_in_surface
-from xosc_lateral.world.scenario import Entity
 from xosc_lateral.world.scenario.controllers import DrivingControllers
+from xosc_lateral.world.scenario.entity import Entity
 from xosc_lateral.world.scenario.enums import EntityCategory
 
 NO_ROAD = -1

@@ -153,3 +153,6 @@ class HeaderOffset(Struct, frozen=True):
         """An inertial direction along the axes of the file. [m]"""
         c, s = cos(self.heading), sin(self.heading)
         return c * dx + s * dy, c * dy - s * dx
+
+
+NO_OFFSET = HeaderOffset()

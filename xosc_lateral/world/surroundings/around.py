@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.segment import FADES
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario import BoundingBox
+from xosc_lateral.world.scenario.entity import BoundingBox
 
 SIGHT_DISTANCE = 200.0
 """How far a driver looks for others [m]; beyond it there is none (about what a series radar sees)."""
@@ -29,8 +29,8 @@ ALONGSIDE = 10.0
 """A vehicle in the next lane counts half as alongside at this free space lengthwise, wholly at half of it. [m]"""
 
 INFLUENCE_DISTANCE = 40.0
-"""Free space over which the influence of others fades to 37 %, as in `fitting.neighbours`: with so much more free space
-for each factor e that less of a body lies in the lane, its influence is the product of both. [m]"""
+"""Free space over which the influence of others fades to 37 %, as in `fitting.context_effects`: with so much more free
+space for each factor e that less of a body lies in the lane, its influence is the product of both. [m]"""
 
 
 class Reach(NamedTuple):
@@ -236,11 +236,6 @@ def smooth_step(u: FloatArray) -> FloatArray:
 # ---- which vehicles come near each other at all: the index that spares looking at every pair of them ----
 BLOCK = 64
 """Rows that one box around a vehicle's path covers: 1.3 s at 50 Hz, 40 m on a motorway. [-]"""
-
-
-def pairs_within(x: Iterable[FloatArray], y: Iterable[FloatArray], reach: float) -> list[tuple[int, int]]:
-    """`stretches_within` over all rows at once."""
-    return sorted({pair for _, pairs in stretches_within(x, y, reach) for pair in pairs})
 
 
 def stretches_within(

@@ -14,8 +14,7 @@ from xosc_lateral.world.player.distances import ahead_and_left, road_gap, spot_o
 from xosc_lateral.world.player.drive import move_along_lane
 from xosc_lateral.world.player.state import NO_ROAD, EntityState, free
 from xosc_lateral.world.player.transition import EPSILON
-from xosc_lateral.world.road import Pose
-from xosc_lateral.world.road.positions import difference
+from xosc_lateral.world.road.positions import Pose, difference
 from xosc_lateral.world.scenario.enums import CoordinateSystem, LateralDisplacement
 from xosc_lateral.world.scenario.private_actions import DynamicConstraints, LateralDistanceAction
 

@@ -16,8 +16,8 @@ from xosc_lateral.world.player.paths.polyline import Corner, PolylinePath, fill_
 from xosc_lateral.world.player.positions.on_road import reference_of
 from xosc_lateral.world.player.simulation import Simulation
 from xosc_lateral.world.player.state import EntityState
-from xosc_lateral.world.road import Pose
-from xosc_lateral.world.scenario import Place, Unsupported
+from xosc_lateral.world.road.positions import Pose
+from xosc_lateral.world.scenario.place import Place, Unsupported
 from xosc_lateral.world.scenario.position import (
     Clothoid,
     ClothoidSpline,

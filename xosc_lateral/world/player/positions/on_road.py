@@ -8,7 +8,7 @@ from xosc_lateral.base.errors import PlaybackError
 from xosc_lateral.world.player.drive import travel
 from xosc_lateral.world.player.simulation import Simulation
 from xosc_lateral.world.player.state import NO_ROAD, EntityState, Placement, RouteGuide, world_pose
-from xosc_lateral.world.road import Pose
+from xosc_lateral.world.road.positions import Pose
 from xosc_lateral.world.scenario.enums import ReferenceContext
 from xosc_lateral.world.scenario.position import (
     FromCurrentEntity,

@@ -20,9 +20,8 @@ from xosc_lateral.world.player.positions.on_road import (
 )
 from xosc_lateral.world.player.simulation import Simulation
 from xosc_lateral.world.player.state import NO_ROAD, Placement, RouteGuide, free, guide, locate, world_pose
-from xosc_lateral.world.road import Pose
-from xosc_lateral.world.road.positions import is_forward
-from xosc_lateral.world.scenario import Unsupported
+from xosc_lateral.world.road.positions import Pose, is_forward
+from xosc_lateral.world.scenario.place import Unsupported
 from xosc_lateral.world.scenario.position import (
     FromCurrentEntity,
     FromLaneCoordinates,
