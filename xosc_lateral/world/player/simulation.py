@@ -260,7 +260,7 @@ def _follows_its_lane(state: EntityState) -> bool:
         and state.trailer is None
         and not state.at_road_end
         and not state.longitudinal_taken
-        and not state.acts()
+        and not state.running
     )
 
 

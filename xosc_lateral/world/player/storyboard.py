@@ -214,13 +214,10 @@ EntityChecks: TypeAlias = dict[type, Callable[[Any, Simulation], EntityCheck]]
 
 
 class Watch:
-    """What is told of changes; a check that goes by it gives the same until then.
+    """What is told of changes; a check that goes by it gives the same until then."""
 
-    `wake`: tells the trigger that looks at it; `is_settled`: the next look gives what the last one gave.
-    """
-
-    wake: Callable[[], None] | None = None
-    is_settled = False
+    wake: Callable[[], None] | None = None  # tells the trigger that looks at it
+    is_settled = False  # the next look gives what the last one gave
 
     def forget(self) -> None:
         """Before the owner waits again: what happened until then no longer counts."""
@@ -307,10 +304,7 @@ class RunningCondition:
 
 @dataclass(slots=True, eq=False)
 class RunningTrigger:
-    """A trigger.
-
-    `when_empty`: value of a trigger without groups: true for start, false for stop triggers.
-    """
+    """A trigger. `when_empty`: value of a trigger without groups: true for start, false for stop triggers."""
 
     groups: tuple[tuple[RunningCondition, ...], ...]
     when_empty: bool = field(kw_only=True)
