@@ -25,19 +25,12 @@ from xosc_lateral.workflows.conversion.result import Drivers, LaneChanges
 from xosc_lateral.workflows.conversion.settings import AUTO, AUTO_PROFILE, ConvertSettings, OutputMode
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario.dependence import (
-    Control,
-    Dependence,
-    actors_of,
-    conditions_of,
-    controlled_entities,
-    dependence,
-    vehicles_under_test,
-)
+from xosc_lateral.world.scenario.controllers import Control, controlled_entities, vehicles_under_test
+from xosc_lateral.world.scenario.dependence import Dependence, dependence
 from xosc_lateral.world.scenario.entity import Entity
 from xosc_lateral.world.scenario.enums import DynamicsShape, VehicleCategory
 from xosc_lateral.world.scenario.private_actions import LaneChangeAction
-from xosc_lateral.world.scenario.scenario import Condition, Scenario
+from xosc_lateral.world.scenario.scenario import Condition, Scenario, conditions_of
 
 LEAST_EXTENSION, LARGEST_EXTENSION = 1.3, 2.0
 """A vehicle under test may be later at what ends the run, or never come to it: others follow trajectories for so
@@ -253,12 +246,11 @@ def _refuse_lane_offsets_for_carla(scenario: Scenario, settings: ConvertSettings
 
 def _refuse_steps(scenario: Scenario, names: Collection[str]) -> None:
     """Raise `FormatError` where a lane change of these entities takes no time, but is to be lifelike."""
-    for _, act, group in scenario.storyboard.groups():
-        for _, event in group.events():
-            for content in (action.content for action in event.actions):
-                is_step = isinstance(content, LaneChangeAction) and content.dynamics.shape is DynamicsShape.STEP
-                if is_step and set(actors_of(act, group, event)) & set(names):
-                    raise content.place.error("a step has no way across: take --lane-changes written")
+    for at in scenario.storyboard.events():
+        for content in (action.content for action in at.event.actions):
+            is_step = isinstance(content, LaneChangeAction) and content.dynamics.shape is DynamicsShape.STEP
+            if is_step and set(at.actors) & set(names):
+                raise content.place.error("a step has no way across: take --lane-changes written")
 
 
 NO_DRIVER = {

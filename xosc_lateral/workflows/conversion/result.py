@@ -20,7 +20,7 @@ from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.world.motion.segments import SegmentSpan
 from xosc_lateral.world.motion.trajectory import WorldTrajectory, leaps
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario.dependence import Control
+from xosc_lateral.world.scenario.controllers import Control
 
 
 class Neighbours(StrEnum):

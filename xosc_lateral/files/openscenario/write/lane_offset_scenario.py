@@ -26,12 +26,11 @@ from xosc_lateral.files.openscenario.write.replaced_maneuvers import ReplacedMan
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_chain import REST_TIME, Move, OffsetChain, OffsetPath, Ring
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
-from xosc_lateral.world.scenario.controllers import Domains, gives_lateral
-from xosc_lateral.world.scenario.dependence import actors_of, controlled_entities
+from xosc_lateral.world.scenario.controllers import Domains, controlled_entities, gives_lateral
 from xosc_lateral.world.scenario.enums import Priority
 from xosc_lateral.world.scenario.global_actions import AddEntityAction
 from xosc_lateral.world.scenario.private_actions import LATERAL, LONGITUDINAL, TeleportAction
-from xosc_lateral.world.scenario.scenario import Action, Scenario
+from xosc_lateral.world.scenario.scenario import Scenario
 
 CHAIN = "xosc-lateral offsets"
 TURNS = 10000
@@ -268,28 +267,25 @@ class LateralActions(Struct, frozen=True):
         names, controls = Counter(_names(scenario)), controlled_entities(scenario)
         by_entity: dict[str, dict[LateralAction, None]] = {}
         changing = set(controls)
-        for path, actors, action, repeats, is_alone in _actions(scenario):
-            content, steers = action.content, gives_lateral(action.content)
-            if isinstance(content, LONGITUDINAL):
-                changing |= set(actors)
-            if steers is not None:
-                actors = tuple(a for a in actors if a in controls and Domains.LATERAL in controls[a].domains)
-            adds = isinstance(content, AddEntityAction)
-            if adds or steers is not None or isinstance(content, (*LATERAL, TeleportAction)):
-                lateral = LateralAction(path, *_reference(path, is_alone, names), repeats, adds, steers)
-                for actor in (content.entity_ref,) if isinstance(content, AddEntityAction) else actors:
+        for at in scenario.storyboard.events():
+            repeats = at.group.maximum_execution_count > 1 or at.event.maximum_execution_count > 1
+            for action in at.event.actions:
+                content, actors, steers = action.content, at.actors, gives_lateral(action.content)
+                if isinstance(content, LONGITUDINAL):
+                    changing |= set(actors)
+                adds = isinstance(content, AddEntityAction)
+                if isinstance(content, AddEntityAction):
+                    actors = (content.entity_ref,)
+                elif steers is not None:
+                    actors = tuple(a for a in actors if a in controls and Domains.LATERAL in controls[a].domains)
+                elif not isinstance(content, (*LATERAL, TeleportAction)):
+                    continue
+                path = (*at.path, action.name)
+                reference = _reference(path, len(at.event.actions) == 1, names)
+                lateral = LateralAction(path, *reference, repeats, adds, steers)
+                for actor in actors:
                     by_entity.setdefault(actor, {})[lateral] = None
         return cls({entity: tuple(actions) for entity, actions in by_entity.items()}, frozenset(changing))
-
-
-def _actions(scenario: Scenario) -> Iterator[tuple[tuple[str, ...], tuple[str, ...], Action, bool, bool]]:
-    """Path and actors of each action of an event, whether it may run again, and whether it is alone in its event."""
-    for story, act, group in scenario.storyboard.groups():
-        for maneuver, event in group.events():
-            repeats = group.maximum_execution_count > 1 or event.maximum_execution_count > 1
-            for action in event.actions:
-                path = (story.name, act.name, group.name, maneuver.name, event.name, action.name)
-                yield path, actors_of(act, group, event), action, repeats, len(event.actions) == 1
 
 
 def _reference(path: tuple[str, ...], is_alone: bool, names: Mapping[str, int]) -> tuple[str, str]:

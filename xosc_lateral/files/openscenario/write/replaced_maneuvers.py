@@ -27,11 +27,11 @@ from xosc_lateral.files.openscenario.write.replay import (
 )
 from xosc_lateral.world.motion.nominal import PlayedAction
 from xosc_lateral.world.scenario.conditions import StoryboardElementStateCondition
-from xosc_lateral.world.scenario.dependence import actors_of, conditions_of, refers_to
+from xosc_lateral.world.scenario.dependence import refers_to
 from xosc_lateral.world.scenario.enums import StoryboardElementState
 from xosc_lateral.world.scenario.global_actions import AddEntityAction, DeleteEntityAction
 from xosc_lateral.world.scenario.private_actions import ConnectTrailerAction
-from xosc_lateral.world.scenario.scenario import Act, Condition, ManeuverGroup, Scenario
+from xosc_lateral.world.scenario.scenario import Act, Condition, ManeuverGroup, Scenario, actors_of, conditions_of
 
 STORY = "xosc-lateral trajectories"
 UNREACHED_TIME = 1e9

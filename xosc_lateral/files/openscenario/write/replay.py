@@ -20,15 +20,14 @@ from xosc_lateral.files.xml import parse_xml
 from xosc_lateral.world.motion.nominal import NominalMotion, PlayedAction
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.scenario.conditions import SimulationTimeCondition
-from xosc_lateral.world.scenario.controllers import named
-from xosc_lateral.world.scenario.dependence import assigned_controllers, conditions_of, controlled_entities
+from xosc_lateral.world.scenario.controllers import assigned_controllers, controlled_entities, named
 from xosc_lateral.world.scenario.enums import Priority
 from xosc_lateral.world.scenario.expressions import ExpressionError
 from xosc_lateral.world.scenario.global_actions import AddEntityAction, ParameterModifyAction, ParameterSetAction
 from xosc_lateral.world.scenario.parameters import Scope
 from xosc_lateral.world.scenario.place import Place, Unsupported
 from xosc_lateral.world.scenario.private_actions import CONTROLLER, MOTION, ConnectTrailerAction
-from xosc_lateral.world.scenario.scenario import Action, Scenario
+from xosc_lateral.world.scenario.scenario import Action, Scenario, conditions_of
 
 _REPLACED_TAGS = {kind.__name__ for kind in MOTION + CONTROLLER}
 
