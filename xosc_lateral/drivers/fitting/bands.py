@@ -108,15 +108,11 @@ class FastPart:
     """Fast movement of drivers, where every column of `effects` is at its reference."""
 
     density: Density
-    effects: tuple[ColumnEffect, ...]
-    """On the fine part."""
+    effects: tuple[ColumnEffect, ...]  # On the fine part.
     volatility: Volatility
-    highest: float
-    """Frequency up to which it is measured. [Hz]"""
-    source: str
-    """In words."""
-    speed: tuple[float, float] | None = None
-    """At which it was measured. [m/s]"""
+    highest: float  # Frequency up to which it is measured. [Hz]
+    source: str  # In words.
+    speed: tuple[float, float] | None = None  # At which it was measured. [m/s]
 
 
 def steering_gain(speed: FloatArray) -> FloatArray:

@@ -43,14 +43,10 @@ MINIMUM_KERNEL_WIDTH, MAXIMUM_KERNEL_WIDTH = 0.1, 3.0
 class Strain:
     """How hard a path is to drive."""
 
-    seldom: float
-    """Lateral acceleration exceeded in 0.1 % of the time. [m/s2]"""
-    largest: float
-    """Largest acceleration. [m/s2]"""
-    jerk: float
-    """Largest over half a second. [m/s3]"""
-    excess: float
-    """Largest of these over their bounds: above 1 it could not be driven. [-]"""
+    seldom: float  # Lateral acceleration exceeded in 0.1 % of the time. [m/s2]
+    largest: float  # Largest acceleration. [m/s2]
+    jerk: float  # Largest over half a second. [m/s3]
+    excess: float  # Largest of these over their bounds: above 1 it could not be driven. [-]
 
 
 @dataclass(frozen=True, slots=True)

@@ -86,18 +86,13 @@ class Provenance(Record, frozen=True):
 class Metadata(Record, frozen=True):
     """What a profile is of, to be searched by; all of it is optional."""
 
-    version: str = ""
-    """Of the profile itself, as its owners count: "2", "1.3"."""
+    version: str = ""  # Of the profile itself, as its owners count: "2", "1.3".
     driver: str = ""
     vehicle: str = ""
-    road: str = ""
-    """Whom and what was measured, and where: "professional", "truck", "motorway"."""
-    country: str = ""
-    """ISO 3166-1 alpha-2: "DE"."""
-    date: str = ""
-    """When the drives were recorded, ISO 8601: "2026-05", "2026-05-03/2026-06-01"."""
-    licence: str = ""
-    """Of the profile."""
+    road: str = ""  # Whom and what was measured, and where: "professional", "truck", "motorway".
+    country: str = ""  # ISO 3166-1 alpha-2: "DE".
+    date: str = ""  # When the drives were recorded, ISO 8601: "2026-05", "2026-05-03/2026-06-01".
+    licence: str = ""  # Of the profile.
     tags: tuple[str, ...] = ()
 
 

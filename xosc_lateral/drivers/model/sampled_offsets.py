@@ -44,8 +44,7 @@ class SampledOffsets:
     offset: FloatArray
     offset_real: FloatArray | None
     lane_width: FloatArray
-    speed: FloatArray
-    """NaN where it is not known. [m/s]"""
+    speed: FloatArray  # NaN where it is not known. [m/s]
 
 
 def sample_like(

@@ -30,8 +30,8 @@ class Band(Record, frozen=True):
     low: Annotated[float, Meta(ge=0, description="[Hz]")]
     high: Annotated[float, Meta(gt=0, description="[Hz]")]
     source: str = ""
+    # Of that recording, where it is another than the profile's; beyond, movement grows by its law. [m/s]
     speed: Interval | None = None
-    """Of that recording, where it is another than the profile's; beyond, movement grows by its law. [m/s]"""
 
     def __post_init__(self) -> None:
         if not self.low < self.high:

@@ -209,25 +209,20 @@ class Colour:
 class Known:
     """A sensor whose error is known."""
 
-    deviation: float
-    """Standard deviation on the table's rows. [m]"""
-    rate: float
-    """Rows per second. [Hz]"""
-    rounding: float = 0.0
-    """What rounding has of its square, which is known from the rows. [m2]"""
+    deviation: float  # Standard deviation on the table's rows. [m]
+    rate: float  # Rows per second. [Hz]
+    rounding: float = 0.0  # What rounding has of its square, which is known from the rows. [m2]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Solution:
     """The maximum."""
 
+    # The driver, shape (N_STATE,): log density at the knots, and the corner of corrections, see `KNOTS`.
     state: FloatArray
-    """The driver, shape (N_STATE,): log density at the knots, and the corner of corrections, see `vehicle_bound`."""
-    white: float
-    """Log densities of the sensor's two parts, of `colour` over its shape; -inf where there is none."""
+    white: float  # Log densities of the sensor's two parts, of `colour` over its shape; -inf where there is none.
     colour: float
-    loss: float
-    """Minus log posterior."""
+    loss: float  # Minus log posterior.
 
     @property
     def knots(self) -> FloatArray:
@@ -244,8 +239,7 @@ class Measured:
     """What driver and sensor are to explain."""
 
     data: Periodogram
-    base: FloatArray
-    """Density of the sensor's that is known already, at the data's frequencies, shape (n,). [m2/Hz]"""
+    base: FloatArray  # Density of the sensor's that is known already, at the data's frequencies, shape (n,). [m2/Hz]
     known: Known | None = None
 
 

@@ -54,11 +54,10 @@ MOST_NOISE = 0.9
 class Separation:
     """Densities of driver and sensor."""
 
-    knots: FloatArray
-    """Of the driver's density, see `vehicle_bound`."""
+    knots: FloatArray  # Of the driver's density, see `KNOTS`.
     sensor: SensorModel
+    # Density of what the sensor's numbers don't hold: of rounding, and of errors seen in a second view. [m2/Hz]
     beside: Callable[[FloatArray], FloatArray]
-    """Density of what the sensor's numbers don't hold: of rounding, and of errors seen in a second view. [m2/Hz]"""
 
     def driver_part(self, offset: FloatArray, step: float) -> FloatArray:
         """The offset with every frequency scaled down to the driver's share of the power, about its own mean.

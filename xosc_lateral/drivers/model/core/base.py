@@ -40,8 +40,7 @@ class CoreStream(Protocol):
     A stream can be copied (`copy.deepcopy`) to come back to a state.
     """
 
-    state: Any
-    """All that changes while driving, a msgspec struct; `CoreModel.resume` goes on from it."""
+    state: Any  # All that changes while driving, a msgspec struct; `CoreModel.resume` goes on from it.
 
     @property
     def mean(self) -> FloatArray | float:
@@ -59,14 +58,12 @@ class CoreStream(Protocol):
 class CoreModel(Record, frozen=True, tag_field="kind", tag=kebab, eq=False):
     """Parameters of a core model: frozen, numbers only. A new one subclasses this and is listed in `registry`."""
 
-    kind: ClassVar[str]
-    """Name in the profile file: the class's without `Model`, in lower case with hyphens."""
+    kind: ClassVar[str]  # Name in the profile file: the class's without `Model`, in lower case with hyphens.
 
-    State: ClassVar[type]
-    """Type of its streams' state."""
+    State: ClassVar[type]  # Type of its streams' state.
 
+    # Whether its fine part is a share of the lane's width, or as large in any lane.
     fine_scales_with_lane: ClassVar[bool] = True
-    """Whether its fine part is a share of the lane's width, or as large in any lane."""
 
     def __init_subclass__(cls, **settings: Any) -> None:
         super().__init_subclass__(**settings)
@@ -112,12 +109,9 @@ class ModelKind(StrEnum):
 class ClockState(msgspec.Struct):
     """Where a changed time is."""
 
-    time: float = 0.0
-    """Own time of the next value, in steps. [-]"""
-    held: FloatArray | None = None
-    """Values of the source that are still needed, shape (k, drivers)."""
-    first: int = 0
-    """Index in the source of the first of them."""
+    time: float = 0.0  # Own time of the next value, in steps. [-]
+    held: FloatArray | None = None  # Values of the source that are still needed, shape (k, drivers).
+    first: int = 0  # Index in the source of the first of them.
 
 
 def take_at_rate(state: ClockState, source: Callable[[int], FloatArray], n: int, rate: FloatArray | None) -> FloatArray:

@@ -31,12 +31,10 @@ class ShapedNoise(Record, frozen=True, eq=False, dict=True):
     Raises `DriverProfileError` if a damping is negative or not finite, or the kernel's length even.
     """
 
+    # At frequencies evenly spaced from 0 to half the sampling rate, shape (n_knots,); >= 0. [lane widths]
     damping: FloatArray
-    """At frequencies evenly spaced from 0 to half the sampling rate, shape (n_knots,); >= 0. [lane widths]"""
-    n_taps: int = KERNEL_TAPS
-    """Length of the kernel, odd."""
-    taper: float = 0.0
-    """Shape of the Kaiser window that the kernel is faded out by; 0: cut off, as in the paper. [-]"""
+    n_taps: int = KERNEL_TAPS  # Length of the kernel, odd.
+    taper: float = 0.0  # Shape of the Kaiser window that the kernel is faded out by; 0: cut off, as in the paper. [-]
 
     def __post_init__(self) -> None:
         damping = frozen_array(self.damping)

@@ -66,8 +66,8 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
 
     later = ("between_drivers", "response_range", "response_order", "course")
 
+    # For the report, fields of the effect in braces: "linear", "proximity (fades over {0.scale:.3g})" ...
     words: ClassVar[str] = ""
-    """For the report, fields of the effect in braces: "linear", "proximity (fades over {0.scale:.3g})" ..."""
 
     acts: Acts
     coefficients: tuple[float, ...] = ()

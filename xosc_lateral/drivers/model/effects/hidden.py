@@ -33,11 +33,10 @@ class HiddenEffect(Effect, frozen=True, kw_only=True):
     Raises `DriverProfileError` if a field is not finite, or one in `positive` is not above 0.
     """
 
-    positive: ClassVar[tuple[str, ...]] = ()
-    """Fields that must be above 0."""
+    positive: ClassVar[tuple[str, ...]] = ()  # Fields that must be above 0.
 
+    # Type of the state: a msgspec struct of numbers, arrays and generators.
     State: ClassVar[type[msgspec.Struct]] = NoState
-    """Type of the state: a msgspec struct of numbers, arrays and generators."""
 
     def __post_init__(self) -> None:
         for name in self.__struct_fields__:

@@ -22,14 +22,10 @@ from xosc_lateral.drivers.model.linear_filters import recur
 class ResponseState(msgspec.Struct):
     """Where a response is."""
 
-    held: FloatArray | None = None
-    """Last rows of the quantity, as far back as they are still needed, shape (m, k)."""
-    taken: int = 0
-    """Rows of the quantity seen."""
-    given: int = 0
-    """Rows of the response given."""
-    settled: FloatArray | None = None
-    """Last response of each first-order lag, shape (order * k,)."""
+    held: FloatArray | None = None  # Last rows of the quantity, as far back as they are still needed, shape (m, k).
+    taken: int = 0  # Rows of the quantity seen.
+    given: int = 0  # Rows of the response given.
+    settled: FloatArray | None = None  # Last response of each first-order lag, shape (order * k,).
 
 
 class Response:

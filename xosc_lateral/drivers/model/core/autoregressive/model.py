@@ -57,13 +57,11 @@ class AutoregressiveState(msgspec.Struct):
     factors: FactorState
     coarse: CoarseState
     fine: FineState
+    # Where bending begins (and, in `limits`, ends), on the lower and on the upper side, shape (2, drivers). [-]
     knees: FloatArray
-    """Where bending begins (and, in `limits`, ends), on the lower and on the upper side, shape (2, drivers). [-]"""
     limits: FloatArray
-    clock: ClockState
-    """Of the coarse part."""
-    single: bool = True
-    """One driver, arrays without an axis of drivers."""
+    clock: ClockState  # Of the coarse part.
+    single: bool = True  # One driver, arrays without an axis of drivers.
 
 
 class AutoregressiveModel(AutoregressiveParameters, frozen=True, eq=False, dict=True):

@@ -149,8 +149,8 @@ class Volatility(Record, frozen=True):
 
     between: float = 0.0
     within: float = 0.0
+    # Of the part that varies within seconds; of the slow one it is `SLOW_CORRELATION_TIME`. [s]
     correlation_time: float = msgspec.field(name="memory", default=10.0)
-    """Of the part that varies within seconds; of the slow one it is `SLOW_CORRELATION_TIME`. [s]"""
     slow: float = 0.0
 
     def __post_init__(self) -> None:

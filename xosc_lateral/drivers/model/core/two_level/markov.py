@@ -137,10 +137,9 @@ class AliasTable:
     """A chain made ready for sampling: one uniform number and two look-ups per step [1]_."""
 
     n_bins: int
+    # Shape (n_bins * n_bins,). Column k of row i stands for bin k below this fraction of its width ...
     keep: FloatArray
-    """Shape (n_bins * n_bins,). Column k of row i stands for bin k below this fraction of its width ..."""
-    other: IntArray
-    """Shape (n_bins * n_bins,). ... and for this bin above it."""
+    other: IntArray  # Shape (n_bins * n_bins,). ... and for this bin above it.
 
     @classmethod
     def of(cls, transition: FloatArray) -> AliasTable:

@@ -87,18 +87,12 @@ class TwoLevelState(msgspec.Struct):
 
     chain: np.random.Generator
     noise: np.random.Generator
-    bins: IntArray
-    """Last bin, shape (drivers,)."""
-    levels: FloatArray
-    """Last levels of the chain, before smoothing, shape (smoothing taps - 1, drivers). [-]"""
-    white: FloatArray
-    """Last values of the fine part's noise, before shaping, shape (kernel taps - 1, drivers). [-]"""
-    fade: FloatArray
-    """What is still added to meet a start, step by step, shape (k, drivers). [-]"""
-    clock: ClockState
-    """Of the coarse part."""
-    single: bool = True
-    """One driver, arrays without an axis of drivers."""
+    bins: IntArray  # Last bin, shape (drivers,).
+    levels: FloatArray  # Last levels of the chain, before smoothing, shape (smoothing taps - 1, drivers). [-]
+    white: FloatArray  # Last values of the fine part's noise, before shaping, shape (kernel taps - 1, drivers). [-]
+    fade: FloatArray  # What is still added to meet a start, step by step, shape (k, drivers). [-]
+    clock: ClockState  # Of the coarse part.
+    single: bool = True  # One driver, arrays without an axis of drivers.
 
 
 class TwoLevelModel(CoreModel, frozen=True, eq=False, dict=True):
