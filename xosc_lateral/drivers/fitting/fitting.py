@@ -26,7 +26,7 @@ from xosc_lateral.drivers.fitting.context_effects import (
 )
 from xosc_lateral.drivers.fitting.sensor.periodogram import PASSED_FREQUENCY, WINDOWS
 from xosc_lateral.drivers.fitting.sensor.separation import separate
-from xosc_lateral.drivers.model.core.base import CoreModel, ModelKind
+from xosc_lateral.drivers.model.core.base import ModelKind
 from xosc_lateral.drivers.model.core.registry import model_named
 from xosc_lateral.drivers.model.profile import DriverProfile, Provenance
 from xosc_lateral.drivers.model.sensor import SensorModel
@@ -123,26 +123,19 @@ def fit_runs(
     model: ModelKind | str = ModelKind.AUTOREGRESSIVE,
     provenance: Provenance | None = None,
 ) -> DriverProfile:
-    """Fit a profile to runs that are cut already."""
+    """Fit a profile to runs that are cut already; its provenance says on what and how."""
     core = model_named(model).fit([run.rel_offset for run in runs], [run.drive for run in runs])
-    return DriverProfile(
-        name=name,
-        model=core,
-        lane_width=float(np.median(np.concatenate([run.lane_width for run in runs]))),
-        provenance=_fitted_on(runs, core, provenance or Provenance()),
-    )
-
-
-def _fitted_on(runs: Sequence[Run], core: CoreModel, known: Provenance) -> Provenance:
-    """What is known, with what it was fitted on and how."""
-    return replace(
+    known, step = provenance or Provenance(), core.step
+    known = replace(
         known,
-        hours=round(sum(map(len, runs)) * core.step / 3600.0, 4),
+        hours=round(sum(map(len, runs)) * step / 3600.0, 4),
         drives=len({run.drive for run in runs}),
         runs=len(runs),
-        fit={**known.fit, "model": core.kind, "step_s": core.step, "sizes": sizes_of_runs(runs, core.step).to_dict()},
+        fit={**known.fit, "model": core.kind, "step_s": step, "sizes": sizes_of_runs(runs, step).to_dict()},
         package_version=__version__,
     )
+    width = float(np.median(np.concatenate([run.lane_width for run in runs])))
+    return DriverProfile(name=name, model=core, lane_width=width, provenance=known)
 
 
 # ---- The driver's part of measured runs ----

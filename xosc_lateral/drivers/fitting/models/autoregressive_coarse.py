@@ -30,7 +30,7 @@ from xosc_lateral.drivers.model.core.autoregressive.coarse import (
     measuring_low_pass,
     stabilise,
 )
-from xosc_lateral.drivers.model.core.noise import NOISE_VARIANCE, ShapedNoise
+from xosc_lateral.drivers.model.core.base import NOISE_VARIANCE, ShapedNoise
 
 RIDGE = 1e-7
 """Share of the mean square that is added to the normal equations' diagonal. [-]"""
@@ -58,14 +58,8 @@ def fit_autoregression(
     the same to every product. Taking each driver's estimated mean out of his runs instead would take slow movement with
     it, and a run of a minute would then forget twice too fast.
 
-    Parameters
-    ----------
-    runs, drivers : sequence of array, shape (n_i,), and of str
-        Series with the mean of all taken out [any unit], and whose each is.
-    order, every : int
-        Of the model, >= 1; one step of it in samples of the runs.
-    between : float
-        Variance of the drivers' own means.
+    `runs`, shape (n_i,): with the mean of all taken out [any unit]; `drivers`: whose each is; `every`: one step of the
+    model in samples of the runs.
     """
     long = [(run, driver) for run, driver in zip(runs, drivers, strict=True) if len(run) > every * order + every]
     pasts = [np.stack([run[every * (order - 1 - k) : len(run) - every * (k + 1)] for k in range(order)], axis=1)
