@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.kit.places import hand_written
-from xosc_lateral.world.road import LaneLink
+from xosc_lateral.world.road.positions import LaneLink
 
 
 def test_moving_along_crosses_a_junction_straight_on_unless_told_otherwise():

@@ -10,7 +10,7 @@ import pytest
 
 from tests.kit.places import VALID, hand_written, random_places, wrapped
 from tests.kit.retold_roads import mirrored, moved, retold, turned_round
-from xosc_lateral.world.road import RoadNetwork
+from xosc_lateral.world.road.network import RoadNetwork
 
 NAMES = sorted({path.stem for path in VALID.glob("*.xodr")} - {"odd"})
 TURNABLE = [name for name in NAMES if name not in ("cubics", "sections")]

@@ -38,6 +38,9 @@ class LaneChanges(StrEnum):
     LIFELIKE = "lifelike"
 
 
+Drivers = Mapping[str, DriverProfile | str]
+"""Per entity the profile that drives it, or the reason why it gets none."""
+
 WRITTEN_AS = {"trajectory": "a trajectory", "lane-offset": "lane offsets"}
 """Modes of vehicles in words."""
 

@@ -121,10 +121,7 @@ class LaneTables:
         return np.array(ways, dtype=np.int32)[inverse.ravel()].reshape(road_.shape)
 
     def lane_index(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[Int32Array, Int32Array]:
-        """Index among the driving lanes of its direction (0 = rightmost in travel direction), and their count.
-
-        Index -1 for a lane that is no driving lane. Shape as the arguments. [-]
-        """
+        """Index among driving lanes of its direction (0 = rightmost in travel; -1: it is none), and their count. [-]"""
 
         def evaluate(road: IndexLike, s: FloatArray, lane: IndexLike) -> tuple[FloatArray, ...]:
             rows = np.broadcast_to(self._row_of(road, lane, s), s.shape)

@@ -28,10 +28,7 @@ class Links:
         self._ends: dict[End, tuple[End, ...]] = {}
 
     def next_lanes(self, road: int, lane: int, direction: int) -> tuple[LaneLink, ...]:
-        """Lanes that follow when leaving the road at its end (direction +1) or at its start (-1).
-
-        `lane` is its id in the road's last (first) section. Several at a junction, none where the lane ends.
-        """
+        """Lanes that follow a lane of the last (first) section when leaving the road at its end (+1) or start (-1)."""
         key = (road, lane, direction)
         if key not in self._links:
             self._links[key] = tuple(dict.fromkeys(self._find_links(*key)))

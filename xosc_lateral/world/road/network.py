@@ -26,10 +26,7 @@ from xosc_lateral.world.road.surface import NO_OFFSET, HeaderOffset
 
 
 class RoadNetwork(SurfaceIndex, Routes):
-    """Roads, their lanes and their links, as read from one OpenDRIVE file.
-
-    Arguments of a batch broadcast; what it answers has the shape of the arguments.
-    """
+    """Roads, lanes and links of one OpenDRIVE file; arguments of a batch broadcast, answers have their shape."""
 
     def __init__(
         self,
@@ -100,10 +97,7 @@ class RoadNetwork(SurfaceIndex, Routes):
         return self.roads[road].curvature_at(s)
 
     def lane_state_at(self, road: int, lane: int, s: float) -> LaneState:
-        """Centre t, its slope along s, and width of a lane; raises `PlaybackError` for a lane that is not there.
-
-        [m], [-], [m]
-        """
+        """Centre t [m], its slope along s [-] and width of a lane [m]; `PlaybackError` for a lane that is not there."""
         road_ = self.roads[road]
         info = road_.section_at(s).by_id.get(lane)
         return (info or find_lane(road_, lane, s)).state_at(s)
@@ -120,10 +114,7 @@ class RoadNetwork(SurfaceIndex, Routes):
     def lane_at(
         self, road: int, s: float, t: float, *, lane_types: Collection[str] | None = DRIVING
     ) -> LaneCoordinates:
-        """The lane of these types that holds `t`, else the nearest one; lane 0 if the road has none of them there.
-
-        `s`, `t` in [m].
-        """
+        """The lane of these types that holds `t`, else the nearest; lane 0 if the road has none of them there. [m]"""
         return lane_at(self.roads[road], road, s, t, lane_types)
 
     def section_at(self, road: int, s: float) -> tuple[float, float]:

@@ -30,10 +30,7 @@ class RoadLink:
 
 @dataclass(frozen=True, slots=True)
 class Connection:
-    """A way through a junction: from an incoming road onto a connecting one.
-
-    `lanes` holds (from, to) lane ids; empty: the file gives none.
-    """
+    """From an incoming road onto a connecting one; `lanes`: (from, to) lane ids, empty where the file gives none."""
 
     incoming_road: str
     connecting_road: str
@@ -201,10 +198,7 @@ def turned_in_surface(turn: float, pitch: float, roll: float) -> tuple[float, fl
 
 
 def turn_for_heading(change: float, pitch: float, roll: float) -> float:
-    """Turn within a surface that pitches and rolls, for a change of heading: the reverse of `turned_in_surface`.
-
-    [rad]
-    """
+    """Turn within a surface that pitches and rolls, for a change of heading: undoes `turned_in_surface`. [rad]"""
     sideways, ahead = sin(change), cos(change)
     return atan2(cos(pitch) * sideways, cos(roll) * ahead - sin(pitch) * sin(roll) * sideways)
 
@@ -218,10 +212,7 @@ def across_lane(lane: Lane, t: float, centre: float, width: float) -> float:
 
 
 def lane_at(road: Road, index: int, s: float, t: float, lane_types: Collection[str] | None) -> LaneCoordinates:
-    """The lane of these types that holds t, else the nearest; lanes of no width only where there is nothing else.
-
-    `s`, `t` in [m].
-    """
+    """The lane of these types that holds t, else the nearest; lanes of no width only as a last resort. [m]"""
     best: tuple[float, float, float] | None = None
     nearest: tuple[Lane, float] | None = None
     for lane in road.section_at(s).lanes:
