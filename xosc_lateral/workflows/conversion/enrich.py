@@ -13,8 +13,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.rows import BLOCK, blocks, columns, stored
-from xosc_lateral.drivers.model.drivability import drivable
-from xosc_lateral.drivers.model.plausibility import check_offsets
+from xosc_lateral.drivers.model.plausibility import check_offsets, drivable
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampled_offsets import known_sensor, sensor_error
 from xosc_lateral.drivers.model.sampling import OffsetSampler

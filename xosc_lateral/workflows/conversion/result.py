@@ -12,7 +12,7 @@ import numpy as np
 from msgspec import Struct
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.model.drivability import Bound
+from xosc_lateral.drivers.model.plausibility import Bound
 from xosc_lateral.drivers.model.profile import SIDES, Basis, DriverProfile
 from xosc_lateral.world.motion.crossings import Crossing
 from xosc_lateral.world.motion.gaps import Gap
