@@ -67,9 +67,9 @@ def twins_of(source: Path, begin: float, variants: int) -> Twins:
 def in_lane_runs(twins: Twins) -> tuple[list[Run], list[list[FloatArray]]]:
     """Recorded road-following of those that a profile drives, and each variant's offsets at the same times. [m]"""
     runs = []
-    for plan, residuals in zip(twins.made.plans, twins.made.residuals, strict=True):
+    for plan in twins.made.plans:
         if twins.variants[0].entity(plan.name).is_enriched:
-            stretches = enumerate(in_lane_offsets(plan, residuals))
+            stretches = enumerate(in_lane_offsets(plan))
             runs += [Run(plan.name, number, *stretch) for number, stretch in stretches]
     time = twins.played.motion.entities[0].time
     paths = [

@@ -231,7 +231,8 @@ def _other_row(row: ManifestRow, data: bytes, origin: _Origin) -> Iterator[str]:
 
 def _made_otherwise(output: Path, data: bytes, origin: _Origin) -> list[tuple[Problem, str]]:
     """How today's program makes it otherwise, from what its provenance states."""
-    made = convert_scenario(origin.scenario, output, origin.settings, variant=origin.variant - 1, saves=False).data
+    index = origin.variant - 1
+    made = convert_scenario(origin.scenario, output, origin.settings, variant_index=index, saves=False).data
     stated, now = origin.facts, facts_in(made) or {}
     if made.replace(_version_of(now), _version_of(stated), 1) == data:
         return []
@@ -320,7 +321,7 @@ def reproduce(
         return Verification(list(_reproduce_folder(old, target.absolute(), search, workers)), _SAME)
     claim([target], [old], force=force)
     origin = _Origin.of(old, read_source(old).data, search)
-    convert_scenario(origin.scenario, target, origin.settings, variant=origin.variant - 1)
+    convert_scenario(origin.scenario, target, origin.settings, variant_index=origin.variant - 1)
     return Verification([_compared(old, target, origin)], _SAME)
 
 

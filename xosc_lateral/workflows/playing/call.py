@@ -16,7 +16,7 @@ from xosc_lateral.workflows.conversion.load import Played, play_scenario
 from xosc_lateral.workflows.conversion.settings import STEP
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths, write_page
 from xosc_lateral.world.motion.segments import SegmentRow, cut_segments
-from xosc_lateral.world.scenario.dependence import controlled_entities
+from xosc_lateral.world.scenario.controllers import controlled_entities
 
 if TYPE_CHECKING:
     from xosc_lateral.files.pages.figure import Figure
@@ -199,7 +199,7 @@ class Playback(Result):
         """Write an ASAM OSI trace (extra `osi`): ``.mcap`` or ``.osi``, one `GroundTruth` per step."""
         from xosc_lateral.files.osi import SUFFIXES
         from xosc_lateral.files.osi.write import host_of, write_osi
-        from xosc_lateral.world.scenario.dependence import vehicles_under_test
+        from xosc_lateral.world.scenario.controllers import vehicles_under_test
 
         output = output_file(path, f"{self.scenario.stem}_gt.mcap", SUFFIXES)
         claim([output], self._inputs(), force=force)
