@@ -29,10 +29,7 @@ class Domains(IntFlag):
 
     def words(self) -> str:
         """In words."""
-        return _WORDS[int(self)]
-
-
-_WORDS = ("nothing", "along the road", "across the road", "along and across the road")
+        return ("nothing", "along the road", "across the road", "along and across the road")[self]
 
 
 class ControllerKind(Struct, frozen=True):
