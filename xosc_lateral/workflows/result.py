@@ -16,8 +16,8 @@ from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.source import parsed_hashes
-from xosc_lateral.workflows.conversion.options import PathLike, Paths, ProfileLike
-from xosc_lateral.workflows.conversion.options import paths as as_paths
+from xosc_lateral.workflows.options import PathLike, Paths, ProfileLike
+from xosc_lateral.workflows.options import paths as as_paths
 
 if TYPE_CHECKING:
     import pandas as pd

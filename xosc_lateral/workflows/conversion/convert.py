@@ -25,11 +25,11 @@ from xosc_lateral.workflows.conversion.drivers import validity_warnings
 from xosc_lateral.workflows.conversion.enrich import enrich
 from xosc_lateral.workflows.conversion.load import load_scenario, play_loaded, read_output, seed_words
 from xosc_lateral.workflows.conversion.meaning import keep_meaning, meaning_of
-from xosc_lateral.workflows.conversion.options import spelled_out
 from xosc_lateral.workflows.conversion.plan import Plan, WrittenAs, decide, heeds_controllers
 from xosc_lateral.workflows.conversion.result import ConversionProvenance, Enriched, EventShift, LaneChanges
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings, relative
 from xosc_lateral.workflows.conversion.shifts import Comparison
+from xosc_lateral.workflows.options import spelled_out
 from xosc_lateral.workflows.result import PAGE_SUFFIXES, PathLike
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_chain import OffsetChain

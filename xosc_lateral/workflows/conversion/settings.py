@@ -17,9 +17,9 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.configuration import SETTINGS, configuration
 from xosc_lateral.files.openscenario.read import RoadSearch
 from xosc_lateral.files.openscenario.write.draft import Player, TargetPlayer, target
-from xosc_lateral.workflows.conversion import options as say
-from xosc_lateral.workflows.conversion.options import Option, PathLike, Paths, ProfileLike, option
+from xosc_lateral.workflows import options as say
 from xosc_lateral.workflows.conversion.result import LaneChanges, Neighbours
+from xosc_lateral.workflows.options import Option, PathLike, Paths, ProfileLike, option
 
 if TYPE_CHECKING:
     from xosc_lateral.drivers.model.profile import DriverProfile

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from msgspec import structs
 
@@ -14,6 +14,7 @@ from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.workflows.conversion.load import Played, play_scenario
 from xosc_lateral.workflows.conversion.settings import STEP
+from xosc_lateral.workflows.options import declare_options, flag
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths, write_page
 from xosc_lateral.world.motion.segments import SegmentRow, cut_segments
 from xosc_lateral.world.scenario.dependence import controlled_entities
@@ -22,35 +23,23 @@ if TYPE_CHECKING:
     from xosc_lateral.files.pages.figure import Figure
 
 
+@declare_options
 def play(
-    scenario: PathLike,
-    *,
-    step: float = STEP,
+    scenario: PathLike, *,
+    step: Annotated[float, flag(help="Length of a frame [s].", min=0.001, max=1.0)] = STEP,
     time_limit: float | None = None,
     parameters: Mapping[str, object] | None = None,
     allow: Paths = (),
     road: PathLike | None = None,
     road_path: Paths = (),
-    strict: bool = False,
-) -> Playback:
+    strict: Annotated[bool, flag("--strict", help="A missing vehicle catalog, or a run cut off, is an error.")] = False,
+) -> Playback:  # fmt: skip
     """Play a scenario's maneuvers, without offsets.
 
     Parameters
     ----------
     scenario : str or Path
         Maneuver-based OpenSCENARIO file.
-    step : float
-        Length of a frame. [s]
-    time_limit : float, optional
-        Where a run is cut off; without it a scenario that never ends after 60 s, one with an end after an hour. [s]
-    parameters : mapping, optional
-        Scenario parameters that replace those declared.
-    allow : path or paths
-        Folders, besides those around the scenario, that its road and catalogs may lie in.
-    road : str or Path, optional
-        The road, whatever the scenario says.
-    road_path : path or paths
-        Folders to look for a road by its name ("Town04").
     strict : bool
         A missing vehicle catalog is an error, instead of a note and a usual car.
 
@@ -73,6 +62,7 @@ def play(
     )
 
 
+@declare_options
 def segments(
     scenario: PathLike | Playback,
     *,

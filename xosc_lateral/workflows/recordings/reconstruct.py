@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Unpack
+from typing import Annotated, Unpack
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.mapping import MappingLike
 from xosc_lateral.files.profiles import find_profile, list_profiles, read_profile
 from xosc_lateral.workflows.conversion.drivers import AUTO_PROFILE
-from xosc_lateral.workflows.conversion.options import spelled_out, values_of
+from xosc_lateral.workflows.options import declare_options, flag, spelled_out, values_of
 from xosc_lateral.workflows.recordings.encounters import encounters, relative_triggers
 from xosc_lateral.workflows.recordings.plan import Residuals, VehiclePlan, plan_vehicles, residuals_of
 from xosc_lateral.workflows.recordings.reconstruction import ChosenDriver, Reconstruction
@@ -47,16 +47,19 @@ NO_HOST = "none"  # stands for no vehicle under test
 
 
 @spelled_out(ReconstructSettings)
+@declare_options
 def reconstruct(
     recording: PathLike,
     output: PathLike | None = None,
     *,
-    format: str | None = None,  # noqa: A002 (as in `import_drives`)
-    road: PathLike | None = None,
+    format: Annotated[str | None, flag("--format", show_default=False,  # noqa: A002 (as in `import_drives`)
+        help="dlr-ht, levelx, osi, commonroad, fcd, tracks; default: by the file.")] = None,
+    road: Annotated[PathLike | None, flag("--road", kind=Path | None, show_default=False,
+        help="OpenDRIVE file, or SUMO network, that it was recorded on.")] = None,
     columns: MappingLike | None = None,
     force: bool = False,
     **options: Unpack[ReconstructKeywords],
-) -> Reconstruction:
+) -> Reconstruction:  # fmt: skip
     """Turn a recording into maneuvers, a road and drivers.
 
     Parameters
