@@ -9,7 +9,7 @@ import typer
 
 import xosc_lateral as xl
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Options, Written, command
+from xosc_lateral.cli.words import Mapped, Options, Written, command
 from xosc_lateral.workflows.recordings.settings import ReconstructSettings
 
 # What is said of one option stays together.
@@ -27,9 +27,9 @@ def reconstruct(
     recording: Annotated[Path, typer.Argument(help="Tracks of several vehicles.", show_default=False)],
     *,
     output: Annotated[str, typer.Option("--output", "-o", help="Folder to write to.", show_default=False)],
-    options: Annotated[Options, xl.reconstruct],
+    mapped: Mapped,
     settings: Annotated[Options, ReconstructSettings],
     reply: Written,
 ) -> None:
     """Turn a recording into maneuvers, its road, and the drivers who drove."""
-    reply.say(xl.reconstruct(recording, output, **options, **settings, force=reply.force))
+    reply.say(xl.reconstruct(recording, output, columns=mapped.mapping(), **settings, force=reply.force))

@@ -25,6 +25,9 @@ ProfileLike: TypeAlias = "PathLike | DriverProfile"
 """A profile, its path, or its name in the library."""
 Paths: TypeAlias = PathLike | Sequence[PathLike]
 
+STEP = 0.02
+"""Of playback, as in the reference logs. [s]"""
+
 NO_EGO = "none"
 """In place of a vehicle under test: there is none."""
 

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.output_paths import claim, output_file
-from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.options import SHARED, declare_options, flag, texts
 from xosc_lateral.workflows.result import PathLike, Paths, ProfileLike, Result, given_profile
 
@@ -47,7 +46,7 @@ def live_esmini(
     profiles: Annotated[Mapping[str, ProfileLike] | None, PROFILES] = None,
     ego: Annotated[Sequence[str], EGO] = (),
     seed: int = 0,
-    neighbours: str = Neighbours.BORROW,
+    neighbours: str = "borrow",
     folders: Annotated[Paths, FOLDERS] = (),
 ) -> LiveRun:  # fmt: skip
     """Play a scenario in esmini with drivers in its vehicles.
@@ -63,6 +62,7 @@ def live_esmini(
     SimulationError, FormatError
         In one line.
     """
+    from xosc_lateral.workflows.conversion.result import Neighbours
     from xosc_lateral.workflows.live.esmini import EsminiTraffic
     from xosc_lateral.workflows.live.esmini_library import open_player
     from xosc_lateral.workflows.live.scene import Scene
@@ -121,7 +121,7 @@ def live_sumo(
     ego: Annotated[Sequence[str], EGO] = (),
     seed: int = 0,
     options: Sequence[str] = (),
-    neighbours: str = Neighbours.BORROW,
+    neighbours: str = "borrow",
     folders: Annotated[Paths, FOLDERS] = (),
 ) -> LiveRun:  # fmt: skip
     """Run a SUMO simulation with drivers in its vehicles; the extra `sumo`.
@@ -138,6 +138,7 @@ def live_sumo(
     SimulationError
         In one line.
     """
+    from xosc_lateral.workflows.conversion.result import Neighbours
     from xosc_lateral.workflows.live.scene import Scene, sumo_entity, sumo_network
     from xosc_lateral.workflows.live.sumo import SumoTraffic, start
 

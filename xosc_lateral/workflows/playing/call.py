@@ -6,21 +6,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from msgspec import structs
-
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.files.openscenario.read import RoadSearch
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.source import parsed_hashes
-from xosc_lateral.workflows.conversion.load import Played, play_scenario
-from xosc_lateral.workflows.conversion.settings import STEP
-from xosc_lateral.workflows.options import declare_options, flag
+from xosc_lateral.workflows.options import STEP, declare_options, flag
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths, write_page
-from xosc_lateral.world.motion.segments import SegmentRow, cut_segments
-from xosc_lateral.world.scenario.dependence import controlled_entities
 
 if TYPE_CHECKING:
     from xosc_lateral.files.pages.figure import Figure
+    from xosc_lateral.workflows.conversion.load import Played
+    from xosc_lateral.world.motion.segments import SegmentRow
 
 
 @declare_options
@@ -48,6 +43,9 @@ def play(
     FormatError, PlaybackError
         With file, line and element.
     """
+    from xosc_lateral.files.openscenario.read import RoadSearch
+    from xosc_lateral.workflows.conversion.load import play_scenario
+
     values = {name: str(value) for name, value in (parameters or {}).items()}
     return Playback(
         play_scenario(
@@ -72,6 +70,8 @@ def segments(
     allow: Paths = (),
 ) -> Segments:
     """Road-following segments of every entity, and why the rest is none; see `play`."""
+    from xosc_lateral.world.scenario.dependence import controlled_entities
+
     played = (
         scenario
         if isinstance(scenario, Playback)
@@ -241,6 +241,8 @@ class Segments(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them."""
+        from msgspec import structs
+
         rows = [structs.asdict(row) for row in self._rows]
         rounded = [row | {"start": round(row["start"], 6), "end": round(row["end"], 6)} for row in rows]
         return {"segments": rounded, "controllers": list(self.controllers)}
@@ -248,6 +250,8 @@ class Segments(Result):
 
 def scenario_segments(played: Played) -> tuple[SegmentRow, ...]:
     """All segments of all entities, in the scenario's order and in order of time."""
+    from xosc_lateral.world.motion.segments import SegmentRow, cut_segments
+
     rows = []
     for motion in played.motion.entities:
         for span in cut_segments(motion, played.network, is_trailer=motion.name in played.trailers):

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.files.mapping import MappingLike
 from xosc_lateral.workflows.options import PROFILE, declare_options, flag
 from xosc_lateral.workflows.result import (
     DrivesLike,
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from xosc_lateral.drivers.evaluation.realism import Realism
     from xosc_lateral.drivers.evaluation.scores import ProfileScores
     from xosc_lateral.drivers.model.profile import DriverProfile
+    from xosc_lateral.files.mapping import MappingLike
     from xosc_lateral.files.pages.figure import Figure
 
 

@@ -9,7 +9,6 @@ from typing import Any
 
 from xosc_lateral.base.errors import DriverProfileError, FormatError, XoscLateralError
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.workflows.batch.manifest import MANIFEST, read_manifest
 from xosc_lateral.workflows.options import declare_options
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths
 
@@ -110,6 +109,7 @@ def find_uses(name: str, outputs: Paths, library: Paths = ()) -> ProfileUses:
         Folders that batches wrote, or their manifests.
     """
     from xosc_lateral.files.profiles import profile_hash, read_profile
+    from xosc_lateral.workflows.batch.manifest import MANIFEST, read_manifest
 
     now: str | None
     try:

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.files.mapping import MappingLike
 from xosc_lateral.files.output_paths import claim, output_folder
 from xosc_lateral.workflows.options import declare_options, flag, texts
 from xosc_lateral.workflows.result import (
@@ -25,6 +24,7 @@ from xosc_lateral.workflows.result import (
 if TYPE_CHECKING:
     from xosc_lateral.drivers.loop.close import LoopResult
     from xosc_lateral.drivers.model.profile import DriverProfile
+    from xosc_lateral.files.mapping import MappingLike
     from xosc_lateral.files.pages.figure import Figure
 
 

@@ -7,8 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.drivers.drives.cleaning import RUN
-from xosc_lateral.files.mapping import MappingLike
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.workflows.options import PROFILE, declare_options, flag
 from xosc_lateral.workflows.result import (
@@ -27,6 +25,7 @@ if TYPE_CHECKING:
     from xosc_lateral.drivers.drives.drive import Drive
     from xosc_lateral.drivers.model.profile import DriverProfile
     from xosc_lateral.drivers.model.sampled_offsets import SampledOffsets
+    from xosc_lateral.files.mapping import MappingLike
     from xosc_lateral.files.pages.figure import Figure
 
 
@@ -134,6 +133,8 @@ class Offsets(Result):
         `snippet` and `offset_real` [m]. `following_run` counts what is cut apart: the table can be fitted as it is.
         """
         import numpy as np
+
+        from xosc_lateral.drivers.drives.cleaning import RUN
 
         lengths = [len(each.time) for each in self._made]
         numbers = np.repeat(np.arange(len(lengths)), lengths)

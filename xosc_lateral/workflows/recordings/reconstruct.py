@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Unpack
+from typing import Unpack
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.mapping import MappingLike
 from xosc_lateral.files.profiles import find_profile, list_profiles, read_profile
 from xosc_lateral.workflows.conversion.drivers import AUTO_PROFILE
-from xosc_lateral.workflows.options import declare_options, flag, spelled_out, values_of
+from xosc_lateral.workflows.options import spelled_out, values_of
 from xosc_lateral.workflows.recordings.encounters import encounters, relative_triggers
 from xosc_lateral.workflows.recordings.plan import Residuals, VehiclePlan, plan_vehicles, residuals_of
 from xosc_lateral.workflows.recordings.reconstruction import ChosenDriver, Reconstruction
@@ -47,19 +47,14 @@ NO_HOST = "none"  # stands for no vehicle under test
 
 
 @spelled_out(ReconstructSettings)
-@declare_options
 def reconstruct(
     recording: PathLike,
     output: PathLike | None = None,
     *,
-    format: Annotated[str | None, flag("--format", show_default=False,  # noqa: A002 (as in `import_drives`)
-        help="dlr-ht, levelx, osi, commonroad, fcd, tracks; default: by the file.")] = None,
-    road: Annotated[PathLike | None, flag("--road", kind=Path | None, show_default=False,
-        help="OpenDRIVE file, or SUMO network, that it was recorded on.")] = None,
     columns: MappingLike | None = None,
     force: bool = False,
     **options: Unpack[ReconstructKeywords],
-) -> Reconstruction:  # fmt: skip
+) -> Reconstruction:
     """Turn a recording into maneuvers, a road and drivers.
 
     Parameters
@@ -68,10 +63,6 @@ def reconstruct(
         Tracks of several vehicles: DLR Highway Traffic, levelX, OSI traces, CommonRoad, SUMO's FCD output, or a table.
     output : str or Path, optional
         Folder to write to, see `Reconstruction.write`; without it nothing is written.
-    format : str, optional
-        "dlr-ht", "levelx", "osi", "commonroad", "fcd" or "tracks"; without it, told from the file.
-    road : str or Path, optional
-        OpenDRIVE file, for recordings that come without their lanes; SUMO's network, for its FCD output.
     columns : dict, path or TableMapping, optional
         Name -> ``COLUMN[:UNIT]`` for tables of tracks, or a saved mapping's file.
     force : bool
@@ -84,7 +75,7 @@ def reconstruct(
     FormatError, NotEnoughDataError
     """
     settings = ReconstructSettings(**values_of(ReconstructSettings, options))
-    traffic = read_recording(Path(recording), kind=format, road=None if road is None else Path(road), columns=columns)
+    traffic = read_recording(Path(recording), kind=settings.format, road=settings.road, columns=columns)
     result = reconstruct_recording(traffic, settings)
     if output is not None:
         result.write(output, force=force)
