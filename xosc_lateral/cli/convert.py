@@ -125,7 +125,7 @@ def _convert_one(
     from xosc_lateral.files.osi import osi_wanted
     from xosc_lateral.files.output_paths import STDOUT, claim, output_file
     from xosc_lateral.workflows.conversion.conversion import osi_files
-    from xosc_lateral.workflows.conversion.convert import convert, lifelike, numbered, output_scenario
+    from xosc_lateral.workflows.conversion.convert import convert, default_output, numbered, output_scenario
     from xosc_lateral.workflows.result import PAGE_SUFFIXES
 
     if output == STDOUT:
@@ -137,7 +137,7 @@ def _convert_one(
         _warn_if_cut_off(result, reply.quiet)
         unclean = bool(result.warnings) or not result.enriched
     else:
-        written = lifelike(source) if output is None else output_scenario(output, source)
+        written = default_output(source) if output is None else output_scenario(output, source)
         page = None if report is None else output_file(report, f"{written.stem}.html", PAGE_SUFFIXES)
         trace = None if osi is None else osi_files(osi, source)[0]
         files = [

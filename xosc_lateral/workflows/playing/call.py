@@ -70,7 +70,7 @@ def segments(
     allow: Paths = (),
 ) -> Segments:
     """Road-following segments of every entity, and why the rest is none; see `play`."""
-    from xosc_lateral.world.scenario.dependence import controlled_entities
+    from xosc_lateral.world.scenario.controllers import controlled_entities
 
     played = (
         scenario
@@ -189,7 +189,7 @@ class Playback(Result):
         """Write an ASAM OSI trace (extra `osi`): ``.mcap`` or ``.osi``, one `GroundTruth` per step."""
         from xosc_lateral.files.osi import SUFFIXES
         from xosc_lateral.files.osi.write import host_of, write_osi
-        from xosc_lateral.world.scenario.dependence import vehicles_under_test
+        from xosc_lateral.world.scenario.controllers import vehicles_under_test
 
         output = output_file(path, f"{self.scenario.stem}_gt.mcap", SUFFIXES)
         claim([output], self._inputs(), force=force)

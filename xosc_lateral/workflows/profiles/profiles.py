@@ -93,14 +93,13 @@ def derive_profile(
     name : str
         Id of the new profile; else the preset's or the base's name with ``-derived``.
     **asked
-        Fields of `fitting.stated_figures.Asked`: ``sdlp=0.25``.
+        Fields of `fitting.derive.Asked`: ``sdlp=0.25``.
     """
     from dataclasses import replace
 
     from msgspec import structs
 
-    from xosc_lateral.drivers.fitting.derive import derive
-    from xosc_lateral.drivers.fitting.stated_figures import Asked, preset_called
+    from xosc_lateral.drivers.fitting.derive import Asked, derive, preset_called
     from xosc_lateral.files.profiles import profile_hash
 
     known = given_profile(base, library)
