@@ -103,7 +103,12 @@ def dependence(scenario: Scenario, unforeseeable: Collection[str]) -> Dependence
     size = -1
     while result.size() != size:
         size = result.size()
-        _follow_init(scenario, result)
+        for private in scenario.storyboard.init.privates:
+            for action in private.actions:  # where others are at the start is known
+                if not isinstance(action.content, TeleportAction) and result.entities & set(
+                    entity_references(action.content)
+                ):
+                    result.entities.add(private.entity_ref)
         for story in scenario.storyboard.stories:
             for act in story.acts:
                 _follow_act(result, (story.name,), act)
@@ -132,16 +137,6 @@ def refers_to(content: StoryboardElementStateCondition, path: Path) -> bool:
     """Whether a state condition is about the element with these names from the story down."""
     wanted = tuple(content.element_ref.split("::"))
     return _DEPTH.get(content.element_type) == len(path) and path[len(path) - len(wanted) :] == wanted
-
-
-def _follow_init(scenario: Scenario, dependence: Dependence) -> None:
-    for private in scenario.storyboard.init.privates:
-        for action in private.actions:
-            # Where others are at the start is known.
-            if not isinstance(action.content, TeleportAction) and dependence.entities & set(
-                entity_references(action.content)
-            ):
-                dependence.entities.add(private.entity_ref)
 
 
 def _follow_act(dependence: Dependence, above: Path, act: Act) -> None:
