@@ -121,9 +121,7 @@ def fit_coarse(
         between = float(np.clip(between, 0.0, 0.9 * variance))
         if abs(between - before) < SHARE_TOLERANCE * variance:
             break
-    kernel = measuring_low_pass(settings.step)
-    gain = np.abs(np.exp(-2j * np.pi * np.outer(FREQUENCIES / COARSE_EVERY, np.arange(len(kernel)))) @ kernel)
-    return scaled_spectrum(coarse, 1.0 / np.maximum(gain, HALF_GAIN)), between
+    return _restored(coarse, settings.step), between
 
 
 def _far_covariance(
@@ -143,6 +141,13 @@ def _far_covariance(
                 pairs[k] += len(run) - lag * COARSE_EVERY
     # The common mean was taken out, and with it a part of the differences between a few drivers.
     return float(total.sum() / max(pairs.sum(), 1) * drivers / (drivers - 1)), lags, pairs.tolist()
+
+
+def _restored(coarse: Autoregression, step: float) -> Autoregression:
+    """With what the measuring low-pass took below the border; `step` of the runs. [s]"""
+    kernel = measuring_low_pass(step)
+    gain = np.abs(np.exp(-2j * np.pi * np.outer(FREQUENCIES / COARSE_EVERY, np.arange(len(kernel)))) @ kernel)
+    return scaled_spectrum(coarse, 1.0 / np.maximum(gain, HALF_GAIN))
 
 
 def scaled_spectrum(coarse: Autoregression, gain: FloatArray) -> Autoregression:
