@@ -23,8 +23,7 @@ from tests.kit.places import VALID, hand_written, random_places
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.openscenario.write.draft import target
-from xosc_lateral.files.openscenario.write.lane_offset_scenario import write_lane_offset_scenario
-from xosc_lateral.files.openscenario.write.trajectory_scenario import write_trajectory_scenario
+from xosc_lateral.files.openscenario.write.fit import write_converted
 from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.world.motion.nominal import EntityMotion
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
@@ -127,10 +126,15 @@ def outputs(seed: int) -> dict[str, str]:
             for what, paths in (("all", swerving), ("one", ego)):
                 try:
                     if what == "all":
-                        result = write_trajectory_scenario(scenario, motion, paths, path.with_name("o.xosc"), **words)
+                        result = write_converted(scenario, motion, paths, path.with_name("o.xosc"), **words)
                     else:
-                        result = write_lane_offset_scenario(
-                            scenario, motion, (), path.with_name("o.xosc"), trajectories=paths, **words
+                        result = write_converted(
+                            scenario,
+                            motion,
+                            paths,
+                            path.with_name("o.xosc"),
+                            chains=(),
+                            **words,
                         )
                 except FormatError as error:
                     hashes[f"{version} {what}"] = error.what

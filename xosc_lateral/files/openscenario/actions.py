@@ -20,7 +20,6 @@ from xosc_lateral.files.openscenario.positions import read_position
 from xosc_lateral.world.scenario import private_actions as private
 from xosc_lateral.world.scenario.entity import BoundingBox, Controller, Performance
 from xosc_lateral.world.scenario.enums import DynamicsShape
-from xosc_lateral.world.scenario.expressions import ExpressionError
 from xosc_lateral.world.scenario.global_actions import (
     AddEntityAction,
     DeleteEntityAction,
@@ -37,6 +36,7 @@ from xosc_lateral.world.scenario.global_actions import (
     VariableModifyAction,
     VariableSetAction,
 )
+from xosc_lateral.world.scenario.parameters import ExpressionError
 from xosc_lateral.world.scenario.place import Unsupported
 from xosc_lateral.world.scenario.private_actions import TransitionDynamics
 from xosc_lateral.world.scenario.scenario import (

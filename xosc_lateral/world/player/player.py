@@ -96,13 +96,10 @@ class _Player:
         unwatched.wake_all()
         ended_by = "time limit" if going else "stop trigger"
         place, cut_off = simulation.scenario.storyboard.place, None
-        if going and (_has_end(simulation.scenario) or self._goes_on()):
+        goes_on = any(story.state is not StoryboardElementState.COMPLETE for story in self.root.children)
+        if going and (_has_end(simulation.scenario) or goes_on):
             cut_off = Note(f"{CUT_OFF} of {time_limit:g} s", place.path, place.line, place.element)
         return self._result(ended_by, cut_off)
-
-    def _goes_on(self) -> bool:
-        """Whether a story still has something to do."""
-        return any(story.state is not StoryboardElementState.COMPLETE for story in self.root.children)
 
     def _begin(self) -> bool:
         """The moment in which everything starts; whether there is another."""

@@ -42,7 +42,6 @@ class StoryboardElement:
     """None: its parent has not started it."""
     count: int = field(default=0, init=False)
     parent: StoryboardElement | None = field(default=None, init=False, repr=False)
-    path: tuple[str, ...] = field(default=(), init=False)
     watchers: list[Watcher] = field(default_factory=list, init=False)
 
     def __post_init__(self) -> None:
@@ -56,11 +55,11 @@ class StoryboardElement:
         return self.state is _RUNNING
 
     # ---- the tree ----------------------------------------------------------------------------------------------------
-    def settle(self, path: tuple[str, ...] = ()) -> None:
-        """Tell the whole tree its paths (names from the story down)."""
-        self.path = (*path, self.name) if self.kind is not None else ()
-        for child in self.children:
-            child.settle(self.path)
+    @property
+    def path(self) -> tuple[str, ...]:
+        """Names from the story down."""
+        above = () if self.parent is None else self.parent.path
+        return above if self.kind is None else (*above, self.name)
 
     def walk(self) -> Iterator[StoryboardElement]:
         """This element and all under it, parents first."""
@@ -214,13 +213,10 @@ EntityChecks: TypeAlias = dict[type, Callable[[Any, Simulation], EntityCheck]]
 
 
 class Watch:
-    """What is told of changes; a check that goes by it gives the same until then.
+    """What is told of changes; a check that goes by it gives the same until then."""
 
-    `wake`: tells the trigger that looks at it; `is_settled`: the next look gives what the last one gave.
-    """
-
-    wake: Callable[[], None] | None = None
-    is_settled = False
+    wake: Callable[[], None] | None = None  # tells the trigger that looks at it
+    is_settled = False  # the next look gives what the last one gave
 
     def forget(self) -> None:
         """Before the owner waits again: what happened until then no longer counts."""
@@ -307,10 +303,7 @@ class RunningCondition:
 
 @dataclass(slots=True, eq=False)
 class RunningTrigger:
-    """A trigger.
-
-    `when_empty`: value of a trigger without groups: true for start, false for stop triggers.
-    """
+    """A trigger. `when_empty`: value of a trigger without groups: true for start, false for stop triggers."""
 
     groups: tuple[tuple[RunningCondition, ...], ...]
     when_empty: bool = field(kw_only=True)

@@ -15,7 +15,6 @@ from xosc_lateral.world.player.actions import (
 )
 from xosc_lateral.world.player.actions.base import Maker, RunningAction
 from xosc_lateral.world.player.conditions import distance, motion, value
-from xosc_lateral.world.player.positions.on_road import reference_of
 from xosc_lateral.world.player.simulation import Simulation
 from xosc_lateral.world.player.state import EntityState
 from xosc_lateral.world.player.storyboard import (
@@ -29,6 +28,7 @@ from xosc_lateral.world.player.storyboard import (
 )
 from xosc_lateral.world.scenario.enums import StoryboardElementType, TriggeringEntitiesRule
 from xosc_lateral.world.scenario.place import Unsupported
+from xosc_lateral.world.scenario.position import reference_of
 from xosc_lateral.world.scenario.private_actions import TeleportAction
 from xosc_lateral.world.scenario.scenario import (
     Act,
@@ -50,7 +50,6 @@ def build_storyboard(storyboard: Storyboard, simulation: Simulation) -> Storyboa
         for story in storyboard.stories
     ]
     root = StoryboardElement("", None, stories, stop_trigger=_trigger(storyboard.stop_trigger, simulation))
-    root.settle()
     for look in simulation.when_built:
         look(root)
     if storyboard.stop_trigger is None:

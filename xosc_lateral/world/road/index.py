@@ -27,10 +27,7 @@ LANE_TOLERANCE = 1e-6
 
 
 class _Feet(NamedTuple):
-    """Feet of perpendiculars: s, t in the leaning surface, how far the point lies ahead of the foot, heading.
-
-    `ahead` differs from 0 beyond the ends of a road and in the outside of corners. [m], [rad]
-    """
+    """Feet of perpendiculars: s, t in the leaning surface, heading, and how far a point is ahead, beyond an end. [m]"""
 
     s: FloatArray
     t: FloatArray

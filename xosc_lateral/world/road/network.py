@@ -26,10 +26,7 @@ from xosc_lateral.world.road.surface import NO_OFFSET, HeaderOffset
 
 
 class RoadNetwork(SurfaceIndex, Routes):
-    """Roads, their lanes and their links, as read from one OpenDRIVE file.
-
-    Arguments of a batch broadcast; what it answers has the shape of the arguments.
-    """
+    """Roads, lanes and links of one OpenDRIVE file; arguments of a batch broadcast, answers have their shape."""
 
     def __init__(
         self,
@@ -100,10 +97,7 @@ class RoadNetwork(SurfaceIndex, Routes):
         return self.roads[road].curvature_at(s)
 
     def lane_state_at(self, road: int, lane: int, s: float) -> LaneState:
-        """Centre t, its slope along s, and width of a lane; raises `PlaybackError` for a lane that is not there.
-
-        [m], [-], [m]
-        """
+        """Centre t [m], its slope along s [-] and width of a lane [m]; `PlaybackError` for a lane that is not there."""
         road_ = self.roads[road]
         info = road_.section_at(s).by_id.get(lane)
         return (info or find_lane(road_, lane, s)).state_at(s)
@@ -120,10 +114,7 @@ class RoadNetwork(SurfaceIndex, Routes):
     def lane_at(
         self, road: int, s: float, t: float, *, lane_types: Collection[str] | None = DRIVING
     ) -> LaneCoordinates:
-        """The lane of these types that holds `t`, else the nearest one; lane 0 if the road has none of them there.
-
-        `s`, `t` in [m].
-        """
+        """The lane of these types that holds `t`, else the nearest; lane 0 if the road has none of them there. [m]"""
         return lane_at(self.roads[road], road, s, t, lane_types)
 
     def section_at(self, road: int, s: float) -> tuple[float, float]:
@@ -136,7 +127,6 @@ class RoadNetwork(SurfaceIndex, Routes):
         x: float,
         y: float,
         z: float | None = None,
-        heading: float | None = None,
         *,
         near: tuple[int, float] | None = None,
         lane_types: Collection[str] | None = DRIVING,
@@ -146,13 +136,13 @@ class RoadNetwork(SurfaceIndex, Routes):
         `near` = (road, s) where it was a moment ago makes it cheap, and distinguishes roads that lie on each other.
         """
         if near is None or near[0] < 0:
-            return self._nearest_lane(x, y, z, heading, lane_types)
+            return self._nearest_lane(x, y, z, lane_types)
         before, s = near
         s, t, ahead = project_at(self.roads[before], x, y, s)
         here = lane_at(self.roads[before], before, s, t, lane_types)
         if _is_on(here, ahead):
             return here
-        located = self._nearest_lane(x, y, z, heading, lane_types)
+        located = self._nearest_lane(x, y, z, lane_types)
         if located.road == before or located.distance > LANE_TOLERANCE:
             return located
         # At the entry of a junction its roads lie on each other, and a point that is between two vertices of a path has
@@ -166,10 +156,8 @@ class RoadNetwork(SurfaceIndex, Routes):
                 return onward
         return located
 
-    def _nearest_lane(
-        self, x: float, y: float, z: float | None, heading: float | None, lane_types: Collection[str] | None
-    ) -> LaneCoordinates:
-        best = self.world_to_lane(x, y, z, heading, lane_types=lane_types)
+    def _nearest_lane(self, x: float, y: float, z: float | None, lane_types: Collection[str] | None) -> LaneCoordinates:
+        best = self.world_to_lane(x, y, z, lane_types=lane_types)
         return LaneCoordinates(int(best.road), int(best.lane), *(float(values) for values in best[2:]))
 
     # ---- to be seen --------------------------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ from math import asin, atan, atan2, ceil, cos, inf, nan, pi, sin
 from xosc_lateral.base.errors import PlaybackError
 from xosc_lateral.world.road.geometry import Line, ReferenceElement
 from xosc_lateral.world.road.lanes import Lane, LaneSection
-from xosc_lateral.world.road.positions import LaneCoordinates, Pose
+from xosc_lateral.world.road.positions import TWO_PI, LaneCoordinates, Pose
 from xosc_lateral.world.road.surface import Surface
 
 
@@ -30,10 +30,7 @@ class RoadLink:
 
 @dataclass(frozen=True, slots=True)
 class Connection:
-    """A way through a junction: from an incoming road onto a connecting one.
-
-    `lanes` holds (from, to) lane ids; empty: the file gives none.
-    """
+    """From an incoming road onto a connecting one; `lanes`: (from, to) lane ids, empty where the file gives none."""
 
     incoming_road: str
     connecting_road: str
@@ -120,7 +117,6 @@ class Road:
 # ---- one place at a time, in plain floats: what the player asks for in every frame ----
 # Derived here: the surface's axes are the reference line's, turned by its pitch and then by its roll; heading, pitch
 # and roll of a vehicle follow from the axes that its own heading gives within that surface.
-TWO_PI = 2.0 * pi
 
 
 def normal_angle(angle: float) -> float:
@@ -201,10 +197,7 @@ def turned_in_surface(turn: float, pitch: float, roll: float) -> tuple[float, fl
 
 
 def turn_for_heading(change: float, pitch: float, roll: float) -> float:
-    """Turn within a surface that pitches and rolls, for a change of heading: the reverse of `turned_in_surface`.
-
-    [rad]
-    """
+    """Turn within a surface that pitches and rolls, for a change of heading: undoes `turned_in_surface`. [rad]"""
     sideways, ahead = sin(change), cos(change)
     return atan2(cos(pitch) * sideways, cos(roll) * ahead - sin(pitch) * sin(roll) * sideways)
 
@@ -218,10 +211,7 @@ def across_lane(lane: Lane, t: float, centre: float, width: float) -> float:
 
 
 def lane_at(road: Road, index: int, s: float, t: float, lane_types: Collection[str] | None) -> LaneCoordinates:
-    """The lane of these types that holds t, else the nearest; lanes of no width only where there is nothing else.
-
-    `s`, `t` in [m].
-    """
+    """The lane of these types that holds t, else the nearest; lanes of no width only as a last resort. [m]"""
     best: tuple[float, float, float] | None = None
     nearest: tuple[Lane, float] | None = None
     for lane in road.section_at(s).lanes:

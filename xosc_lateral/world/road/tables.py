@@ -171,10 +171,7 @@ class NetworkTables(LaneTables):
         *,
         angles: bool = True,
     ) -> _Lie:
-        """What `Surface.at` answers, by the elevation there and its slope.
-
-        Without `angles` no more than height, shrinking and lead.
-        """
+        """What `Surface.at` answers, by elevation and slope; without `angles` height, shrinking and lead alone."""
         nothing = np.zeros(len(s))
         if self._flat:
             return nothing, nothing, nothing, None, None, None
@@ -202,10 +199,7 @@ class NetworkTables(LaneTables):
         return height, pitch, roll, shrink, drift, lead
 
     def _lead(self, road: IndexLike, s: FloatArray, across: FloatArray) -> FloatArray | None:
-        """How far along s places lie from the feet of their s, `across` the line; None: nothing leans on a grade.
-
-        Shape as `s`. [m]
-        """
+        """How far along s places lie from the feet of their s, `across` the line; None: none leans on a grade. [m]"""
         if self._superelevation.is_zero or self._elevation.is_zero:
             return None
         angle, grade = self._superelevation.at(road, s)[0], self._elevation.at(road, s)[1]
@@ -241,8 +235,7 @@ class NetworkTables(LaneTables):
     def lane_curvature(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, offset: ArrayLike = 0.0) -> FloatArray:
         """Curvature of the path at a constant offset from the lane centre, positive turning left in TRAVEL. [1/m]
 
-        The centre's slope t' and bend t'' count, the change of the reference line's own curvature along a sloping path
-        (t t' dk/ds, under 1e-6 1/m on roads) does not.
+        The centre's slope t' and bend t'' count, not the change of the line's own curvature along it (under 1e-6 1/m).
         """
 
         return self._batch(self._curvature_beside, 1, road, s, offset, lane=lane)[0]

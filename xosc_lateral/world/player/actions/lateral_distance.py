@@ -142,12 +142,10 @@ PEAK = 1.5
 
 
 class BesideEntity:
-    """Moves an entity to the line, and along it.
+    """Moves an entity to the line, `wanted` to the left of the other [m], and along it.
 
     Without a limit of acceleration it is on the line at once. With one, it heads for the line, and turns into it when
     it is nearer than the radius of its turn.
-
-    `wanted`: of the line, to the left of the other entity. [m]
     """
 
     def __init__(self, state: EntityState, other: EntityState, wanted: float, limits: DynamicConstraints) -> None:

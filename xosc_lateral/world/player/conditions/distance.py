@@ -151,10 +151,7 @@ _MANY_LANES = 1000
 
 
 def prepare_relative_clearance(content: conditions.RelativeClearanceCondition, simulation: Simulation) -> EntityCheck:
-    """True when the lanes of the range exist and hold nobody between `-distance_backward` and `distance_forward`. [m]
-
-    Lanes count along the road's lane ids, without lane 0, as in the reference player.
-    """
+    """Whether the lanes of the range exist and hold nobody; ids along the road, as in the reference player. [m]"""
     ranges = tuple(
         (
             -_MANY_LANES if lanes.from_lane is None else lanes.from_lane,
