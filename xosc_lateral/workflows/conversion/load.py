@@ -89,7 +89,7 @@ def _read(
     """Read a scenario, once for all its variants if that depends on its own file and on the place of its road alone."""
     state = check_regular(path)
     guard_input(path)
-    reads = _read_once.cache_info().misses
+    reads = _read_once.cache_info().misses  # a result that was kept holds where nothing else was read, or missed
     scenario = _read_once(path, parameters, allowed, roads, strict, state_key(state))
     is_fresh = _read_once.cache_info().misses > reads
     stands_alone = not scenario.catalog_locations and not scenario.remarks

@@ -125,17 +125,14 @@ def spelled_out(settings: type) -> Callable[[Verb], Verb]:
             for item in settable(settings)
         ]
         verb.__signature__ = signature.replace(parameters=[*positional, *named])  # type: ignore[attr-defined]
-        verb.__doc__ = _with_parameters(verb.__doc__ or "", settings)
+        # The settings' own parameters in place of the one line that refers to them.
+        _, _, described = inspect.cleandoc(settings.__doc__ or "").partition("Parameters\n----------\n")
+        parameters, _, _ = described.partition("\n\nRaises")
+        text = inspect.cleandoc(verb.__doc__ or "")
+        verb.__doc__ = text.replace(f"options\n    `{settings.__name__}`.", parameters)
         return verb
 
     return with_options
-
-
-def _with_parameters(text: str, settings: type) -> str:
-    """A docstring with the settings' own parameters in place of the one line that refers to them."""
-    _, _, described = inspect.cleandoc(settings.__doc__ or "").partition("Parameters\n----------\n")
-    parameters, _, _ = described.partition("\n\nRaises")
-    return inspect.cleandoc(text).replace(f"options\n    `{settings.__name__}`.", parameters)
 
 
 def names(stated: str | Collection[str]) -> frozenset[str]:

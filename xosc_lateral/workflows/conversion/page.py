@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from xosc_lateral.files.pages.page import KeyFigure, Page, Tone
-from xosc_lateral.workflows.conversion.result import WRITTEN_AS, ConvertedScenario, Enriched, EntityResult
+from xosc_lateral.workflows.conversion.result import MODE_WORDS, ConvertedScenario, Enriched, EntityResult
 from xosc_lateral.workflows.playing import figures as figures
 from xosc_lateral.workflows.playing.figures import COMFORTABLE
 from xosc_lateral.workflows.playing.page import add_notes
@@ -92,7 +92,7 @@ def _provenance(conversion: ConvertedScenario) -> dict[str, object]:
         "scenario": conversion.source.name,
         "output": (conversion.output or conversion.source).name,
         "under test": list(made.ego) or "none",
-        "written as": [f"{name}: {WRITTEN_AS[mode]}" for name, mode in made.modes.items()],
+        "written as": [f"{name}: {MODE_WORDS[mode]}" for name, mode in made.modes.items()],
         "neighbours": [
             f"{one.name}: {one.beside(made.options['neighbours'])}"
             for one in conversion.movement.entities

@@ -209,8 +209,8 @@ def _unwritable(
     """See `Plan`: of those alone that `only` leaves out; the others follow trajectories anyway."""
     if settings.only is None or settings.mode is OutputMode.LANE_OFFSET:
         return {}
-    left = {*settings.only, *unforeseeable}
-    others = [entity.name for entity in played.motion.entities if entity.name not in left]
+    excluded = {*settings.only, *unforeseeable}
+    others = [entity.name for entity in played.motion.entities if entity.name not in excluded]
     if settings.target.player is Player.CARLA:
         return dict.fromkeys(others, "CARLA's ScenarioRunner plays maneuvers in ways of its own")
     return motion_unknown_to(version, played.scenario, played.motion, others)

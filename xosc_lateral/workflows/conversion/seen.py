@@ -82,10 +82,7 @@ def seen_by(
     contexts: Contexts,
     neighbours: Neighbours,
 ) -> Seen:
-    """What the driver of an entity sees on runs of spans.
-
-    `motion` is the run of the scenario with those alone whose place beside him is certain.
-    """
+    """What the driver of an entity sees on runs of spans; in `motion` are those whose place beside him is certain."""
     index = next(k for k, one in enumerate(motion.entities) if one is entity)
     every = max(1, round(SAMPLE_STEP / motion.step))
     segments: list[SeenSegment] = []
