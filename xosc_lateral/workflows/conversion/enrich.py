@@ -29,10 +29,17 @@ from xosc_lateral.workflows.conversion.result import (
     untouched,
 )
 from xosc_lateral.workflows.conversion.seen import NOTHING_SEEN, SAMPLE_STEP, Contexts, Seen, going_on, seen_by
-from xosc_lateral.world.motion.crossings import Crossing, beside_written, crossings
 from xosc_lateral.world.motion.gaps import gaps_of
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
-from xosc_lateral.world.motion.segments import SegmentKind, SegmentSpan, cut_segments, movement_runs
+from xosc_lateral.world.motion.segments import (
+    Crossing,
+    SegmentKind,
+    SegmentSpan,
+    beside_written,
+    crossings,
+    cut_segments,
+    movement_runs,
+)
 from xosc_lateral.world.motion.trajectory import (
     SETTLING_TIME,
     SampledDeviation,
@@ -140,14 +147,10 @@ class _Sample(NamedTuple):
     """Offsets sampled on one run of spans."""
 
     spans: tuple[SegmentSpan, ...]
-    knots: IntArray
-    """Rows of the motion that were sampled."""
-    offset: FloatArray
-    """There. [m]"""
-    error: FloatArray
-    """What a sensor adds; zeros unless asked for. [m]"""
-    beyond: FloatArray
-    """How it would go on after the end. [m]"""
+    knots: IntArray  # rows of the motion that were sampled
+    offset: FloatArray  # there [m]
+    error: FloatArray  # what a sensor adds; zeros unless asked for [m]
+    beyond: FloatArray  # how it would go on after the end [m]
 
 
 @dataclass(frozen=True, eq=False)

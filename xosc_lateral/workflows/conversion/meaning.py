@@ -187,15 +187,12 @@ def with_speeds(scenario: Scenario, motion: NominalMotion, egos: Collection[str]
 
 @dataclass(frozen=True, slots=True)
 class KeptChains:
-    """Chains that leave what happens as it was, the runs with them, and what is left that could not be mended.
-
-    `smaller`: entity -> least size of its moves, and whether all of its chains are smaller.
-    """
+    """Chains that leave what happens as it was, the runs with them, and what is left that could not be mended."""
 
     chains: tuple[OffsetChain, ...]
     comparisons: tuple[Comparison, ...]
     changes: tuple[Change, ...]
-    smaller: dict[str, tuple[Size, bool]]
+    smaller: dict[str, tuple[Size, bool]]  # entity -> least size of its moves; whether all chains are smaller
 
     @property
     def shifts(self) -> tuple[EventShift, ...]:

@@ -31,23 +31,14 @@ Cell = Callable[[str, Path], Any]
 
 @dataclass(frozen=True, slots=True)
 class Option:
-    """How users say a setting.
+    """How users say a setting."""
 
-    - `read`: what they say in Python, a word of the command line or a cell of a table -> the field's value, or
-      `ValueError`
-    - `flags`: on the command line; empty: its name
-    - `kind`: type of the command line's value; None: several verbs share the option, and `cli.words` has it
-    - `words`: what else the command line says of it (help, limits)
-    - `cell`: reads the column of its name; None: a table has no such column
-    - `prefix`, `entry`: of columns that hold one entry each of a mapping
-    """
-
-    read: Callable[[Any], Any]
-    flags: tuple[str, ...] = ()
-    kind: Any = None
-    words: Mapping[str, Any] = field(default_factory=dict)
-    cell: Cell | None = None
-    prefix: str = ""
+    read: Callable[[Any], Any]  # what they say in Python, a word or a cell -> the field's value; or `ValueError`
+    flags: tuple[str, ...] = ()  # on the command line; empty: its name
+    kind: Any = None  # type of the command line's value; None: several verbs share the option, and `cli.words` has it
+    words: Mapping[str, Any] = field(default_factory=dict)  # what else the command line says of it (help, limits)
+    cell: Cell | None = None  # reads the column of its name; None: a table has no such column
+    prefix: str = ""  # prefix, entry: of columns that hold one entry each of a mapping
     entry: Cell | None = None
 
     def value(self, name: str, stated: Any) -> Any:

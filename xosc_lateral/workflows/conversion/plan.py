@@ -83,13 +83,11 @@ class Plan:
 
 @dataclass(frozen=True, slots=True)
 class WrittenAs:
-    """Who follows a trajectory, and who keeps its maneuvers and may get lane offsets; all others stay as they are.
-
-    `frozen`: triggers that depend on a vehicle under test and no longer do in the output, a line each.
-    """
+    """Who follows a trajectory, and who keeps its maneuvers and may get lane offsets; all others stay as they are."""
 
     trajectories: frozenset[str]
     lane_offsets: frozenset[str]
+    # frozen: triggers that depend on a vehicle under test and no longer do in the output, a line each
     frozen: tuple[str, ...] = ()
 
 

@@ -14,10 +14,9 @@ from msgspec import Struct
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.model.plausibility import Bound
 from xosc_lateral.drivers.model.profile import SIDES, Basis, DriverProfile
-from xosc_lateral.world.motion.crossings import Crossing
 from xosc_lateral.world.motion.gaps import Gap
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
-from xosc_lateral.world.motion.segments import SegmentSpan
+from xosc_lateral.world.motion.segments import Crossing, SegmentSpan
 from xosc_lateral.world.motion.trajectory import WorldTrajectory, leaps
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.controllers import Control
@@ -139,8 +138,7 @@ class LaneDeparture:
 
     name: str
     time: float
-    beyond: float
-    """How far beyond the marking. [m]"""
+    beyond: float  # how far beyond the marking [m]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
