@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.base.lazy import pd
@@ -27,6 +27,7 @@ from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, read_ma
 from xosc_lateral.workflows.batch.workers import WorkerDiedError, open_pool, run_tasks
 from xosc_lateral.workflows.conversion.convert import convert_scenario
 from xosc_lateral.workflows.conversion.settings import AUTO, AUTO_PROFILE, ConvertSettings
+from xosc_lateral.workflows.options import declare_options, flag
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths
 
 
@@ -121,13 +122,14 @@ class _Origin:
         return cls(facts, scenario, replace(settings, **places), variant)
 
 
+@declare_options
 def verify(
     outputs: Paths,
     *,
     library: Paths = (),
     allow: Paths = (),
     road_path: Paths = (),
-    fast: bool = False,
+    fast: Annotated[bool, flag("--fast", help="Compare hashes alone; make nothing again.")] = False,
     workers: int = 0,
 ) -> Verification:
     """Whether outputs are what their provenance says, and what today's inputs and program would give.
@@ -280,6 +282,7 @@ def _other_profile(settings: ConvertSettings, entity: str, recorded: Any) -> str
     return None if same else f"profile {profile.name!r} of {entity!r} has changed"
 
 
+@declare_options
 def reproduce(
     output: PathLike,
     new: PathLike,

@@ -17,12 +17,12 @@ from xosc_lateral.workflows.conversion.conversion import Conversion
 from xosc_lateral.workflows.conversion.enrich import enrich, seed_words_of
 from xosc_lateral.workflows.conversion.load import load_scenario, play_loaded, read_output
 from xosc_lateral.workflows.conversion.meaning import as_played, keep_meaning, meaning_of
-from xosc_lateral.workflows.conversion.options import spelled_out
 from xosc_lateral.workflows.conversion.plan import Plan, decide, heeds_controllers
 from xosc_lateral.workflows.conversion.result import Enriched, LaneChanges
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
 from xosc_lateral.workflows.conversion.shifts import Comparison
 from xosc_lateral.workflows.conversion.write import Written, write, write_with
+from xosc_lateral.workflows.options import spelled_out
 from xosc_lateral.workflows.result import PAGE_SUFFIXES, PathLike
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_chain import OffsetChain

@@ -13,16 +13,7 @@ from typing import Any
 
 from msgspec import Struct
 
-from xosc_lateral.world.scenario.conditions import (
-    CollisionCondition,
-    ParameterCondition,
-    RelativeClearanceCondition,
-    StoryboardElementStateCondition,
-    TrafficSignalCondition,
-    TrafficSignalControllerCondition,
-    UserDefinedValueCondition,
-    VariableCondition,
-)
+from xosc_lateral.world.scenario import conditions
 from xosc_lateral.world.scenario.enums import StoryboardElementState, StoryboardElementType
 from xosc_lateral.world.scenario.global_actions import TrafficSignalControllerAction, TrafficSignalStateAction
 from xosc_lateral.world.scenario.private_actions import (
@@ -79,16 +70,16 @@ class Dependence:
         if looked_at & self.entities:
             return True
         match content:
-            case CollisionCondition(entity_ref=None) | RelativeClearanceCondition(entity_refs=()):
+            case conditions.CollisionCondition(entity_ref=None) | conditions.RelativeClearanceCondition(entity_refs=()):
                 return bool(self.entities)  # anybody
-            case StoryboardElementStateCondition():
+            case conditions.StoryboardElementStateCondition():
                 paths = self.begins if content.state is StoryboardElementState.START_TRANSITION else self.ends
                 return any(refers_to(content, path) for path in paths)
-            case ParameterCondition() | VariableCondition() | TrafficSignalCondition():
+            case conditions.ParameterCondition() | conditions.VariableCondition() | conditions.TrafficSignalCondition():
                 return _value(content) in self.values
-            case TrafficSignalControllerCondition():
+            case conditions.TrafficSignalControllerCondition():
                 return content.controller_ref in self.values
-        return isinstance(content, UserDefinedValueCondition)  # comes from whoever drives
+        return isinstance(content, conditions.UserDefinedValueCondition)  # comes from whoever drives
 
     def size(self) -> int:
         """Of what was found."""
@@ -103,7 +94,12 @@ def dependence(scenario: Scenario, unforeseeable: Collection[str]) -> Dependence
     size = -1
     while result.size() != size:
         size = result.size()
-        _follow_init(scenario, result)
+        for private in scenario.storyboard.init.privates:
+            for action in private.actions:  # where others are at the start is known
+                if not isinstance(action.content, TeleportAction) and result.entities & set(
+                    entity_references(action.content)
+                ):
+                    result.entities.add(private.entity_ref)
         for story in scenario.storyboard.stories:
             for act in story.acts:
                 _follow_act(result, (story.name,), act)
@@ -128,20 +124,10 @@ def entity_references(content: object) -> Iterator[str]:
                 yield from entity_references(value)
 
 
-def refers_to(content: StoryboardElementStateCondition, path: Path) -> bool:
+def refers_to(content: conditions.StoryboardElementStateCondition, path: Path) -> bool:
     """Whether a state condition is about the element with these names from the story down."""
     wanted = tuple(content.element_ref.split("::"))
     return _DEPTH.get(content.element_type) == len(path) and path[len(path) - len(wanted) :] == wanted
-
-
-def _follow_init(scenario: Scenario, dependence: Dependence) -> None:
-    for private in scenario.storyboard.init.privates:
-        for action in private.actions:
-            # Where others are at the start is known.
-            if not isinstance(action.content, TeleportAction) and dependence.entities & set(
-                entity_references(action.content)
-            ):
-                dependence.entities.add(private.entity_ref)
 
 
 def _follow_act(dependence: Dependence, above: Path, act: Act) -> None:
@@ -184,7 +170,7 @@ def _follow_event(
 
 def _value(content: object) -> str:
     """Name of the parameter, variable or signal that an action sets or a condition looks at; empty: none."""
-    if isinstance(content, TrafficSignalStateAction | TrafficSignalCondition):
+    if isinstance(content, TrafficSignalStateAction | conditions.TrafficSignalCondition):
         return content.name
     if isinstance(content, TrafficSignalControllerAction):
         return content.controller_ref

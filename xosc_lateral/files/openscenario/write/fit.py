@@ -21,7 +21,7 @@ from xosc_lateral.files.openscenario.write.versions import fit_version
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_chain import OffsetChain
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
-from xosc_lateral.world.scenario.expressions import ExpressionError
+from xosc_lateral.world.scenario.parameters import ExpressionError
 from xosc_lateral.world.scenario.scenario import Scenario
 
 

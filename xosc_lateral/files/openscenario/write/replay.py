@@ -22,9 +22,8 @@ from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.scenario.conditions import SimulationTimeCondition
 from xosc_lateral.world.scenario.controllers import assigned_controllers, controlled_entities, named
 from xosc_lateral.world.scenario.enums import Priority
-from xosc_lateral.world.scenario.expressions import ExpressionError
 from xosc_lateral.world.scenario.global_actions import AddEntityAction, ParameterModifyAction, ParameterSetAction
-from xosc_lateral.world.scenario.parameters import Scope
+from xosc_lateral.world.scenario.parameters import ExpressionError, Scope
 from xosc_lateral.world.scenario.place import Place, Unsupported
 from xosc_lateral.world.scenario.private_actions import CONTROLLER, MOTION, ConnectTrailerAction
 from xosc_lateral.world.scenario.scenario import Scenario, conditions_of
