@@ -9,9 +9,8 @@ from msgspec import structs
 from tests.kit.simulated.movements import ornstein_uhlenbeck, record_movement
 from xosc_lateral.drivers.loop.candidates import FINE_SCALES, Family, candidates_of, shapes_of
 from xosc_lateral.drivers.loop.columns import Column, Values
-from xosc_lateral.drivers.loop.model import Fitted
+from xosc_lateral.drivers.loop.model import Fitted, fit_model
 from xosc_lateral.drivers.loop.refinement import Refinement
-from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
 from xosc_lateral.drivers.loop.timeline import Coarse, join_drives, on_fine_grid
 from xosc_lateral.drivers.model.effects import Acts, Linear, Product, Proximity, Saturating, Threshold

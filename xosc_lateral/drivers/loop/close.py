@@ -22,10 +22,9 @@ from xosc_lateral.drivers.loop.held_out import (
     score_runs,
 )
 from xosc_lateral.drivers.loop.identify import Identified, identify, initial_terms
-from xosc_lateral.drivers.loop.model import Description, Fitted, Term
+from xosc_lateral.drivers.loop.model import Description, Fitted, Term, fit_model
 from xosc_lateral.drivers.loop.omnibus import Explained, Omnibus, check_remainder, explained_share
 from xosc_lateral.drivers.loop.refinement import Alternatives
-from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.residual import LackOfFit, lack_of_fit_of, size_of
 from xosc_lateral.drivers.loop.selection import Accepted, Gain, Selection
 from xosc_lateral.drivers.loop.significance import LoopSeed

@@ -20,10 +20,9 @@ from xosc_lateral.drivers.loop.dictionary import (
     orthonormal,
     score_entries,
 )
-from xosc_lateral.drivers.loop.model import Fitted, Outcome
+from xosc_lateral.drivers.loop.model import Fitted, Outcome, fit_model
 from xosc_lateral.drivers.loop.omnibus import courses
 from xosc_lateral.drivers.loop.refinement import Refined, Refinement
-from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.significance import NULL_DRAWS, LoopSeed, upper_tail
 from xosc_lateral.drivers.loop.terms.column import ColumnTerm, of_kind
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect

@@ -18,8 +18,7 @@ import numpy as np
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.drivers.loop.autocorrelation import Whitener
 from xosc_lateral.drivers.loop.dictionary import Search
-from xosc_lateral.drivers.loop.model import CLIP, Fitted, Term, own_levels
-from xosc_lateral.drivers.loop.regression import design_of, fit_model
+from xosc_lateral.drivers.loop.model import CLIP, Fitted, Term, design_of, fit_model, own_levels
 from xosc_lateral.drivers.loop.selection import Gain, Selection, select
 from xosc_lateral.drivers.loop.terms.time import StepTerm
 from xosc_lateral.drivers.loop.timeline import Coarse, Timeline, coarse_middle

@@ -13,8 +13,7 @@ from xosc_lateral.drivers.loop.columns import Assigned, Column, Role, known_colu
 from xosc_lateral.drivers.loop.cross_validation import Nested, Progress, nest
 from xosc_lateral.drivers.loop.dictionary import Quantities, Search
 from xosc_lateral.drivers.loop.feedback import Feedback, find_feedback
-from xosc_lateral.drivers.loop.model import Term
-from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop.model import Term, fit_model
 from xosc_lateral.drivers.loop.selection import ERROR_BUDGET, Gain, Rejected, Selection, select
 from xosc_lateral.drivers.loop.terms.between import BetweenTerm, is_between
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm

@@ -24,7 +24,7 @@ from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.drivers.loop.autocorrelation import Whitener, positions_in_run
 from xosc_lateral.drivers.loop.candidates import Family
 from xosc_lateral.drivers.loop.dictionary import CROSS_BASIS, MIN_SUPPORT_S, Quantities, beside, orthonormal
-from xosc_lateral.drivers.loop.model import Fitted, latent_path
+from xosc_lateral.drivers.loop.model import Fitted
 from xosc_lateral.drivers.loop.significance import NULL_DRAWS, LoopSeed, as_one_degree, draw_null, upper_tail
 from xosc_lateral.drivers.loop.timeline import Coarse
 from xosc_lateral.drivers.model.seeds import generator
@@ -188,7 +188,7 @@ def explained_share(
 
 def _path(fitted: Fitted) -> FloatArray:
     """Mean by the terms that say where a car is on rows that they were not fitted on, shape (n,). [m]"""
-    paths = [latent_path(term, fitted) for term in fitted.terms if term.seen_held_out]
+    paths = [fitted.path(term) for term in fitted.terms if term.seen_held_out]
     return np.asarray(np.sum([np.zeros(len(fitted.coarse)), *paths], axis=0))
 
 

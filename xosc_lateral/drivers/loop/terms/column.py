@@ -10,7 +10,7 @@ import numpy as np
 from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.loop.model import Description, Fitted, Removal, Term
+from xosc_lateral.drivers.loop.model import Description, Fitted, Term
 from xosc_lateral.drivers.loop.refinement import Alternatives
 from xosc_lateral.drivers.loop.timeline import Coarse
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect, Linear, Piecewise, Saturating, Threshold
@@ -40,12 +40,9 @@ class ColumnTerm(Term):
         """A term of an effect that may act on something else."""
         return cls(structs.replace(effect, acts=cls.acts), alike)
 
-    def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
-        """Evaluate the sized effects."""
-        for effect in effects:
-            assert isinstance(effect, ColumnEffect)
-            part = {Acts.LOCATION: removal.location, Acts.SPREAD: removal.spread, Acts.FINE: removal.fine}[effect.acts]
-            part += fitted.coarse.strength(effect)
+    def removed(self, fitted: Fitted, effects: tuple[Effect, ...]) -> Sequence[tuple[Acts, FloatArray]]:
+        """What the sized effects do."""
+        return [(own.acts, fitted.coarse.strength(own)) for own in effects if isinstance(own, ColumnEffect)]
 
     def quantity(self, coarse: Coarse, effects: tuple[Effect, ...]) -> FloatArray:
         """What it does."""

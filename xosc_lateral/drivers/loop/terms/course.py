@@ -22,10 +22,9 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.loop.candidates import Family
 from xosc_lateral.drivers.loop.column_search import grows
 from xosc_lateral.drivers.loop.dictionary import Search
-from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage
+from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage, fit_model
 from xosc_lateral.drivers.loop.omnibus import DELAYS, check_remainder, smooth_covariance, tents, weights_of
 from xosc_lateral.drivers.loop.passage import Passage, typical_passage
-from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.terms.column import ColumnTerm, of_kind
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
 from xosc_lateral.drivers.loop.terms.time import penalised

@@ -11,6 +11,7 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
@@ -36,9 +37,8 @@ from xosc_lateral.drivers.loop.low_frequencies import (
     step_moments,
     without_known,
 )
-from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Removal, Stage, Term
+from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage, Term, fit_model
 from xosc_lateral.drivers.loop.refinement import Alternatives
-from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.significance import LoopSeed
 from xosc_lateral.drivers.loop.terms.column import ColumnTerm
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
@@ -53,7 +53,7 @@ from xosc_lateral.drivers.loop.terms.spread import (
     what_columns_do,
 )
 from xosc_lateral.drivers.loop.timeline import COARSE, Coarse
-from xosc_lateral.drivers.model.effects import Effect, Step, TimeSmooth
+from xosc_lateral.drivers.model.effects import Acts, Effect, Step, TimeSmooth
 from xosc_lateral.drivers.model.seeds import generator
 
 STEP_PARAMETERS = 2  # Of a step: its height and its moment.
@@ -186,10 +186,10 @@ class TimeMeanTerm(_MeanByTime):
         assert isinstance(effects[0], TimeSmooth)
         return effects[0].path(effects[0].location, coarse.timeline.time)
 
-    def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
+    def removed(self, fitted: Fitted, effects: tuple[Effect, ...]) -> Sequence[tuple[Acts, FloatArray]]:
         """As the profile has it."""
         path = self.quantity(fitted.coarse, effects)
-        removal.location += path - path[fitted.coarse.timeline.valid].mean()
+        return [(Acts.LOCATION, path - path[fitted.coarse.timeline.valid].mean())]
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Change between its extremes, in the order of time."""
@@ -282,11 +282,11 @@ class TimeSpreadTerm(Term):
         assert isinstance(effects[0], TimeSmooth)
         return effects[0].path(effects[0].spread, coarse.timeline.time)
 
-    def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
+    def removed(self, fitted: Fitted, effects: tuple[Effect, ...]) -> Sequence[tuple[Acts, FloatArray]]:
         """A plain function of time."""
         assert isinstance(effects[0], TimeSmooth)
-        removal.spread += self.quantity(fitted.coarse, effects)
-        removal.fine += effects[0].path(effects[0].fine, fitted.coarse.timeline.time)
+        fine = effects[0].path(effects[0].fine, fitted.coarse.timeline.time)
+        return [(Acts.SPREAD, self.quantity(fitted.coarse, effects)), (Acts.FINE, fine)]
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Factor between its extremes, in the order of time."""
