@@ -171,18 +171,12 @@ def read_column(name: str, seen: FloatArray, period: float) -> Column | str:
     if period > 0.0:
         return Column(name, Values.ANGLE, gaps, period=period)
     low, high = np.quantile(values, [MIN_SHARE, 1.0 - MIN_SHARE])
-    levels = _levels(values)
-    if len(levels) == 1 or (not levels and high - low <= 1e-9 * max(1e-9, abs(low), abs(high))):
-        return Column(name, Values.NUMBER, True) if gaps and not levels else "it hardly varies"
-    if len(levels) > MAX_LEVELS or not levels:
-        return Column(name, Values.NUMBER, gaps)
-    return Column(name, Values.SWITCH if len(levels) == 2 else Values.LEVELS, gaps, levels)
-
-
-def _levels(values: FloatArray) -> tuple[float, ...]:
-    """Values that occur often enough, when nearly all rows have one of a few."""
     levels, counts = np.unique(values, return_counts=True)
     often = counts >= MIN_SHARE * len(values)
-    if counts[often].sum() < (1.0 - MIN_SHARE) * len(values) or often.sum() > MAX_LEVELS:
-        return ()
-    return tuple(float(level) for level in levels[often])
+    few = counts[often].sum() >= (1.0 - MIN_SHARE) * len(values) and often.sum() <= MAX_LEVELS
+    levels = levels[often].tolist() if few else []
+    if len(levels) == 1 or (not levels and high - low <= 1e-9 * max(1e-9, abs(low), abs(high))):
+        return Column(name, Values.NUMBER, True) if gaps and not levels else "it hardly varies"
+    if not levels:
+        return Column(name, Values.NUMBER, gaps)
+    return Column(name, Values.SWITCH if len(levels) == 2 else Values.LEVELS, gaps, tuple(levels))

@@ -30,6 +30,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
+from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.loop.autocorrelation import positions_in_run
 from xosc_lateral.drivers.loop.columns import Assigned, Column, Role, Values
 from xosc_lateral.drivers.loop.timeline import Timeline
 
@@ -81,11 +83,10 @@ def find_feedback(
     timeline: Timeline, columns: Iterable[Column], roles: Mapping[str, Assigned] = MappingProxyType({})
 ) -> list[Feedback]:
     """Columns that follow from the movement, doubtful ones included."""
-    segments = _segments(timeline.valid)
-    moved = _movement(timeline)
+    segments, moved = _Segments(timeline.valid), _movement(timeline)
     spectra = {name: segments.spectra(values) for name, values in moved.items()}
-    rows = _rows_with_past(timeline.valid, max(OWN_PAST, MOVED_PAST))
-    chance = CHANCE / max(1, len(segments.starts))
+    rows = np.flatnonzero(positions_in_run(timeline.valid) >= max(OWN_PAST, MOVED_PAST))
+    chance = CHANCE / max(1, segments.number)
     feedback = []
     for column in columns:
         assigned = roles.get(column.name, Assigned(column.name, Role.UNKNOWN, ""))
@@ -105,18 +106,14 @@ def find_feedback(
         # a switch has hardly any changes that could be predicted
         changes = column.values in (Values.NUMBER, Values.ANGLE)
         predicted = _predicted_share(values, moved, rows) if changes else 0.0
-        of, coherence, function = (
-            max(shared, key=lambda name: shared[name]),
-            max(shared.values()),
-            max(by_function.values()),
-        )
+        of, coherence = max(shared.items(), key=lambda pair: pair[1])
+        of_function, function = max(by_function.items(), key=lambda pair: pair[1])
         is_function = function >= max(FUNCTION, chance)
-        clear = predicted >= PREDICTED or (
-            coherence >= max(FEEDBACK_COHERENCE, chance) and predicted >= NEGLIGIBLE_SHARE
-        )
+        follows = coherence >= max(FEEDBACK_COHERENCE, chance) and predicted >= NEGLIGIBLE_SHARE
+        clear = follows or predicted >= PREDICTED
         doubtful = coherence >= max(DOUBTFUL_COHERENCE, chance) or predicted >= DOUBTFUL_SHARE
         if is_function and not clear:
-            of = max(by_function, key=lambda name: by_function[name])
+            of = of_function
         if assigned.role.is_exogenous:  # a name alone is overruled where both marks are strong
             clear, doubtful = predicted >= PREDICTED and coherence >= max(DOUBTFUL_COHERENCE, chance), False
         is_movement = assigned.role is Role.OWN
@@ -175,51 +172,33 @@ def _left(values: FloatArray, design: FloatArray) -> float:
     return float(np.mean((values - scaled @ sizes) ** 2))
 
 
-def _rows_with_past(valid: BoolArray, past: int) -> IndexArray:
-    sums = np.concatenate([[0], np.cumsum(valid)])
-    rows = np.arange(past, len(valid))
-    return np.asarray(rows[sums[rows + 1] - sums[rows - past] == past + 1], dtype=np.intp)
-
-
-@dataclass(frozen=True, eq=False, slots=True)
 class _Segments:
-    """Where the segments of a spectral estimate begin, and how many samples each has."""
+    """Segments of uninterrupted movement, half overlapping, for spectra: the longest of which there are enough."""
 
-    starts: IndexArray
-    length: int
+    def __init__(self, valid: BoolArray) -> None:
+        sums = np.concatenate([[0], np.cumsum(valid)])
+        for length in SEGMENTS:
+            starts, at = [], 0
+            while at + length <= len(valid):
+                inside = sums[at + length] - sums[at] == length
+                starts.extend([at] if inside else [])
+                at += length // 2 if inside else length // 16
+            if len(starts) >= MIN_SEGMENTS:
+                break
+        self.number = len(starts)
+        self._rows = np.asarray(starts, dtype=np.intp)[:, None] + np.arange(length)
+        frequency = np.fft.rfftfreq(length, STEP)
+        self._in_band = (frequency >= BAND[0]) & (frequency <= BAND[-1])
+        self._part = np.searchsorted(BAND[1:-1], frequency[self._in_band], side="right")
 
     def spectra(self, values: FloatArray) -> ComplexArray:
         """Transforms of the first difference in the band, shape (segments, frequencies)."""
-        change = np.diff(values, prepend=values[:1])
-        pieces = change[self.starts[:, None] + np.arange(self.length)] * np.hanning(self.length)
-        return np.asarray(np.fft.rfft(pieces, axis=1)[:, self._in_band(self._frequency())])
+        pieces = np.diff(values, prepend=values[:1])[self._rows] * np.hanning(self._rows.shape[1])
+        return np.asarray(np.fft.rfft(pieces, axis=1)[:, self._in_band])
 
     def coherence(self, first: ComplexArray, second: ComplexArray) -> float:
         """Squared, in the part of the band where most is shared: a shaky sensor hides the faster parts."""
         cross = np.abs(np.sum(first * np.conj(second), axis=0)) ** 2
         power = np.sum(np.abs(first) ** 2, axis=0) * np.sum(np.abs(second) ** 2, axis=0)
         coherence = cross / np.maximum(power, 1e-300)
-        frequency = self._frequency()
-        part = np.searchsorted(BAND[1:-1], frequency[self._in_band(frequency)], side="right")
-        return float(max(coherence[part == index].mean() for index in np.unique(part)))
-
-    def _frequency(self) -> FloatArray:
-        return np.asarray(np.fft.rfftfreq(self.length, 0.2), dtype=np.float64)
-
-    @staticmethod
-    def _in_band(frequency: FloatArray) -> BoolArray:
-        return np.asarray((frequency >= BAND[0]) & (frequency <= BAND[-1]))
-
-
-def _segments(valid: BoolArray) -> _Segments:
-    """The longest of which there are enough, half overlapping, in uninterrupted stretches."""
-    sums = np.concatenate([[0], np.cumsum(valid)])
-    for length in SEGMENTS:
-        starts, at = [], 0
-        while at + length <= len(valid):
-            inside = sums[at + length] - sums[at] == length
-            starts.extend([at] if inside else [])
-            at += length // 2 if inside else length // 16
-        if len(starts) >= MIN_SEGMENTS:
-            break
-    return _Segments(np.asarray(starts, dtype=np.intp), length)
+        return float(max(coherence[self._part == index].mean() for index in np.unique(self._part)))
