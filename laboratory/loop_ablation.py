@@ -24,8 +24,8 @@ from tests.kit.simulated import preview_driver
 from xosc_lateral.drivers.loop import (
     candidates,
     column_search,
+    columns,
     dictionary,
-    feedback,
     model,
     refinement,
     selection,
@@ -86,7 +86,7 @@ PARTS: dict[str, Callable[[], list[Any]]] = {
         patch.object(candidates, "_curves", lambda column, values: []),
     ],
     "what a column may do, beside time": lambda: [patch.object(spread, "MAY_ACT", 0.0)],
-    "direction of time": lambda: [patch.object(feedback, "_predicted_share", lambda values, moved, rows: 0.0)],
+    "direction of time": lambda: [patch.object(columns, "_predicted_share", lambda values, moved, rows: 0.0)],
     "bias of short drives": lambda: [
         patch.object(model, "unbiased", lambda process, *rest, **more: process),
     ],

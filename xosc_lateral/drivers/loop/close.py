@@ -11,7 +11,6 @@ import numpy as np
 
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.loop.core_model import DriverVariance, SpectrumShape, compare_spectrum_shapes, test_population
-from xosc_lateral.drivers.loop.cross_validation import Progress, folds_of, held_out_words
 from xosc_lateral.drivers.loop.held_out import (
     HeldOut,
     Scorecard,
@@ -21,7 +20,7 @@ from xosc_lateral.drivers.loop.held_out import (
     score_held_out,
     score_runs,
 )
-from xosc_lateral.drivers.loop.identify import Identified, identify, initial_terms
+from xosc_lateral.drivers.loop.identify import Identified, Progress, folds_of, held_out_words, identify, initial_terms
 from xosc_lateral.drivers.loop.model import Description, Fitted, Term, fit_model
 from xosc_lateral.drivers.loop.omnibus import Explained, Omnibus, check_remainder, explained_share
 from xosc_lateral.drivers.loop.refinement import Alternatives

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.drivers.loop.autocorrelation import Whitener
-from xosc_lateral.drivers.loop.candidates import Candidate, candidates_of
+from xosc_lateral.drivers.loop.candidates import Candidate, Family, candidates_of
 from xosc_lateral.drivers.loop.columns import Column
 from xosc_lateral.drivers.loop.significance import NULL_DRAWS, draw_null
 from xosc_lateral.drivers.loop.timeline import Coarse, Timeline, coarse_mean, coarse_middle, start_anew
@@ -290,6 +290,11 @@ class Search:
         candidates = candidates_of(columns, seen, most=MAX_PRODUCT_COLUMNS)
         quantities = Quantities.of(candidates, coarse.timeline, coarse.context, coarse.valid)
         return cls(coarse, {column.name: column for column in columns}, quantities, seed, levels, progress)
+
+    def plain_candidates(self) -> list[Candidate]:
+        """Columns as they are, of one component each."""
+        candidates = self.quantities.candidates
+        return [one for one in candidates if one.family is Family.PLAIN and len(one.contrast) == 1]
 
     def once(self, kind: object, fitted: object, make: Callable[[], Any]) -> Any:
         """What is worked out once for one kind of term beside one fit; the last few are kept, for one thread."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.drivers.loop.close import LoopResult
-from xosc_lateral.drivers.loop.cross_validation import hold_out_blocks
+from xosc_lateral.drivers.loop.identify import hold_out_blocks
 from xosc_lateral.drivers.loop.terms.between import is_between
 from xosc_lateral.drivers.loop.terms.regimes import RegimesTerm
 from xosc_lateral.drivers.loop.timeline import LOCAL_S, Timeline, coarse_mean, coarse_middle, local_mean

@@ -8,7 +8,7 @@ import numpy as np
 
 from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.drivers.loop.close import Finding, LoopResult
-from xosc_lateral.drivers.loop.feedback import BAND, FUNCTION, Feedback
+from xosc_lateral.drivers.loop.columns import BAND, FUNCTION, Feedback
 from xosc_lateral.drivers.loop.omnibus import DELAYS
 from xosc_lateral.drivers.loop.passage import Passage
 from xosc_lateral.drivers.loop.selection import Rejected

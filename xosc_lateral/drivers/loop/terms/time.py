@@ -19,7 +19,6 @@ import numpy as np
 from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.loop.candidates import Family
 from xosc_lateral.drivers.loop.dictionary import Search
 from xosc_lateral.drivers.loop.low_frequencies import (
     MEAN_SHORTEST_S,
@@ -32,6 +31,7 @@ from xosc_lateral.drivers.loop.low_frequencies import (
     low_frequencies,
     mean_probability,
     moment_of,
+    penalised,
     slow_rows,
     smooth_probabilities,
     step_moments,
@@ -312,8 +312,7 @@ def _priced(fitted: Fitted, term: Term, parameters: int) -> float:
 
 def _columns_as_likely(search: Search, fitted: Fitted, kind: type[ColumnTerm], by_time: float) -> Alternatives:
     """Columns that as they are explain about as much as time does, whose priced likelihood is `by_time`."""
-    plain = (one for one in search.quantities.candidates if one.family is Family.PLAIN and len(one.contrast) == 1)
-    terms = (kind.of(structs.replace(one.effect, response_s=1.0)) for one in plain)
+    terms = (kind.of(structs.replace(one.effect, response_s=1.0)) for one in search.plain_candidates())
     return tuple(dict.fromkeys(term.columns for term in terms if _priced(fitted, term, 1) > by_time - AS_LIKELY))
 
 
@@ -321,21 +320,6 @@ def penalised_cosines(sizes: FloatArray, covariance: FloatArray) -> tuple[FloatA
     """Sizes of half cosines and their errors, shape (k,), given that rougher ones are smaller beforehand."""
     estimates, known = penalised(sizes, covariance, np.diag(np.arange(1, len(sizes) + 1, dtype=np.float64) ** -4.0))
     return estimates, np.sqrt(np.diag(known))
-
-
-def penalised(sizes: FloatArray, covariance: FloatArray, prior: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Sizes, shape (k,), given how they vary beforehand but for a scale, that of restricted maximum likelihood, and
-    covariance."""
-    largest = float(np.max(np.square(sizes) / np.diag(prior), initial=1e-300))
-    best, scaled_prior = -np.inf, np.zeros_like(prior)
-    for scale in largest * np.geomspace(1e-6, 10.0, 60):
-        total = covariance + scale * prior
-        sign, volume = np.linalg.slogdet(total)
-        likelihood = -0.5 * float(sizes @ np.linalg.solve(total, sizes)) - 0.5 * volume if sign > 0 else -np.inf
-        if likelihood > best:
-            best, scaled_prior = likelihood, scale * prior
-    gain = np.linalg.solve(covariance + scaled_prior, scaled_prior).T
-    return gain @ sizes, gain @ covariance
 
 
 def _smooth(coarse: Coarse, **sizes: tuple[float, ...]) -> TimeSmooth:
