@@ -99,7 +99,7 @@ def test_a_finer_choice_pays_for_its_number() -> None:
     distance = np.where(rng.random(400) < 0.5, np.nan, rng.exponential(40.0, 400))
     columns = [Column("gap", Values.NUMBER, gaps=True), Column("lane", Values.LEVELS, gaps=False, levels=(0.0, 1.0))]
     context = {"gap": distance, "lane": (rng.random(400) < 0.5).astype(float)}
-    candidates = candidates_of(columns, context, most=24)
+    candidates = candidates_of(columns, context)
     for family in Family:
         members = [one for one in candidates if one.family is family]
         np.testing.assert_allclose([one.cost for one in members], 2.0 * np.log(len(members)))

@@ -90,8 +90,7 @@ class _Scored:
         return self.dictionary.timed(self.best), upper_tail(float(self.scores[self.best]), self.maxima)
 
     def contenders(self) -> list[int]:
-        """Best entry of the best sets of columns, and of each column of the best: of a product with what hardly varies,
-        one factor."""
+        """Best entry of the best sets of columns, and of each single column of the very best."""
         scores, columns = self.scores, [candidate.columns for candidate in self.dictionary.candidates]
         order = np.argsort(-scores, kind="stable")
         best: dict[tuple[str, ...], int] = {}
@@ -168,8 +167,7 @@ class ColumnSearch:
         draws: int = NULL_DRAWS,
         spared: tuple[str, ...] = (),
     ) -> _Scored | None:
-        """Score what is neither barred nor refused beside the model and the cross-basis of its columns, but for those
-        `spared`."""
+        """Score what is neither barred nor refused beside all that is known of its columns but those `spared`."""
         kind, search = self.kind, self.search
         if dictionary is None:
             dictionary = build_dictionary(search.quantities, problem.whitener)

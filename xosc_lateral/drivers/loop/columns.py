@@ -109,8 +109,7 @@ def proposed_role(column: str) -> Role:
 
 
 def roles_of(timeline: Timeline, names: Iterable[str], declared: Mapping[str, str]) -> dict[str, Assigned]:
-    """Role of each column; refuses a `declared` role that there is not, or of a column that the table lacks
-    (`FormatError`)."""
+    """Role of each column; a `declared` one that there is not, or of no column, is a `FormatError`."""
     names = list(names)
     for column, word in declared.items():
         if word not in set(Role):

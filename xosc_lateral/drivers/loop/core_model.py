@@ -36,8 +36,7 @@ DRIVERS_LEVEL = 0.002  # Probability of a false finding.
 
 @dataclass(frozen=True, eq=False)
 class SpectrumShape:
-    """Profile over drives, by bands up to `bands_s` [s], of the movement's size over its overall size, with Hotelling's
-    test [1]_."""
+    """Movement by bands up to `bands_s` [s] over the whole, profile over drives, with Hotelling's test [1]_."""
 
     KIND: ClassVar[str] = "memory"
     bands_s: tuple[float, ...]
@@ -91,8 +90,7 @@ def _shapes(offset: FloatArray, timeline: Timeline) -> FloatArray:
 
 @dataclass(frozen=True, slots=True)
 class DriverVariance:
-    """Standard deviation between drives of means [m] and log spreads, noise taken out, and the p-value that all are
-    alike."""
+    """Deviation between drives of means [m] and log spreads without noise, and the p-value that all are alike."""
 
     KIND: ClassVar[str] = "population"
     drives: int
@@ -113,8 +111,7 @@ class DriverVariance:
 
 
 def test_population(fitted: Fitted, known: FloatArray) -> DriverVariance | None:
-    """Analysis of variance with drives' halves as the noise, so that slow drift counts as noise; None with too few
-    drives."""
+    """Analysis of variance with drives' halves as noise, so that drift counts as noise; None: too few drives."""
     whitener = fitted.whitener
     offset = fitted.movement * whitener.scale + (fitted.levels - known)[whitener.drive]
     halves = []

@@ -119,8 +119,7 @@ class HeldOut:
 
     @property
     def surely_worse(self) -> bool:
-        """Whether the error after is the larger one for other drives, too: half samples less the whole, added to what
-        was measured."""
+        """Whether the error after is the larger one for other drives, too: half samples added to the measured."""
         rises = []
         for half in self.halves:
             other = {name: values + np.nan_to_num(half[name]) for name, values in self.real.items()}

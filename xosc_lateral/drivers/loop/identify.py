@@ -84,8 +84,7 @@ def identify(
     roles: Mapping[str, str] = MappingProxyType({}),
     progress: Progress = lambda share, what: None,
 ) -> Identified:
-    """Select terms beside the `initial` ones, and keep those that predict blocks on which they were neither selected
-    nor sized."""
+    """Select terms beside the `initial` ones; keep what predicts blocks that it was not selected and sized on."""
     from threadpoolctl import threadpool_limits
 
     usable = usable_columns(coarse.timeline, excluded, roles)

@@ -142,8 +142,7 @@ def without_known(
 
 
 def penalised(sizes: FloatArray, covariance: FloatArray, prior: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Sizes, shape (k,), given how they vary beforehand but for a scale, that of restricted maximum likelihood, and
-    covariance."""
+    """Sizes, shape (k,), and covariance, given a prior covariance but for its scale, which is likeliest (REML)."""
     largest = float(np.max(np.square(sizes) / np.diag(prior), initial=1e-300))
     best, scaled_prior = -np.inf, np.zeros_like(prior)
     for scale in largest * np.geomspace(1e-6, 10.0, 60):

@@ -347,8 +347,7 @@ def _whitener(left: FloatArray, valid: BoolArray, drive: IntArray, scale: FloatA
 def innovations(
     moved: FloatArray, responses: FloatArray, valid: BoolArray, drive: IntArray, scale: FloatArray
 ) -> FloatArray:
-    """White rows of variance about 1, shape (n,), young runs by their own size, of offsets less levels and responses
-    [m]."""
+    """White rows of variance about 1, shape (n,), young runs by their own size, of offsets less responses [m]."""
     if np.any(responses):
         responses = smoothed_as_seen(moved, responses, valid, drive, scale)
     left = np.where(valid, moved - responses, 0.0)
@@ -360,8 +359,7 @@ def innovations(
 def smoothed_as_seen(
     moved: FloatArray, responses: FloatArray, valid: BoolArray, drive: IntArray, scale: FloatArray
 ) -> FloatArray:
-    """Responses through the five-second filter of gain one that leaves least of them: providers smooth them, edges and
-    all. [m]"""
+    """Responses through the filter of 5 s and gain 1 that leaves least of them: providers smooth them. [m]"""
     whitener = _whitener(np.where(valid, moved, 0.0), valid, drive, scale)
     seconds = np.arange(len(responses))
     shifted = [responses[np.clip(seconds - shift, 0, len(seconds) - 1)] for shift in SMOOTHING_S]

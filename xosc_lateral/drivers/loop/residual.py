@@ -149,8 +149,7 @@ def error_between(first: Mapping[str, FloatArray], second: Mapping[str, FloatArr
 def half_samples(
     statistics: SummaryStatistics, offset: FloatArray, blocks: IntArray, rng: np.random.Generator
 ) -> list[dict[str, FloatArray]]:
-    """Random halves of the blocks less all of them, which vary as all about the truth [2]_; of offsets less the mean's
-    effects."""
+    """Random halves of the blocks less all of them, which vary as all about the truth [2]_."""
     valid = statistics.timeline.valid
     numbers, whole = np.unique(blocks[valid]), statistics.describe(offset, valid)
     differences = []
@@ -188,8 +187,7 @@ class GroupError:
 
 @dataclass(frozen=True, eq=False)
 class LackOfFit:
-    """What is left after the loop beside the sampling error of what is measured [m], and the share of half samples as
-    far off."""
+    """What is left beside the sampling error of what is measured [m], and the share of half samples as far off."""
 
     floors: Mapping[str, FloatArray]
     groups: tuple[GroupError, ...]

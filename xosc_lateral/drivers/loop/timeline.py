@@ -72,8 +72,7 @@ class Timeline:
         return [slice(int(first), int(last)) for first, last in pairwise(edges)]
 
     def respond(self, values: FloatArray, lag_s: float, response_s: float) -> FloatArray:
-        """`effects.response.respond` drive by drive, of `values`, shape (n,) or (n, k): a lag of a minute outlasts the
-        pad."""
+        """`effects.response.respond` drive by drive, of `values`, shape (n,) or (n, k), whatever the lag."""
         response = respond(values, self.step, lag_s, response_s)
         if response_s <= 0.0:
             return response

@@ -11,6 +11,7 @@ from typing import Any
 from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.loop.close import Finding, LoopResult
+from xosc_lateral.drivers.loop.identify import held_out_words
 from xosc_lateral.drivers.loop.selection import Gain
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.profiles import profile_hash
@@ -33,10 +34,10 @@ def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
     error = {"before": result.error_before, "after": result.error_after, "floor": result.floor}
     left, scores, known = result.lack_of_fit, result.scores, result.explained
     return {
-        "drives": list(result.names),
+        "drives": list(result.coarse.timeline.names),
         "base_profile": _profile(result.base) | {"given": result.base_given, "in_sample": result.in_sample},
         "refined_profile": _profile(result.refined),
-        "held_out": result.held_out,
+        "held_out": held_out_words(result.coarse.timeline),
         "columns": [column_record(column, result) for column in sorted(result.identified.usable.roles)],
         "findings": [finding_record(finding) | {"meaning": meaning(finding, result)} for finding in result.findings],
         "consequences": [

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from xosc_lateral.drivers.loop.close import Finding, LoopResult
 from xosc_lateral.drivers.loop.held_out import SNIPPET_ROWS
+from xosc_lateral.drivers.loop.identify import held_out_words
 from xosc_lateral.drivers.model.effects import ColumnEffect
 from xosc_lateral.files.pages.page import KeyFigure, Page, Tone
 from xosc_lateral.files.profiles import profile_hash
@@ -70,8 +71,9 @@ def finding_sentence(finding: Finding) -> str:
 
 def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] = ()) -> str:
     """HTML page; same result, same bytes. `proofs`: what findings do in a scenario, in words."""
-    names = ", ".join(result.names) if len(result.names) <= NAMED_DRIVES else f"{len(result.names)} drives"
-    page = Page(f"Closed loop: {names}")
+    timeline = result.coarse.timeline
+    drives = timeline.names if len(timeline.names) <= NAMED_DRIVES else (f"{len(timeline.names)} drives",)
+    page = Page(f"Closed loop: {', '.join(drives)}")
     page.lead(outcome(result))
     tone: Tone = "bad" if result.lack_of_fit.is_clear else "good" if result.findings else ""
     page.key_figures(
@@ -128,7 +130,7 @@ def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] 
         {
             "base profile": f"{result.base.name} {profile_hash(result.base)[:12]}",
             "refined profile": f"{result.refined.name} {profile_hash(result.refined)[:12]}",
-            "held out": result.held_out,
+            "held out": held_out_words(timeline),
             "seed": result.seed,
             **{name: value[:16] for name, value in parsed_hashes(tables).items()},
         }

@@ -70,8 +70,7 @@ class ColumnTerm(Term):
         )
 
     def ends(self, coarse: Coarse) -> tuple[FloatArray, FloatArray]:
-        """Lowest and highest response that counts: all seen, for a shift; 5 % and 95 % quantile for a factor. Shape
-        (k,) each."""
+        """Lowest and highest response that counts, shape (k,): of all for a shift, 5 % and 95 % for a factor."""
         response = coarse.response(self.effect, keep=True)[coarse.valid]
         least, most = response.min(axis=0), response.max(axis=0)
         if self.acts is Acts.LOCATION:
@@ -118,8 +117,7 @@ def columns_on_size(fitted: Fitted) -> frozenset[str]:
 
 
 def driving_range(coarse: Coarse, effect: ColumnEffect) -> tuple[FloatArray, FloatArray]:
-    """The 5 % and 95 % quantile, or extremes if they are one, of column, product or strength: as quantities, shape (k,)
-    each."""
+    """Quantity, shape (k,), at the 5 % and 95 % quantile of column, product or strength, or its extremes."""
     inside = coarse.timeline.valid
     if isinstance(effect, Linear | Threshold | Saturating | Piecewise):
         seen = coarse.context[effect.column][inside]

@@ -282,4 +282,5 @@ class CourseTerm(MeanTerm):
         )
         moved = tents(quantity[:, 0], DELAYS, np.zeros(len(quantity), dtype=np.intp))
         moved = moved - moved[0]
-        return passage.with_path(moved @ sizes, np.sqrt(np.sum((moved @ covariance) * moved, axis=1)))
+        error = np.sqrt(np.sum((moved @ covariance) * moved, axis=1))
+        return replace(passage, path=moved @ sizes, error=error)

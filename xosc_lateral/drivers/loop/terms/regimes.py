@@ -179,8 +179,7 @@ class RegimesTerm(Term):
 def probability_of_persistence(
     squares: FloatArray, valid: BoolArray, known: FloatArray, rng: np.random.Generator
 ) -> float:
-    """Probability that loudness of at most `CLUSTER_S`, without what is `known` to go with it, shows as much
-    persistence."""
+    """Probability that loudness of `CLUSTER_S` at most, beside what is `known`, persists as much."""
     if known.shape[1]:
         basis = np.linalg.qr((known - known[valid].mean(axis=0)) * valid[:, None])[0]
         squares = beside(basis, squares)
