@@ -92,7 +92,7 @@ def column_record(column: str, result: LoopResult) -> dict[str, Any]:
 
 
 def finding_record(finding: Finding) -> dict[str, Any]:
-    """One finding, as DESIGN has it, with its uncertainty and what the profile got."""
+    """One finding of the JSON result, with its uncertainty and what the profile got."""
     passage, about = finding.passage, NORMAL_95 * finding.size_error
     return {name: getattr(finding, name) for name in FINDING_FIELDS} | {
         "columns": list(finding.columns),

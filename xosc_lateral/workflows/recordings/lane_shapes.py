@@ -15,7 +15,7 @@ from xosc_lateral.workflows.recordings.importers.track_table import Tracks
 from xosc_lateral.workflows.recordings.importers.tracks import PlacedTracks
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
 
-SMOOTHED = 20.0  # way over which a lane's turning is averaged into a curvature: bounds are polygons [m]
+CURVATURE_WINDOW = 20.0  # way over which a lane's turning is averaged into a curvature: bounds are polygons [m]
 FACING_STEP = 5.0  # of places at which lanes beside each other are compared: 2 mm off at R = 100 m [m]
 
 
@@ -118,14 +118,15 @@ def lane_graph(shapes: Sequence[LaneShape], left: IntArray, following: Sequence[
 def curvature_along(start: FloatArray, direction: FloatArray, way: FloatArray) -> FloatArray:
     """Smoothed curvature [1/m] at ways along a polyline, by the way to its points and its pieces' direction."""
     middles = 0.5 * (start[1:] + start[:-1])
-    bend = np.interp(way + 0.5 * SMOOTHED, middles, direction) - np.interp(way - 0.5 * SMOOTHED, middles, direction)
-    span = np.minimum(way + 0.5 * SMOOTHED, middles[-1]) - np.maximum(way - 0.5 * SMOOTHED, middles[0])
+    half = 0.5 * CURVATURE_WINDOW
+    bend = np.interp(way + half, middles, direction) - np.interp(way - half, middles, direction)
+    span = np.minimum(way + half, middles[-1]) - np.maximum(way - half, middles[0])
     return np.asarray(np.where(span > 1.0, bend / np.maximum(span, 1.0), 0.0))
 
 
 # ---- lanes between lines whose points don't face each other
 STEP = 1.0  # points of a centre line are at most this far apart, so that the nearest one is next to a point's foot [m]
-BEYOND = 1e-3  # a foot that lies farther than this before the start or past the end is outside [m]
+END_TOLERANCE = 1e-3  # a foot that lies farther than this before the start or past the end is outside [m]
 
 
 class Strip(LaneShape):
@@ -134,7 +135,7 @@ class Strip(LaneShape):
     def __init__(self, centre: FloatArray, left: FloatArray, right: FloatArray) -> None:
         from scipy.spatial import cKDTree
 
-        super().__init__(_dense(centre), [left, right], BEYOND)
+        super().__init__(_dense(centre), [left, right], END_TOLERANCE)
         self._tree = cKDTree(self.centre[:, :2])
         self._left, self._right = self._edge(left), self._edge(right)
 
@@ -151,7 +152,7 @@ class Strip(LaneShape):
         left, right = (np.interp(way, edge[0], edge[1]) for edge in (self._left, self._right))
         high, low = (np.interp(way, edge[0], edge[2]) for edge in (self._left, self._right))
         lean = np.hypot(left - right, high - low) / np.maximum(left - right, 1e-6)  # across the surface, as roads count
-        outside = np.abs(beyond) > BEYOND
+        outside = np.abs(beyond) > END_TOLERANCE
         curvature = curvature_along(self.start, self.direction, way)
         offset, width = lean * (aside - 0.5 * (left + right)), lean * (left - right)
         return np.where(outside, np.nan, way), offset, width, self.direction[k], curvature

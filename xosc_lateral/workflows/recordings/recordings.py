@@ -34,7 +34,7 @@ REAR_AXLE = 0.3  # middle of a vehicle ahead of its rear axle, as a share of its
 GATE_ROWS = 20_000  # so many rows tell whether a recording drives along its lanes [-]
 MAXIMUM_LENGTH = 60.0  # of vehicles with all that they pull: road trains have 53.5 m [m]
 MAXIMUM_WIDTH = 6.0  # of what drives on roads, heavy transports included [m]
-AROUND = 50.0  # a made road goes on so far beyond its traffic [m]
+ROAD_MARGIN = 50.0  # a made road goes on so far beyond its traffic [m]
 USUAL_WIDTH = {"truck": 2.5, "bus": 2.5, "trailer": 2.5, "van": 2.0, "motorcycle": 0.8, "motorbike": 0.8}
 """Where no width is given; 1.8 m for the rest (2.55 m is the EU's limit, directive 96/53/EC). [m]"""
 USUAL_HEIGHT = {"truck": 3.6, "bus": 3.2, "trailer": 3.6, "van": 2.3}
@@ -237,8 +237,8 @@ def _levelx(source: Path, road: Path | None, columns: TableMapping) -> RecordedT
         [WrittenLane.even("median", inner), *(WrittenLane.even("driving", float(width)) for width in widths)]
         for inner, widths in sides
     )
-    x0 = float(np.floor(table["x"].min() - AROUND))
-    plan = np.array([[0.0, x0, -middle, 0.0, float(np.ceil((table["x"].max() + length.max()) + AROUND)) - x0]])
+    x0 = float(np.floor(table["x"].min() - ROAD_MARGIN))
+    plan = np.array([[0.0, x0, -middle, 0.0, float(np.ceil((table["x"].max() + length.max()) + ROAD_MARGIN)) - x0]])
     return _made(WrittenRoad(f"highd-{files[0].name.split('_')[0]}", plan, left, right), tracks, files[0])
 
 

@@ -56,7 +56,8 @@ COLUMNS = (
     *("acceleration_signed", "dimension_length", "dimension_height", "interpolated"),
     *(f"classifications_{name}" for name in CLASSES),
 )
-PIECES = (0.5, 0.6)  # movement across is kept below, and none of it above: half a jump of the cubics a period [Hz]
+CUTOFF_FREQUENCIES = (0.5, 0.6)
+"""Movement across is kept below, and none of it above: half a jump of the cubics a period. [Hz]"""
 ATTENUATION = 40.0  # of what is faster; a third of a millimetre of its 3 cm is left [dB]
 HIGHEST_FREQUENCY = 0.1  # of what these tracks show of driving [Hz]
 POSITION_RESOLUTION = 0.01  # that positions are given in [m]
@@ -186,8 +187,8 @@ def find_lanes(tracks: pd.DataFrame, settings: CutSettings = DEFAULT_CUTS) -> Ca
 
 
 def _slow(d: FloatArray, tracks: pd.DataFrame) -> FloatArray:
-    """Lateral positions, shape (n,) [m], without what is faster than `PIECES`; nothing is filtered across a gap."""
-    kernel = low_pass_between(*PIECES, STEP, ATTENUATION)
+    """Lateral positions, shape (n,) [m], low-passed at `CUTOFF_FREQUENCIES`; nothing is filtered across a gap."""
+    kernel = low_pass_between(*CUTOFF_FREQUENCIES, STEP, ATTENUATION)
     vehicle, time = tracks["vehicle"].to_numpy(), tracks["time"].to_numpy()
     ends = np.flatnonzero((np.diff(vehicle) != 0) | (np.diff(time) > 1.5 * STEP)) + 1
     return np.concatenate([filtered(part, kernel) for part in np.split(d, ends)])

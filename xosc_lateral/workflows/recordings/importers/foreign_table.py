@@ -51,7 +51,7 @@ SIDES = {
 }
 FILLERS = _words("from to off of im in der zu zur von the vehicle ego car")
 SATELLITE = _words("gps gnss wgs lon")
-ELSEWHERE = SATELLITE | _words("time zeit heading yaw speed")
+FOREIGN_WORDS = SATELLITE | _words("time zeit heading yaw speed")
 """Words of headers for the place in the lane, in any order: bus logs, simulators and trackers combine them alike."""
 
 COMPOUND = re.compile(
@@ -70,7 +70,7 @@ BY_SIZE = {
 }
 """Median sizes that no value in the standard unit has, and the unit that they speak for."""
 
-LEVELS = 12  # so many different texts are written out at most
+LISTED_TEXTS = 12  # so many different texts are written out at most
 SIGNS = {"offset": "positive to the LEFT of travel, else :-m", "curvature": "positive in LEFT curves, else :-1/m"}
 
 
@@ -147,7 +147,7 @@ def _place_named(bare: str) -> str | None:
     """Offset or distance to a marking, by a header's words; at most one of them may be of the system's own."""
     words = set(bare.split("_"))
     sides = [name for name, own in SIDES.items() if words & own]
-    if words & ELSEWHERE or "width" in words or len(sides) > 1:
+    if words & FOREIGN_WORDS or "width" in words or len(sides) > 1:
         return None
     known = LATERAL | PLACE | MIDDLE | MARKING | FILLERS | frozenset().union(*SIDES.values())
     if len(words - known) > 1:
@@ -195,7 +195,7 @@ def _numbers(column: pd.Series) -> FloatArray:
 
 def _texts(name: str, column: pd.Series) -> list[str]:
     texts = sorted({str(cell).strip() for cell in column.dropna()})
-    if name == "time" or len(texts) > LEVELS:
+    if name == "time" or len(texts) > LISTED_TEXTS:
         return []
     numbers = {text: int(bool(TRUCKS.search(text))) if name == "is_truck" else k for k, text in enumerate(texts)}
     return ["", f"[values.{name}]", *(f"{_quoted(text)} = {number}" for text, number in numbers.items())]

@@ -31,7 +31,7 @@ from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.tables import read_table
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings, Rows, cut_table, require_lane_direction
 from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
-from xosc_lateral.workflows.recordings.lane_graph import REACH, find_neighbours
+from xosc_lateral.workflows.recordings.lane_graph import NEIGHBOUR_DISTANCE, find_neighbours
 
 LICENCE = (
     "highD/exiD: leveLXData, under the licence that you signed (free for non-commercial research); whether fitted "
@@ -245,7 +245,7 @@ def _exid_neighbours(tracks: pd.DataFrame, is_truck: NDArray[np.bool_]) -> dict[
         return np.where(place >= 0, rows[place], -1)
 
     lead, lead_row = tracks["leadDHW"].to_numpy(dtype=np.float64), rows_of("leadId")
-    there = (lead_row >= 0) & (lead >= 0.0) & (lead <= REACH)
+    there = (lead_row >= 0) & (lead >= 0.0) & (lead <= NEIGHBOUR_DISTANCE)
     near = {
         "lead_distance": np.where(there, lead, np.inf),
         "lead_is_truck": np.where(there, is_truck[lead_row], False).astype(np.float64),
@@ -257,7 +257,7 @@ def _exid_neighbours(tracks: pd.DataFrame, is_truck: NDArray[np.bool_]) -> dict[
             along = (east[other] - east) * np.cos(heading) + (north[other] - north) * np.sin(heading)
             free = np.maximum(np.abs(along) - 0.5 * (length + length[other]), 0.0)
             gap = np.where(other >= 0, free, np.inf)
-            closer = (gap < best) & (gap <= REACH)
+            closer = (gap < best) & (gap <= NEIGHBOUR_DISTANCE)
             best, truck = np.where(closer, gap, best), np.where(closer, is_truck[other], truck)
         near |= {f"{side}_distance": np.where(np.isfinite(best), best, np.nan), f"{side}_is_truck": truck}
     return near

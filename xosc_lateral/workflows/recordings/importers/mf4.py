@@ -47,7 +47,7 @@ POSITIONS = (("offset", "lane_width"), ("distance_left", "distance_right"))
 LICENCE = "your own recording"
 
 _NO_MDF = "not an MDF file that asammdf can read"
-LISTED = 40  # channel names in a message, at most
+LISTED_CHANNELS = 40  # channel names in a message, at most
 MAX_CHANNEL_DISTANCE = 0.2  # median distance of two channels of one name that is not one of rates, by the spread [-]
 SPARSE_STEPS = 2.5  # a channel of few samples has a gap where more than two in a row lack: of its median steps [-]
 
@@ -136,7 +136,7 @@ def channels_wanted(source: Path) -> str:
     """What the channel map has to name, and the channels that there are to choose from: for who has no map yet."""
     with _opened(source) as log:
         names = _names(log)
-    listed = ", ".join(names[:LISTED]) + (", ..." if len(names) > LISTED else "")
+    listed = ", ".join(names[:LISTED_CHANNELS]) + (", ..." if len(names) > LISTED_CHANNELS else "")
     return (
         "the channel map needs --map offset=CHANNEL[:UNIT] and --map lane_width=CHANNEL[:UNIT], or "
         "--map distance_left=CHANNEL[:UNIT] and --map distance_right=CHANNEL[:UNIT]; "

@@ -198,8 +198,8 @@ def _columns(table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequen
     return made.dropna(subset=["vehicle", "time", "x", "y"])
 
 
-FIRST = b"esmini "  # begins the lines before the table, which name the player's version
-HEAD = "Index [-]"
+LOG_BEGINNING = b"esmini "  # begins the lines before the table, which name the player's version
+TABLE_HEAD = "Index [-]"
 MOST_LINES = 50  # before the table's head; a player writes seven
 
 _LOGGED = {
@@ -220,7 +220,7 @@ _NAME = re.compile(r"\s*#(\d+)\s+(\w+)")
 def is_esmini_log(path: Path) -> bool:
     """Whether a file begins like one."""
     with open_source(path) as source:
-        return unpacked_text(source).read(len(FIRST)) == FIRST
+        return unpacked_text(source).read(len(LOG_BEGINNING)) == LOG_BEGINNING
 
 
 def read_esmini_log(path: Path) -> pd.DataFrame:
@@ -228,9 +228,9 @@ def read_esmini_log(path: Path) -> pd.DataFrame:
     with open_source(path) as source, foreign_errors(path, "can't be read as a log of esmini"):
         text = unpacked_text(source)
         head = (text.readline().decode("utf-8", "replace") for _ in range(MOST_LINES))
-        names = next((line.rstrip().rstrip(",").split(",") for line in head if line.startswith(HEAD)), None)
+        names = next((line.rstrip().rstrip(",").split(",") for line in head if line.startswith(TABLE_HEAD)), None)
         if names is None:
-            raise FormatError(f"a log of esmini without a line that begins with '{HEAD}'", path=path)
+            raise FormatError(f"a log of esmini without a line that begins with '{TABLE_HEAD}'", path=path)
         lines = text.read()
         width = max((line.count(b",") + 1 for line in lines.splitlines()), default=len(names))
         table = pd.read_csv(BytesIO(lines), header=None, names=range(width), skipinitialspace=True, index_col=False)

@@ -25,8 +25,8 @@ KINDS = {
 }
 """`VehicleClassification.Type` -> vehicle class; others by their own names."""
 
-THINGS = ("lane", "lane_boundary", "logical_lane", "logical_lane_boundary")  # kept of a `GroundTruth` besides objects
-LEAP = 3.0  # farther than twice what it drives in a step, and by this much: not the same vehicle any more [m]
+LANE_FIELDS = ("lane", "lane_boundary", "logical_lane", "logical_lane_boundary")  # what is kept besides objects
+LEAP_DISTANCE = 3.0  # farther than twice what it drives in a step, and by this much: not the same vehicle any more [m]
 COLUMNS = 12  # number, time, x, y, yaw, speed, length, pitch, roll; the rear axle, on the ground, from the middle
 
 
@@ -37,7 +37,7 @@ class Recorded:
     # tracks: x and y are those of the ground below the rear axle where the trace says where that is, else below
     # the middle
     tracks: Tracks
-    things: Mapping[str, Mapping[int, Any]]  # of `THINGS`: by identifier, as far as all messages show them
+    things: Mapping[str, Mapping[int, Any]]  # of `LANE_FIELDS`: by identifier, as far as all messages show them
     hosts: tuple[str, ...]  # names of all host vehicles
     numbers: dict[str, str]  # name -> identifier
     notes: list[str]
@@ -59,7 +59,7 @@ class _Collected:
     values: array[float] = field(default_factory=lambda: array("d"))
     names: dict[int, str] = field(default_factory=dict)
     kinds: dict[int, str] = field(default_factory=dict)
-    things: dict[str, dict[int, Any]] = field(default_factory=lambda: {name: {} for name in THINGS})
+    things: dict[str, dict[int, Any]] = field(default_factory=lambda: {name: {} for name in LANE_FIELDS})
     latest: dict[tuple[str, int], Any] = field(default_factory=dict)  # of `things`, as last seen
     hosts: dict[int, None] = field(default_factory=dict)
     left_out: Counter[str] = field(default_factory=Counter)
@@ -153,7 +153,7 @@ class _Collected:
         """Track of every row: an identifier that leaps is another vehicle from there on."""
         moved, passed = np.hypot(*np.diff(rows[:, 2:4], axis=0).T), np.diff(rows[:, 1])
         recent = np.fmax(rows[1:, 5], rows[:-1, 5])
-        leaps = same & np.isfinite(recent) & (moved > 2.0 * recent * passed + LEAP)
+        leaps = same & np.isfinite(recent) & (moved > 2.0 * recent * passed + LEAP_DISTANCE)
         vehicle = np.concatenate([[0], np.cumsum(~same | leaps)]).astype(np.int64)
         first = np.flatnonzero(np.r_[True, ~same | leaps])
         names, count = list[str](), Counter[int]()

@@ -24,7 +24,7 @@ class Trace:
     """
 
     def __init__(self, path: Path, channel: str | None = None) -> None:
-        if path.suffix.lower() not in READ:
+        if path.suffix.lower() not in OPENERS:
             what = f"an OSI trace ends in {', '.join(SUFFIXES)}, one of omega-prime in .parquet too"
             raise FormatError(what, path=path)
         check_regular(path)
@@ -33,7 +33,7 @@ class Trace:
         self.path = path
         self.notes: list[str] = []
         self.opendrive: bytes | None = None
-        self._reader = READ[path.suffix.lower()](self, channel)
+        self._reader = OPENERS[path.suffix.lower()](self, channel)
 
     def __enter__(self) -> Trace:
         return self
@@ -102,7 +102,7 @@ class Trace:
         return reader
 
 
-READ = {".mcap": Trace._of_mcap, ".osi": Trace._of_messages, ".parquet": Trace._of_rows}
+OPENERS = {".mcap": Trace._of_mcap, ".osi": Trace._of_messages, ".parquet": Trace._of_rows}
 """By suffix: how a trace is opened."""
 
 
