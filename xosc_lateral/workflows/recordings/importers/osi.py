@@ -19,11 +19,10 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.drives import file_labels
 from xosc_lateral.files.opendrive import parse_opendrive, read_opendrive
 from xosc_lateral.files.osi import osi
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, MOVING_SPEED, CutSettings
-from xosc_lateral.workflows.recordings.importers.table import Imported, guarded, import_each, paths_of
+from xosc_lateral.workflows.recordings.importers import Imported, import_each, importer, paths_of
 from xosc_lateral.workflows.recordings.importers.tracks import (
     PlacedTracks,
     import_placed,
@@ -38,7 +37,7 @@ LICENCE = "that of the trace"
 HOST = "host"  # stands for the trace's own host vehicle
 
 
-@guarded
+@importer
 def import_osi(
     sources: Path | Sequence[Path],
     settings: CutSettings = DEFAULT_CUTS,
@@ -46,7 +45,6 @@ def import_osi(
     host: str | None = None,
     road: Path | str | None = None,
     channel: str | None = None,
-    keep_cut: bool = False,
 ) -> Imported:
     """Read one or several traces of ground truth or sensor views.
 
@@ -54,20 +52,19 @@ def import_osi(
     OpenDRIVE file to take lanes from. `channel`: topic of an MCAP file with several.
     """
     files = paths_of(sources)
-    labels = dict(zip(files, file_labels(files), strict=True))
 
-    def read(path: Path) -> Imported:
+    def read(path: Path, label: str) -> Imported:
         recorded = read_osi(path, channel)
         only = None if host is None else _named(recorded, host, path)
         if len(files) > 1:
-            names = tuple(f"{labels[path]}:{name}" for name in recorded.tracks.names)
+            names = tuple(f"{label}:{name}" for name in recorded.tracks.names)
             recorded = replace(recorded, tracks=replace(recorded.tracks, names=names))
-            only = None if only is None else {f"{labels[path]}:{name}" for name in only}
+            only = None if only is None else {f"{label}:{name}" for name in only}
         placed, graph, read_from = _placed(recorded, path, None if road is None else Path(road))
         about = {"format": "osi", "sources": read_from, "licence": LICENCE, "notes": recorded.notes}
-        return import_placed(placed, graph, settings, keep_cut=True, only=only, **about)
+        return import_placed(placed, graph, settings, only=only, **about)
 
-    return import_each(sources, read, keep_cut=keep_cut)
+    return import_each(files, read)
 
 
 def _named(recorded: Recorded, host: str, path: Path) -> set[str]:

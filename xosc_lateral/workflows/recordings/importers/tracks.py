@@ -26,7 +26,7 @@ from xosc_lateral.workflows.recordings.cuts import (
     cut_table,
     require_lane_direction,
 )
-from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
+from xosc_lateral.workflows.recordings.importers import Imported, imported, importer
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks, rate, read_tracks
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph, neighbour_columns
 from xosc_lateral.world.road.lanes import DRIVING, beside
@@ -38,7 +38,7 @@ INTO_NEXT = 1e-3  # step beyond a section's end that brings one into the next [m
 Piece = tuple[int, int, int]  # road, lane section, lane
 
 
-@guarded
+@importer
 def import_tracks(
     source: Path,
     *,
@@ -46,7 +46,6 @@ def import_tracks(
     columns: Sequence[str] = (),
     mapping: MappingLike | None = None,
     settings: CutSettings = DEFAULT_CUTS,
-    keep_cut: bool = False,
 ) -> Imported:
     """Read tracks on a known road, an OpenDRIVE file.
 
@@ -58,7 +57,7 @@ def import_tracks(
     placed, graph = place_on_road(read_tracks(source, columns, mapping), network)
     require_lanes(placed, Path(road).name, source)
     sources = [source, Path(road)]
-    return import_placed(placed, graph, settings, keep_cut=keep_cut, format="tracks", sources=sources, licence=LICENCE)
+    return import_placed(placed, graph, settings, format="tracks", sources=sources, licence=LICENCE)
 
 
 def place_on_road(tracks: Tracks, network: RoadNetwork) -> tuple[PlacedTracks, LaneGraph]:
@@ -162,11 +161,11 @@ def require_lanes(placed: PlacedTracks, where: str, path: Path) -> None:
 def import_placed(
     placed: PlacedTracks, graph: LaneGraph, settings: CutSettings, *, only: Collection[str] | None = None, **about: Any
 ) -> Imported:
-    """Neighbours, cuts and record, see `table.finished`; of the vehicles in `only` alone, if it is given."""
+    """Neighbours, cuts and record, see `imported`; of the vehicles in `only` alone, if it is given."""
     table = _drive_table(placed, graph, settings)
     if only is not None:
         table = table[table["drive"].isin(only)].reset_index(drop=True)
-    return finished(table, settings=asdict(settings), step=placed.tracks.step, **about)
+    return imported(table, settings=asdict(settings), step=placed.tracks.step, **about)
 
 
 def _drive_table(placed: PlacedTracks, graph: LaneGraph, settings: CutSettings) -> pd.DataFrame:
