@@ -37,8 +37,7 @@ from xosc_lateral.drivers.evaluation.record import scores_to_dict
 from xosc_lateral.drivers.evaluation.scores import SNIPPET, score_profile
 from xosc_lateral.drivers.evaluation.snippets import sample_runs, snippets_of
 from xosc_lateral.drivers.evaluation.spectra import spectrum
-from xosc_lateral.drivers.fitting.bands import measured, with_fast_movement
-from xosc_lateral.drivers.fitting.fast_part import FastPart, fast_part_of_runs
+from xosc_lateral.drivers.fitting.bands import FastPart, fast_part_of_runs, measured, with_fast_movement
 from xosc_lateral.drivers.fitting.fitting import driver_runs, fit_population, fit_profile, fit_runs
 from xosc_lateral.drivers.model.profile import POPULATION as ANSWERS
 from xosc_lateral.drivers.model.profile import DriverProfile, Metadata, Provenance

@@ -26,7 +26,6 @@ from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.evaluation.snippets import Snippets, snippets_of
 from xosc_lateral.drivers.evaluation.spectra import slow_movement
 from xosc_lateral.files.profiles import read_profile
-from xosc_lateral.workflows.conversion.consequences import Gap, gaps_of
 from xosc_lateral.workflows.conversion.enrich import enrich
 from xosc_lateral.workflows.conversion.load import Played, play_scenario
 from xosc_lateral.workflows.conversion.result import Enriched
@@ -35,6 +34,7 @@ from xosc_lateral.workflows.recordings.reconstruct import STEP, in_lane_offsets,
 from xosc_lateral.workflows.recordings.reconstruction import Reconstruction
 from xosc_lateral.workflows.recordings.recordings import read_recording
 from xosc_lateral.workflows.recordings.settings import ReconstructSettings
+from xosc_lateral.world.motion.gaps import Gap, gaps_of
 
 FloatArray = NDArray[np.float64]
 

@@ -71,10 +71,9 @@ def fit(
 ) -> None:
     """Fit a driver profile to measured drives."""
     from xosc_lateral import fit, write_profile
-    from xosc_lateral.drivers.model.drivability import fit_warnings
     from xosc_lateral.files.output_paths import STDOUT, claim, output_file
     from xosc_lateral.files.profiles import describe_profile, profile_bytes, profile_record
-    from xosc_lateral.workflows.profiles.fit import band_warnings
+    from xosc_lateral.workflows.profiles.fit import fit_warnings
     from xosc_lateral.workflows.profiles.profiles import PROFILE_SUFFIXES
 
     usual = name or tables[0].name.split(".")[0]
@@ -91,7 +90,7 @@ def fit(
         write_profile(profile, written, force=reply.force)
     facts = None if written is None else {"output": str(written), **profile_record(profile)}
     reply.say_words(describe_profile(profile), facts)
-    warn([*fit_warnings(profile, sensor_noise), *band_warnings(profile)])
+    warn(fit_warnings(profile, sensor_noise))
 
 
 Table = list[Path] | None

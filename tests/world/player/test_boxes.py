@@ -25,12 +25,12 @@ from xosc_lateral.world.player.boxes import (
 from xosc_lateral.world.player.simulation import TrafficSignals
 from xosc_lateral.world.player.values import Values, holds, holds_exactly
 from xosc_lateral.world.road.positions import Pose
-from xosc_lateral.world.scenario import Parameter, Performance, Place
-from xosc_lateral.world.scenario.entity import BoundingBox
+from xosc_lateral.world.scenario.entity import BoundingBox, Performance
 from xosc_lateral.world.scenario.enums import ParameterType, Rule
 from xosc_lateral.world.scenario.global_actions import ModifyOperation
+from xosc_lateral.world.scenario.place import Place
 from xosc_lateral.world.scenario.private_actions import DynamicConstraints
-from xosc_lateral.world.scenario.scenario import TrafficSignalController, TrafficSignalPhase
+from xosc_lateral.world.scenario.scenario import Parameter, TrafficSignalController, TrafficSignalPhase
 
 HERE = Place(Path("x.xosc"), 1, "X")
 
@@ -140,7 +140,7 @@ def test_rules_hold_as_they_say_and_hardly_apart_is_equal(rule: Rule, below: boo
 
 
 def declared(**values: tuple[ParameterType, str]) -> Values:
-    return Values({name: Parameter(name, kind, text, HERE) for name, (kind, text) in values.items()})
+    return Values("parameter", {name: Parameter(name, kind, text, HERE) for name, (kind, text) in values.items()})
 
 
 def test_values_are_read_as_their_types() -> None:

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 
 from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.player.values import Values, holds, holds_exactly
-from xosc_lateral.world.scenario import Parameter, Place
 from xosc_lateral.world.scenario.enums import ParameterType, Rule
 from xosc_lateral.world.scenario.global_actions import ModifyOperation
+from xosc_lateral.world.scenario.place import Place
+from xosc_lateral.world.scenario.scenario import Parameter
 
 numbers = st.floats(-1e6, 1e6)
 OPPOSITE = (
@@ -29,7 +30,8 @@ MIRRORED = (
 
 def values(**declared: tuple[ParameterType, str]) -> Values:
     return Values(
-        {name: Parameter(name, kind, text, Place("made", 1, name)) for name, (kind, text) in declared.items()}
+        "parameter",
+        {name: Parameter(name, kind, text, Place("made", 1, name)) for name, (kind, text) in declared.items()},
     )
 
 

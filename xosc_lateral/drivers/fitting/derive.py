@@ -30,7 +30,7 @@ from xosc_lateral.drivers.model.profile import DriverProfile
 TOLERANCE = 0.02
 """Figures are reached within this share of what was asked; a mean within it of the standard deviation. [-]"""
 
-DESIGN, PROOF = 20261, 20262
+DESIGN_SEED, PROOF_SEED = 20261, 20262
 """Seeds of the runs that handles are corrected by, and of those that the result is measured with. [-]"""
 
 DRIVES = 240
@@ -78,21 +78,21 @@ def derive(base: DriverProfile, asked: Asked, name: str, *, preset: Preset | Non
         step, simulated = plain.model.step, (drives.size * plain.model.step, len(drives))
         return lane_keeping(drives, plain.lane_width, step, half_width=half_width, recorded=simulated), drives
 
-    known, drives = measured(adapted, DESIGN)
+    known, drives = measured(adapted, DESIGN_SEED)
     if asked.sdlp_change is not None:
         if known.sdlp + asked.sdlp_change <= 0.0:
             raise DriverProfileError(f"the SDLP of {base.name} is {known.sdlp:.3f} m: it can't be so much smaller")
         asked = replace(asked, sdlp=known.sdlp + asked.sdlp_change, sdlp_change=None)
     within = drives - drives.mean(axis=1, keepdims=True)
-    parts = _parts(known, measured(structs.replace(adapted, fine=0.5 * adapted.fine), DESIGN)[0])
+    parts = _parts(known, measured(structs.replace(adapted, fine=0.5 * adapted.fine), DESIGN_SEED)[0])
     handles, reached, want = adapted, known, asked
     for _ in range(CORRECTIONS):
         handles = _handles(adapted, known, parts, within, want, plain.lane_width)
-        reached, _ = measured(handles, DESIGN)
+        reached, _ = measured(handles, DESIGN_SEED)
         if not _missed(asked, reached, share=0.25):
             break
         want = _corrected(want, asked, reached)
-    reached, drives = measured(handles, PROOF)
+    reached, drives = measured(handles, PROOF_SEED)
     missed = _missed(asked, reached)
     if missed:
         raise DriverProfileError(f"{base.name} can't have these together: {'; '.join(missed)}")

@@ -17,13 +17,17 @@ from xosc_lateral.drivers.drives.drive import Drive, Run
 from xosc_lateral.drivers.drives.resampling import STEP, resample
 from xosc_lateral.drivers.evaluation.sizes import sizes_of_runs
 from xosc_lateral.drivers.fitting.bands import in_bands, split_by_band
-from xosc_lateral.drivers.fitting.neighbours import answer_effects, measure_beside
-from xosc_lateral.drivers.fitting.place import LEAST_DRIVES, fit_place, without_place
+from xosc_lateral.drivers.fitting.context_effects import (
+    LEAST_DRIVES,
+    beside_effects,
+    fit_context_effects,
+    measure_beside,
+    without_effects,
+)
 from xosc_lateral.drivers.fitting.sensor.periodogram import PASSED_FREQUENCY, WINDOWS
 from xosc_lateral.drivers.fitting.sensor.separation import separate
 from xosc_lateral.drivers.model.core.base import CoreModel, ModelKind
 from xosc_lateral.drivers.model.core.registry import model_named
-from xosc_lateral.drivers.model.effects import ColumnEffect
 from xosc_lateral.drivers.model.profile import DriverProfile, Provenance
 from xosc_lateral.drivers.model.sensor import SensorModel
 
@@ -42,7 +46,7 @@ def fit_profile(
     """Cut drives into runs, separate driver and sensor, and fit a profile.
 
     Of a population it holds what class, lane and speed do to level, spread and fine movement, and neighbours to the
-    level, as far as they are known (`place`); of few drives, and of the two-level model, nothing of that.
+    level, as far as they are known (`context_effects`); of few drives, and of the two-level model, nothing of that.
 
     Raises `NotEnoughDataError` when too little is left after cutting, or neighbours are asked for (True) and not known;
     `DriverProfileError` when neighbours are asked for (True) of the two-level model, which is the paper's to the
@@ -103,15 +107,13 @@ def fit_population(
 
     Runs come without the sensor's part (`driver_runs`), which the profile keeps. For `neighbours` see `fit_profile`.
     """
-    few = len({run.drive for run in runs}) < LEAST_DRIVES
-    beside = measure_beside(runs)
-    place: tuple[ColumnEffect, ...]
+    few, beside = len({run.drive for run in runs}) < LEAST_DRIVES, measure_beside(runs)
     if few and neighbours is not False and beside:
-        place = tuple(answer_effects(runs, beside))
+        effects = beside_effects(runs, beside)
     else:
-        place = fit_place(runs, neighbours=neighbours)
-    profile = fit_runs(without_place(runs, place), name=name, model=model, provenance=provenance)
-    return replace(profile, sensor=sensor, effects=place, beside=beside)
+        effects = fit_context_effects(runs, neighbours=neighbours)
+    profile = fit_runs(without_effects(runs, effects), name=name, model=model, provenance=provenance)
+    return replace(profile, sensor=sensor, effects=effects, beside=beside)
 
 
 def fit_runs(

@@ -19,18 +19,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.drives.filters import filtered
-from xosc_lateral.drivers.fitting.sensor.periodogram import COARSE_STEP_RATIO, uniform_variance
-from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.drivers.model.sampling import sample_offsets
 
 GRAVITY = 9.80665
 MPH = 0.44704
 _SPEED = MPH * np.arange(15.0, 81.0, 5.0)
 _FRICTION = np.array([0.32, 0.27, 0.23, 0.20, 0.18, 0.16, 0.15, 0.14, 0.13, 0.12, 0.11, 0.10, 0.09, 0.08])
 
-LIMIT, JERK_LIMIT = 3.0, 5.0
+ACCELERATION_LIMIT, JERK_LIMIT = 3.0, 5.0
 """[m/s2], [m/s3]"""
 
 JERK_WINDOW = 0.5
@@ -39,17 +35,8 @@ JERK_WINDOW = 0.5
 UNCOMFORTABLE_SHARE = 1e-3
 """Share of the time that lane keeping may be uncomfortable. [-]"""
 
-TRAFFIC = 0.6
-"""Twice what 99.9 % of real motorway traffic stays below: beyond, a profile probably holds a sensor's noise. [m/s2]"""
-
 MINIMUM_KERNEL_WIDTH, MAXIMUM_KERNEL_WIDTH = 0.1, 3.0
 """Standard deviations of the kernel by which paths are smoothed: from, to. [s]"""
-
-AS_GIVEN = 1.15
-"""A sensor's error found may be so many times the one given: by chance errors go along with the path. [-]"""
-
-FREE_RUN = 1200.0
-"""Sampled to see what a profile writes. [s]"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +89,7 @@ def strain(offset: FloatArray, step: float, speed: FloatArray) -> Strain:
     bound = comfort(speed)[1:-1]
     largest = float(acceleration.max())
     seldom, uncomfortable = (_seldom_exceeded(values) for values in (acceleration, acceleration / bound))
-    return Strain(seldom, largest, hardest, max(uncomfortable, largest / LIMIT, hardest / JERK_LIMIT))
+    return Strain(seldom, largest, hardest, max(uncomfortable, largest / ACCELERATION_LIMIT, hardest / JERK_LIMIT))
 
 
 def _seldom_exceeded(values: FloatArray) -> float:
@@ -127,62 +114,6 @@ def drivable(offset: FloatArray, step: float, speed: FloatArray) -> tuple[FloatA
         after = strain(smooth, step, speed)
         width *= 1.3
     return smooth, Bound(before, after, width / 1.3)
-
-
-def fit_warnings(profile: DriverProfile, sensor_noise: float | None = None) -> list[str]:
-    """What to know about a profile's sensor (and its error, as far as it was given, [m]) and drivability, in lines."""
-    return [*_beside_given(profile, sensor_noise), *_coarse_steps(profile), *_strained(profile)]
-
-
-def _beside_given(profile: DriverProfile, stated: float | None) -> list[str]:
-    """Where the drives don't bear out a sensor error that was given."""
-    sensor = profile.sensor
-    if stated is None:
-        return []
-    if sensor is None:
-        return [f"runs are too short to separate driver and sensor: the error of {stated:g} m is not used"]
-    least = float(np.sqrt(uniform_variance(sensor.rounding)))
-    if stated < least / AS_GIVEN:
-        return [
-            f"a sensor error of {stated:g} m is less than that of rounding to {sensor.rounding:.3g} m alone, "
-            f"{least:.2g} m: taken for rounding and nothing else"
-        ]
-    noise = float(np.sqrt(sensor.sensor_variance))
-    if least > noise / AS_GIVEN or noise / AS_GIVEN < stated < AS_GIVEN * noise:  # rounding of coarse steps is not even
-        return []
-    return [f"the drives contradict a sensor error of {stated:g} m: {noise:.2g} m is what explains them best beside it"]
-
-
-def _coarse_steps(profile: DriverProfile) -> list[str]:
-    sensor = profile.sensor
-    if sensor is None or sensor.driver_share != (0.0, 1.0):
-        return []
-    deviation = np.sqrt(sensor.driver_variance + sensor.sensor_variance)
-    if sensor.rounding <= COARSE_STEP_RATIO * deviation:  # little data, not steps
-        return []
-    return [
-        f"the offsets are rounded to {sensor.rounding:.3g} m, too coarse to show how far the driver of {profile.name} "
-        "moves between steps"
-    ]
-
-
-def _strained(profile: DriverProfile) -> list[str]:
-    segment = Segment.even(FREE_RUN, profile.model.step, profile.lane_width, 30.0)
-    speed = segment.speed
-    strained = strain(sample_offsets(profile, segment, 1), profile.model.step, speed)
-    if strained.excess > 1.0:
-        return [
-            f"movement of {profile.name} could not be driven at {speed[0]:g} m/s: lateral acceleration above "
-            f"{strained.seldom:.2f} m/s2 for 0.1 % of the time (comfort limit {float(comfort(speed[:1])[0]):.2f}), "
-            f"at most {strained.largest:.1f} m/s2, jerk at most {strained.jerk:.1f} m/s3 "
-            f"(UN R79: {LIMIT:g} and {JERK_LIMIT:g}); convert will smooth it"
-        ]
-    if strained.seldom > TRAFFIC:
-        return [
-            f"lateral acceleration of {profile.name} is above {strained.seldom:.2f} m/s2 for 0.1 % of the time, twice "
-            "that of real motorway traffic or more: check the sensor that measured the drives"
-        ]
-    return []
 
 
 def _smoothed(values: FloatArray, width: float) -> FloatArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from enum import StrEnum
 from functools import lru_cache
 from typing import Annotated, Any
@@ -53,6 +53,17 @@ class Beside(Record, frozen=True):
 
 POPULATION = {side: Beside(Basis.POPULATION) for side in SIDES}
 """Of profiles whose effects are of the recording that the law of `surroundings.give_way` was measured in."""
+
+SIGNIFICANT_ERRORS = 2.6
+"""Standard errors from which a shift beside a vehicle is an effect: one of a hundred by chance. [-]"""
+
+UNMEASURED_RESPONSES = {
+    Basis.POPULATION: "moves as the drivers of its recording do",
+    Basis.DECLARED: "moves as its effects state",
+    Basis.MEASURED: "moves as its effects state",
+    Basis.UNKNOWN: "not known, does not move",
+}
+"""How a driver responds to vehicles beside him, by what that rests on, where the profile holds no figure."""
 
 
 class Provenance(Record, frozen=True):
@@ -180,24 +191,44 @@ class DriverProfile(Record, frozen=True):
         """Context columns that its effects read."""
         return tuple(sorted({column for effect in self.effects for column in effect.columns}))
 
+    def basis_of(self, side: str) -> Basis:
+        """Where its response to neighbours on a side is known from.
+
+        A shift that was measured and that no effect makes is as good as unknown; one that effects make and of which
+        nothing else is said was measured by who found them.
+        """
+        responds, known = any(column in COLUMNS[side] for column in self.columns), self.beside.get(side)
+        if known is None or known.basis is Basis.UNKNOWN:
+            return Basis.MEASURED if responds else Basis.UNKNOWN
+        if known.basis is Basis.MEASURED and not responds and abs(known.shift) > SIGNIFICANT_ERRORS * known.error:
+            return Basis.UNKNOWN
+        return known.basis
+
+    def responses_in_words(self, borrowed: Collection[str] = ()) -> str:
+        """How a driver responds to vehicles on either side, in a line; on `borrowed` sides as the population does."""
+
+        def in_words(side: str) -> str:
+            if side in borrowed:
+                return "not known, moves as the population does"
+            basis, known = self.basis_of(side), self.beside.get(side)
+            if known is None or not known.seconds:
+                return UNMEASURED_RESPONSES[basis]
+            way = "left" if known.shift > 0 else "right"
+            return f"moves {abs(known.shift):.2f} +- {known.error:.2f} m to the {way} ({basis}, {known.seconds:.0f} s)"
+
+        left, right = map(in_words, SIDES)
+        if left == right:
+            return f"beside vehicles on either side: {left}"
+        return f"beside vehicles on the left: {left}; beside vehicles on the right: {right}"
+
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values, as the profile file holds them."""
         values = super().to_dict()
         values["effects"] = [effect.to_dict() for effect in self.effects]
         values["sensor"] = None if self.sensor is None else self.sensor.to_dict()
-        order = (
-            "id",
-            "metadata",
-            "validity",
-            "lane_width",
-            "left_hand",
-            "model",
-            "effects",
-            "beside",
-            "sensor",
-            "provenance",
-        )
-        return {"format": FORMAT, "version": VERSION, **{name: values[name] for name in order if name in values}}
+        order = ("id", "metadata", "validity", "lane_width", "left_hand", "model", "effects", "beside", "sensor")
+        present = {name: values[name] for name in (*order, "provenance") if name in values}
+        return {"format": FORMAT, "version": VERSION, **present}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> DriverProfile:

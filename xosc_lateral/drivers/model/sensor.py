@@ -15,11 +15,15 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.drives.filters import scale_frequencies
-from xosc_lateral.drivers.fitting.sensor.likelihood import Colour
 from xosc_lateral.drivers.model.records import Record
 
 PASS_FREQUENCY = 1.5
 """Runs are low-passed here on being resampled to 5 Hz, and so is what is sampled. [Hz]"""
+
+
+def butterworth(frequency: FloatArray, order: int, corner: float) -> FloatArray:
+    """Power of a low-pass over that at frequency 0. [-] Shape as `frequency`, in the unit of its corner."""
+    return np.asarray(1.0 / (1.0 + (frequency / corner) ** (2 * order)))
 
 
 class SensorModel(Record, frozen=True):
@@ -72,7 +76,7 @@ class SensorModel(Record, frozen=True):
         """One-sided power density without rounding. [m2/Hz] Shape as `frequency` [Hz]."""
         total: FloatArray = np.full(np.shape(frequency), self.white)
         if self.order:
-            total = total + self.coloured * Colour(self.order, self.corner).shape(frequency)
+            total = total + self.coloured * butterworth(frequency, self.order, self.corner)
         return total
 
     def sample(self, n: int, step: float, rng: np.random.Generator) -> FloatArray:

@@ -26,8 +26,7 @@ from xosc_lateral.workflows.batch.jobs import Batch, Job, fingerprint
 from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, read_manifest
 from xosc_lateral.workflows.batch.workers import WorkerDiedError, open_pool, run_tasks
 from xosc_lateral.workflows.conversion.convert import convert_scenario
-from xosc_lateral.workflows.conversion.drivers import AUTO_PROFILE
-from xosc_lateral.workflows.conversion.settings import AUTO, ConvertSettings
+from xosc_lateral.workflows.conversion.settings import AUTO, AUTO_PROFILE, ConvertSettings
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths
 
 

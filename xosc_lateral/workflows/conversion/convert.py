@@ -3,37 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Unpack
 
 from xosc_lateral.base.errors import DriverProfileError, FormatError
 from xosc_lateral.base.rows import beside
-from xosc_lateral.base.version import BEHAVIOUR, __version__
 from xosc_lateral.files.atomic import write_atomically
-from xosc_lateral.files.openscenario.provenance import PENDING
-from xosc_lateral.files.openscenario.write.build import named
-from xosc_lateral.files.openscenario.write.draft import WrittenScenario
-from xosc_lateral.files.openscenario.write.trajectory_scenario import write_trajectory_scenario
 from xosc_lateral.files.output_paths import claim, output_file
-from xosc_lateral.files.profiles import profile_hash
 from xosc_lateral.files.source import guarding_inputs
-from xosc_lateral.workflows.conversion.chains import chains_of_all
-from xosc_lateral.workflows.conversion.consequences import as_played, stay_as_written
+from xosc_lateral.workflows.conversion.consequences import stay_as_written, validity_warnings
 from xosc_lateral.workflows.conversion.conversion import Conversion
-from xosc_lateral.workflows.conversion.drivers import validity_warnings
-from xosc_lateral.workflows.conversion.enrich import enrich
-from xosc_lateral.workflows.conversion.load import load_scenario, play_loaded, read_output, seed_words
-from xosc_lateral.workflows.conversion.meaning import keep_meaning, meaning_of
+from xosc_lateral.workflows.conversion.enrich import enrich, seed_words
+from xosc_lateral.workflows.conversion.load import load_scenario, play_loaded, read_output
+from xosc_lateral.workflows.conversion.meaning import as_played, keep_meaning, meaning_of
 from xosc_lateral.workflows.conversion.options import spelled_out
-from xosc_lateral.workflows.conversion.plan import Plan, WrittenAs, decide, heeds_controllers
-from xosc_lateral.workflows.conversion.result import ConversionProvenance, Enriched, EventShift, LaneChanges
-from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings, relative
+from xosc_lateral.workflows.conversion.plan import Plan, decide, heeds_controllers
+from xosc_lateral.workflows.conversion.result import Enriched, EventShift, LaneChanges
+from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
 from xosc_lateral.workflows.conversion.shifts import Comparison
+from xosc_lateral.workflows.conversion.write import Written, write, write_with
 from xosc_lateral.workflows.result import PAGE_SUFFIXES, PathLike
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_chain import OffsetChain
-from xosc_lateral.world.scenario import Scenario
+from xosc_lateral.world.scenario.scenario import Scenario
 
 SCENARIO_SUFFIXES = (".xosc",)
 SUPPLY = 60.0
@@ -117,9 +110,10 @@ def convert_scenario(
         )
         played = play_loaded(loaded, settings.step, settings.time_limit)
         plan = decide(loaded, played, settings, output=output, variant=variant, report=report, saves=saves)
-        enriched = sample(plan)
-        written = write(plan, enriched)
-        return _conversion(plan, check(plan, enriched, written))
+        sampled = sample(plan)
+        written = write(plan, sampled)
+        checked = check(plan, sampled, written)
+        return _conversion(plan, checked)
 
 
 def sample(plan: Plan) -> Enriched:
@@ -132,7 +126,7 @@ def sample(plan: Plan) -> Enriched:
             plan.drivers,
             seed=settings.seed,
             variant=plan.variant,
-            entropy=seed_words(plan.played),
+            entropy=seed_words(plan.played.motion, plan.played.network),
             context=plan.context,
             trailers=plan.played.trailers,
             attempts=settings.attempts,
@@ -140,66 +134,12 @@ def sample(plan: Plan) -> Enriched:
             neighbours=settings.neighbours,
             uncertain=plan.depends.entities,
             heeds_controllers=heeds_controllers(settings),
-            through=plan.on_trajectories(plan.drivers),
+            through=plan.through,
             lane_changes=settings.lane_changes,
             at_least=0.0 if plan.is_replay else SUPPLY,
         )
     except DriverProfileError as error:  # found in the movement: who sampled knows the profile by its name alone
         raise DriverProfileError(f"{plan.source}: {error}") from error
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Written:
-    """An output, how its vehicles are written, and the chains of those that keep their maneuvers."""
-
-    vehicles: WrittenAs
-    chains: tuple[OffsetChain, ...]
-    provenance: ConversionProvenance
-    file: WrittenScenario
-
-
-def write(plan: Plan, enriched: Enriched, chains: Sequence[OffsetChain] | None = None) -> Written:
-    """Write the output: a replay to its place, a reactive one into memory, since it is still to be checked.
-
-    `chains`: of entities that keep their maneuvers; without it all that was sampled.
-    """
-    vehicles = plan.written_as([entity.name for entity in enriched.entities if entity.is_enriched])
-    if not plan.is_replay:
-        chains = chains_of_all(enriched, plan.played, vehicles.lane_offsets) if chains is None else chains
-        vehicles = replace(vehicles, lane_offsets=frozenset(chain.entity for chain in chains))
-    provenance = _provenance(plan, enriched, vehicles)
-    profiles = sorted({name for name, _ in provenance.profiles.values()})
-    summary = f"seed {plan.settings.seed}, variant {provenance.variant}, {', '.join(profiles) or 'no profile'}"
-    summary += ", with sensor" if plan.settings.with_sensor else ""
-    facts = {field.name: getattr(provenance, field.name) for field in fields(provenance)}
-    on_trajectories = plan.replayed() if plan.is_replay else vehicles.trajectories
-    trajectories = {entity.name: entity.trajectory for entity in enriched.entities if entity.name in on_trajectories}
-    if plan.is_replay:
-        file = write_trajectory_scenario(
-            plan.extended.scenario,
-            plan.extended.motion,
-            trajectories,
-            plan.output,
-            provenance=facts,
-            summary=summary,
-            save=plan.saves,
-            target=plan.settings.target,
-        )
-    else:
-        from xosc_lateral.files.openscenario.write.lane_offset_scenario import write_lane_offset_scenario
-
-        file = write_lane_offset_scenario(
-            plan.extended.scenario,
-            plan.extended.motion,
-            chains or (),
-            plan.output,
-            provenance=facts,
-            summary=summary,
-            save=False,
-            target=plan.settings.target,
-            trajectories=dict(sorted(trajectories.items())),
-        )
-    return Written(vehicles, tuple(chains or ()), replace(provenance, content_sha256=file.content_sha256), file)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -219,29 +159,18 @@ def check(plan: Plan, sampled: Enriched, first: Written) -> Checked:
     """
     if plan.is_replay:
         return Checked(sampled, first)
-    meaning = meaning_of(plan.played, tuple(plan.egos), step=plan.settings.step, time_limit=plan.settings.time_limit)
-    intended = plan.written_as([entity.name for entity in sampled.entities if entity.is_enriched]).lane_offsets
-    trials: list[tuple[Written, Scenario, NominalMotion]] = []
+    settings, source = plan.settings, plan.played.scenario
+    meaning = meaning_of(plan.played, tuple(plan.egos), step=settings.step, time_limit=settings.time_limit)
 
-    def attempt(chains: Sequence[OffsetChain]) -> list[Comparison]:
-        written = first if chains == first.chains else write(plan, sampled, chains)
-        scenario = read_output(
-            written.file.data,
-            plan.output,
-            plan.played.scenario,
-            allowed=plan.settings.allow,
-            roads=plan.settings.roads,
-        )
-        comparisons, run = meaning.compare(scenario, written.vehicles.trajectories)
-        trials[:] = [(written, scenario, run)]
-        return comparisons
+    def attempt(chains: Sequence[OffsetChain]) -> tuple[tuple[Written, Scenario, NominalMotion], list[Comparison]]:
+        written = first if chains == first.chains else write_with(chains, plan, sampled, first.vehicles)
+        output = read_output(written.file.data, plan.output, source, allowed=settings.allow, roads=settings.roads)
+        comparisons, run = meaning.compare(output, first.vehicles.trajectories)
+        return (written, output, run), comparisons
 
-    kept = keep_meaning(first.chains, plan.played.motion, attempt)
-    if trials[0][0].chains != kept.chains:
-        attempt(kept.chains)
-    written, scenario, run = trials[0]
-    left = intended - written.vehicles.lane_offsets
-    enriched = as_played(sampled, scenario, run, written.vehicles.lane_offsets, left)
+    (written, output, run), kept = keep_meaning(first.chains, plan.played.motion, attempt)
+    left = first.vehicles.lane_offsets - written.with_lane_offsets
+    enriched = as_played(sampled, output, run, written.with_lane_offsets, left)
     if plan.saves:
         write_atomically(plan.output, written.file.data)
     return Checked(enriched, written, kept.shifts, tuple(kept.warnings(left)))
@@ -259,7 +188,7 @@ def _conversion(plan: Plan, checked: Checked) -> Conversion:
         *written.file.notes,
         *written.vehicles.frozen,
         *checked.warnings,
-        *(stay_as_written(enriched, plan.on_trajectories(plan.drivers)) if lifelike else ()),
+        *(stay_as_written(enriched, plan.through) if lifelike else ()),
         *validity_warnings(enriched),
     )
     return Conversion(
@@ -273,27 +202,6 @@ def _conversion(plan: Plan, checked: Checked) -> Conversion:
         plan.is_replay,
         checked.shifts,
         plan.controllers,
-    )
-
-
-def _provenance(plan: Plan, enriched: Enriched, vehicles: WrittenAs) -> ConversionProvenance:
-    folder = plan.source.parent
-    return ConversionProvenance(
-        package_version=__version__,
-        behaviour=BEHAVIOUR,
-        scenario=f"{relative(folder, plan.output.parent)}/{plan.source.name}",
-        inputs={relative(path, folder): sha256 for path, sha256 in plan.inputs.items()},
-        profiles={
-            entity.name: (entity.profile.name, profile_hash(entity.profile))
-            for entity in enriched.entities
-            if entity.profile is not None
-        },
-        options=plan.settings.record(folder),
-        variant=plan.variant + 1,
-        version=named(plan.settings.target.version_for(plan.played.scenario)),
-        ego=tuple(plan.egos),
-        modes={name: mode for name, mode in vehicles.modes().items() if enriched.entity(name).is_enriched},
-        content_sha256=PENDING,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import zlib
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -12,14 +13,15 @@ from typing import NamedTuple
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
-from xosc_lateral.base.rows import blocks, columns, stored
+from xosc_lateral.base.rows import BLOCK, blocks, columns, stored
 from xosc_lateral.drivers.model.drivability import drivable
 from xosc_lateral.drivers.model.plausibility import check_offsets
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampled_offsets import known_sensor, sensor_error
 from xosc_lateral.drivers.model.sampling import OffsetSampler
-from xosc_lateral.workflows.conversion.consequences import gaps_of, lane_departures
+from xosc_lateral.workflows.conversion.consequences import lane_departures
 from xosc_lateral.workflows.conversion.result import (
+    Drivers,
     Enriched,
     EntityResult,
     LaneChanges,
@@ -31,14 +33,12 @@ from xosc_lateral.workflows.conversion.result import (
 from xosc_lateral.workflows.conversion.seen import NOTHING_SEEN, SAMPLE_STEP, Contexts, Seen, going_on, seen_by
 from xosc_lateral.world.motion.crossings import Crossing, beside_written, crossings
 from xosc_lateral.world.motion.deviation import SETTLING_TIME, SampledDeviation, deviation_through
-from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
+from xosc_lateral.world.motion.gaps import gaps_of
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.motion.segments import SegmentKind, SegmentSpan, cut_segments, movement_runs
 from xosc_lateral.world.motion.trajectory import displace, distance_driven
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.surroundings.give_way import SampledVehicle, give_way
-
-Drivers = Mapping[str, DriverProfile | str]
-"""Per entity the profile that drives it, or the reason why it gets none."""
 
 
 def enrich(
@@ -114,6 +114,21 @@ def enrich(
             break
     assert best is not None
     return best
+
+
+def seed_words(motion: NominalMotion, network: RoadNetwork) -> dict[str, tuple[int, ...]]:
+    """Seed words of each entity from where it starts and how fast: nothing that anybody else does changes them."""
+    words = {}
+    for entity in motion.entities:
+        there = ((entity.activity[rows] & Activity.ACTIVE) != 0 for rows in blocks(len(entity.activity)))
+        row = next((BLOCK * k + int(np.argmax(mask)) for k, mask in enumerate(there) if mask.any()), 0)
+        on_road = int(entity.road[row])
+        where = (entity.x[row], entity.y[row]) if on_road < 0 else (entity.s[row], entity.offset[row])
+        road = "" if on_road < 0 else network.road_ids[on_road]
+        start = [road, str(entity.lane[row]), *(f"{value:.3f}" for value in (*where, entity.speed[row]))]
+        digest = hashlib.sha256("\0".join(start).encode()).digest()
+        words[entity.name] = tuple(int.from_bytes(digest[k : k + 4], "little") for k in range(0, 16, 4))
+    return words
 
 
 def _trouble(enriched: Enriched) -> int:

@@ -12,9 +12,8 @@ import numpy as np
 from msgspec import Struct
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.fitting.neighbours import borrows, responses_in_words
 from xosc_lateral.drivers.model.drivability import Bound
-from xosc_lateral.drivers.model.profile import SIDES, DriverProfile
+from xosc_lateral.drivers.model.profile import SIDES, Basis, DriverProfile
 from xosc_lateral.world.motion.crossings import Crossing
 from xosc_lateral.world.motion.gaps import Gap
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
@@ -38,6 +37,9 @@ class LaneChanges(StrEnum):
     WRITTEN = "written"
     LIFELIKE = "lifelike"
 
+
+Drivers = Mapping[str, DriverProfile | str]
+"""Per entity the profile that drives it, or the reason why it gets none."""
 
 WRITTEN_AS = {"trajectory": "a trajectory", "lane-offset": "lane offsets"}
 """Modes of vehicles in words."""
@@ -92,8 +94,8 @@ class EntityResult:
         if self.profile is None or neighbours == Neighbours.NONE:
             return "beside vehicles: does not move (--neighbours none)"
         may_borrow = neighbours == Neighbours.BORROW
-        sides = [side for side in SIDES if may_borrow and borrows(self.profile, side)]
-        return responses_in_words(self.profile, sides)
+        sides = [side for side in SIDES if may_borrow and self.profile.basis_of(side) is Basis.UNKNOWN]
+        return self.profile.responses_in_words(sides)
 
     @property
     def segment_seconds(self) -> float:

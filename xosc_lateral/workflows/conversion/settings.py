@@ -33,6 +33,10 @@ STEP = 0.02
 AUTO = "auto"
 """Profile name for the shipped population, and for nobody who has no driver (a trailer, a tram)."""
 
+AUTO_PROFILE = "motorway"
+"""What "auto" chooses: it gives every class, lane and speed its own. Motorcycles ride like cars for want of measured
+ones."""
+
 
 class OutputMode(StrEnum):
     """How offsets are written: by vehicle as it depends on a vehicle under test, or the same for all."""
@@ -220,6 +224,11 @@ class ConvertSettings:
                     stated = declared.cell(stated, folder)
                 settings[name] = declared.value(name, stated)
         return cls(**settings)
+
+    @property
+    def uses_auto(self) -> bool:
+        """Whether "auto" chooses for any entity."""
+        return AUTO in (self.profile, *self.entity.values())
 
     @property
     def target(self) -> TargetPlayer:

@@ -124,21 +124,8 @@ def fit(
     return replace(profile, left_hand=left_hand)
 
 
-def band_warnings(profile: DriverProfile) -> list[str]:
-    """What to know about the band that a profile's drives show, in lines."""
-    from xosc_lateral.drivers.fitting.bands import KEEPING_BAND, smoothed_above
-    from xosc_lateral.drivers.model.core.base import ModelKind
+def fit_warnings(profile: DriverProfile, sensor_noise: float | None = None) -> list[str]:
+    """What to know about a fitted profile, and the error of its sensor as far as it was given [m], in lines."""
+    from xosc_lateral.drivers.fitting import warnings
 
-    highest = profile.validity.highest_frequency
-    if profile.model.kind != ModelKind.AUTOREGRESSIVE:
-        return []
-    if highest is not None and highest < KEEPING_BAND:
-        what = f"{profile.name} moves below {highest:g} Hz alone, as its drives show it"
-        return [f"{what}: a second table or --prior gives it what is faster"]
-    above = smoothed_above(profile, given_profile(PRIOR))
-    if above is None:
-        return []
-    return [
-        f"above {above:g} Hz {profile.name} has less than a fifth of the power of real drivers: if the drives were "
-        "smoothed, say so with --valid-below"
-    ]
+    return warnings.fit_warnings(profile, sensor_noise, given_profile(PRIOR))

@@ -18,8 +18,7 @@ from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMot
 from xosc_lateral.world.motion.segments import SegmentKind, SegmentSpan
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario import Entity
-from xosc_lateral.world.scenario.entity import BoundingBox
+from xosc_lateral.world.scenario.entity import BoundingBox, Entity
 from xosc_lateral.world.scenario.enums import EntityCategory
 from xosc_lateral.world.scenario.place import Place
 

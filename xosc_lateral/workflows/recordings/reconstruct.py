@@ -29,8 +29,8 @@ from xosc_lateral.drivers.evaluation.metrics import free_runs
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.mapping import MappingLike
 from xosc_lateral.files.profiles import find_profile, list_profiles, read_profile
-from xosc_lateral.workflows.conversion.drivers import AUTO_PROFILE
 from xosc_lateral.workflows.conversion.options import spelled_out, values_of
+from xosc_lateral.workflows.conversion.settings import AUTO_PROFILE
 from xosc_lateral.workflows.recordings.encounters import encounters, relative_triggers
 from xosc_lateral.workflows.recordings.plan import VehiclePlan, plan_vehicles
 from xosc_lateral.workflows.recordings.reconstruction import ChosenDriver, Reconstruction

@@ -15,7 +15,7 @@ from xosc_lateral.base.errors import PlaybackError
 from xosc_lateral.base.rows import BLOCK, columns, stored
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
 from xosc_lateral.world.player.state import NO_ROAD, EntityState
-from xosc_lateral.world.road import RoadNetwork
+from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.road.tables import turned_in_surface
 
 NO_LANE = "none"
@@ -144,9 +144,15 @@ class Rows:
             if known.any():
                 direction[known] = network.travel_directions(road[known], lane[known])
             offset *= direction
-            if len(looked_up):
+            if len(looked_up) and network.road_ids:
                 height = free[unknown, 2] if self._knows_height else None
-                _look_up(network, looked_up, free[unknown], height, where, direction, self.state.lane_types)
+                x, y, lane_types = free[unknown, 0], free[unknown, 1], self.state.lane_types
+                located = network.world_to_lane(x, y, height, lane_types=lane_types)
+                road[looked_up], lane[looked_up] = located.road, located.lane
+                s[looked_up], offset[looked_up] = located.s, located.offset
+                direction[looked_up] = network.travel_directions(located.road, located.lane)
+            elif len(looked_up):
+                road[looked_up] = NO_ROAD
             to_lane = along - np.where(direction > 0, 0.0, pi)
             on_road = road >= 0
             pose = _poses(network, where, to_lane)
@@ -228,29 +234,6 @@ def _poses(network: RoadNetwork, where: _Where, to_lane: FloatArray) -> FloatArr
         turn, pose[sloped, 4], pose[sloped, 5] = turned_in_surface(to_lane[sloped], pose[sloped, 4], pose[sloped, 5])
         pose[sloped, 3] += turn
     return pose
-
-
-def _look_up(
-    network: RoadNetwork,
-    rows: IntArray,
-    free: FloatArray,
-    height: FloatArray | None,
-    where: _Where,
-    direction: FloatArray,
-    lane_types: frozenset[str],
-) -> None:
-    """Road coordinates of rows that only have a world pose."""
-    if not network.road_ids:
-        where.road[rows] = NO_ROAD
-        return
-    located = network.world_to_lane(free[:, 0], free[:, 1], height, lane_types=lane_types)
-    where.road[rows], where.lane[rows], where.s[rows], where.offset[rows] = (
-        located.road,
-        located.lane,
-        located.s,
-        located.offset,
-    )
-    direction[rows] = network.travel_directions(located.road, located.lane)
 
 
 def _beside_road(network: RoadNetwork, where: _Where, pose: FloatArray) -> BoolArray:

@@ -20,9 +20,9 @@ from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.player.values import Values
 from xosc_lateral.world.road.geometry import Arc, Line
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario import Action, Place, Scenario, TrafficSignalController
 from xosc_lateral.world.scenario.controllers import DrivingControllers
-from xosc_lateral.world.scenario.scenario import TrafficSignalPhase
+from xosc_lateral.world.scenario.place import Place
+from xosc_lateral.world.scenario.scenario import Action, Scenario, TrafficSignalController, TrafficSignalPhase
 
 
 @dataclass
@@ -119,8 +119,8 @@ class Simulation:
         )
         self.unwatched = Unwatched(self.entities)
         self.by_name = {state.name: state for state in self.entities}
-        self.parameters = Values(scenario.parameters)
-        self.variables = Values(scenario.variables)
+        self.parameters = Values("parameter", scenario.parameters)
+        self.variables = Values("variable", scenario.variables)
         self.signals = TrafficSignals(scenario.traffic_signal_controllers)
         self.time = 0.0
         """Time at the start of the present frame. [s]"""
@@ -172,6 +172,11 @@ class Simulation:
         if key not in self._noted:
             self._noted.add(key)
             self.notes.append(Note(what, place.path, place.line, place.element))
+
+    def values_of(self, content: object) -> tuple[Values, str]:
+        """Parameters or variables, whichever an action or a condition refers to, and the name that it gives."""
+        name = getattr(content, "parameter_ref", None)
+        return (self.variables, getattr(content, "variable_ref", "")) if name is None else (self.parameters, name)
 
     def clock(self) -> datetime | None:
         """Time of day now; None if no environment has set it."""
@@ -255,7 +260,7 @@ def _follows_its_lane(state: EntityState) -> bool:
         and state.trailer is None
         and not state.at_road_end
         and not state.longitudinal_taken
-        and not state.acts()
+        and not state.running
     )
 
 

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from operator import eq, ge, gt, le, lt, ne
 
 from xosc_lateral.world.player.transition import EPSILON
-from xosc_lateral.world.scenario import Parameter
 from xosc_lateral.world.scenario.enums import ParameterType, Rule
 from xosc_lateral.world.scenario.global_actions import ModifyOperation
+from xosc_lateral.world.scenario.scenario import Parameter
 
 Value = bool | float | int | str
 
@@ -45,9 +45,10 @@ def holds_exactly(left: Value, rule: Rule, right: Value) -> bool:
 
 
 class Values:
-    """Named values with their types: the parameters, or the variables, of a run."""
+    """Named values with their types: the parameters, or the variables, of a run; `kind`: what messages call one."""
 
-    def __init__(self, declared: Mapping[str, Parameter]) -> None:
+    def __init__(self, kind: str, declared: Mapping[str, Parameter]) -> None:
+        self.kind = kind
         self._types = {name: parameter.type for name, parameter in declared.items()}
         self._values: dict[str, Value] = {}
         for name, parameter in declared.items():

@@ -76,10 +76,7 @@ class Lane(LaneFacts, frozen=True, kw_only=True):
         return LaneState(a + s * (b + s * (c + s * d)), b + s * (2.0 * c + 3.0 * s * d), e + s * (f + s * (g + s * h)))
 
     def height_at(self, s: float, across: float) -> float:
-        """Height over the road surface, `across` the lane from its inner (0) to its outer edge (1). [m]
-
-        Linear in s from one record to the next, as the reference player has it: files draw kerb ramps so.
-        """
+        """Height over the road, `across` from inner (0) to outer edge (1); linear in s, as files draw ramps. [m]"""
         i = max(bisect_right(self.heights, s, key=lambda record: record[0]) - 1, 0)
         start, inner, outer = self.heights[i]
         if i + 1 < len(self.heights) and s > start:

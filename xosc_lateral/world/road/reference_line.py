@@ -77,10 +77,7 @@ class ReferenceLines:
         self._cubic = np.array(cubics).reshape(-1, 12).T.copy()
 
     def at(self, road: IndexLike, s: FloatArray, *, derivatives: bool = False) -> Frame:
-        """The reference lines at s; curvature and speed are only filled in where `derivatives` are asked for.
-
-        Shape as `s`. [m], [rad], [1/m]
-        """
+        """The reference lines at s, curvature and speed only with `derivatives`. Shape as `s`. [m], [rad], [1/m]"""
         piece = self._lookup.find(road, s)
         ds = s - self._origin[piece]
         row = self._row[piece]

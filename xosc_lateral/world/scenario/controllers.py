@@ -155,10 +155,7 @@ class _Assigned:
 
 
 class DrivingControllers:
-    """Controllers of one entity in the course of a run.
-
-    `controllers`: assigned from the start; `for_carla`: an activation turns CARLA's autopilot on and off.
-    """
+    """Controllers of one entity in the course of a run; `for_carla`: an activation is of CARLA's autopilot."""
 
     def __init__(self, controllers: Iterable[Controller], *, for_carla: bool) -> None:
         self._for_carla = for_carla

@@ -242,10 +242,7 @@ class Control:
 
 
 def controlled_entities(scenario: Scenario) -> dict[str, Control]:
-    """Entities whose motion controllers decide at some time, in the scenario's order.
-
-    Those alone that some action makes active: an assigned one that nothing activates drives nobody.
-    """
+    """Entities that controllers drive at some time, by an action that makes them active, in the scenario's order."""
     assigned, actions = assigned_controllers(scenario), dict[str, list[object]]()
     for actors, action in _private_actions(scenario):
         for actor in actors if isinstance(action.content, CONTROLLER) else ():

@@ -1,4 +1,4 @@
-"""What a driver in the scenario may react to: DESIGN's context names as time series along each vehicle's motion.
+"""What a driver in the scenario may react to: the context, as time series along each vehicle's motion.
 
 Distances between vehicles are free space: from bumper to bumper along the lane, 0 while they overlap lengthwise,
 infinite where nobody is within reach, NaN where there is no such lane.
@@ -47,7 +47,7 @@ TRUCKS = frozenset({VehicleCategory.TRUCK, VehicleCategory.SEMITRAILER, VehicleC
 
 
 def entity_context(motion: NominalMotion, network: RoadNetwork, index: int, grid: IntArray) -> dict[str, FloatArray]:
-    """Context of the `index`-th vehicle of a motion on some of its rows, shape (n,) each, under DESIGN's names.
+    """Context of the `index`-th vehicle of a motion on some of its rows, shape (n,) each.
 
     NaN where there is none (no lane to that side; off the road), infinite where a lane has nobody within reach. Weather
     that the scenario does not state is absent.
@@ -92,19 +92,17 @@ def spread_out(values: FloatArray, where: BoolArray) -> FloatArray:
 def road_columns(
     network: RoadNetwork, road: ArrayLike, lane: ArrayLike, s: ArrayLike, offset: ArrayLike, along: FloatArray
 ) -> dict[str, FloatArray]:
-    """What the road is like at places on lanes, by the names of context columns; `along`: 1, or -1 against traffic.
-
-    Shape (n,) each.
-    """
+    """Context columns of places on lanes, shape (n,) each; `along`: 1, or -1 against traffic."""
     lane_index, lane_count = network.lane_index(road, lane, s)
+    crossfall, grade = network.lean(road, lane, s)
     lane_seen = np.where(along > 0, lane_index, lane_count - 1 - lane_index)
     return {
         "curvature": along * network.lane_curvature(road, lane, s, offset),
         "lane_width": network.lane_width(road, lane, s),
         "lane_index": np.where(lane_index >= 0, lane_seen, np.nan).astype(np.float64),
         "lane_count": lane_count.astype(np.float64),
-        "crossfall": along * network.crossfall(road, lane, s),
-        "grade": along * network.grade(road, lane, s),
+        "crossfall": along * crossfall,
+        "grade": along * grade,
     }
 
 
@@ -235,10 +233,7 @@ _NEGLIGIBLE_SHARE = 1e-3
 
 @lru_cache(maxsize=1)  # asked for every entity of one motion after another
 def _in_sight(motion: NominalMotion) -> list[tuple[slice, list[IntArray]]]:
-    """For rows of the run, and every entity, those that it may see along its lane then, in order.
-
-    Whoever is not near in space is not near on the road.
-    """
+    """For rows of the run, and every entity, those near in space, whom alone it may see along its lane, in order."""
 
     def where_active(axis: str) -> Iterator[FloatArray]:
         for entity in motion.entities:
@@ -295,7 +290,7 @@ def _environments(motion: NominalMotion) -> list[tuple[float, Environment]]:
 
 
 def _stated(environment: Environment, time: FloatArray, start: float, heading: FloatArray) -> Mapping[str, FloatArray]:
-    """What one environment states, in DESIGN's units."""
+    """What one environment states, in the units of `segment.CONTEXT_UNITS`."""
     even = np.ones(len(time))
     values: dict[str, FloatArray] = {}
     clock = environment.time_of_day

@@ -14,7 +14,6 @@ from xosc_lateral.files.openscenario.element import at_node, children_of, elemen
 from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.draft import Draft, source_of
 from xosc_lateral.world.motion.nominal import PlayedAction
-from xosc_lateral.world.scenario import Action, Scenario
 from xosc_lateral.world.scenario.controllers import named
 from xosc_lateral.world.scenario.dependence import assigned_controllers, controlled_entities
 from xosc_lateral.world.scenario.enums import Priority
@@ -23,6 +22,7 @@ from xosc_lateral.world.scenario.global_actions import ParameterModifyAction, Pa
 from xosc_lateral.world.scenario.parameters import Scope
 from xosc_lateral.world.scenario.place import Place, Unsupported
 from xosc_lateral.world.scenario.private_actions import CONTROLLER, MOTION
+from xosc_lateral.world.scenario.scenario import Action, Scenario
 
 _REPLACED_TAGS = {kind.__name__ for kind in MOTION + CONTROLLER}
 

@@ -12,23 +12,19 @@ planned from wherever an action has left it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from lxml import etree
 
 from xosc_lateral.files.openscenario.write import build
-from xosc_lateral.files.openscenario.write.draft import STANDARD, Draft, TargetPlayer, WrittenScenario
-from xosc_lateral.files.openscenario.write.fit import finish
-from xosc_lateral.files.openscenario.write.lateral_actions import LateralAction, changing_speed, lateral_actions
+from xosc_lateral.files.openscenario.write.draft import Draft
+from xosc_lateral.files.openscenario.write.lateral_actions import LateralActions
 from xosc_lateral.files.openscenario.write.literal import inline_maneuvers, name_literally
 from xosc_lateral.files.openscenario.write.moving import moving_entities
 from xosc_lateral.files.openscenario.write.replaced_maneuvers import ReplacedManeuvers
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_chain import REST_TIME, Move, OffsetChain, OffsetPath, Ring
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
-from xosc_lateral.world.scenario import Scenario
 from xosc_lateral.world.scenario.enums import Priority
 
 CHAIN = "xosc-lateral offsets"
@@ -48,52 +44,29 @@ REPEATED = 3
 """Acts more than runs in the nominal run, after an action that may run again. [-]"""
 
 
-def write_lane_offset_scenario(
-    scenario: Scenario,
-    motion: NominalMotion,
+def add_lane_offsets(
+    draft: Draft,
     chains: Sequence[OffsetChain],
-    output: Path | str,
-    *,
-    provenance: Mapping[str, Any],
-    summary: str,
-    save: bool = True,
-    target: TargetPlayer = STANDARD,
-    trajectories: Mapping[str, WorldTrajectory] | None = None,
-) -> WrittenScenario:
-    """Write the scenario with its maneuvers as they are and lane offset actions added.
-
-    `output`, `provenance`, `summary`, `save`, `target`, and what is raised: see `write_trajectory_scenario`.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        As read.
-    motion : NominalMotion
-        The run: says how often an action runs.
-    chains : sequence of OffsetChain
-        One for each entity from its start, and one for each of its lateral actions.
-    trajectories : mapping of str to WorldTrajectory, optional
-        Entities that follow trajectories in place of their maneuvers: none that a chain is for.
-    """
-    draft = Draft(scenario, motion, target)
-    moving = moving_entities(draft, trajectories or {})
+    lateral: LateralActions,
+    trajectories: Mapping[str, WorldTrajectory],
+) -> tuple[str, ...]:
+    """Add lane offset actions to maneuvers that stay as they are; who has them or follows a trajectory instead."""
+    moving = moving_entities(draft, trajectories)
     maneuvers = ReplacedManeuvers(draft, moving)
     story = build.story("xosc-lateral")
-    lateral = lateral_actions(scenario)
-    changing = changing_speed(scenario)
     for chain in chains:
-        acts = _Acts(story, chain, draft, lateral.get(chain.entity, ()), chain.entity in changing)
-        acts.add()
+        _Acts(story, chain, draft, lateral).add()
     _place_aside(draft, chains)
     if len(story):
         # Last: a lane change that starts in the same frame has started before ours are looked at.
         draft.put_last(story)
-    referred = _referred(story)
-    name_literally(draft.root, scenario.path, draft.scope, referred)
+    # Names of the elements that our conditions look at, with those above them where they are needed.
+    references = (item.get("storyboardElementRef") or "" for item in story.iter("StoryboardElementStateCondition"))
+    referred = {name for reference in references for name in reference.split("::")}
+    name_literally(draft.root, draft.scenario.path, draft.scope, referred)
     inline_maneuvers(draft, referred)
     maneuvers.replace()
-    names = tuple(dict.fromkeys([*moving, *(chain.entity for chain in chains)]))
-    return finish(draft, Path(output), names, reactive=True, provenance=provenance, summary=summary, save=save)
+    return tuple(dict.fromkeys([*moving, *(chain.entity for chain in chains)]))
 
 
 def _place_aside(draft: Draft, chains: Sequence[OffsetChain]) -> None:
@@ -113,25 +86,13 @@ def _place_aside(draft: Draft, chains: Sequence[OffsetChain]) -> None:
         build.insert_indented(owner, len(owner), action)
 
 
-def _referred(story: etree._Element) -> set[str]:
-    """Names of the elements that our conditions look at, with those above them where they are needed."""
-    references = (item.get("storyboardElementRef") or "" for item in story.iter("StoryboardElementStateCondition"))
-    return {name for reference in references for name in reference.split("::")}
-
-
 class _Acts:
     """The acts of one chain: one, or several after an action that may run again."""
 
-    def __init__(
-        self,
-        story: etree._Element,
-        chain: OffsetChain,
-        draft: Draft,
-        items: Sequence[LateralAction],
-        changes_speed: bool,
-    ) -> None:
-        self._story, self._chain, self._items, self._version = story, chain, items, draft.version
-        self._changes_speed = changes_speed
+    def __init__(self, story: etree._Element, chain: OffsetChain, draft: Draft, lateral: LateralActions) -> None:
+        self._story, self._chain, self._version = story, chain, draft.version
+        self._items = lateral.by_entity.get(chain.entity, ())
+        self._changes_speed = chain.entity in lateral.changing_speed
         self._moving_speed = _moving_speed(draft.motion, chain)
         self._runs = sum(one.path == chain.after and one.actor == chain.entity for one in draft.motion.actions)
 

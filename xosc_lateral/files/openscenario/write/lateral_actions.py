@@ -7,11 +7,11 @@ from collections.abc import Iterator, Mapping
 
 from msgspec import Struct
 
-from xosc_lateral.world.scenario import Action, Scenario
 from xosc_lateral.world.scenario.controllers import Domains, gives_lateral
 from xosc_lateral.world.scenario.dependence import actors_of, controlled_entities
 from xosc_lateral.world.scenario.global_actions import AddEntityAction
 from xosc_lateral.world.scenario.private_actions import LATERAL, LONGITUDINAL, TeleportAction
+from xosc_lateral.world.scenario.scenario import Action, Scenario
 
 
 class LateralAction(Struct, frozen=True):
@@ -25,31 +25,30 @@ class LateralAction(Struct, frozen=True):
     steers: bool | None = None  # it gives the lateral domain to a controller; False: it takes it back
 
 
-def lateral_actions(scenario: Scenario) -> dict[str, tuple[LateralAction, ...]]:
-    """Lateral actions of events, by entity, in file order."""
-    names = Counter(_names(scenario))
-    steered = {name for name, one in controlled_entities(scenario).items() if Domains.LATERAL in one.domains}
-    by_entity: dict[str, dict[LateralAction, None]] = {}
-    for path, actors, action, repeats, is_alone in _actions(scenario):
-        adds, steers = isinstance(action.content, AddEntityAction), gives_lateral(action.content)
-        if steers is not None:
-            actors = tuple(actor for actor in actors if actor in steered)
-        if adds or steers is not None or isinstance(action.content, (*LATERAL, TeleportAction)):
-            lateral = LateralAction(path, *_reference(path, is_alone, names), repeats, adds, steers)
-            for actor in (action.content.entity_ref,) if isinstance(action.content, AddEntityAction) else actors:
-                by_entity.setdefault(actor, {})[lateral] = None
-    return {entity: tuple(actions) for entity, actions in by_entity.items()}
+class LateralActions(Struct, frozen=True):
+    """Of a scenario's events, by entity, in file order; and who changes its speed or has a controller."""
 
+    by_entity: Mapping[str, tuple[LateralAction, ...]]
+    changing_speed: frozenset[str]
 
-def changing_speed(scenario: Scenario) -> set[str]:
-    """Entities that have longitudinal actions in events, or a controller."""
-    changing = {
-        actor
-        for _, actors, action, *_ in _actions(scenario)
-        if isinstance(action.content, LONGITUDINAL)
-        for actor in actors
-    }
-    return changing | controlled_entities(scenario).keys()
+    @classmethod
+    def of(cls, scenario: Scenario) -> LateralActions:
+        """Those of a scenario."""
+        names, controls = Counter(_names(scenario)), controlled_entities(scenario)
+        by_entity: dict[str, dict[LateralAction, None]] = {}
+        changing = set(controls)
+        for path, actors, action, repeats, is_alone in _actions(scenario):
+            content, steers = action.content, gives_lateral(action.content)
+            if isinstance(content, LONGITUDINAL):
+                changing |= set(actors)
+            if steers is not None:
+                actors = tuple(a for a in actors if a in controls and Domains.LATERAL in controls[a].domains)
+            adds = isinstance(content, AddEntityAction)
+            if adds or steers is not None or isinstance(content, (*LATERAL, TeleportAction)):
+                lateral = LateralAction(path, *_reference(path, is_alone, names), repeats, adds, steers)
+                for actor in (content.entity_ref,) if isinstance(content, AddEntityAction) else actors:
+                    by_entity.setdefault(actor, {})[lateral] = None
+        return cls({entity: tuple(actions) for entity, actions in by_entity.items()}, frozenset(changing))
 
 
 def _actions(scenario: Scenario) -> Iterator[tuple[tuple[str, ...], tuple[str, ...], Action, bool, bool]]:

@@ -26,13 +26,12 @@ from xosc_lateral.files.openscenario.write.entities import (
 )
 from xosc_lateral.files.openscenario.write.moving import Moving, add_trajectories
 from xosc_lateral.world.motion.nominal import PlayedAction
-from xosc_lateral.world.scenario import Act, ManeuverGroup, Scenario
 from xosc_lateral.world.scenario.conditions import StoryboardElementStateCondition
 from xosc_lateral.world.scenario.dependence import actors_of, conditions_of, refers_to
 from xosc_lateral.world.scenario.enums import StoryboardElementState
 from xosc_lateral.world.scenario.global_actions import AddEntityAction, DeleteEntityAction
 from xosc_lateral.world.scenario.private_actions import ConnectTrailerAction
-from xosc_lateral.world.scenario.scenario import Condition
+from xosc_lateral.world.scenario.scenario import Act, Condition, ManeuverGroup, Scenario
 
 STORY = "xosc-lateral trajectories"
 UNREACHED_TIME = 1e9

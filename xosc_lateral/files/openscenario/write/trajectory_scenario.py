@@ -3,22 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from pathlib import Path
-from typing import Any
 
 from lxml import etree
 
 from xosc_lateral.files.openscenario.element import child_of
 from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.carla import add_drives, start_of
-from xosc_lateral.files.openscenario.write.draft import (
-    STANDARD,
-    Draft,
-    Player,
-    TargetPlayer,
-    WrittenScenario,
-    source_of,
-)
+from xosc_lateral.files.openscenario.write.draft import Draft, Player, source_of
 from xosc_lateral.files.openscenario.write.entities import (
     add_kept_actions,
     dropped_reason,
@@ -27,17 +18,16 @@ from xosc_lateral.files.openscenario.write.entities import (
     remove_controllers,
     rewrite_init,
 )
-from xosc_lateral.files.openscenario.write.fit import finish
 from xosc_lateral.files.openscenario.write.moving import Moving, add_trajectories, moving_entities
 from xosc_lateral.files.openscenario.write.versions import newer_than
 from xosc_lateral.files.xml import parse_xml
 from xosc_lateral.world.motion.nominal import NominalMotion, PlayedAction
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
-from xosc_lateral.world.scenario import Scenario
 from xosc_lateral.world.scenario.conditions import SimulationTimeCondition
 from xosc_lateral.world.scenario.dependence import conditions_of
 from xosc_lateral.world.scenario.global_actions import AddEntityAction
 from xosc_lateral.world.scenario.private_actions import MOTION, ConnectTrailerAction
+from xosc_lateral.world.scenario.scenario import Scenario
 
 STORY = "xosc-lateral"
 TRAILERS_SINCE = (1, 3)
@@ -46,61 +36,21 @@ STOP_TRIGGER = "stop trigger"
 """`NominalMotion.ended_by` of a run that the scenario itself ended."""
 
 
-def write_trajectory_scenario(
-    scenario: Scenario,
-    motion: NominalMotion,
-    trajectories: Mapping[str, WorldTrajectory],
-    output: Path | str,
-    *,
-    provenance: Mapping[str, Any],
-    summary: str,
-    save: bool = True,
-    target: TargetPlayer = STANDARD,
-) -> WrittenScenario:
-    """Write a scenario in which entities follow trajectories; all else happens when it happened in the run.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        As read: its bytes are the starting point, so that comments, catalogs and vendor extensions survive.
-    motion : NominalMotion
-        The run: gives the times of kept actions, standstill, teleports, and the end.
-    trajectories : mapping of str to WorldTrajectory
-        Per entity, on the rows of `motion`. An entity that is absent keeps its actions, at the times of the run.
-        Trailers follow whoever pulls them: theirs are ignored.
-    output : path
-    provenance : mapping
-        JSON values: goes into the file as it is.
-    summary : str
-        A few words of it for the file header's description.
-    save : bool
-        Write it; else the bytes are only handed back.
-    target : TargetPlayer
-        Player and version that it is made for.
-
-    Raises
-    ------
-    FormatError
-        The scenario was converted before, or can't be expressed for the target.
-    OSError
-        The output can't be written; nothing is left half-written.
-    ValueError
-        A trajectory holds NaN or does not fit the motion.
-    """
-    draft = Draft(scenario, motion, target)
-    alone = target.adapts(scenario) and draft.version < TRAILERS_SINCE
-    pulled = set() if alone else pulled_entities(scenario, motion)
+def replay(draft: Draft, trajectories: Mapping[str, WorldTrajectory]) -> tuple[str, ...]:
+    """Put trajectories in place of all maneuvers: all else happens when it happened in the run; who follows one."""
+    alone = draft.is_adapted and draft.version < TRAILERS_SINCE
+    pulled = set() if alone else pulled_entities(draft.scenario, draft.motion)
     moving = moving_entities(draft, {name: path for name, path in trajectories.items() if name not in pulled})
-    note_dropped(draft, motion.actions)
+    note_dropped(draft, draft.motion.actions)
     remove_controllers(draft, moving)
-    for_carla = target.player is Player.CARLA
+    for_carla = draft.player is Player.CARLA
     rewrite_init(draft, {name: start_of(item) if for_carla else item.start for name, item in moving.items()})
     index = _take_away(draft.storyboard)
     story = _new_story(draft, moving)
     if len(story):
         build.insert_indented(draft.storyboard, index, story)
     _replace_stop_trigger(draft)
-    return finish(draft, Path(output), tuple(moving), reactive=False, provenance=provenance, summary=summary, save=save)
+    return tuple(moving)
 
 
 def pulled_entities(scenario: Scenario, motion: NominalMotion) -> set[str]:
@@ -138,7 +88,7 @@ def _new_story(draft: Draft, moving: Mapping[str, Moving]) -> etree._Element:
     # Up to 1.1 there has to be a story, even if nothing happens in it.
     if with_pieces or (not kept and draft.version < (1, 2)):
         act = build.sub(story, "Act", name=f"{STORY} trajectories")
-        add = add_drives if draft.target.player is Player.CARLA else add_trajectories
+        add = add_drives if draft.player is Player.CARLA else add_trajectories
         for item in with_pieces:
             add(act, f"{STORY} {item.name}", item, draft)
         if not with_pieces:

@@ -81,6 +81,7 @@ def place_on_road(tracks: Tracks, network: RoadNetwork) -> tuple[PlacedTracks, L
     where = place.road[there], place.lane[there], place.s[there]
     lane_index, lane_count = network.lane_index(*where)
     bend = network.curvature(where[0], where[2])
+    crossfall, grade = network.lean(*where)
     values = {
         "agreement": np.cos(heading[there] - network.lane_to_world(*where).heading),
         "scale": 1.0 - bend * network.lane_centre_t(*where),
@@ -88,8 +89,8 @@ def place_on_road(tracks: Tracks, network: RoadNetwork) -> tuple[PlacedTracks, L
         "curvature": network.lane_curvature(*where),
         "lane_index": lane_index,
         "lane_count": lane_count,
-        "crossfall": network.crossfall(*where),
-        "grade": network.grade(*where),
+        "crossfall": crossfall,
+        "grade": grade,
     }
     columns = {name: np.full(len(piece), np.nan) for name in values}
     for name, known in values.items():

@@ -11,9 +11,9 @@ from xosc_lateral.world.motion.nominal import Activity
 from xosc_lateral.world.player.simulation import Simulation
 from xosc_lateral.world.player.state import EntityState
 from xosc_lateral.world.player.storyboard import StoryboardElement
-from xosc_lateral.world.scenario import Action
 from xosc_lateral.world.scenario.enums import StoryboardElementState as State
 from xosc_lateral.world.scenario.enums import StoryboardElementType
+from xosc_lateral.world.scenario.scenario import Action
 
 JUMP = 0.05
 """When an action puts the entity further away than this at once, the entity's motion is not continuous. [m]"""

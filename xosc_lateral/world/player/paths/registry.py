@@ -13,23 +13,11 @@ from xosc_lateral.base.errors import FormatError, PlaybackError, UnsupportedElem
 from xosc_lateral.world.player.paths.base import Path
 from xosc_lateral.world.player.paths.curves import ClothoidPath, Control, NurbsPath, TimedClothoid, clamped_knots
 from xosc_lateral.world.player.paths.polyline import Corner, PolylinePath, fill_times, has_gaps_in_time, merge_close
-from xosc_lateral.world.player.positions.on_road import reference_of
 from xosc_lateral.world.player.simulation import Simulation
 from xosc_lateral.world.player.state import EntityState
-from xosc_lateral.world.road import Pose
-from xosc_lateral.world.scenario import Place, Unsupported
-from xosc_lateral.world.scenario.position import (
-    Clothoid,
-    ClothoidSpline,
-    ClothoidSplineSegment,
-    Nurbs,
-    Polyline,
-    Position,
-    Shape,
-    Trajectory,
-    Vertex,
-    WorldPosition,
-)
+from xosc_lateral.world.road.positions import Pose
+from xosc_lateral.world.scenario import position as positions
+from xosc_lateral.world.scenario.place import Place, Unsupported
 
 MOST_TURNING = 1e4
 """Clothoids that turn by more are refused. [rad]"""
@@ -39,20 +27,17 @@ VERTEX_RADIUS = 0.1
 
 
 class Layout(Struct, frozen=True):
-    """What laying out a path may depend on, besides the world: who follows it, how, and how fast it comes. [m/s]
-
-    `closes`: it goes on from its end to its start.
-    """
+    """What laying out a path depends on: who follows it, how, how fast [m/s], whether it goes on at its start."""
 
     simulation: Simulation
-    locate: Callable[[Position, Simulation], Pose]
+    locate: Callable[[positions.Position, Simulation], Pose]
     place: Place
     follower: EntityState | None
     follow: bool
     speed: float
     closes: bool
 
-    def pose_of(self, position: Position) -> Pose:
+    def pose_of(self, position: positions.Position) -> Pose:
         """World pose of a position now. [m], [rad]"""
         return self.locate(position, self.simulation)
 
@@ -65,7 +50,7 @@ class Layout(Struct, frozen=True):
         return self.place.error(what, PlaybackError)
 
 
-def _polyline(shape: Polyline, layout: Layout) -> Path:
+def _polyline(shape: positions.Polyline, layout: Layout) -> Path:
     if not shape.vertices:
         raise layout.error("the polyline has no vertices")
     corners = [_corner(vertex, layout) for vertex in shape.vertices]
@@ -83,7 +68,7 @@ def _polyline(shape: Polyline, layout: Layout) -> Path:
     return PolylinePath(merged, follow=layout.follow, initial_speed=layout.speed)
 
 
-def _corner(vertex: Vertex, layout: Layout) -> Corner:
+def _corner(vertex: positions.Vertex, layout: Layout) -> Corner:
     """A vertex where it is now; its height counts where the file gives one, and then its pitch and roll do."""
     position = vertex.position
     pose = layout.pose_of(position)
@@ -95,18 +80,18 @@ def _corner(vertex: Vertex, layout: Layout) -> Corner:
         pitch, roll = nan, nan
     elif roll != roll:
         roll = pose.roll
-    z, is_fixed = (pose.z if _gives_height(position) else nan), reference_of(position) is None
+    z, is_fixed = (pose.z if _gives_height(position) else nan), positions.reference_of(position) is None
     return Corner(pose.x, pose.y, z, heading, pitch, roll, _or_nan(vertex.time), pose.z, is_fixed)
 
 
-def _clothoid(shape: Clothoid, layout: Layout) -> Path:
+def _clothoid(shape: positions.Clothoid, layout: Layout) -> Path:
     end = shape.curvature + shape.curvature_prime * shape.length
-    start = shape.start_time
-    piece = ClothoidSplineSegment(shape.curvature, end, shape.length, position_start=shape.position, time_start=start)
-    return _clothoid_spline(ClothoidSpline((piece,), shape.stop_time), layout)
+    where, when = shape.position, shape.start_time
+    piece = positions.ClothoidSplineSegment(shape.curvature, end, shape.length, time_start=when, position_start=where)
+    return _clothoid_spline(positions.ClothoidSpline((piece,), shape.stop_time), layout)
 
 
-def _clothoid_spline(shape: ClothoidSpline, layout: Layout) -> Path:
+def _clothoid_spline(shape: positions.ClothoidSpline, layout: Layout) -> Path:
     if not shape.segments:
         raise layout.error("the clothoid spline has no segments")
     pieces: list[TimedClothoid] = []
@@ -119,7 +104,7 @@ def _clothoid_spline(shape: ClothoidSpline, layout: Layout) -> Path:
 
 
 def _start_of(
-    segment: ClothoidSplineSegment, pieces: Sequence[TimedClothoid], layout: Layout
+    segment: positions.ClothoidSplineSegment, pieces: Sequence[TimedClothoid], layout: Layout
 ) -> tuple[float, float, float]:
     """Its own position, the end of the piece before, or where the follower is. [m], [m], [rad]"""
     if segment.position_start is not None:
@@ -153,7 +138,7 @@ def _check_times(times: Sequence[float], what: str, layout: Layout) -> None:
         last = time if time == time else last
 
 
-def _nurbs(shape: Nurbs, layout: Layout) -> Path:
+def _nurbs(shape: positions.Nurbs, layout: Layout) -> Path:
     count = len(shape.control_points)
     knots = shape.knots or clamped_knots(count, shape.order)
     if count < max(shape.order, 2) or len(knots) != count + shape.order:
@@ -170,17 +155,17 @@ def _nurbs(shape: Nurbs, layout: Layout) -> Path:
 
 
 SHAPES: dict[type, Callable[[Any, Layout], Path]] = {
-    Clothoid: _clothoid,
-    ClothoidSpline: _clothoid_spline,
-    Nurbs: _nurbs,
-    Polyline: _polyline,
+    positions.Clothoid: _clothoid,
+    positions.ClothoidSpline: _clothoid_spline,
+    positions.Nurbs: _nurbs,
+    positions.Polyline: _polyline,
 }
 
 
 def path_of(
-    trajectory: Trajectory,
+    trajectory: positions.Trajectory,
     simulation: Simulation,
-    pose_of: Callable[[Position, Simulation], Pose],
+    pose_of: Callable[[positions.Position, Simulation], Pose],
     *,
     follower: EntityState | None = None,
     follow: bool = False,
@@ -203,29 +188,29 @@ def path_of(
     return path
 
 
-def duration(shape: Shape) -> float:
+def duration(shape: positions.Shape) -> float:
     """Time from the first to the last time stamp; 0 where there are none. [s]"""
     times: list[float | None] = []
-    if isinstance(shape, Polyline):
+    if isinstance(shape, positions.Polyline):
         times = [vertex.time for vertex in shape.vertices]
-    elif isinstance(shape, Clothoid):
+    elif isinstance(shape, positions.Clothoid):
         times = [shape.start_time, shape.stop_time]
-    elif isinstance(shape, ClothoidSpline):
+    elif isinstance(shape, positions.ClothoidSpline):
         times = [*(segment.time_start for segment in shape.segments), shape.time_end]
-    elif isinstance(shape, Nurbs) and all(point.time is not None for point in shape.control_points):
+    elif isinstance(shape, positions.Nurbs) and all(point.time is not None for point in shape.control_points):
         times = [point.time for point in shape.control_points]
     start, end = (times[0], times[-1]) if times else (None, None)
     return 0.0 if start is None or end is None else end - start
 
 
-def _given_angles(position: Position) -> tuple[float | None, float | None, float | None]:
+def _given_angles(position: positions.Position) -> tuple[float | None, float | None, float | None]:
     """Heading, pitch and roll as written, absolute or relative; None: the path's own."""
-    orientation = position if isinstance(position, WorldPosition) else getattr(position, "orientation", None)
+    orientation = position if isinstance(position, positions.WorldPosition) else getattr(position, "orientation", None)
     return (None, None, None) if orientation is None else (orientation.h, orientation.p, orientation.r)
 
 
-def _gives_height(position: Position) -> bool:
-    if isinstance(position, WorldPosition):
+def _gives_height(position: positions.Position) -> bool:
+    if isinstance(position, positions.WorldPosition):
         return position.z is not None
     return getattr(position, "dz", None) is not None
 

@@ -1,4 +1,4 @@
-"""GeoPosition: latitude and longitude, by the road network's projection.
+"""From latitude and longitude to x and y, by a road network's projection.
 
 Transverse Mercator (and UTM, Mercator) of WGS 84, as far as road networks name them. Series of Krueger to sixth order
 in the third flattening n: better than a millimetre over a whole zone.
@@ -11,26 +11,7 @@ References
 
 from __future__ import annotations
 
-from math import asinh, atan2, atanh, cos, cosh, hypot, log, nan, pi, radians, sin, sinh, sqrt, tan
-
-from xosc_lateral.base.errors import PlaybackError
-from xosc_lateral.world.player.positions.on_road import headed
-from xosc_lateral.world.player.simulation import Simulation
-from xosc_lateral.world.player.state import Placement, free, locate
-from xosc_lateral.world.scenario.position import GeoPosition
-
-
-def geo_position(position: GeoPosition, simulation: Simulation) -> Placement:
-    """Needs the road network's geoReference."""
-    try:
-        x, y = project(simulation.network.geo_reference, position.latitude, position.longitude)
-    except ProjectionError as error:
-        raise position.place.error(str(error), PlaybackError) from error
-    offset = simulation.network.header_offset
-    x, y = offset.undo(x, y)
-    z = nan if position.altitude is None else position.altitude - offset.z
-    return locate(simulation.network, free(x, y, headed(position.orientation, 0.0, simulation) - offset.heading, z))
-
+from math import asinh, atan2, atanh, cos, cosh, hypot, log, pi, radians, sin, sinh, sqrt, tan
 
 _RADIUS = 6378137.0
 """Equatorial radius of WGS 84. [m]"""

@@ -1,15 +1,26 @@
-"""From sampled offsets to chains of moves: one from the start, one after each action that moves an entity sideways."""
+"""An output of a plan: trajectories, and chains of moves beside maneuvers that stay, with all that made them.
+
+A vehicle that keeps its maneuvers has a chain from its start, and one after each action that moves it sideways.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.files.openscenario.write.lateral_actions import LateralAction, changing_speed, lateral_actions
-from xosc_lateral.workflows.conversion.load import Played
-from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, SampledSegment
+from xosc_lateral.base.version import BEHAVIOUR, __version__
+from xosc_lateral.files.openscenario.provenance import PENDING
+from xosc_lateral.files.openscenario.write.build import named
+from xosc_lateral.files.openscenario.write.draft import WrittenScenario
+from xosc_lateral.files.openscenario.write.fit import write_converted
+from xosc_lateral.files.openscenario.write.lateral_actions import LateralAction
+from xosc_lateral.files.profiles import profile_hash
+from xosc_lateral.workflows.conversion.plan import Plan, WrittenAs
+from xosc_lateral.workflows.conversion.result import ConversionProvenance, Enriched, EntityResult, SampledSegment
+from xosc_lateral.workflows.conversion.settings import OutputMode, relative
 from xosc_lateral.world.motion.deviation import (
     SETTLING_TIME,
     NaturalSpline,
@@ -21,7 +32,7 @@ from xosc_lateral.world.motion.deviation import (
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.motion.offset_chain import GRID, RESOLUTION, OffsetChain, OffsetPath, Ring, ring_along
 from xosc_lateral.world.motion.trajectory import distance_driven
-from xosc_lateral.world.road import RoadNetwork
+from xosc_lateral.world.road.network import RoadNetwork
 
 LONGEST_TURN = 300.0
 """Of a ring: a run that is stopped by something that never happens lasts an hour. [s]"""
@@ -37,22 +48,75 @@ AT_ONCE = 0.1
 """A segment that begins within this after an action ends begins because of it. [s]"""
 
 
-def chains_of_all(enriched: Enriched, played: Played, names: Collection[str]) -> list[OffsetChain]:
-    """Chains of the named entities, from what was sampled for them, as `played` nominally."""
-    lateral, changing = lateral_actions(played.scenario), changing_speed(played.scenario)
-    return [
+@dataclass(frozen=True, eq=False, slots=True)
+class Written:
+    """An output, how its vehicles were to be written, and the chains of those that keep their maneuvers."""
+
+    vehicles: WrittenAs
+    chains: tuple[OffsetChain, ...]
+    provenance: ConversionProvenance
+    file: WrittenScenario
+
+    @property
+    def with_lane_offsets(self) -> frozenset[str]:
+        """Those that have a chain, of those that were to."""
+        return frozenset(chain.entity for chain in self.chains)
+
+
+def write(plan: Plan, sampled: Enriched) -> Written:
+    """Write the output: a replay to its place, a reactive one into memory, since it is still to be checked."""
+    vehicles = plan.written_as(frozenset(entity.name for entity in sampled.entities if entity.is_enriched))
+    towing, played = plan.played.trailers.values(), plan.played
+    chains = [
         chain
-        for entity in enriched.entities
-        if entity.name in names
+        for entity in sampled.entities
+        if entity.name in vehicles.lane_offsets
         for chain in chains_of(
             entity,
             played.motion,
             played.network,
-            lateral.get(entity.name, ()),
-            tows=entity.name in played.trailers.values(),
-            changes_speed=entity.name in changing,
+            plan.lateral.by_entity.get(entity.name, ()),
+            tows=entity.name in towing,
+            changes_speed=entity.name in plan.lateral.changing_speed,
         )
     ]
+    return write_with(chains, plan, sampled, vehicles)
+
+
+def write_with(chains: Sequence[OffsetChain], plan: Plan, sampled: Enriched, vehicles: WrittenAs) -> Written:
+    """Write the output with these chains for those who get lane offsets."""
+    on_trajectories = vehicles.trajectories
+    modes = dict.fromkeys((chain.entity for chain in chains), OutputMode.LANE_OFFSET.value)
+    modes |= dict.fromkeys(on_trajectories, OutputMode.TRAJECTORY.value)
+    folder, drivers = plan.source.parent, {one.name: one.profile for one in sampled.entities if one.profile is not None}
+    provenance = ConversionProvenance(
+        package_version=__version__,
+        behaviour=BEHAVIOUR,
+        scenario=f"{relative(folder, plan.output.parent)}/{plan.source.name}",
+        inputs={relative(path, folder): sha256 for path, sha256 in plan.inputs.items()},
+        profiles={name: (profile.name, profile_hash(profile)) for name, profile in drivers.items()},
+        options=plan.settings.record(folder),
+        variant=plan.variant + 1,
+        version=named(plan.version),
+        ego=tuple(plan.egos),
+        modes={name: mode for name, mode in sorted(modes.items()) if sampled.entity(name).is_enriched},
+        content_sha256=PENDING,
+    )
+    names = ", ".join(sorted({name for name, _ in provenance.profiles.values()})) or "no profile"
+    sensor = ", with sensor" if plan.settings.with_sensor else ""
+    file = write_converted(
+        plan.extended.scenario,
+        plan.extended.motion,
+        {one.name: one.trajectory for one in sampled.entities if one.name in on_trajectories},
+        plan.output,
+        chains=None if plan.is_replay else chains,
+        lateral=plan.lateral,
+        provenance={field.name: getattr(provenance, field.name) for field in fields(provenance)},
+        summary=f"seed {plan.settings.seed}, variant {provenance.variant}, {names}{sensor}",
+        save=plan.saves and plan.is_replay,
+        target=plan.settings.target,
+    )
+    return Written(vehicles, tuple(chains), replace(provenance, content_sha256=file.content_sha256), file)
 
 
 def chains_of(
