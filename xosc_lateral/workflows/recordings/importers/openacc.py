@@ -190,8 +190,8 @@ def _centre_line(cars: Sequence[_Car]) -> _Loop:
         near = np.abs(offset) < LANE_SHARE * LANE_WIDTH
         n = len(loop.points)
         at = np.round(index[near]).astype(np.int64) % n
-        sums, counts = (_smooth(1.0 * np.bincount(at, each, minlength=n)) for each in (offset[near], np.ones(len(at))))
-        shift = sums / np.maximum(counts, 1e-9)
+        sums, counts = (np.bincount(at, each, n).astype(np.float64) for each in (offset[near], np.ones(len(at))))
+        shift = _smooth(sums) / np.maximum(_smooth(counts), 1e-9)
         loop = _even(loop.points + shift[:, None] * loop.normals())
     return loop
 
