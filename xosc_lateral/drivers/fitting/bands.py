@@ -39,8 +39,7 @@ from xosc_lateral.drivers.fitting.sensor.periodogram import uniform_variance
 from xosc_lateral.drivers.model.core.autoregressive.coarse import BORDER, COARSE_EVERY, FREQUENCIES
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
 from xosc_lateral.drivers.model.core.autoregressive.parameters import Volatility
-from xosc_lateral.drivers.model.core.base import ModelKind
-from xosc_lateral.drivers.model.core.noise import NOISE_VARIANCE
+from xosc_lateral.drivers.model.core.base import NOISE_VARIANCE, ModelKind
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Piecewise
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.validity import Band, Validity
@@ -108,15 +107,11 @@ class FastPart:
     """Fast movement of drivers, where every column of `effects` is at its reference."""
 
     density: Density
-    effects: tuple[ColumnEffect, ...]
-    """On the fine part."""
+    effects: tuple[ColumnEffect, ...]  # On the fine part.
     volatility: Volatility
-    highest: float
-    """Frequency up to which it is measured. [Hz]"""
-    source: str
-    """In words."""
-    speed: tuple[float, float] | None = None
-    """At which it was measured. [m/s]"""
+    highest: float  # Frequency up to which it is measured. [Hz]
+    source: str  # In words.
+    speed: tuple[float, float] | None = None  # At which it was measured. [m/s]
 
 
 def steering_gain(speed: FloatArray) -> FloatArray:

@@ -26,7 +26,7 @@ from xosc_lateral.drivers.fitting.context_effects import (
 )
 from xosc_lateral.drivers.fitting.sensor.periodogram import PASSED_FREQUENCY, WINDOWS
 from xosc_lateral.drivers.fitting.sensor.separation import separate
-from xosc_lateral.drivers.model.core.base import CoreModel, ModelKind
+from xosc_lateral.drivers.model.core.base import ModelKind
 from xosc_lateral.drivers.model.core.registry import model_named
 from xosc_lateral.drivers.model.profile import DriverProfile, Provenance
 from xosc_lateral.drivers.model.sensor import SensorModel
@@ -123,27 +123,19 @@ def fit_runs(
     model: ModelKind | str = ModelKind.AUTOREGRESSIVE,
     provenance: Provenance | None = None,
 ) -> DriverProfile:
-    """Fit a profile to runs that are cut already."""
+    """Fit a profile to runs that are cut already; its provenance says on what and how."""
     core = model_named(model).fit([run.rel_offset for run in runs], [run.drive for run in runs])
-    return DriverProfile(
-        name=name,
-        model=core,
-        lane_width=float(np.median(np.concatenate([run.lane_width for run in runs]))),
-        provenance=_fitted_on(runs, core, provenance or Provenance()),
-    )
-
-
-def _fitted_on(runs: Sequence[Run], core: CoreModel, known: Provenance) -> Provenance:
-    """What is known, with what it was fitted on and how."""
-    seconds = sum(len(run) for run in runs) * core.step
-    return replace(
+    known, step = provenance or Provenance(), core.step
+    known = replace(
         known,
-        hours=round(seconds / 3600.0, 4),
+        hours=round(sum(map(len, runs)) * step / 3600.0, 4),
         drives=len({run.drive for run in runs}),
         runs=len(runs),
-        fit={**known.fit, "model": core.kind, "step_s": core.step, "sizes": sizes_of_runs(runs, core.step).to_dict()},
+        fit={**known.fit, "model": core.kind, "step_s": step, "sizes": sizes_of_runs(runs, step).to_dict()},
         package_version=__version__,
     )
+    width = float(np.median(np.concatenate([run.lane_width for run in runs])))
+    return DriverProfile(name=name, model=core, lane_width=width, provenance=known)
 
 
 # ---- The driver's part of measured runs ----
@@ -166,12 +158,12 @@ def driver_runs(
     if highest < LEAST_BAND:
         variance = float(np.concatenate([run.offset for run in runs]).var())
         return list(runs), SensorModel(0.0, driver_variance=significant(variance, 7), driver_share=(1.0, 1.0))
-    rows, rate = rows_of(runs, drives)
+    rows, durations, rate = rows_of(runs, drives)
     separated = separate(
         [run.offset for run in runs],
         STEP,
         rows=rows,
-        durations=durations_of(runs, drives),
+        durations=durations,
         rate=rate,
         sensor_noise=sensor_noise,
         half_widths=half_widths_of(runs, drives),
@@ -181,19 +173,17 @@ def driver_runs(
     return [with_fields(run, offset=separated.driver_part(run.offset, STEP)) for run in runs], separated.sensor
 
 
-def rows_of(runs: Sequence[Run], drives: Sequence[Drive]) -> tuple[list[FloatArray] | None, float | None]:
-    """Offsets of the runs as recorded [m], and rows per second [Hz]; None where not all drives are there."""
+def rows_of(
+    runs: Sequence[Run], drives: Sequence[Drive]
+) -> tuple[list[FloatArray] | None, list[FloatArray] | None, float | None]:
+    """Offsets of the runs as recorded [m], how long each row stands for, up to the middles between it and its
+    neighbours [s], and rows per second [Hz]; None where not all drives are there."""
     cut = _recorded(runs, drives)
     if cut is None:
-        return None, None
-    steps = np.concatenate([np.diff(drive.time[rows]) for drive, rows in cut])
-    return [drive.offset[rows] for drive, rows in cut], 1.0 / float(np.median(steps))
-
-
-def durations_of(runs: Sequence[Run], drives: Sequence[Drive]) -> list[FloatArray] | None:
-    """How long each row of the runs stands for, up to the middles between it and its neighbours [s]; None as above."""
-    cut = _recorded(runs, drives)
-    return None if cut is None else [np.gradient(drive.time[rows]) for drive, rows in cut]
+        return None, None, None
+    times = [drive.time[rows] for drive, rows in cut]
+    rate = 1.0 / float(np.median(np.concatenate([np.diff(time) for time in times])))
+    return [drive.offset[rows] for drive, rows in cut], [np.gradient(time) for time in times], rate
 
 
 def half_widths_of(runs: Sequence[Run], drives: Sequence[Drive]) -> list[FloatArray] | None:

@@ -24,18 +24,14 @@ from xosc_lateral.drivers.model.seeds import DriveSeed, child, generator
 class DriveState(msgspec.Struct, kw_only=True):
     """Where a drive is."""
 
-    begun_at: float | None = None
-    """Time of row 0 in the drive's clock; None before it is known. [s]"""
-    core: Any = None
-    """`CoreModel.State`; None before the first offset."""
-    hidden: list[Any]
-    """`HiddenEffect.State` of each."""
+    begun_at: float | None = None  # Time of row 0 in the drive's clock; None before it is known. [s]
+    core: Any = None  # `CoreModel.State`; None before the first offset.
+    hidden: list[Any]  # `HiddenEffect.State` of each.
+    # `EffectTerms.parts` of all hidden effects at rows `first` to `drawn`, which may still be asked for.
     terms: list[FloatArray | None] = msgspec.field(default_factory=lambda: [None] * len(EffectTerms().parts))
-    """`EffectTerms.parts` of all hidden effects at rows `first` to `drawn`, which may still be asked for."""
     first: int = 0
     drawn: int = 0
-    coarse: FloatArray
-    """Core movement drawn ahead, as is `fine`, shape (k,). [lane widths]"""
+    coarse: FloatArray  # Core movement drawn ahead, as is `fine`, shape (k,). [lane widths]
     fine: FloatArray
 
 

@@ -22,8 +22,8 @@ T = TypeVar("T")
 class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Parameters: set once, checked in `__post_init__`; `msgspec.structs.replace` makes a changed copy."""
 
+    # Fields that came later: files are without them where they have their defaults, as they were before.
     later: ClassVar[tuple[str, ...]] = ()
-    """Fields that came later: files are without them where they have their defaults, as they were before."""
 
     def __deepcopy__(self, memo: object) -> Self:
         return self

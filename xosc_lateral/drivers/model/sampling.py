@@ -29,13 +29,8 @@ class OffsetSampler:
     """One driver on one drive, sampled segment after segment.
 
     The state goes on from segment to segment (through a lane change, say) and from call to call: a segment cut in two
-    gives the same offsets as the whole, if both pieces carry the context around them (`Segment.before`, `after`).
-
-    Parameters
-    ----------
-    profile : DriverProfile
-    seed : int or numpy.random.SeedSequence
-        Same profile, seed and segments: same offsets, bit by bit.
+    gives the same offsets as the whole, if both pieces carry the context around them (`Segment.before`, `after`). Same
+    profile, seed and segments: same offsets, bit by bit.
     """
 
     def __init__(self, profile: DriverProfile, seed: int | np.random.SeedSequence) -> None:
@@ -46,17 +41,9 @@ class OffsetSampler:
     def sample(self, segment: Segment, *, start: float | None = None, responses: Responses | None = None) -> FloatArray:
         """Next offsets from the lane centre, positive to the LEFT of travel, one per row inside the segment. [m]
 
-        Raises `ValueError` if the segment has another step or lies before the last one, or `start` is given in the
-        middle of a drive.
-
-        Parameters
-        ----------
-        segment : Segment
-            At the model's step (5 Hz), not earlier than the last one.
-        start : float, optional
-            Offset at the first row [m]; at the start of a drive only. Without it the drive starts as chance has it.
-        responses : sequence of array or None, optional
-            What `responses_to` gave for this profile and segment, where that was asked before.
+        Raises `ValueError` if the segment has another step or lies before the last one, or `start` [m] is given in the
+        middle of a drive; without it a drive starts as chance has it. `responses`: what `responses_to` gave for this
+        profile and segment, where that was asked before.
         """
         _check_step(segment, self.profile.model.step)
         width = segment.lane_width[segment.inside]
@@ -98,11 +85,8 @@ class OffsetSampler:
 def responses_to(segment: Segment, profile: DriverProfile) -> Responses:
     """What every driver of a profile responds to in the same way on a segment; drivers differ in how strongly.
 
-    Returns
-    -------
-    tuple of array or None
-        Per effect of columns, in the profile's order, what `ColumnEffect.response` gives for the rows inside, shape
-        (n, k); None where a column is not known.
+    Per effect of columns, in the profile's order, what `ColumnEffect.response` gives for the rows inside, shape (n, k);
+    None where a column is not known.
     """
     columned = [effect for effect in profile.effects if isinstance(effect, ColumnEffect)]
     if not columned:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, Int32Array, IntArray
-from xosc_lateral.base.errors import PlaybackError
+from xosc_lateral.base.errors import FormatError, PlaybackError
 from xosc_lateral.base.rows import BLOCK, columns, stored
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
 from xosc_lateral.world.player.state import NO_ROAD, EntityState
@@ -97,15 +97,10 @@ class Rows:
         ):
             column.frombytes(np.full(n, value, dtype=column.typecode).tobytes())
 
-    def _implausible(self, time: float, what: str) -> PlaybackError:
-        place = self.state.entity.place
-        return PlaybackError(
-            f"'{self.state.name}' leaves every plausible bound at {time:.2f} s ({what}; limits "
-            f"{MAXIMUM_COORDINATE:g} m and {MAXIMUM_SPEED:g} m/s): the scenario can't be played",
-            path=place.path,
-            line=place.line,
-            element=place.element,
-        )
+    def _implausible(self, time: float, what: str) -> FormatError:
+        limits = f"limits {MAXIMUM_COORDINATE:g} m and {MAXIMUM_SPEED:g} m/s"
+        where = f"'{self.state.name}' leaves every plausible bound at {time:.2f} s ({what}; {limits})"
+        return self.state.entity.place.error(f"{where}: the scenario can't be played", PlaybackError)
 
     def put_away(self) -> None:
         """Make place for rows to come."""

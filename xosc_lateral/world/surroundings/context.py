@@ -289,32 +289,19 @@ def _environments(motion: NominalMotion) -> list[tuple[float, Environment]]:
     return [(start, content.environment) for start, content in actions if isinstance(content, EnvironmentAction)]
 
 
-def _stated(environment: Environment, time: FloatArray, start: float, heading: FloatArray) -> Mapping[str, FloatArray]:
-    """What one environment states, in the units of `segment.CONTEXT_UNITS`."""
-    even = np.ones(len(time))
+def _stated(environment: Environment, time: FloatArray, start: float, heading: FloatArray) -> dict[str, FloatArray]:
+    """Context columns of what one environment states, shape (n,) each."""
     values: dict[str, FloatArray] = {}
-    clock = environment.time_of_day
+    weather, clock = environment.weather or Weather(), environment.time_of_day
     if clock is not None:
         seconds = clock.date_time.hour * 3600.0 + clock.date_time.minute * 60.0 + clock.date_time.second
-        running = time - start if clock.animation else 0.0
-        values["time_of_day"] = (seconds + running) / 3600.0 % 24.0 * even
-    if environment.friction_scale_factor is not None:
-        values["friction"] = environment.friction_scale_factor * even
-    weather = environment.weather
-    return values if weather is None else values | _stated_weather(weather, even, heading)
-
-
-def _stated_weather(weather: Weather, ones: FloatArray, heading: FloatArray) -> dict[str, FloatArray]:
-    """Light, rain and wind, shape (n,) each."""
-    values: dict[str, FloatArray] = {}
-    if weather.illuminance is not None:
-        values["illuminance"] = weather.illuminance * ones
-    if weather.precipitation_type == "dry":
-        values["rain"] = 0.0 * ones
-    elif weather.precipitation_type == "rain" and weather.precipitation_intensity is not None:
-        values["rain"] = weather.precipitation_intensity * ones
+        running = time - start if clock.animation else np.zeros(len(time))
+        values["time_of_day"] = (seconds + running) / 3600.0 % 24.0
+    rain = {"dry": 0.0, "rain": weather.precipitation_intensity}.get(weather.precipitation_type or "")
+    constant = {"friction": environment.friction_scale_factor, "illuminance": weather.illuminance, "rain": rain}
+    values |= {name: np.full(len(time), value) for name, value in constant.items() if value is not None}
     if weather.wind_speed is not None and weather.wind_direction is not None:
-        values["wind_speed"] = weather.wind_speed * ones
+        values["wind_speed"] = np.full(len(time), weather.wind_speed)
         # 90 deg blows to the left of travel; the standard's direction is where the wind blows to, against world x
         values["wind_direction"] = np.degrees(weather.wind_direction - heading) % 360.0
     return values

@@ -14,7 +14,8 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.drivers.model.core.noise import fit_shaped_noise
+from xosc_lateral.drivers.drives.filters import periodograms
+from xosc_lateral.drivers.model.core.base import KERNEL_TAPS, N_KNOTS, NOISE_VARIANCE, ShapedNoise
 from xosc_lateral.drivers.model.core.two_level.markov import N_BINS, MarkovChain, bin_of
 from xosc_lateral.drivers.model.core.two_level.model import PAPER_SETTINGS, TwoLevelModel, TwoLevelSettings
 from xosc_lateral.drivers.model.linear_filters import convolve
@@ -46,6 +47,34 @@ def fit_markov_chain(rel_offsets: Sequence[FloatArray], *, n_bins: int = N_BINS)
     if not counts.any():
         raise NotEnoughDataError(f"{len(rel_offsets)} runs hold no two successive offsets: nothing to fit")
     return MarkovChain(counts)
+
+
+def fit_shaped_noise(
+    fine_parts: Sequence[FloatArray], *, n_knots: int = N_KNOTS, n_taps: int = KERNEL_TAPS
+) -> ShapedNoise:
+    """Fit the damping function to measured fine parts [lane widths], one array of shape (n_i,) per run.
+
+    Raises `NotEnoughDataError` when no run holds a window of 5 s.
+    """
+    longest = max(map(len, fine_parts), default=0)
+    window = min(n_taps - 1, longest)
+    if window < n_taps // 2:
+        raise NotEnoughDataError(f"the longest fine part has {longest} values, {n_taps // 2} are needed")
+    power = mean_power(fine_parts, window)
+    at = np.linspace(0.0, 1.0, len(power))
+    hats = np.maximum(0.0, 1.0 - np.abs(at[:, None] * (n_knots - 1) - np.arange(n_knots)[None, :]))
+    damping = np.linalg.lstsq(hats, np.sqrt(power / NOISE_VARIANCE), rcond=None)[0]
+    return ShapedNoise(np.maximum(damping, 0.0), n_taps)
+
+
+def mean_power(parts: Sequence[FloatArray], window: int) -> FloatArray:
+    """Mean power per frequency over half-overlapping Hann windows, shape (window // 2 + 1,). [square of the unit]"""
+    total, count = np.zeros(window // 2 + 1), 0
+    for part in parts:
+        powers = periodograms(part, window)
+        total += powers.sum(axis=0)
+        count += len(powers)
+    return total / max(count, 1)
 
 
 def fit_two_level(rel_offsets: Sequence[FloatArray], settings: TwoLevelSettings = PAPER_SETTINGS) -> TwoLevelModel:

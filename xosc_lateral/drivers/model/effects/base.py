@@ -50,8 +50,7 @@ class EffectTerms:
 class Effect(Record, frozen=True, kw_only=True, tag_field="kind", tag=kebab):
     """One effect, frozen: a `ColumnEffect` or a `HiddenEffect`; parameters and their uncertainty are its fields."""
 
-    kind: ClassVar[str]
-    """Name in the profile file: the class's, in lower case with hyphens."""
+    kind: ClassVar[str]  # Name in the profile file: the class's, in lower case with hyphens.
 
     def __init_subclass__(cls, **settings: Any) -> None:
         super().__init_subclass__(**settings)

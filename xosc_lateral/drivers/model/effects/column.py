@@ -38,46 +38,29 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
     A new one names its columns, its `shape` and its `quantity`. A table without one of the columns leaves the movement
     unchanged. Raises `DriverProfileError` if the lengths disagree, a number is not finite, the response time or a
     deviation is negative, or the order is not 1 to 9.
-
-    Parameters
-    ----------
-    acts : Acts
-        What it changes.
-    coefficients : tuple of float
-        One per component of the quantity; [m] per unit of it for location, else natural logarithm per unit.
-    errors : tuple of float
-        Standard errors of the coefficients.
-    lag_s, response_s : float
-        Delay (negative: preview) and first-order lag of the response. [s]
-    response_order : int
-        Count of such lags one after the other: after one, a jump of the quantity is a corner of the path, after two a
-        bend.
-    reference : tuple of float
-        Value of the quantity at which nothing changes: its mean over the drives it was fitted on.
-    between_drivers : tuple of float
-        Standard deviations of the coefficients between drivers (random slopes); empty: all drivers respond alike.
-    response_range : tuple of (float, float)
-        Lowest and highest response, per component, that the effect was fitted on; responses beyond are taken as these.
-        Empty: no bounds. [unit of the quantity]
-    course : tuple of (float, float)
-        Further delay [s] and weight [-] of each of several shifts in time that the response is the sum of, where one
-        delay does not do: into a bend, through it and out. Empty: one of weight 1.
     """
 
     later = ("between_drivers", "response_range", "response_order", "course")
 
+    # For the report, fields of the effect in braces: "linear", "proximity (fades over {0.scale:.3g})" ...
     words: ClassVar[str] = ""
-    """For the report, fields of the effect in braces: "linear", "proximity (fades over {0.scale:.3g})" ..."""
 
-    acts: Acts
+    acts: Acts  # What it changes.
+    # One per component of the quantity; [m] per unit of it for location, else natural logarithm per unit.
     coefficients: tuple[float, ...] = ()
-    errors: tuple[float, ...] = ()
-    lag_s: float = 0.0
-    response_s: float = 0.0
-    reference: tuple[float, ...] = ()
+    errors: tuple[float, ...] = ()  # Standard errors of the coefficients.
+    lag_s: float = 0.0  # Delay of the response; negative: preview. [s]
+    response_s: float = 0.0  # First-order lag of the response. [s]
+    reference: tuple[float, ...] = ()  # Quantity at which nothing changes: its mean over the drives it was fitted on.
+    # Standard deviations of the coefficients between drivers (random slopes); empty: all drivers respond alike.
     between_drivers: tuple[float, ...] = ()
+    # Lowest and highest response, per component, that the effect was fitted on; responses beyond are taken as these.
+    # Empty: no bounds. [unit of the quantity]
     response_range: tuple[tuple[float, float], ...] = msgspec.field(name="answer_range", default=())
+    # Count of lags one after the other: after one, a jump of the quantity is a corner of the path, after two a bend.
     response_order: int = 1
+    # Further delay [s] and weight [-] of each of several shifts in time that the response is the sum of, where one
+    # delay does not do: into a bend, through it and out. Empty: one of weight 1.
     course: tuple[tuple[float, float], ...] = ()
 
     def __post_init__(self) -> None:
@@ -162,7 +145,8 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         missing = np.isnan(values)
         if not missing.any():
             return values
-        stand_in = self.reference if self.reference else tuple(_finite_mean(column) for column in like.T)
+        known = [column[np.isfinite(column)] for column in like.T]
+        stand_in = self.reference or tuple(float(column.mean()) if len(column) else 0.0 for column in known)
         return np.where(missing, np.asarray(stand_in), values)
 
     @property
@@ -222,8 +206,3 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
 def _finite(context: Mapping[str, FloatArray], columns: Iterable[str]) -> dict[str, FloatArray]:
     read = {name: np.asarray(context[name]) for name in columns}
     return {name: np.where(far, np.nan, own) if (far := np.isinf(own)).any() else own for name, own in read.items()}
-
-
-def _finite_mean(values: FloatArray) -> float:
-    finite = values[np.isfinite(values)]
-    return float(finite.mean()) if len(finite) else 0.0
