@@ -220,13 +220,14 @@ def _levelx(source: Path, road: Path | None, columns: TableMapping) -> RecordedT
     lower, upper = (np.sort(levelx.markings(about, side, files[0])) for side in ("lower", "upper"))
     table = table.sort_values(["id", "frame"], ignore_index=True)
     meta = meta.set_index("id").loc[table["id"]]
-    kinds, is_ahead = meta["class"].astype(str).str.lower().to_numpy(), meta["drivingDirection"].to_numpy() == 2
+    kind = meta["class"].astype(str).str.lower().to_numpy(dtype=str)
+    is_ahead = meta["drivingDirection"].to_numpy() == 2
     vehicle, ids = table["id"].factorize()
     time, length, width = table["frame"].to_numpy(dtype=np.float64) / rate, table["width"], table["height"]
     x, y = (table["x"] + 0.5 * length).to_numpy(), -(table["y"] + 0.5 * width).to_numpy()  # y points down there
     place, speed = (x, y, np.where(is_ahead, 0.0, np.pi)), np.abs(table["xVelocity"].to_numpy())
     when = tuple(map(str, ids)), vehicle, time, 1.0 / rate
-    tracks = Tracks(*when, *place, speed, length.to_numpy(), kinds, width.to_numpy())
+    tracks = Tracks(*when, *place, speed, length.to_numpy(), kind, width.to_numpy())
     middle = 0.5 * (upper[-1] + lower[0])
     sides = ((middle - float(upper[-1]), np.diff(upper)[::-1]), (float(lower[0]) - middle, np.diff(lower)))
     left, right = (
