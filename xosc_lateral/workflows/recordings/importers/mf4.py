@@ -41,7 +41,7 @@ from xosc_lateral.files.mapping import ColumnSource, MappingLike, as_mapping, fa
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import LONGEST_MESSAGE, foreign_errors
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
-from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded, paths_of
+from xosc_lateral.workflows.recordings.importers import Imported, imported, importer, paths_of
 
 POSITIONS = (("offset", "lane_width"), ("distance_left", "distance_right"))
 LICENCE = "your own recording"
@@ -93,7 +93,7 @@ class Channel:
         return values
 
 
-@guarded
+@importer
 def import_mf4(
     sources: Path | Sequence[Path],
     channels: Sequence[str] = (),
@@ -129,7 +129,7 @@ def import_mf4(
     every_unit = {name: " | ".join(sorted(words)) for name, words in units.items()}
     settings = {"step": step, "channels": list(channels), "units": every_unit}
     about = {"format": "mf4", "licence": LICENCE, "settings": settings, "notes": tuple(dict.fromkeys(notes))}
-    return finished(pd.concat(tables, ignore_index=True), keep_cut=False, sources=files, step=step, **about)
+    return imported(pd.concat(tables, ignore_index=True), sources=files, step=step, **about)
 
 
 def channels_wanted(source: Path) -> str:
