@@ -34,7 +34,7 @@ from xosc_lateral.files.sumo import (
     wrong_element,
 )
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS, is_right_to_left
-from xosc_lateral.workflows.recordings.importers import Imported, imported, importer
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph, neighbour_columns
 from xosc_lateral.workflows.recordings.roads_from_lanes import DrivenLane
@@ -48,7 +48,7 @@ REAR_FROM_FRONT = 0.8  # rear axle behind the front bumper, as a share of the le
 @importer
 def import_fcd(
     source: Path, *, net: str | Path | None = None, types: str | Path | None = None, lane_width: float = WIDTH
-) -> Imported:
+) -> ImportedDrives:
     """A drive for every vehicle of what ``--fcd-output`` wrote; it is a truck when its type's name or class says so.
 
     `net`: the road network, ``.net.xml``, for widths and counts of lanes, and for who is on the next edge. `types`:
