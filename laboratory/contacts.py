@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 
 from laboratory.markers import show
-from xosc_lateral.workflows.conversion.drivers import choose_drivers
 from xosc_lateral.workflows.conversion.enrich import enrich
 from xosc_lateral.workflows.conversion.load import play_scenario
+from xosc_lateral.workflows.conversion.plan import choose_drivers
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
 from xosc_lateral.workflows.playing.templates import write_template
 

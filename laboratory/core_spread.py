@@ -28,7 +28,7 @@ from xosc_lateral.drivers.evaluation.metrics import snippet_distances
 from xosc_lateral.drivers.fitting.models import autoregressive_coarse as fit_coarse
 from xosc_lateral.drivers.fitting.models import autoregressive_fit as fitting
 from xosc_lateral.drivers.fitting.models.autoregressive_coarse import fit_autoregression
-from xosc_lateral.drivers.fitting.models.autoregressive_matching import simulate
+from xosc_lateral.drivers.fitting.models.autoregressive_fit import simulate
 from xosc_lateral.drivers.loop.timeline import Timeline, join_drives, local_mean
 from xosc_lateral.drivers.model.core.autoregressive.coarse import Autoregression, stabilise
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel

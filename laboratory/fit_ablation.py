@@ -27,8 +27,7 @@ from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.evaluation.metrics import snippet_distances, split_groups
 from xosc_lateral.drivers.fitting.fitting import driver_runs
 from xosc_lateral.drivers.fitting.models.autoregressive_coarse import DEFAULT_SETTINGS, fit_autoregression
-from xosc_lateral.drivers.fitting.models.autoregressive_fit import fit_autoregressive
-from xosc_lateral.drivers.fitting.models.autoregressive_matching import simulate
+from xosc_lateral.drivers.fitting.models.autoregressive_fit import fit_autoregressive, simulate
 from xosc_lateral.drivers.model.core.autoregressive.coarse import COARSE_EVERY, split_bands
 from xosc_lateral.files.drives import read_drives
 

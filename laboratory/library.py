@@ -33,21 +33,19 @@ from xosc_lateral.drivers.drives.drive import Drive, Run
 from xosc_lateral.drivers.drives.resampling import PASS_BAND_EDGES, STEP
 from xosc_lateral.drivers.evaluation.lane_keeping import figures_of
 from xosc_lateral.drivers.evaluation.metrics import snippet_metrics
-from xosc_lateral.drivers.evaluation.record import scores_to_dict
-from xosc_lateral.drivers.evaluation.scores import SNIPPET, score_profile
+from xosc_lateral.drivers.evaluation.scores import SNIPPET, score_profile, scores_to_dict
 from xosc_lateral.drivers.evaluation.snippets import sample_runs, snippets_of
 from xosc_lateral.drivers.evaluation.spectra import spectrum
-from xosc_lateral.drivers.fitting.bands import measured, with_fast_movement
-from xosc_lateral.drivers.fitting.fast_part import FastPart, fast_part_of_runs
+from xosc_lateral.drivers.fitting.bands import FastPart, fast_part_of_runs, measured, with_fast_movement
 from xosc_lateral.drivers.fitting.fitting import driver_runs, fit_population, fit_profile, fit_runs
 from xosc_lateral.drivers.model.profile import POPULATION as ANSWERS
 from xosc_lateral.drivers.model.profile import DriverProfile, Metadata, Provenance
 from xosc_lateral.drivers.model.sensor import SensorModel
 from xosc_lateral.files.drives import drives_of_table, read_drives
 from xosc_lateral.files.source import parsed_hash
+from xosc_lateral.workflows.recordings.importers import ImportedDrives
 from xosc_lateral.workflows.recordings.importers.dlr_ht import HIGHEST_FREQUENCY, import_dlr_ht
 from xosc_lateral.workflows.recordings.importers.openacc import import_openacc
-from xosc_lateral.workflows.recordings.importers.table import write_imported
 
 FloatArray = NDArray[np.float64]
 
@@ -107,7 +105,7 @@ def build_library(
     kind = dict(zip(imported.table["drive"], imported.table["vehicle_class"], strict=True))
     with tempfile.TemporaryDirectory() as folder:
         table = Path(folder) / "dlr-ht.parquet"
-        write_imported(imported, table)
+        ImportedDrives(imported, (source,)).write(table)
         drives = read_drives(table)
     runs = all_runs(drives)
     rural, fast = _rural(gnss, model)

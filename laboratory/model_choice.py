@@ -24,8 +24,7 @@ from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.evaluation.classifier import classifier_two_sample_test
 from xosc_lateral.drivers.evaluation.metrics import METRICS, snippet_distances, split_groups
 from xosc_lateral.drivers.fitting.models.autoregressive_coarse import DEFAULT_SETTINGS
-from xosc_lateral.drivers.fitting.models.autoregressive_fit import fit_autoregressive
-from xosc_lateral.drivers.fitting.models.autoregressive_matching import matched, simulate
+from xosc_lateral.drivers.fitting.models.autoregressive_fit import fit_autoregressive, matched, simulate
 from xosc_lateral.drivers.fitting.models.two_level import fit_two_level
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
 from xosc_lateral.drivers.model.core.autoregressive.parameters import Volatility

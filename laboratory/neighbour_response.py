@@ -20,7 +20,7 @@ from laboratory.markers import show
 from xosc_lateral.drivers.drives.cuts import all_runs
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.resampling import STEP
-from xosc_lateral.drivers.fitting.neighbours import NEIGHBOURS
+from xosc_lateral.drivers.fitting.context_effects import NEIGHBOURS
 from xosc_lateral.drivers.model.effects import Acts, Proximity
 from xosc_lateral.files.drives import read_drives
 

@@ -121,7 +121,8 @@ def window_lines(traffic: RecordedTraffic, other: OtherReading, begins: Sequence
         both, missed, extra, ends = lane_changes(made, other)
         near, nearer = (np.abs(ends) < 1.0).mean(axis=0), (np.abs(ends) < 0.5).mean(axis=0)
         along, across, in_lane = (
-            np.concatenate([getattr(one, name) for one in made.residuals]) for name in ("along", "across", "in_lane")
+            np.concatenate([getattr(plan.residuals, name) for plan in made.plans])
+            for name in ("along", "across", "in_lane")
         )
         rms = [float(np.sqrt((across[part] ** 2).mean())) for part in (~in_lane, in_lane)]
         lines.append(

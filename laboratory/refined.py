@@ -29,7 +29,7 @@ def refine_population(drives: Sequence[Drive], seed: int, known: Provenance | No
 def refined_profile(result: LoopResult) -> DriverProfile:
     """The refined profile, its effects rounded to what is known, with what the loop found in its provenance.
 
-    The loop's errors are not in it: they are the loop's own figures (docs/closing_the_loop.md, section 5), and a change
+    The loop's errors are not in it: they are the loop's own figures (docs/closing_the_loop.md), and a change
     of how they are measured must not change a driver.
     """
     refined = result.refined

@@ -26,7 +26,6 @@ from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.evaluation.snippets import Snippets, snippets_of
 from xosc_lateral.drivers.evaluation.spectra import slow_movement
 from xosc_lateral.files.profiles import read_profile
-from xosc_lateral.workflows.conversion.consequences import Gap, gaps_of
 from xosc_lateral.workflows.conversion.enrich import enrich
 from xosc_lateral.workflows.conversion.load import Played, play_scenario
 from xosc_lateral.workflows.conversion.result import Enriched
@@ -35,6 +34,7 @@ from xosc_lateral.workflows.recordings.reconstruct import STEP, in_lane_offsets,
 from xosc_lateral.workflows.recordings.reconstruction import Reconstruction
 from xosc_lateral.workflows.recordings.recordings import read_recording
 from xosc_lateral.workflows.recordings.settings import ReconstructSettings
+from xosc_lateral.world.motion.gaps import Gap, gaps_of
 
 FloatArray = NDArray[np.float64]
 
@@ -67,9 +67,9 @@ def twins_of(source: Path, begin: float, variants: int) -> Twins:
 def in_lane_runs(twins: Twins) -> tuple[list[Run], list[list[FloatArray]]]:
     """Recorded road-following of those that a profile drives, and each variant's offsets at the same times. [m]"""
     runs = []
-    for plan, residuals in zip(twins.made.plans, twins.made.residuals, strict=True):
+    for plan in twins.made.plans:
         if twins.variants[0].entity(plan.name).is_enriched:
-            stretches = enumerate(in_lane_offsets(plan, residuals))
+            stretches = enumerate(in_lane_offsets(plan))
             runs += [Run(plan.name, number, *stretch) for number, stretch in stretches]
     time = twins.played.motion.entities[0].time
     paths = [

@@ -101,3 +101,15 @@ def test_dotted_names_in_backticks_exist(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     names = {match[1] for match in DOTTED.finditer(text) if match[1].split(".")[0] in ROOMS}
     assert not {name for name in names if not _exists(name)}
+
+
+# ---- pages in docstrings and comments ----
+PAGE = re.compile(r"\bdocs/[\w/]+\.md\b")
+
+
+def test_pages_that_the_package_refers_to_are_in_the_repository() -> None:
+    texts = {path: path.read_text(encoding="utf-8") for path in MODULES}
+    pages = {(path.name, page) for path, text in texts.items() for page in PAGE.findall(text)}
+    assert pages  # the pattern still matches what the package says
+    assert not {(module, page) for module, page in pages if not (PACKAGE.parent / page).is_file()}
+    assert not [path.name for path, text in texts.items() if re.search(r"\bDESIGN\b", text)]  # the team's own page

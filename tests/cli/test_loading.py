@@ -56,7 +56,9 @@ def test_nothing_is_loaded_to_say_what_there_is(words: list[str], tmp_path: Path
 )
 def test_heavy_packages_are_loaded_where_they_work(words: list[str], needs: set[str], tmp_path: Path) -> None:
     xl.write_template("cut-in", tmp_path)
-    assert loaded(words, tmp_path) & set(HEAVY) == needs
+    modules = loaded(words, tmp_path)
+    assert modules & set(HEAVY) == needs
+    assert not [name for name in modules if name.startswith("xosc_lateral.drivers.fitting")], "who drives fits nothing"
 
 
 @pytest.mark.parametrize("name", VERBS)

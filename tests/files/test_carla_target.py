@@ -26,7 +26,7 @@ from tests.kit.scenario_files import (
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.openscenario.write.draft import target
-from xosc_lateral.files.openscenario.write.trajectory_scenario import write_trajectory_scenario
+from xosc_lateral.files.openscenario.write.fit import write_converted
 
 SIGNAL = (
     "<GlobalAction><InfrastructureAction><TrafficSignalAction>"
@@ -168,7 +168,7 @@ def test_without_a_road_it_can_not_be_played(tmp_path: Path) -> None:
     source.write_text(text, encoding="utf-8")
     made_for = target("carla")
     with pytest.raises(FormatError, match="without a road"):
-        write_trajectory_scenario(
+        write_converted(
             read_scenario(source),
             motion,
             nominal(motion),

@@ -12,7 +12,7 @@ from tests.kit.scenario_files import action, event, speed_action, story
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.openscenario.write.draft import target
-from xosc_lateral.files.openscenario.write.lane_offset_scenario import write_lane_offset_scenario
+from xosc_lateral.files.openscenario.write.fit import write_converted
 
 RANDOM = "<PrivateAction><RoutingAction><RandomRouteAction/></RoutingAction></PrivateAction>"
 ANGLE = (
@@ -40,11 +40,12 @@ def test_without_such_things_it_is_what_anybody_gets(tmp_path: Path) -> None:
 def test_a_condition_that_stops_it_is_refused(tmp_path: Path) -> None:
     scenario = read_scenario(tree(tmp_path, stop=ANGLE))
     with pytest.raises(FormatError, match=r"Condition 'turned': esmini has no RelativeAngleCondition"):
-        write_lane_offset_scenario(
+        write_converted(
             scenario,
             played(scenario),
-            [],
+            {},
             tmp_path / "out.xosc",
+            chains=[],
             provenance={},
             summary="",
             target=target("esmini"),

@@ -84,7 +84,7 @@ def test_the_same_note_is_counted_and_not_repeated(tmp_path):
 
 def test_attributes_of_road_links_and_junctions_are_kept():
     network = read_opendrive(DATA / "valid" / "junction.xodr")
-    (junction,) = network.junctions
+    (junction,) = network.junctions.values()
     assert [(c.incoming_road, c.connecting_road, c.lanes) for c in junction.connections] == [
         ("west", "west-south", ((-1, -1),)),
         ("west", "west-east", ((-1, -1),)),

@@ -13,10 +13,10 @@ from lxml import etree
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.openscenario.distribution import read_distribution
 from xosc_lateral.files.openscenario.read import read_scenario
-from xosc_lateral.files.openscenario.write.trajectory_scenario import write_trajectory_scenario
+from xosc_lateral.files.openscenario.write.fit import write_converted
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion, PlayedAction
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
-from xosc_lateral.world.scenario import Scenario
+from xosc_lateral.world.scenario.scenario import Scenario
 
 XSD = Path(__file__).parents[1] / "data" / "xsd"
 FILES = {(1, 0): "1.0.0", (1, 1): "1.1.1", (1, 2): "1.2.0", (1, 3): "1.3.0"}
@@ -101,7 +101,7 @@ def test_what_is_written_from_the_reference_logs_is_valid_and_loads(shared: Path
         scenario = read_scenario(path)
         motion, trajectories = logged_motion(scenario, log)
         output = tmp_path / path.name
-        write_trajectory_scenario(scenario, motion, trajectories, output, provenance={}, summary="test")
+        write_converted(scenario, motion, trajectories, output, provenance={}, summary="test")
         document = etree.parse(str(output))
         assert schemas[scenario.header.version].validate(document), (
             path.name,

@@ -31,7 +31,7 @@ from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.files.opendrive import read_opendrive
 from xosc_lateral.files.openscenario.distribution import read_distribution
 from xosc_lateral.files.openscenario.read import read_scenario
-from xosc_lateral.files.openscenario.write.trajectory_scenario import write_trajectory_scenario
+from xosc_lateral.files.openscenario.write.fit import write_converted
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.player.player import play
 
@@ -182,7 +182,7 @@ def test_mutated_scenarios_that_load_are_played_and_written_or_refused(folder: P
         paths = {
             e.name: WorldTrajectory(e.time, e.x, e.y, e.z, e.heading, e.pitch, e.roll, e.speed) for e in motion.entities
         }
-        write_trajectory_scenario(scenario, motion, paths, output, provenance={}, summary="fuzz")
+        write_converted(scenario, motion, paths, output, provenance={}, summary="fuzz")
     except XoscLateralError as error:
         assert "\n" not in str(error)
         assert not output.exists()

@@ -33,16 +33,15 @@ from xosc_lateral.files.opendrive import read_opendrive
 from xosc_lateral.files.openscenario.provenance import provenance_of
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.openscenario.write.draft import WrittenScenario
-from xosc_lateral.files.openscenario.write.lane_offset_scenario import write_lane_offset_scenario
-from xosc_lateral.files.openscenario.write.lateral_actions import lateral_actions
-from xosc_lateral.files.openscenario.write.trajectory_scenario import write_trajectory_scenario
+from xosc_lateral.files.openscenario.write.fit import write_converted
+from xosc_lateral.files.openscenario.write.lane_offset_scenario import LateralActions
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_chain import OffsetChain, OffsetPath, ring_along
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.player.player import play
-from xosc_lateral.world.scenario import Scenario
 from xosc_lateral.world.scenario.position import Polyline, WorldPosition
 from xosc_lateral.world.scenario.private_actions import FollowTrajectoryAction
+from xosc_lateral.world.scenario.scenario import Scenario
 
 XSD = Path(__file__).parents[1] / "data" / "xsd"
 STEP = 0.02
@@ -81,7 +80,7 @@ def provenance(scenario: Scenario) -> dict[str, Any]:
 def converted(scenario: Scenario, output: Path, **overrides: Any) -> WrittenScenario:
     motion = overrides.pop("motion", None) or played(scenario)
     trajectories = overrides.pop("trajectories", None) or nominal(motion)
-    return write_trajectory_scenario(
+    return write_converted(
         scenario, motion, trajectories, output, provenance=provenance(scenario), summary="seed 3", **overrides
     )
 
@@ -248,7 +247,7 @@ def test_provenance_with_dashes_stays_one_comment(tmp_path: Path) -> None:
     scenario = made(tmp_path)
     motion = played(scenario)
     wild = {"note": "a--b---c-", "inputs": {}}
-    write_trajectory_scenario(scenario, motion, nominal(motion), tmp_path / "out.xosc", provenance=wild, summary="s")
+    write_converted(scenario, motion, nominal(motion), tmp_path / "out.xosc", provenance=wild, summary="s")
     assert provenance_of(etree.parse(str(tmp_path / "out.xosc")).getroot()) == wild
 
 
@@ -344,11 +343,12 @@ def test_lane_offset_output_is_valid_and_keeps_the_maneuvers(
 ) -> None:
     scenario = read_scenario(write_scenario(tmp_path, scenario_text(minor=minor)))
     motion = played(scenario)
-    write_lane_offset_scenario(
+    write_converted(
         scenario,
         motion,
-        [sine_chain("Ego")],
+        {},
         tmp_path / "out.xosc",
+        chains=[sine_chain("Ego")],
         provenance=provenance(scenario),
         summary="seed 3",
     )
@@ -366,8 +366,14 @@ def test_offsets_come_out_when_the_lane_offset_scenario_is_played_and_go_on(tmp_
     scenario = made(tmp_path, stop=time_condition(60), init=init, stories=stories)
     motion = played(scenario, 70.0)
     chain = sine_chain("Ego")
-    write_lane_offset_scenario(
-        scenario, motion, [chain], tmp_path / "out.xosc", provenance=provenance(scenario), summary="seed 3"
+    write_converted(
+        scenario,
+        motion,
+        {},
+        tmp_path / "out.xosc",
+        chains=[chain],
+        provenance=provenance(scenario),
+        summary="seed 3",
     )
     ego = played(read_scenario(tmp_path / "out.xosc"), 70.0).entities[0]
     # Lane -1 of a right-hand road: the direction of travel is that of s, so +t is left. The ring begins at a turn.
@@ -401,8 +407,14 @@ def test_a_path_by_distance_stands_still_with_its_car_and_goes_on_with_it(tmp_pa
     path = OffsetPath(tuple(distance.tolist()), tuple(np.round(offset, 4).tolist()))
     chain = structs.replace(chain, placed_t=0.2, path=path)
     motion = played(scenario, 40.0)
-    write_lane_offset_scenario(
-        scenario, motion, [chain], tmp_path / "out.xosc", provenance=provenance(scenario), summary="seed 3"
+    write_converted(
+        scenario,
+        motion,
+        {},
+        tmp_path / "out.xosc",
+        chains=[chain],
+        provenance=provenance(scenario),
+        summary="seed 3",
     )
     run = played(read_scenario(tmp_path / "out.xosc"), 40.0)
     ego, nominal_ego = run.entities[0], motion.entities[0]
@@ -427,7 +439,7 @@ LANE_CHANGE = (
 
 def test_a_lateral_action_without_a_name_is_referred_to_by_its_event(tmp_path: Path) -> None:
     text = scenario_text(stories=story(event("change", action("", LANE_CHANGE), time=8.0)), stop=time_condition(25))
-    found = lateral_actions(read_scenario(write_scenario(tmp_path, text)))
+    found = LateralActions.of(read_scenario(write_scenario(tmp_path, text))).by_entity
     assert [(one.kind, one.reference) for one in found["Ego"]] == [("event", "change")]
 
 
@@ -441,8 +453,14 @@ def test_a_lane_change_overrules_the_offsets_whenever_it_comes(tmp_path: Path) -
     motion = played(scenario, 30.0)
     path = next(p.path for p in motion.actions if p.action.name == "change")
     chains = [sine_chain("Ego"), sine_chain("Ego", path)]
-    write_lane_offset_scenario(
-        scenario, motion, chains, tmp_path / "out.xosc", provenance=provenance(scenario), summary="seed 3"
+    write_converted(
+        scenario,
+        motion,
+        {},
+        tmp_path / "out.xosc",
+        chains=chains,
+        provenance=provenance(scenario),
+        summary="seed 3",
     )
     # The test drive makes the change come 3 s earlier than planned.
     output = tmp_path / "out.xosc"

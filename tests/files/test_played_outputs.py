@@ -12,7 +12,7 @@ from tests.files.test_openscenario_write import LANE_CHANGE, nominal, played, pr
 from tests.kit.motion import drive, entity, together, two_roads
 from tests.kit.scenario_files import action, event, made, time_condition
 from xosc_lateral.files.openscenario.read import read_scenario
-from xosc_lateral.files.openscenario.write.lane_offset_scenario import write_lane_offset_scenario
+from xosc_lateral.files.openscenario.write.fit import write_converted
 from xosc_lateral.files.openscenario.write.moving import Moving, _heading_times
 from xosc_lateral.world.motion.path_pieces import vertex_times
 
@@ -92,7 +92,15 @@ def test_a_maneuver_of_a_catalog_is_written_out_where_the_offsets_refer_to_it(tm
     motion = played(scenario, 30.0)
     chain = sine_chain("Ego")
     output = tmp_path / "out.xosc"
-    write_lane_offset_scenario(scenario, motion, [chain], output, provenance=provenance(scenario), summary="")
+    write_converted(
+        scenario,
+        motion,
+        {},
+        output,
+        chains=[chain],
+        provenance=provenance(scenario),
+        summary="",
+    )
     root = etree.parse(str(output)).getroot()
     references = {item.get("storyboardElementRef") for item in root.iter("StoryboardElementStateCondition")}
     assert "aside" in references

@@ -13,7 +13,7 @@ from msgspec import structs
 from tests.kit.stage import Stage, after, event, lane_change, maneuvers, on_lane, speed, teleport, to_lane
 from xosc_lateral.files.output_tables import COLUMNS, states_csv, states_frame
 from xosc_lateral.world.motion.nominal import Activity, NominalMotion
-from xosc_lateral.world.road import RoadNetwork
+from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.road.surface import HeaderOffset
 
 

@@ -31,9 +31,8 @@ from tests.kit.scenario_files import (
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.openscenario.write.draft import WrittenScenario, target
-from xosc_lateral.files.openscenario.write.lane_offset_scenario import write_lane_offset_scenario
+from xosc_lateral.files.openscenario.write.fit import write_converted
 from xosc_lateral.files.openscenario.write.literal import name_literally
-from xosc_lateral.files.openscenario.write.trajectory_scenario import write_trajectory_scenario
 from xosc_lateral.files.openscenario.write.versions import additions as table_of_additions
 from xosc_lateral.world.scenario.parameters import Scope
 
@@ -94,9 +93,7 @@ def written(source: Path, version: str | None, player: str = "standard") -> Writ
     motion = played(scenario)
     output = source.with_name(f"out_{version}_{player}.xosc")
     made_for = target(player, version)
-    found = write_trajectory_scenario(
-        scenario, motion, nominal(motion), output, provenance={}, summary="", target=made_for
-    )
+    found = write_converted(scenario, motion, nominal(motion), output, provenance={}, summary="", target=made_for)
     return found, etree.parse(str(output)).getroot()
 
 
@@ -152,8 +149,8 @@ def test_weather_keeps_its_meaning_under_its_former_names(tmp_path: Path) -> Non
 def test_another_version_is_played_alike(tmp_path: Path, version: str) -> None:
     source = tree(tmp_path, **RICH)
     before = played(read_scenario(source))
-    found, _ = written(source, version)
-    after = played(read_scenario(found.path))
+    _, root = written(source, version)
+    after = played(read_scenario(Path(root.base)))
     assert after.end_time == pytest.approx(before.end_time, abs=0.02)
     for one, other in zip(before.entities, after.entities, strict=True):
         n = min(len(one.time), len(other.time))
@@ -203,8 +200,15 @@ def test_an_entry_takes_the_place_of_its_reference(tmp_path: Path) -> None:
 def reactive(source: Path, version: str) -> Written:
     scenario = read_scenario(source)
     output = source.with_name("reactive.xosc")
-    found = write_lane_offset_scenario(
-        scenario, played(scenario), [], output, provenance={}, summary="", target=target(version=version)
+    found = write_converted(
+        scenario,
+        played(scenario),
+        {},
+        output,
+        chains=[],
+        provenance={},
+        summary="",
+        target=target(version=version),
     )
     return found, etree.parse(str(output)).getroot()
 
@@ -381,7 +385,7 @@ def test_a_trailer_follows_by_itself_or_is_an_entity_of_its_own(tmp_path: Path, 
     names = [item.get("name") for item in root.iter("ScenarioObject")]
     assert names == (["Ego", "Ego+"] if minor < 3 else ["Ego"])
     before = {one.name: one for one in played(read_scenario(source)).entities}
-    for after in played(read_scenario(found.path)).entities:
+    for after in played(read_scenario(Path(root.base))).entities:
         one = before[after.name]
         n = min(len(one.time), len(after.time))
         assert np.hypot(one.x[:n] - after.x[:n], one.y[:n] - after.y[:n]).max() < 0.02

@@ -14,7 +14,7 @@ from xosc_lateral.world.motion.gaps import BoxPath, Gap, smallest_gaps
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, Note
 from xosc_lateral.world.motion.segments import cut_segments
 from xosc_lateral.world.motion.trajectory import WorldTrajectory, displace
-from xosc_lateral.world.road import RoadNetwork
+from xosc_lateral.world.road.network import RoadNetwork
 
 DURATION = 30.0
 

@@ -113,7 +113,8 @@ class StandIn:
         road, lane, s = int(one.road[row]), int(one.lane[row]), float(one.s[row])
         # while an action runs, it says anew in every step where the vehicle is
         to = self.offset if self._lateral(one.name, row) is None else self.shown
-        to[one.name] = float(self.network.t_to_offset(road, lane, s, t)) - float(one.offset[row])
+        offset_t = t - self.network.lane_state_at(road, lane, s).centre_t
+        to[one.name] = self.network.offset_from_offset_t(road, lane, offset_t) - float(one.offset[row])
         return 0
 
     def SE_RegisterStoryBoardElementStateChangeCallback(self, callback: Callable[..., None]) -> None:

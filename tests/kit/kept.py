@@ -23,12 +23,11 @@ from tests.kit.places import VALID, hand_written, random_places
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.openscenario.write.draft import target
-from xosc_lateral.files.openscenario.write.lane_offset_scenario import write_lane_offset_scenario
-from xosc_lateral.files.openscenario.write.trajectory_scenario import write_trajectory_scenario
+from xosc_lateral.files.openscenario.write.fit import write_converted
 from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.world.motion.nominal import EntityMotion
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
-from xosc_lateral.world.road import RoadNetwork
+from xosc_lateral.world.road.network import RoadNetwork
 
 FOLDER = Path(__file__).parents[1] / "data" / "kept"
 
@@ -55,11 +54,12 @@ def road_answers(name: str) -> dict[str, Any]:
         "poses": _rows(*poses),
         "along": _rows(*along),
         "found": _rows(*back),
-        "across": _rows(network.offset_to_t(road, lane, s, offset), network.t_to_offset(road, lane, s, offset),
+        "across": _rows(network.offset_to_t(road, lane, s, offset),
+                        network.travel_directions(road, lane) * (offset - network.lane_centre_t(road, lane, s)),
                         network.lane_centre_t(road, lane, s), network.lane_width(road, lane, s)),
         "beside": _rows(*network.lane_index(road, lane, s), network.speed_limit(road, lane, s)),
         "shape": _rows(network.curvature(road, s), network.lane_curvature(road, lane, s, offset),
-                       network.crossfall(road, lane, s), network.grade(road, lane, s)),
+                       *network.lean(road, lane, s)),
         "sections": [_plain(network.section_at(int(r), float(at))) for r, at in zip(road, s, strict=True)],
         "lanes": [[info.id for info in network.lanes_at(int(r), float(at))] for r, at in zip(road, s, strict=True)],
         "links": list(_links(network)),
@@ -126,10 +126,15 @@ def outputs(seed: int) -> dict[str, str]:
             for what, paths in (("all", swerving), ("one", ego)):
                 try:
                     if what == "all":
-                        result = write_trajectory_scenario(scenario, motion, paths, path.with_name("o.xosc"), **words)
+                        result = write_converted(scenario, motion, paths, path.with_name("o.xosc"), **words)
                     else:
-                        result = write_lane_offset_scenario(
-                            scenario, motion, (), path.with_name("o.xosc"), trajectories=paths, **words
+                        result = write_converted(
+                            scenario,
+                            motion,
+                            paths,
+                            path.with_name("o.xosc"),
+                            chains=(),
+                            **words,
                         )
                 except FormatError as error:
                     hashes[f"{version} {what}"] = error.what

@@ -10,8 +10,9 @@ from xosc_lateral.files.opendrive import read_opendrive
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion, PlayedAction
 from xosc_lateral.world.motion.trajectory import distance_driven
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario import BoundingBox, Entity, Place
+from xosc_lateral.world.scenario.entity import BoundingBox, Entity
 from xosc_lateral.world.scenario.enums import EntityCategory, VehicleCategory
+from xosc_lateral.world.scenario.place import Place
 
 LANE_WIDTH = 3.5
 RADIUS = 400.0

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from xosc_lateral.files.opendrive import read_opendrive
-from xosc_lateral.world.road import DRIVING, RoadNetwork
+from xosc_lateral.world.road.lanes import DRIVING
+from xosc_lateral.world.road.network import RoadNetwork
 
 VALID = Path(__file__).parents[1] / "data" / "xodr" / "valid"
 

@@ -6,7 +6,7 @@ import shutil
 from pathlib import Path
 
 from xosc_lateral.files.openscenario.read import read_scenario
-from xosc_lateral.world.scenario import Scenario
+from xosc_lateral.world.scenario.scenario import Scenario
 
 ROAD = Path(__file__).parents[1] / "data" / "xosc" / "road.xodr"
 

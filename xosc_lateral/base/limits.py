@@ -132,7 +132,7 @@ CONTEXT_RANGES: Mapping[str, Range] = MappingProxyType(
         "illuminance": Range(0, 200_000, "the sun in the zenith: 130 000 lx"),
     }
 )
-"""Context by the names of DESIGN, section 4, in the units of `segment.CONTEXT_UNITS`."""
+"""Context by its names, in the units of `segment.CONTEXT_UNITS`."""
 
 DISTANCES = frozenset({"lead_distance", "left_distance", "right_distance"})
 """To vehicles in lanes; infinite where a lane has nobody in it."""

@@ -13,7 +13,7 @@ from xosc_lateral.base.arrays import FloatArray
 MINIMUM_SPEED = 40.0 / 3.6
 """Below this the model says nothing [m/s] (Neis & Beyerer cut their data at 40 km/h)."""
 
-# Contexts that a scenario can supply by itself (DESIGN, section 4): name -> (unit, what is neutral).
+# Contexts that a scenario can supply by itself: name -> (unit, what is neutral).
 # `None` as the neutral value: "there is none", written as NaN in the arrays (no vehicle ahead, say).
 CONTEXT_UNITS: Mapping[str, str] = MappingProxyType(
     {
@@ -61,7 +61,7 @@ class Segment:
     speed : array, shape (n,)
         [m/s]
     context : mapping of str to array, shape (n,)
-        What the driver may react to, under DESIGN's names or any other; NaN where there is nothing (no leader).
+        What the driver may react to (`CONTEXT_UNITS` and other names); NaN where there is nothing (no leader).
         A name that is absent has no effect.
     before, after : int
         Rows at the start and at the end of the arrays that lie outside the segment: context only, no offsets are

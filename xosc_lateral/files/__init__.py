@@ -1,1 +1,1 @@
-"""Reads and writes every format; the only folder that touches the disk."""
+"""Reads and writes every format: scenarios, roads, tables, profiles, pages."""

@@ -18,7 +18,7 @@ from xosc_lateral.files.atomic import write_atomically
 from xosc_lateral.files.json_text import canonical_json
 from xosc_lateral.files.output_paths import SIDECAR_SUFFIX
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
-from xosc_lateral.world.road import RoadNetwork
+from xosc_lateral.world.road.network import RoadNetwork
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 

@@ -12,18 +12,20 @@ from tests.kit.profiles import simulated_profile
 from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
 from xosc_lateral.drivers.drives.drive import Drive, Run
 from xosc_lateral.drivers.drives.filters import filtered, low_pass_between
-from xosc_lateral.drivers.fitting.bands import smoothed_above, split_by_band, visible_below
-from xosc_lateral.drivers.fitting.fast_part import (
+from xosc_lateral.drivers.fitting.bands import (
     SPEED_KNOTS,
     density_of,
     fast_part_of,
     fast_part_of_runs,
     growth_with_speed,
     shows_growth,
+    split_by_band,
     steering_gain,
+    visible_below,
     with_fast_part,
 )
 from xosc_lateral.drivers.fitting.fitting import fit_profile
+from xosc_lateral.drivers.fitting.warnings import smoothed_above
 from xosc_lateral.drivers.model.core.base import ModelKind
 from xosc_lateral.drivers.model.sampled_offsets import sample_free
 from xosc_lateral.drivers.model.sensor import SensorModel

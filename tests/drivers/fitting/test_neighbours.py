@@ -10,16 +10,14 @@ import pytest
 from tests.kit.motion import LANE_WIDTH, drive, entity, together, two_roads
 from tests.kit.profiles import simulated_profile
 from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.fitting.context_effects import FADING_DISTANCE, measure_beside, response_to
 from xosc_lateral.drivers.fitting.fitting import fit_population
-from xosc_lateral.drivers.fitting.neighbours import LAG, ORDER, RESPONSE, SCALE, basis_of, measure_beside
 from xosc_lateral.drivers.model.effects import Acts, Proximity
 from xosc_lateral.drivers.model.profile import Basis, Beside
 from xosc_lateral.workflows.conversion.enrich import enrich
 from xosc_lateral.workflows.conversion.result import Neighbours
 
-BESIDE = Proximity(
-    acts=Acts.LOCATION, column="right_distance", scale=SCALE, lag_s=LAG, response_s=RESPONSE, response_order=ORDER
-)
+BESIDE = response_to("right_distance")
 
 
 def runs_beside(shift: float, *, drives: int = 3, minutes: float = 10.0, seed: int = 0) -> list[Run]:
@@ -52,8 +50,8 @@ def test_three_drives_say_how_far_a_driver_moves_and_that_he_does_not(shift: flo
     assert known["right"].basis is Basis.MEASURED
     assert known["right"].shift == pytest.approx(shift, abs=3 * known["right"].error)
     profile = fit_population(runs, name="one")
-    assert basis_of(profile, "right") is Basis.MEASURED
-    assert basis_of(profile, "left") is Basis.UNKNOWN
+    assert profile.basis_of("right") is Basis.MEASURED
+    assert profile.basis_of("left") is Basis.UNKNOWN
     sizes = [effect.coefficients[0] for effect in profile.effects if isinstance(effect, Proximity)]
     assert sizes == ([pytest.approx(shift, abs=0.05)] if shift else [])
 
@@ -68,7 +66,7 @@ def test_a_measured_shift_that_no_effect_makes_is_as_good_as_unknown() -> None:
     from msgspec.structs import replace
 
     known = {"right": Beside(Basis.MEASURED, 600.0, 0.2, 0.02)}
-    assert basis_of(replace(simulated_profile(), beside=known), "right") is Basis.UNKNOWN
+    assert replace(simulated_profile(), beside=known).basis_of("right") is Basis.UNKNOWN
 
 
 @pytest.mark.parametrize(
@@ -112,7 +110,7 @@ def test_with_no_neighbours_not_even_a_profile_s_own_effect_answers(tmp_path: Pa
         Proximity(
             acts=Acts.LOCATION,
             column="right_distance",
-            scale=SCALE,
+            scale=FADING_DISTANCE,
             coefficients=(0.3,),
             errors=(0.01,),
             reference=(0.0,),

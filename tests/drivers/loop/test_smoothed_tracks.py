@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.kit.planted import planted_drive
-from xosc_lateral.drivers.fitting.fast_part import density_of
+from xosc_lateral.drivers.fitting.bands import density_of
 from xosc_lateral.drivers.loop.held_out import fit_refined
 from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm

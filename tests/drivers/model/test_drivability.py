@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.drivers.model.drivability import JERK_LIMIT, LIMIT, comfort, drivable, strain
+from xosc_lateral.drivers.model.plausibility import ACCELERATION_LIMIT, JERK_LIMIT, comfort, drivable, strain
 
 STEP = 0.2
 
@@ -32,7 +32,7 @@ def test_what_can_be_driven_is_left_alone_and_the_rest_is_smoothed_no_more_than_
     path, bound = drivable(shaky, STEP, speed)
     assert bound is not None and bound.before.excess > 1.0 >= bound.after.excess
     found = strain(path, STEP, speed)
-    assert found.largest <= LIMIT and found.jerk <= JERK_LIMIT and found.seldom <= comfort(speed[:1])[0]
+    assert found.largest <= ACCELERATION_LIMIT and found.jerk <= JERK_LIMIT and found.seldom <= comfort(speed[:1])[0]
     assert np.corrcoef(path, calm)[0, 1] > 0.98, "the wander stays"
     assert (path[0], path[-1]) == pytest.approx((shaky[0], shaky[-1]), abs=0.1)
     assert "could not be driven" in str(bound)

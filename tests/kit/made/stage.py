@@ -10,7 +10,7 @@ import numpy as np
 
 from tests.kit.made.roads import Map
 from tests.kit.made.xml import element
-from xosc_lateral.world.road import RoadNetwork
+from xosc_lateral.world.road.network import RoadNetwork
 
 T = TypeVar("T")
 

@@ -9,8 +9,9 @@ import pytest
 from msgspec import structs
 
 from tests.kit.motion import LANE_WIDTH, drive, entity, together, two_roads
-from xosc_lateral.workflows.conversion.consequences import gaps_of, lane_departures
+from xosc_lateral.workflows.conversion.consequences import lane_departures
 from xosc_lateral.workflows.conversion.result import EntityResult, SampledSegment
+from xosc_lateral.world.motion.gaps import gaps_of
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
 from xosc_lateral.world.motion.segments import cut_segments
 from xosc_lateral.world.motion.trajectory import displace

@@ -14,9 +14,10 @@ from xosc_lateral.workflows.conversion.enrich import enrich
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.world.motion.nominal import NominalMotion, PlayedAction
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario import Action, Place
 from xosc_lateral.world.scenario.enums import VehicleCategory
 from xosc_lateral.world.scenario.global_actions import Environment, EnvironmentAction, Weather
+from xosc_lateral.world.scenario.place import Place
+from xosc_lateral.world.scenario.scenario import Action
 from xosc_lateral.world.surroundings.context import STEERING
 
 PROFILE = Neighbours.PROFILE

@@ -58,11 +58,11 @@ def test_the_smallest_change_that_helps_is_one_chain_of_one_vehicle() -> None:
     change = Comparison((), (Change("event 'cut in' of 'A' at 8.00 s", "A", 8.0, "no longer happens"),))
     chains = [_chain("A", None), _chain("A", ("late",)), _chain("B", None)]
 
-    def attempt(some: list[OffsetChain]) -> list[Comparison]:
+    def attempt(some: list[OffsetChain]) -> tuple[None, list[Comparison]]:
         large = [one for one in some if one.entity == "A" and one.after is None and one.ring.origin > 0.034]
-        return [change if large else Comparison((), ())]
+        return None, [change if large else Comparison((), ())]
 
-    kept = keep_meaning(chains, _nobody(), attempt)
+    _, kept = keep_meaning(chains, _nobody(), attempt)
     assert kept.changes == ()
     assert [chain.ring.origin for chain in kept.chains] == [pytest.approx(0.025), 0.1, 0.1]
     assert kept.smaller == {"A": (Size(0.25), False)}
@@ -74,12 +74,12 @@ def test_a_contact_costs_the_largest_offsets_alone() -> None:
     ring = Ring(0.05, (Move(0.0, 3.0, -0.1), Move(0.0, 4.0, 0.25), Move(0.0, 3.0, -0.15)))
     chains = [_chain("A", None), OffsetChain("B", None, ring)]
 
-    def attempt(some: list[OffsetChain]) -> list[Comparison]:
+    def attempt(some: list[OffsetChain]) -> tuple[None, list[Comparison]]:
         ring = next(chain.ring for chain in some if chain.entity == "B")
         place = ring.origin + sum(move.change for move in ring.moves[:2])
-        return [change if place > 0.16 else Comparison((), ())]
+        return None, [change if place > 0.16 else Comparison((), ())]
 
-    kept = keep_meaning(chains, _nobody(), attempt)
+    _, kept = keep_meaning(chains, _nobody(), attempt)
     assert kept.chains[0] == chains[0] and kept.smaller == {"B": (Size(limit=0.75), True)}
     assert [move.change for move in kept.chains[1].ring.moves] == pytest.approx([-0.1, 0.2, -0.1])
     assert "lane offsets of 'B' are at most 0.75 times the largest that was sampled" in next(kept.warnings(()))
@@ -88,7 +88,7 @@ def test_a_contact_costs_the_largest_offsets_alone() -> None:
 def test_what_no_change_of_offsets_helps_against_is_told_and_costs_nobody_offsets() -> None:
     change = Comparison((), (Change("event 'cut in' of 'A' at 8.00 s", "A", 8.0, "no longer happens"),))
     chains = [_chain("A", None), _chain("B", None)]
-    kept = keep_meaning(chains, _nobody(), lambda _: [change])
+    _, kept = keep_meaning(chains, _nobody(), lambda _: (None, [change]))
     assert kept.chains == tuple(chains) and kept.smaller == {}
     assert kept.changes == change.changes
 

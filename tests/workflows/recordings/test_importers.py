@@ -19,10 +19,10 @@ from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.cli import main
 from xosc_lateral.files.output_tables import METADATA_KEY
 from xosc_lateral.workflows.recordings.cuts import CutSettings, lane_changes, long_gaps, name_states, number_runs
+from xosc_lateral.workflows.recordings.importers import Imported
 from xosc_lateral.workflows.recordings.importers.dlr_ht import import_dlr_ht, read_tracks
 from xosc_lateral.workflows.recordings.importers.levelx import import_levelx
-from xosc_lateral.workflows.recordings.importers.table import Imported
-from xosc_lateral.workflows.recordings.lane_graph import REACH, find_neighbours
+from xosc_lateral.workflows.recordings.lane_graph import NEIGHBOUR_DISTANCE, find_neighbours
 from xosc_lateral.workflows.recordings.lanes_from_tracks import fit_lane_centre
 from xosc_lateral.world.road.reference_line import fit_reference_line
 
@@ -54,8 +54,8 @@ def test_neighbours_agree_with_a_search_over_all_pairs():
             if not there[name][k]:
                 assert np.isnan(found), "no such lane"
             else:
-                assert (found == np.inf and free > REACH) or found <= min(free, REACH)
-            if step == 0 and free <= REACH:
+                assert (found == np.inf and free > NEIGHBOUR_DISTANCE) or found <= min(free, NEIGHBOUR_DISTANCE)
+            if step == 0 and free <= NEIGHBOUR_DISTANCE:
                 assert found == pytest.approx(free)
                 assert near["lead_is_truck"][k] == truck[nearest]
 
@@ -281,7 +281,8 @@ def test_dlr_leaders_and_classes_are_those_of_the_recording(dlr_full):
     assert 10 < len(trucks) < 45
     assert table["is_truck"].eq(table["vehicle_class"] == "truck").all(), "as a scenario states it"
     inside = table[table["lane_index"] >= 0]
-    assert inside["lead_distance"].replace(np.inf, REACH).between(0, REACH).all(), "infinite: nobody within reach"
+    lead = inside["lead_distance"].replace(np.inf, NEIGHBOUR_DISTANCE)
+    assert lead.between(0, NEIGHBOUR_DISTANCE).all(), "infinite: nobody within reach"
     assert inside["left_distance"].isna().eq(inside["lane_index"] == 1).all(), "no lane beyond the left one"
     assert inside["right_distance"].isna().eq(inside["lane_index"] == 0).all()
     assert set(table["lead_is_truck"].unique()) <= {0.0, 1.0}

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.workflows.recordings.lateral import lateral_plan
-from xosc_lateral.workflows.recordings.motion_fits import SHAPES
+from xosc_lateral.workflows.recordings.lateral import SHAPES, lateral_plan
 from xosc_lateral.workflows.recordings.recorded import RecordedVehicle
 from xosc_lateral.world.scenario.enums import DynamicsShape
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.workflows.recordings.motion_fits import SpeedProfile, fit_speed
+from xosc_lateral.workflows.recordings.plan import SpeedProfile, fit_speed
 
 TIME = np.arange(0.0, 60.05, 0.1)
 

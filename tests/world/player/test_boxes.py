@@ -23,14 +23,14 @@ from xosc_lateral.world.player.boxes import (
     overlap,
 )
 from xosc_lateral.world.player.simulation import TrafficSignals
-from xosc_lateral.world.player.values import Values, holds, holds_exactly
+from xosc_lateral.world.player.values import Values, holds
 from xosc_lateral.world.road.positions import Pose
-from xosc_lateral.world.scenario import Parameter, Performance, Place
-from xosc_lateral.world.scenario.entity import BoundingBox
+from xosc_lateral.world.scenario.entity import BoundingBox, Performance
 from xosc_lateral.world.scenario.enums import ParameterType, Rule
 from xosc_lateral.world.scenario.global_actions import ModifyOperation
+from xosc_lateral.world.scenario.place import Place
 from xosc_lateral.world.scenario.private_actions import DynamicConstraints
-from xosc_lateral.world.scenario.scenario import TrafficSignalController, TrafficSignalPhase
+from xosc_lateral.world.scenario.scenario import Parameter, TrafficSignalController, TrafficSignalPhase
 
 HERE = Place(Path("x.xosc"), 1, "X")
 
@@ -135,12 +135,12 @@ def test_limits_are_the_tighter_of_action_and_vehicle() -> None:
 def test_rules_hold_as_they_say_and_hardly_apart_is_equal(rule: Rule, below: bool, same: bool, above: bool) -> None:
     assert [holds(value, rule, 10.0) for value in (9.0, 10.0, 11.0)] == [below, same, above]
     assert [holds(value, rule, 10.0) for value in (10.0 - 1e-9, 10.0 + 1e-9)] == [same, same]
-    assert [holds_exactly(value, rule, 10) for value in (9, 10, 11)] == [below, same, above]
+    assert [rule.holds(value, 10) for value in (9, 10, 11)] == [below, same, above]
     assert holds(inf, rule, inf) is same
 
 
 def declared(**values: tuple[ParameterType, str]) -> Values:
-    return Values({name: Parameter(name, kind, text, HERE) for name, (kind, text) in values.items()})
+    return Values("parameter", {name: Parameter(name, kind, text, HERE) for name, (kind, text) in values.items()})
 
 
 def test_values_are_read_as_their_types() -> None:

@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from xosc_lateral.world.player.actions.speed_profile import NoSolutionError, Piece, follow
-from xosc_lateral.world.scenario import Performance
+from xosc_lateral.world.scenario.entity import Performance
 
 LIMITS = Performance(100.0, 3.0, 5.0, 2.0, 4.0)
 

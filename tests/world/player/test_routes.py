@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from xosc_lateral.world.player.state import NO_ROAD, Placement, RouteGuide, guide
-from xosc_lateral.world.road import LaneLink, RouteStep
+from xosc_lateral.world.road.positions import LaneLink, RouteStep
 
 STEPS = (RouteStep(0, 1, 20.0, 100.0), RouteStep(7, -1, 50.0, 0.0), RouteStep(3, 1, 0.0, 30.0))
 """80 m along road 0, 50 m against road 7, 30 m along road 3."""

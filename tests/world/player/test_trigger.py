@@ -143,7 +143,7 @@ def test_a_trigger_that_rests_fires_when_one_that_is_always_looked_at_does(seed:
     resting, looking = (
         RunningTrigger(
             tuple(
-                tuple(RunningCondition(w, NONE, d, w) for w, d in zip(group, row, strict=True))
+                tuple(RunningCondition(w, NONE, d) for w, d in zip(group, row, strict=True))
                 for group, row in zip(watches, delays.tolist(), strict=True)
             ),
             when_empty=True,

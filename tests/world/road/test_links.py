@@ -10,7 +10,7 @@ import pytest
 from tests.kit.places import VALID, hand_written
 from xosc_lateral.files.opendrive import read_opendrive
 from xosc_lateral.files.opendrive.reader import parse_opendrive
-from xosc_lateral.world.road import DRIVING
+from xosc_lateral.world.road.lanes import DRIVING
 
 
 def named(network, link):

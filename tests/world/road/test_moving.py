@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from tests.kit.places import hand_written
-from xosc_lateral.world.road import LaneLink
-from xosc_lateral.world.road.links import most_turning
+from xosc_lateral.world.road.positions import LaneLink
 
 
 def test_moving_along_crosses_a_junction_straight_on_unless_told_otherwise():
@@ -77,4 +76,4 @@ def test_the_straightest_of_several_ways_is_taken():
     network = hand_written("junction")
     options = [LaneLink(network.index_of(name), -1, 0.0, 1) for name in ("west-south", "west-east", "south-east")]
     assert network.straightest(options) == options[1]
-    assert most_turning(network.roads, options) != options[1]
+    assert network.most_turning(options) != options[1]

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from tests.kit.places import hand_written
-from xosc_lateral.world.road import DRIVING, RoadNetwork
+from xosc_lateral.world.road.lanes import DRIVING
+from xosc_lateral.world.road.network import RoadNetwork
 
 SPACING = 0.5
 """Of the places, along and across. [m]"""

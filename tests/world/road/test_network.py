@@ -127,7 +127,9 @@ def test_offset_and_t_turn_into_each_other_with_the_sign_of_travel():
     network = hand_written("straight")
     road, lane, s, offset = random_places(network, np.random.default_rng(3), 30)
     t = network.offset_to_t(road, lane, s, offset)
-    assert np.allclose(network.t_to_offset(road, lane, s, t), offset, atol=1e-12)
+    assert np.allclose(
+        network.travel_directions(road, lane) * (t - network.lane_centre_t(road, lane, s)), offset, atol=1e-12
+    )
     assert network.offset_to_t(0, 1, 10.0, 0.5) == pytest.approx(1.75 - 0.5)
     assert network.offset_to_t(0, -1, 10.0, 0.5) == pytest.approx(-1.75 + 0.5)
     assert network.offset_from_offset_t(0, 1, 0.5) == -0.5
@@ -196,15 +198,16 @@ def test_crossfall_and_shape_lower_the_road_beside_its_reference_line():
     # at s = 400 m the right half falls inwards by 4 %; half way there by 2 %
     assert network.road_pose_at(shape, 200.0, -5.0).z == pytest.approx(0.1)
     assert network.road_pose_at(shape, 200.0, 5.0).z == pytest.approx(0.0)
-    assert network.crossfall(roof, [-1, 1], 10.0) == pytest.approx([100 * 0.025, 100 * 0.02])
-    assert network.crossfall(shape, -1, 200.0) == pytest.approx(-2.0)
+    assert network.lean(roof, [-1, 1], 10.0)[0] == pytest.approx([100 * 0.025, 100 * 0.02])
+    assert network.lean(shape, -1, 200.0)[0] == pytest.approx(-2.0)
 
 
 def test_crossfall_and_grade_are_seen_in_travel_direction():
     network = hand_written("leaning")
     bank = network.index_of("bank")
-    assert network.crossfall(bank, [-1, 1], 300.0) == pytest.approx([100 * tan(0.1), -100 * tan(0.1)])
-    assert network.grade(bank, [-1, 1], 300.0) == pytest.approx([5.0, -5.0])
+    crossfall, grade = network.lean(bank, [-1, 1], 300.0)
+    assert crossfall == pytest.approx([100 * tan(0.1), -100 * tan(0.1)])
+    assert grade == pytest.approx([5.0, -5.0])
 
 
 def test_a_kerb_lifts_its_lane_and_rises_linearly_between_records():

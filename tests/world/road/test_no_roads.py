@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from xosc_lateral.world.road import RoadNetwork
+from xosc_lateral.world.road.network import RoadNetwork
 
 
 def test_a_network_without_roads_answers_an_empty_batch_with_an_empty_one():

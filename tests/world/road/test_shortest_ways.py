@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import cast
-
 import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import shortest_path
 
-from xosc_lateral.world.road.links import End, Links
-from xosc_lateral.world.road.routes import path_between
+from xosc_lateral.world.road.links import End
+from xosc_lateral.world.road.routes import Routes
 
 ROADS = 14
 
@@ -20,7 +18,7 @@ class _Road:
         self.length = length
 
 
-class Net:
+class Net(Routes):
     """Roads between crossings, at which whoever arrives may enter every road but the one that he comes from.
 
     Parameters
@@ -74,7 +72,7 @@ def test_the_way_is_the_shortest_there_is(seed: int) -> None:
     for _ in range(12):
         road, goal = (int(one) for one in rng.integers(0, ROADS, size=2))
         start, end = (road, rng.uniform(0.0, lengths[road])), (goal, rng.uniform(0.0, lengths[goal]))
-        found, expected = path_between(cast(Links, roads), start, end), shortest(roads, start, end)
+        found, expected = roads.path_between(start, end), shortest(roads, start, end)
         if found is None:
             assert expected == np.inf
         else:
@@ -87,7 +85,7 @@ def test_the_way_that_is_told_is_linked_and_as_long_as_it_says(seed: int) -> Non
     for _ in range(12):
         road, goal = (int(one) for one in rng.choice(ROADS, size=2, replace=False))
         s, goal_s = (rng.uniform(0.0, roads.roads[one].length) for one in (road, goal))
-        found = path_between(cast(Links, roads), (road, s), (goal, goal_s))
+        found = roads.path_between((road, s), (goal, goal_s))
         if found is None:
             continue
         length, here = roads.roads[road].length - s if found.way > 0 else s, (road, found.way)
@@ -102,14 +100,14 @@ def test_the_way_that_is_told_is_linked_and_as_long_as_it_says(seed: int) -> Non
 
 @pytest.mark.parametrize("seed", range(4))
 def test_there_and_back_is_as_far_and_turned_round_it_has_the_other_sign(seed: int) -> None:
-    roads, rng = cast(Links, net(seed)), np.random.default_rng([3, seed])
+    roads, rng = net(seed), np.random.default_rng([3, seed])
     for _ in range(12):
         road, goal = (int(one) for one in rng.choice(ROADS, size=2, replace=False))
         start, end = ((one, rng.uniform(0.0, roads.roads[one].length)) for one in (road, goal))
         there, back, turned = (
-            path_between(roads, start, end),
-            path_between(roads, end, start),
-            path_between(roads, start, end, direction=-1),
+            roads.path_between(start, end),
+            roads.path_between(end, start),
+            roads.path_between(start, end, direction=-1),
         )
         if there is None:
             assert back is None and turned is None
@@ -121,11 +119,11 @@ def test_there_and_back_is_as_far_and_turned_round_it_has_the_other_sign(seed: i
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_limit_lets_through_what_is_within_it_and_nothing_else(seed: int) -> None:
-    roads, rng = cast(Links, net(seed)), np.random.default_rng([4, seed])
+    roads, rng = net(seed), np.random.default_rng([4, seed])
     for _ in range(12):
         road, goal = (int(one) for one in rng.integers(0, ROADS, size=2))
         start, end = ((one, rng.uniform(0.0, roads.roads[one].length)) for one in (road, goal))
-        free = path_between(roads, start, end)
+        free = roads.path_between(start, end)
         if free is not None:
-            assert path_between(roads, start, end, limit=abs(free.ds) + 1e-6) == free
-            assert path_between(roads, start, end, limit=abs(free.ds) - 1e-6) is None
+            assert roads.path_between(start, end, limit=abs(free.ds) + 1e-6) == free
+            assert roads.path_between(start, end, limit=abs(free.ds) - 1e-6) is None

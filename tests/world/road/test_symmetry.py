@@ -10,7 +10,7 @@ import pytest
 
 from tests.kit.places import VALID, hand_written, random_places, wrapped
 from tests.kit.retold_roads import mirrored, moved, retold, turned_round
-from xosc_lateral.world.road import RoadNetwork
+from xosc_lateral.world.road.network import RoadNetwork
 
 NAMES = sorted({path.stem for path in VALID.glob("*.xodr")} - {"odd"})
 TURNABLE = [name for name in NAMES if name not in ("cubics", "sections")]
@@ -63,12 +63,14 @@ def test_what_a_driver_sees_is_mirrored_with_the_road(name, tmp_path):
     told = in_the_mirror(name, tmp_path)
     here, there = told.both("travel_directions", 2)
     assert np.array_equal(there, here)
-    for same in ("lane_width", "grade", "speed_limit"):
+    (crossfall, grade), (other_crossfall, other_grade) = told.both("lean")
+    assert other_grade == pytest.approx(grade, rel=1e-9, abs=1e-12)
+    assert other_crossfall == pytest.approx(-crossfall, abs=1e-9)
+    for same in ("lane_width", "speed_limit"):
         here, there = told.both(same)
         assert there == pytest.approx(here, rel=1e-9, abs=1e-12), same
-    for opposite in ("lane_centre_t", "crossfall"):
-        here, there = told.both(opposite)
-        assert there == pytest.approx(-here, abs=1e-9), opposite
+    here, there = told.both("lane_centre_t")
+    assert there == pytest.approx(-here, abs=1e-9)
     here, there = told.both("lane_curvature", 4)
     assert there == pytest.approx(-here, rel=1e-6, abs=1e-9)
     (index, count), (other_index, other_count) = told.both("lane_index")
@@ -101,8 +103,8 @@ def test_what_a_driver_sees_does_not_hang_on_where_a_road_is_drawn_from(name, tm
     told = from_the_other_end(name, tmp_path)
     here, there = told.both("travel_directions", 2)
     assert np.array_equal(there, -here)
-    for same in ("lane_width", "grade", "crossfall"):
-        here, there = told.both(same)
+    for same in ("lane_width", "lean"):
+        here, there = (np.asarray(answer) for answer in told.both(same))
         assert there == pytest.approx(here, rel=1e-7, abs=1e-9), same
     here, there = told.both("lane_curvature", 4)
     assert there == pytest.approx(here, rel=1e-5, abs=1e-8)

@@ -14,9 +14,11 @@ from tests.kit.profiles import effect_from_dict
 from xosc_lateral.drivers.model.effects import ColumnEffect
 from xosc_lateral.world.motion.nominal import EntityMotion, PlayedAction
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario import Action, Entity, Place
+from xosc_lateral.world.scenario.entity import Entity
 from xosc_lateral.world.scenario.enums import VehicleCategory
 from xosc_lateral.world.scenario.global_actions import Environment, EnvironmentAction, TimeOfDay, Weather
+from xosc_lateral.world.scenario.place import Place
+from xosc_lateral.world.scenario.scenario import Action
 from xosc_lateral.world.surroundings.around import INFLUENCE_DISTANCE
 from xosc_lateral.world.surroundings.context import STEERING, entity_context
 

@@ -9,7 +9,7 @@ import pytest
 
 from xosc_lateral.world.motion import gaps
 from xosc_lateral.world.motion.gaps import BoxPath, smallest_gaps
-from xosc_lateral.world.surroundings.around import pairs_within
+from xosc_lateral.world.surroundings.around import stretches_within
 
 
 def paths(count: int, seed: int, turn: float) -> tuple[list[np.ndarray], list[np.ndarray]]:
@@ -35,9 +35,10 @@ def test_no_pair_that_comes_near_is_missing_and_few_others_are_there(seed: int, 
         for a, b in combinations(range(len(x)), 2)
         if np.nanmin([np.inf, *np.hypot(x[a] - x[b], y[a] - y[b])]) <= reach
     }
-    found = pairs_within(x, y, reach)
-    assert near and near <= set(found)
-    assert found == sorted(found)
+    stretches = [pairs for _, pairs in stretches_within(x, y, reach)]
+    found = set().union(*stretches)
+    assert near and near <= found
+    assert all(pairs == sorted(pairs) for pairs in stretches)
     assert len(found) < 0.5 * len(x) * (len(x) - 1) / 2
 
 
@@ -54,5 +55,5 @@ def test_gaps_are_those_of_all_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_nobody_is_near_nobody() -> None:
-    assert pairs_within([], [], 1.0) == []
-    assert pairs_within([np.zeros(3)], [np.zeros(3)], 1.0) == []
+    assert list(stretches_within([], [], 1.0)) == []
+    assert list(stretches_within([np.zeros(3)], [np.zeros(3)], 1.0)) == []

@@ -24,8 +24,8 @@ from xosc_lateral.drivers.evaluation.metrics import (
     snippet_metrics,
 )
 from xosc_lateral.drivers.fitting.bands import in_bands, measured
+from xosc_lateral.drivers.fitting.context_effects import COLUMNS as KNOWN_TO_THE_BASE
 from xosc_lateral.drivers.fitting.fitting import fit_population, fit_runs
-from xosc_lateral.drivers.fitting.place import COLUMNS as KNOWN_TO_THE_BASE
 from xosc_lateral.drivers.loop.columns import Column
 from xosc_lateral.drivers.loop.cross_validation import Nested, Progress, folds_of, hold_out_blocks
 from xosc_lateral.drivers.loop.model import Fitted, Removal

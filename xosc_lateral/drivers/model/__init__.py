@@ -1,1 +1,1 @@
-"""The lateral model: chains, noise, effects, profiles, sampling, fitting. Numbers only, no XML, roads or files."""
+"""The lateral model: chains, noise, effects, profiles, sampling. Numbers only, no XML, roads or files."""

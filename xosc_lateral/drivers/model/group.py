@@ -18,9 +18,9 @@ from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, EffectTerms
 from xosc_lateral.drivers.model.effects.base import terms_of
 from xosc_lateral.drivers.model.effects.response import ResponseState
 from xosc_lateral.drivers.model.linear_filters import SAMPLES_AHEAD, extrapolate, piece
-from xosc_lateral.drivers.model.process import DriveProcess, Movement, combine, offsets_of
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.records import plain, read_as
+from xosc_lateral.drivers.model.sampling import DriveProcess, Movement, combine, offsets_of
 
 BLOCK = 64
 """Model steps drawn at once for a driver. [-]"""
@@ -208,29 +208,23 @@ class OffsetGroup:
 
     def sample(self, width: FloatArray, start: float | None = None) -> FloatArray:
         """Everybody's next sample, once what it depends on was seen, shape (n,); the first may be given. [m]"""
-        effects = self._effects()
-        if start is not None:
-            for k, drive in enumerate(self._drives):
-                drive.start(start, width[k : k + 1], self._all_terms(k, effects, k))
-        return self._next(np.arange(len(self)), effects, width)
+        return self._next(np.arange(len(self)), self._effects(), width, start)
 
     def _effects(self) -> list[EffectTerms]:
         """What each effect of columns does to each driver at the sample that is next, shape (n,)."""
         return [response.next() for response in self.responses]
 
-    def _all_terms(self, index: int, effects: Sequence[EffectTerms], row: int) -> EffectTerms:
-        """What all effects do to the driver `index`, who is a `row` of theirs, at his next sample, shape (1,)."""
-        hidden = self._drives[index].hidden_terms_at(self._state["row"][index : index + 1])
-        return combine([hidden, *(terms.rows(slice(row, row + 1)) for terms in effects)])
-
-    def _next(self, drivers: IntArray, effects: Sequence[EffectTerms], width: FloatArray) -> FloatArray:
+    def _next(
+        self, drivers: IntArray, effects: Sequence[EffectTerms], width: FloatArray, start: float | None = None
+    ) -> FloatArray:
         """The next sample of some drivers, shape (m,). [m]"""
         state = self._state
-        if self._rated:  # nothing can be drawn ahead where effects act on the rate of mean reversion
-            taken = [
-                self._drives[index].take(self._all_terms(index, effects, row), width[row : row + 1])
-                for row, index in enumerate(drivers.tolist())
-            ]
+        if self._rated or start is not None:  # what the rate of mean reversion acts on can't be drawn ahead
+            taken = []
+            for k, index in enumerate(drivers.tolist()):
+                hidden, row = self._drives[index].hidden_terms_at(state["row"][index : index + 1]), slice(k, k + 1)
+                terms = combine([hidden, *(effect.rows(row) for effect in effects)])
+                taken.append(self._drives[index].take(terms, width[row], start))
             state["row"][drivers] += 1
             return np.concatenate(taken)
         self._draw(drivers)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from enum import StrEnum
 from functools import lru_cache
 from typing import Annotated, Any
@@ -54,6 +54,17 @@ class Beside(Record, frozen=True):
 POPULATION = {side: Beside(Basis.POPULATION) for side in SIDES}
 """Of profiles whose effects are of the recording that the law of `surroundings.give_way` was measured in."""
 
+SIGNIFICANT_ERRORS = 2.6
+"""Standard errors from which a shift beside a vehicle is an effect: one of a hundred by chance. [-]"""
+
+UNMEASURED_RESPONSES = {
+    Basis.POPULATION: "moves as the drivers of its recording do",
+    Basis.DECLARED: "moves as its effects state",
+    Basis.MEASURED: "moves as its effects state",
+    Basis.UNKNOWN: "not known, does not move",
+}
+"""How a driver responds to vehicles beside him, by what that rests on, where the profile holds no figure."""
+
 
 class Provenance(Record, frozen=True):
     """Where a profile comes from."""
@@ -75,18 +86,13 @@ class Provenance(Record, frozen=True):
 class Metadata(Record, frozen=True):
     """What a profile is of, to be searched by; all of it is optional."""
 
-    version: str = ""
-    """Of the profile itself, as its owners count: "2", "1.3"."""
+    version: str = ""  # Of the profile itself, as its owners count: "2", "1.3".
     driver: str = ""
     vehicle: str = ""
-    road: str = ""
-    """Whom and what was measured, and where: "professional", "truck", "motorway"."""
-    country: str = ""
-    """ISO 3166-1 alpha-2: "DE"."""
-    date: str = ""
-    """When the drives were recorded, ISO 8601: "2026-05", "2026-05-03/2026-06-01"."""
-    licence: str = ""
-    """Of the profile."""
+    road: str = ""  # Whom and what was measured, and where: "professional", "truck", "motorway".
+    country: str = ""  # ISO 3166-1 alpha-2: "DE".
+    date: str = ""  # When the drives were recorded, ISO 8601: "2026-05", "2026-05-03/2026-06-01".
+    licence: str = ""  # Of the profile.
     tags: tuple[str, ...] = ()
 
 
@@ -100,43 +106,21 @@ MAX_LANE_WIDTH = 10.0
 
 
 class DriverProfile(Record, frozen=True):
-    """What it takes to sample offsets. Raises `DriverProfileError` if it has no name or its lane width is no width.
-
-    Parameters
-    ----------
-    name : str
-        Its id: the same in the file, in the file's name and wherever it is looked up.
-    model : CoreModel
-        Base movement.
-    effects : tuple of Effect
-        In the order in which they were found.
-    lane_width : float
-        Median width of the lanes that it was fitted on; where a lane's own width is unknown it stands in.
-        Above 0, at most `MAX_LANE_WIDTH`. [m]
-    provenance : Provenance
-    metadata : Metadata
-    sensor : SensorModel, optional
-        What the sensor added to the drives it was fitted on, where that is known.
-    left_hand : bool
-        Fitted on left-hand traffic. On a road of the other hand it is sampled as in a mirror.
-    beside : mapping of str to Beside
-        By side, "left" and "right": whether its answer to neighbours there is known, and how.
-    validity : Validity
-        Where it is known to hold.
-    """
+    """What it takes to sample offsets. Raises `DriverProfileError` if it has no name or its lane width is no width."""
 
     later = ("left_hand", "beside", "validity")
 
-    name: str = field(name="id")
-    model: CoreModel
-    effects: tuple[Effect, ...] = ()
+    name: str = field(name="id")  # The same in the file, in the file's name and wherever it is looked up.
+    model: CoreModel  # Base movement.
+    effects: tuple[Effect, ...] = ()  # In the order in which they were found.
+    # Median width of the lanes that it was fitted on; where a lane's own width is unknown it stands in. [m]
     lane_width: float = 3.75
     provenance: Provenance = field(default_factory=Provenance)
     metadata: Metadata = field(default_factory=Metadata)
-    sensor: SensorModel | None = None
-    left_hand: bool = False
-    beside: Mapping[str, Beside] = field(default_factory=dict)
-    validity: Validity = Validity()
+    sensor: SensorModel | None = None  # What it added to the drives that were fitted, where that is known.
+    left_hand: bool = False  # Fitted on left-hand traffic. On a road of the other hand it is sampled as in a mirror.
+    beside: Mapping[str, Beside] = field(default_factory=dict)  # Whether its response on a side is known, and how.
+    validity: Validity = Validity()  # Where it is known to hold.
 
     def __post_init__(self) -> None:
         if not self.name:
@@ -180,24 +164,44 @@ class DriverProfile(Record, frozen=True):
         """Context columns that its effects read."""
         return tuple(sorted({column for effect in self.effects for column in effect.columns}))
 
+    def basis_of(self, side: str) -> Basis:
+        """Where its response to neighbours on a side is known from.
+
+        A shift that was measured and that no effect makes is as good as unknown; one that effects make and of which
+        nothing else is said was measured by who found them.
+        """
+        responds, known = any(column in COLUMNS[side] for column in self.columns), self.beside.get(side)
+        if known is None or known.basis is Basis.UNKNOWN:
+            return Basis.MEASURED if responds else Basis.UNKNOWN
+        if known.basis is Basis.MEASURED and not responds and abs(known.shift) > SIGNIFICANT_ERRORS * known.error:
+            return Basis.UNKNOWN
+        return known.basis
+
+    def responses_in_words(self, borrowed: Collection[str] = ()) -> str:
+        """How a driver responds to vehicles on either side, in a line; on `borrowed` sides as the population does."""
+
+        def in_words(side: str) -> str:
+            if side in borrowed:
+                return "not known, moves as the population does"
+            basis, known = self.basis_of(side), self.beside.get(side)
+            if known is None or not known.seconds:
+                return UNMEASURED_RESPONSES[basis]
+            way = "left" if known.shift > 0 else "right"
+            return f"moves {abs(known.shift):.2f} +- {known.error:.2f} m to the {way} ({basis}, {known.seconds:.0f} s)"
+
+        left, right = map(in_words, SIDES)
+        if left == right:
+            return f"beside vehicles on either side: {left}"
+        return f"beside vehicles on the left: {left}; beside vehicles on the right: {right}"
+
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values, as the profile file holds them."""
         values = super().to_dict()
         values["effects"] = [effect.to_dict() for effect in self.effects]
         values["sensor"] = None if self.sensor is None else self.sensor.to_dict()
-        order = (
-            "id",
-            "metadata",
-            "validity",
-            "lane_width",
-            "left_hand",
-            "model",
-            "effects",
-            "beside",
-            "sensor",
-            "provenance",
-        )
-        return {"format": FORMAT, "version": VERSION, **{name: values[name] for name in order if name in values}}
+        order = ("id", "metadata", "validity", "lane_width", "left_hand", "model", "effects", "beside", "sensor")
+        present = {name: values[name] for name in (*order, "provenance") if name in values}
+        return {"format": FORMAT, "version": VERSION, **present}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> DriverProfile:
@@ -206,7 +210,13 @@ class DriverProfile(Record, frozen=True):
         Raises `DriverProfileError` if it is no profile, of another version, or contradicts itself; names the field and
         where it stands.
         """
-        present = _checked(values)
+        if not isinstance(values, Mapping) or values.get("format") != FORMAT:
+            raise DriverProfileError(f'not a driver profile: "format" is not "{FORMAT}"')
+        version = values.get("version")
+        if version != VERSION or isinstance(version, bool):
+            cure = ": update the package" if isinstance(version, int) and version > VERSION else ""
+            raise DriverProfileError(f"file format {version!r}; this version of xosc-lateral reads {VERSION}{cure}")
+        present = {name: value for name, value in values.items() if name not in ("format", "version")}
         effects = present.get("effects")
         effects = effects if isinstance(effects, list) else ()
         kinds = [effect.get("kind") for effect in effects if isinstance(effect, Mapping)]
@@ -214,18 +224,6 @@ class DriverProfile(Record, frozen=True):
         kind = model.get("kind") if isinstance(model, Mapping) else None
         read = read_as(file_type(str(kind), frozenset(map(str, kinds))), present)
         return cls(**{name: getattr(read, name) for name in cls.__struct_fields__})
-
-
-def _checked(values: object) -> dict[str, Any]:
-    """A profile file's values without format and version; refused if it is none of ours, or of another version."""
-    if not isinstance(values, Mapping) or values.get("format") != FORMAT:
-        raise DriverProfileError(f'not a driver profile: "format" is not "{FORMAT}"')
-    version = values.get("version")
-    if version != VERSION or isinstance(version, bool):
-        newer = isinstance(version, int) and version > VERSION
-        cure = ": update the package" if newer else ""
-        raise DriverProfileError(f"file format {version!r}; this version of xosc-lateral reads {VERSION}{cure}")
-    return {name: value for name, value in values.items() if name not in ("format", "version")}
 
 
 @lru_cache(maxsize=16)

@@ -15,11 +15,15 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.drives.filters import scale_frequencies
-from xosc_lateral.drivers.fitting.sensor.likelihood import Colour
 from xosc_lateral.drivers.model.records import Record
 
 PASS_FREQUENCY = 1.5
 """Runs are low-passed here on being resampled to 5 Hz, and so is what is sampled. [Hz]"""
+
+
+def butterworth(frequency: FloatArray, order: int, corner: float) -> FloatArray:
+    """Power of a low-pass over that at frequency 0. [-] Shape as `frequency`, in the unit of its corner."""
+    return np.asarray(1.0 / (1.0 + (frequency / corner) ** (2 * order)))
 
 
 class SensorModel(Record, frozen=True):
@@ -27,23 +31,16 @@ class SensorModel(Record, frozen=True):
 
     later = ("second_view",)
 
-    white: float
-    """One-sided power density of the white part. [m2/Hz]"""
-    coloured: float = 0.0
-    """That of the low-passed part at frequency 0. [m2/Hz]"""
-    corner: float = 1.0
-    """Of the low-passed part. [Hz]"""
-    order: int = 0
-    """Of its Butterworth shape; 0 where there is none."""
-    rounding: float = 0.0
-    """Step that values come in; 0 where none was found. [m]"""
-    driver_variance: float = 0.0
-    """Of the measured rows, as `sensor_variance`; their sum is the measured variance. [m2]"""
+    white: float  # One-sided power density of the white part. [m2/Hz]
+    coloured: float = 0.0  # That of the low-passed part at frequency 0. [m2/Hz]
+    corner: float = 1.0  # Of the low-passed part. [Hz]
+    order: int = 0  # Of its Butterworth shape; 0 where there is none.
+    rounding: float = 0.0  # Step that values come in; 0 where none was found. [m]
+    driver_variance: float = 0.0  # Of the measured rows, as `sensor_variance`; their sum is the measured variance. [m2]
     sensor_variance: float = 0.0
-    driver_share: tuple[float, float] = (0.0, 1.0)
-    """Share of the driver: 95 % interval. [-]"""
+    driver_share: tuple[float, float] = (0.0, 1.0)  # Share of the driver: 95 % interval. [-]
+    # Power of the error over that of half the lane width, where it was estimated so (`second_view`); else 0. [-]
     second_view: float = 0.0
-    """Power of the error over that of half the lane width, where it was estimated so (`second_view`); else 0. [-]"""
 
     def __post_init__(self) -> None:
         levels = (self.white, self.coloured, self.rounding, self.second_view)
@@ -72,7 +69,7 @@ class SensorModel(Record, frozen=True):
         """One-sided power density without rounding. [m2/Hz] Shape as `frequency` [Hz]."""
         total: FloatArray = np.full(np.shape(frequency), self.white)
         if self.order:
-            total = total + self.coloured * Colour(self.order, self.corner).shape(frequency)
+            total = total + self.coloured * butterworth(frequency, self.order, self.corner)
         return total
 
     def sample(self, n: int, step: float, rng: np.random.Generator) -> FloatArray:

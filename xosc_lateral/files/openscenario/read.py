@@ -17,16 +17,15 @@ from xosc_lateral.files.openscenario.declarations import read_declarations, read
 from xosc_lateral.files.openscenario.element import XmlElement, local_name, means_true
 from xosc_lateral.files.openscenario.entities import read_entities
 from xosc_lateral.files.xml import document_of, read_document
-from xosc_lateral.world.scenario import (
+from xosc_lateral.world.scenario.parameters import Scope
+from xosc_lateral.world.scenario.place import Place, Unsupported
+from xosc_lateral.world.scenario.scenario import (
     FileHeader,
     Scenario,
     Storyboard,
     TrafficSignalController,
-    Unsupported,
+    TrafficSignalPhase,
 )
-from xosc_lateral.world.scenario.parameters import Scope
-from xosc_lateral.world.scenario.place import Place
-from xosc_lateral.world.scenario.scenario import TrafficSignalPhase
 
 BOOLEANS = frozenset(
     {

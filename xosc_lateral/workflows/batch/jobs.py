@@ -20,8 +20,8 @@ from xosc_lateral.files.source import file_hash
 from xosc_lateral.workflows.batch.manifest import ManifestRow, printable
 from xosc_lateral.workflows.batch.request import DocumentKind, Request, concrete, document_kind, find_requests
 from xosc_lateral.workflows.conversion.convert import numbered
-from xosc_lateral.workflows.conversion.drivers import AUTO_PROFILE, hidden_by_libraries, uses_auto
-from xosc_lateral.workflows.conversion.settings import AUTO, ConvertSettings
+from xosc_lateral.workflows.conversion.plan import hidden_by_libraries
+from xosc_lateral.workflows.conversion.settings import AUTO, AUTO_PROFILE, ConvertSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +137,7 @@ def plan_batch(
     if report is not None:
         pages = _normal(Path(report))
         planned = [replace(job, page=(pages / job.name).with_suffix(".html")) for job in planned]
-    libraries = dict.fromkeys(request.settings.library for request in requests if uses_auto(request.settings))
+    libraries = dict.fromkeys(request.settings.library for request in requests if request.settings.uses_auto)
     notes = dict.fromkeys(note for folders in libraries for note in hidden_by_libraries(folders))
     return Batch(root, base, tuple(planned), tuple(left_out), tuple(notes))
 

@@ -10,7 +10,6 @@ import numpy as np
 from msgspec import structs
 
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.drivers.fitting.neighbours import basis_of
 from xosc_lateral.drivers.model.profile import SIDES
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.workflows.conversion.result import WRITTEN_AS, ConvertedScenario
@@ -116,7 +115,7 @@ class Conversion(ConvertedScenario, Result):
                     "why_not": entity.why,
                     "neighbours": None
                     if entity.profile is None
-                    else {side: basis_of(entity.profile, side).value for side in SIDES},
+                    else {side: entity.profile.basis_of(side).value for side in SIDES},
                     "mode": self.provenance.modes.get(entity.name),
                     "segments": [
                         [round(segment.span.start, 6), round(segment.span.end, 6)] for segment in entity.segments

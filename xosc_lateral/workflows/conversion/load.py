@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
-import numpy as np
-from msgspec import structs
-
-from xosc_lateral.base.rows import BLOCK, blocks
 from xosc_lateral.files.opendrive import read_opendrive
 from xosc_lateral.files.openscenario.read import NO_ROADS, RoadSearch, read_scenario
 from xosc_lateral.files.source import check_regular, guard_input, state_key
-from xosc_lateral.workflows.conversion.settings import STEP
-from xosc_lateral.world.motion.nominal import Activity, NominalMotion
+from xosc_lateral.workflows.options import STEP
+from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.player.player import play
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario import Scenario
-from xosc_lateral.world.scenario.conditions import at_time
+from xosc_lateral.world.scenario.scenario import Scenario
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -123,20 +117,6 @@ def play_loaded(loaded: Loaded, step: float, time_limit: float | None) -> Played
     return Played(loaded.scenario, loaded.network, motion)
 
 
-@lru_cache(maxsize=2)  # as `play_loaded`, whose result is the same object for all variants
-def play_until(played: Played, end: float, *, step: float) -> Played:
-    """The same run, stopped at another time. [s]"""
-    motion = play(ending_at(played.scenario, end), played.network, step=step, time_limit=end + 1.0)
-    return replace(played, motion=motion)
-
-
-def ending_at(scenario: Scenario, end: float) -> Scenario:
-    """The same scenario, stopped at a time and by nothing else. [s]"""
-    storyboard = scenario.storyboard
-    later = structs.replace(storyboard, stop_trigger=at_time(end, "later", storyboard.place))
-    return replace(scenario, storyboard=later)
-
-
 def road_network(path: Path) -> RoadNetwork:
     """Read a road, once per process for as long as the file stays the same."""
     state = check_regular(path)
@@ -147,21 +127,6 @@ def road_network(path: Path) -> RoadNetwork:
 @lru_cache(maxsize=32)
 def _road_network(path: Path, _state: tuple[int, ...]) -> RoadNetwork:
     return read_opendrive(path)
-
-
-def seed_words(played: Played) -> dict[str, tuple[int, ...]]:
-    """Seed words of each entity from where it starts and how fast: nothing that anybody else does changes them."""
-    words = {}
-    for entity in played.motion.entities:
-        there = ((entity.activity[rows] & Activity.ACTIVE) != 0 for rows in blocks(len(entity.activity)))
-        row = next((BLOCK * k + int(np.argmax(mask)) for k, mask in enumerate(there) if mask.any()), 0)
-        on_road = int(entity.road[row])
-        where = (entity.x[row], entity.y[row]) if on_road < 0 else (entity.s[row], entity.offset[row])
-        road = "" if on_road < 0 else played.network.road_ids[on_road]
-        start = [road, str(entity.lane[row]), *(f"{value:.3f}" for value in (*where, entity.speed[row]))]
-        digest = hashlib.sha256("\0".join(start).encode()).digest()
-        words[entity.name] = tuple(int.from_bytes(digest[k : k + 4], "little") for k in range(0, 16, 4))
-    return words
 
 
 def read_output(data: bytes, output: Path, source: Scenario, *, allowed: Iterable[Path], roads: RoadSearch) -> Scenario:

@@ -9,18 +9,23 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import chain as chained
 from math import inf
+from typing import TypeVar
 
+import numpy as np
 from msgspec import structs
 
-from xosc_lateral.workflows.conversion.consequences import CHANGES
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.workflows.conversion.consequences import lane_departures
 from xosc_lateral.workflows.conversion.load import Played
-from xosc_lateral.workflows.conversion.result import EventShift
+from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, EventShift, untouched
 from xosc_lateral.workflows.conversion.shifts import Change, Comparison, compare_runs, largest_of
-from xosc_lateral.world.motion.nominal import NominalMotion
+from xosc_lateral.world.motion.gaps import gaps_of
+from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.world.motion.offset_chain import OffsetChain, Size, resized
+from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.player.player import play
-from xosc_lateral.world.scenario import Action, Event, Maneuver, ManeuverGroup, Scenario, Story
 from xosc_lateral.world.scenario.conditions import StoryboardElementStateCondition, at_time
 from xosc_lateral.world.scenario.enums import (
     ConditionEdge,
@@ -31,7 +36,18 @@ from xosc_lateral.world.scenario.enums import (
     StoryboardElementType,
 )
 from xosc_lateral.world.scenario.private_actions import AbsoluteTargetSpeed, SpeedAction, TransitionDynamics
-from xosc_lateral.world.scenario.scenario import Act, Actors, Condition, ConditionGroup
+from xosc_lateral.world.scenario.scenario import (
+    Act,
+    Action,
+    Actors,
+    Condition,
+    ConditionGroup,
+    Event,
+    Maneuver,
+    ManeuverGroup,
+    Scenario,
+    Story,
+)
 
 CHANGE_AT = 1.0
 """When an ego begins to drive faster or slower than in the nominal run. [s]"""
@@ -48,6 +64,7 @@ AFTER_ALL = 2.0
 """After the last event of all, such a run is over: the last lane is reached, contacts have come about. [s]"""
 
 STORY = "xosc-lateral ego"
+CHANGES = "with offsets, what happens would happen otherwise"
 
 LONGEST_RUN = 3.0
 """Times the nominal run, or what happens in one that does not end by itself, each run is played: beyond, all
@@ -62,6 +79,8 @@ LARGE_SHIFT = 0.3
 """Of its duration, by which an action lasts longer or shorter without a word. [-]"""
 MOST_TRIALS = 40
 """Of a conversion: beyond, what is left is told. [-]"""
+
+Output = TypeVar("Output")
 
 Sizes = dict[int, Size]
 """By the number of a chain, where it is driven otherwise than sampled."""
@@ -221,9 +240,9 @@ class KeptChains:
 def keep_meaning(
     chains: Sequence[OffsetChain],
     motion: NominalMotion,
-    attempt: Callable[[Sequence[OffsetChain]], list[Comparison]],
-) -> KeptChains:
-    """Chains as large as leave what happens as it was.
+    attempt: Callable[[Sequence[OffsetChain]], tuple[Output, list[Comparison]]],
+) -> tuple[Output, KeptChains]:
+    """Chains as large as leave what happens as it was, and the output with them.
 
     `motion`, without offsets, says which chain comes before a conflict; `attempt` writes with some chains and plays.
     """
@@ -234,7 +253,7 @@ def keep_meaning(
         driven = [resized(chain, some[k]) if k in some else chain for k, chain in enumerate(chains)]
         return [chain for chain in driven if chain.ring.moves]
 
-    comparisons = attempt(chains)
+    output, comparisons = attempt(chains)
     changes = _changes(comparisons)
     stuck = set[tuple[int, int]]()
     while changes and trials < MOST_TRIALS:
@@ -244,10 +263,10 @@ def keep_meaning(
         first = SIZES.index(sizes[blamed]) + 1 if blamed in sizes else int(chains[blamed].path is None)
         for smaller in SIZES[first:]:
             trial = sizes | {blamed: smaller}
-            outcome = attempt(applied(trial))
+            made, outcome = attempt(applied(trial))
             trials += 1
             if len(_changes(outcome)) < len(changes):
-                sizes, comparisons, changes = trial, outcome, _changes(outcome)
+                sizes, output, comparisons, changes = trial, made, outcome, _changes(outcome)
                 break
         else:
             stuck.add((blamed, len(changes)))
@@ -256,7 +275,7 @@ def keep_meaning(
     for name in dict.fromkeys(chains[k].entity for k in reduced):
         theirs = [k for k, chain in enumerate(chains) if chain.entity == name]
         least[name] = min(reduced.get(k, Size()) for k in theirs), all(k in sizes for k in theirs)
-    return KeptChains(tuple(applied(sizes)), tuple(comparisons), tuple(changes), least)
+    return output, KeptChains(tuple(applied(sizes)), tuple(comparisons), tuple(changes), least)
 
 
 def _changes(comparisons: Sequence[Comparison]) -> list[Change]:
@@ -284,3 +303,63 @@ def _blamed(
     order += range(len(chains))
     free = (k for k in order if sizes.get(k, Size()) > SIZES[-1] and (k, len(changes)) not in stuck)
     return next(free, None)
+
+
+@lru_cache(maxsize=2)  # as `play_loaded`, whose result is the same object for all variants
+def play_until(played: Played, end: float, *, step: float) -> Played:
+    """The same run, stopped at another time. [s]"""
+    motion = play(ending_at(played.scenario, end), played.network, step=step, time_limit=end + 1.0)
+    return replace(played, motion=motion)
+
+
+def ending_at(scenario: Scenario, end: float) -> Scenario:
+    """The same scenario, stopped at a time and by nothing else. [s]"""
+    storyboard = scenario.storyboard
+    later = structs.replace(storyboard, stop_trigger=at_time(end, "later", storyboard.place))
+    return replace(scenario, storyboard=later)
+
+
+def as_played(
+    enriched: Enriched, written: Scenario, run: NominalMotion, moved: Collection[str], left: Collection[str]
+) -> Enriched:
+    """What a reactive output does when it is played, in place of what was sampled.
+
+    - `written`, `run`: the output and its nominal run, which may end earlier than the one that was sampled for
+    - `moved`, `left`: entities that keep their maneuvers: those with lane offsets, and those that stay as they are
+    """
+    motion = enriched.motion
+    if run.end_time < motion.end_time - motion.step:
+        run = play(
+            ending_at(written, motion.end_time),
+            enriched.network,
+            step=motion.step,
+            time_limit=motion.end_time + motion.step,
+        )
+    played = {entity.name: entity for entity in run.entities}
+    entities = tuple(
+        _measured(entity, played[entity.name])
+        if entity.name in moved
+        else untouched(entity.motion, entity.spans, CHANGES)
+        if entity.name in left
+        else entity
+        for entity in enriched.entities
+    )
+    gaps_after = gaps_of(motion, [entity.trajectory for entity in entities])
+    departures = tuple(chained.from_iterable(lane_departures(entity, enriched.network) for entity in entities))
+    return replace(enriched, entities=entities, gaps_after=gaps_after, departures=departures)
+
+
+def _measured(entity: EntityResult, played: EntityMotion) -> EntityResult:
+    """One entity where it is when the output is played, held where that ends first."""
+    motion = entity.motion
+    rows = np.minimum(np.arange(len(motion.time)), len(played.time) - 1)
+    x, y, z, heading, pitch, roll, speed = (
+        np.asarray(getattr(played, name)[rows]) for name in ("x", "y", "z", "heading", "pitch", "roll", "speed")
+    )
+    deviation: FloatArray = (y - motion.y) * np.cos(motion.heading) - (x - motion.x) * np.sin(motion.heading)
+    segments = tuple(
+        replace(segment, offset=np.interp(segment.time, motion.time, deviation), beyond=np.empty(0))
+        for segment in entity.segments
+    )
+    trajectory = WorldTrajectory(motion.time, x, y, z, heading, pitch, roll, speed)
+    return replace(entity, segments=segments, deviation=deviation, trajectory=trajectory)

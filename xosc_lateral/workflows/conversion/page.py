@@ -8,13 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from xosc_lateral.files.pages.page import KeyFigure, Page, Tone
-from xosc_lateral.workflows.conversion.consequences import followings_of
 from xosc_lateral.workflows.conversion.result import WRITTEN_AS, ConvertedScenario, Enriched, EntityResult
 from xosc_lateral.workflows.playing import figures as figures
 from xosc_lateral.workflows.playing.figures import COMFORTABLE
 from xosc_lateral.workflows.playing.page import add_notes
 from xosc_lateral.workflows.playing.scene import scene_of
-from xosc_lateral.world.motion.gaps import MAXIMUM_GAP, Following, Gap
+from xosc_lateral.world.motion.gaps import MAXIMUM_GAP, Following, Gap, closest_following, road_path
 
 MOST_PANELS, MOST_DYNAMICS = 12, 6
 """Entities with panels of their own, for offsets and for dynamics; those with the largest offsets come first."""
@@ -211,7 +210,9 @@ def _add_gaps(page: Page, enriched: Enriched) -> None:
 
 def _add_followings(page: Page, enriched: Enriched) -> None:
     """Smallest headway and time to collision of each pair, as written and as converted."""
-    before, after = (followings_of(enriched.entities, enriched.network, enriched=side) for side in (False, True))
+    network, vehicles = enriched.network, [one for one in enriched.entities if one.motion.entity.is_vehicle]
+    before = closest_following([road_path(one.motion, network, one.motion, 0.0) for one in vehicles])
+    after = closest_following([road_path(one.motion, network, one.trajectory, one.deviation) for one in vehicles])
     names = [
         pair
         for pair in sorted(before | after)

@@ -2,35 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
+from functools import cache, partial
 from pathlib import Path
 
-from xosc_lateral.base.errors import FormatError, locate
+import numpy as np
+
+from xosc_lateral.base.errors import FormatError, did_you_mean, locate
+from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.files.openscenario.write.build import Version
 from xosc_lateral.files.openscenario.write.draft import Player
+from xosc_lateral.files.openscenario.write.lane_offset_scenario import LateralActions
 from xosc_lateral.files.openscenario.write.replaced_maneuvers import replaced_groups, separable
-from xosc_lateral.files.openscenario.write.trajectory_scenario import motion_unknown_to
+from xosc_lateral.files.openscenario.write.replay import motion_unknown_to
 from xosc_lateral.files.output_paths import refuse_outputs
+from xosc_lateral.files.profiles import SHIPPED, find_profile, read_profile
 from xosc_lateral.files.tables import ContextTable, read_context
-from xosc_lateral.workflows.conversion.drivers import choose_drivers, without_proving_grounds
-from xosc_lateral.workflows.conversion.enrich import Drivers
-from xosc_lateral.workflows.conversion.load import Loaded, Played, play_until
-from xosc_lateral.workflows.conversion.meaning import meaning_of
-from xosc_lateral.workflows.conversion.result import LaneChanges
-from xosc_lateral.workflows.conversion.settings import ConvertSettings, OutputMode
-from xosc_lateral.world.scenario import Scenario
-from xosc_lateral.world.scenario.dependence import (
-    Control,
-    Dependence,
-    actors_of,
-    conditions_of,
-    controlled_entities,
-    dependence,
-    vehicles_under_test,
-)
-from xosc_lateral.world.scenario.enums import DynamicsShape
+from xosc_lateral.workflows.conversion.load import Loaded, Played
+from xosc_lateral.workflows.conversion.meaning import meaning_of, play_until
+from xosc_lateral.workflows.conversion.result import Drivers, LaneChanges
+from xosc_lateral.workflows.conversion.settings import AUTO, AUTO_PROFILE, ConvertSettings, OutputMode
+from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
+from xosc_lateral.world.road.network import RoadNetwork
+from xosc_lateral.world.scenario.controllers import Control, controlled_entities, vehicles_under_test
+from xosc_lateral.world.scenario.dependence import Dependence, dependence
+from xosc_lateral.world.scenario.entity import Entity
+from xosc_lateral.world.scenario.enums import DynamicsShape, VehicleCategory
 from xosc_lateral.world.scenario.private_actions import LaneChangeAction
-from xosc_lateral.world.scenario.scenario import Condition
+from xosc_lateral.world.scenario.scenario import Condition, Scenario, conditions_of
 
 LEAST_EXTENSION, LARGEST_EXTENSION = 1.3, 2.0
 """A vehicle under test may be later at what ends the run, or never come to it: others follow trajectories for so
@@ -39,77 +39,51 @@ many times the nominal run. A fifth slower takes a quarter longer; a file of tra
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Plan:
-    """One conversion, decided.
-
-    - `output`, `saves`: where it goes, and whether it is written there
-    - `inputs`: SHA-256 of every file that was read
-    - `played`, `extended`: the nominal run; as long as others may need offsets where a vehicle under test is slower
-    - `egos`: vehicles under test, and why each is one
-    - `controllers`: of entities that are left to them
-    - `depends`: what depends on either
-    - `drivers`: per entity its profile, or why it gets none
-    - `unwritable`: entities whose maneuvers the target does not know, so that only a trajectory is left, and why
-    """
+    """One conversion, decided."""
 
     settings: ConvertSettings
-    variant: int
-    output: Path
+    variant_index: int  # from 0: each has other offsets
+    source: Path
+    output: Path  # where it goes; it is written there if it `saves`
     saves: bool
-    inputs: Mapping[Path, str]
-    played: Played
-    extended: Played
-    egos: Mapping[str, str]
-    controllers: Mapping[str, Control]
-    depends: Dependence
+    version: Version  # of the standard that is written
+    inputs: Mapping[Path, str]  # SHA-256 of every file that was read
+    played: Played  # the nominal run
+    extended: Played  # as long as others may need offsets where a vehicle under test is slower
+    egos: Mapping[str, str]  # vehicles under test, and why each is one
+    controllers: Mapping[str, Control]  # of entities that are left to them
+    depends: Dependence  # on either
+    is_replay: bool  # everything happens by the clock of the nominal run, whoever drives
     drivers: Drivers
+    continuous: frozenset[str]  # whose movement goes on through lane changes: they may follow trajectories
     context: ContextTable | None
+    # unwritable: entities whose maneuvers the target does not know, so that only a trajectory is left, and why
     unwritable: Mapping[str, str]
+    lateral: LateralActions  # of the scenario: what is to stop lane offsets
 
-    @property
-    def source(self) -> Path:
-        """The scenario's file."""
-        return self.played.scenario.path
-
-    @property
-    def is_replay(self) -> bool:
-        """Whether everything happens by the clock of the nominal run, whoever drives."""
-        return _is_replay(self.settings, self.depends)
-
-    def on_trajectories(self, names: Iterable[str]) -> frozenset[str]:
-        """Those of the named entities that follow trajectories if they get offsets."""
-        if self.settings.mode is OutputMode.LANE_OFFSET:
-            return frozenset()
-        if self.settings.mode is OutputMode.TRAJECTORY or self.is_replay:
-            return frozenset(names)
-        return separable(self.played.scenario, set(names) - self.depends.entities)
-
-    def written_as(self, enriched: Collection[str]) -> WrittenAs:
+    def written_as(self, enriched: frozenset[str]) -> WrittenAs:
         """How the vehicles that got offsets are written."""
         scenario = self.played.scenario
         if self.is_replay:
-            return WrittenAs(frozenset(enriched), frozenset(), _frozen(scenario, self.depends, None))
-        chosen = self.on_trajectories(enriched)
+            everybody = frozenset(entity.name for entity in self.played.motion.entities)
+            only = self.settings.only
+            chosen = everybody if only is None else self._with_pulled(only) | self.unwritable.keys()
+            replayed = chosen - {*self.egos, *self.controllers}
+            return WrittenAs(replayed, frozenset(), _frozen(scenario, self.depends, None))
+        chosen = _on_trajectories(scenario, self.settings, self.depends, enriched) | self.unwritable.keys()
         if self.settings.mode is OutputMode.TRAJECTORY:
-            chosen = self.with_pulled({*chosen, *self.unwritable})
+            chosen = self._with_pulled(chosen)
             return WrittenAs(chosen, frozenset(), _frozen(scenario, self.depends, chosen))
-        chosen |= self.unwritable.keys()
-        return WrittenAs(chosen, frozenset(enriched) - chosen)
+        return WrittenAs(chosen, enriched - chosen)
 
-    def replayed(self) -> frozenset[str]:
-        """Who follows a trajectory where everything happens by the clock."""
-        everybody = frozenset(entity.name for entity in self.played.motion.entities)
-        only = self.settings.only
-        chosen = everybody if only is None else self.with_pulled(only) | self.unwritable.keys()
-        return chosen - {*self.egos, *self.controllers}
-
-    def with_pulled(self, names: Collection[str]) -> frozenset[str]:
+    def _with_pulled(self, names: Collection[str]) -> frozenset[str]:
         """With the trailers that these entities pull from the start."""
         return frozenset(names) | {trailer for trailer, name in self.played.trailers.items() if name in names}
 
 
 @dataclass(frozen=True, slots=True)
 class WrittenAs:
-    """Who follows a trajectory, and who keeps its maneuvers and gets lane offsets; all others stay as they are.
+    """Who follows a trajectory, and who keeps its maneuvers and may get lane offsets; all others stay as they are.
 
     `frozen`: triggers that depend on a vehicle under test and no longer do in the output, a line each.
     """
@@ -118,11 +92,6 @@ class WrittenAs:
     lane_offsets: frozenset[str]
     frozen: tuple[str, ...] = ()
 
-    def modes(self) -> dict[str, str]:
-        """Vehicle -> how its offsets are written."""
-        modes = dict.fromkeys(self.lane_offsets, OutputMode.LANE_OFFSET.value)
-        return dict(sorted((modes | dict.fromkeys(self.trajectories, OutputMode.TRAJECTORY.value)).items()))
-
 
 def decide(
     loaded: Loaded,
@@ -130,7 +99,7 @@ def decide(
     settings: ConvertSettings,
     *,
     output: Path,
-    variant: int = 0,
+    variant_index: int = 0,
     report: Path | None = None,
     saves: bool = True,
 ) -> Plan:
@@ -139,36 +108,61 @@ def decide(
     Raises `FormatError`: the settings do not go with the scenario, or an output would replace an input;
     `DriverProfileError`: a profile is not known.
     """
-    scenario = played.scenario
+    scenario, target = played.scenario, settings.target
     _refuse_lane_offsets_for_carla(scenario, settings)
     egos = chosen_egos(scenario, settings)
-    controllers = _kept_controllers(scenario, settings, egos)
+    controllers = dict[str, Control]()  # none where everybody is replayed
+    if heeds_controllers(settings):
+        controllers = {name: control for name, control in controlled_entities(scenario).items() if name not in egos}
     depends = dependence(scenario, (*egos, *controllers))
     context = None if settings.context is None else read_context(settings.context)
     inputs = dict(loaded.files)
     if context is not None and settings.context is not None:
         inputs[settings.context] = context.sha256
     refuse_outputs([output if saves else None, report], inputs)
-    for_carla = settings.target.player is Player.CARLA
-    drivers = choose_drivers(scenario, settings, egos, controllers if for_carla else {})
+    drivers = choose_drivers(scenario, settings, egos, controllers if target.player is Player.CARLA else {})
+    continuous = _on_trajectories(scenario, settings, depends, frozenset(drivers))
+    version = target.version_for(scenario)
     plan = Plan(
         settings,
-        variant,
+        variant_index,
+        scenario.path,
         output,
         saves,
+        version,
         inputs,
         played,
         _extended_run(played, settings, depends, tuple(egos)),
         egos,
         controllers,
         depends,
-        without_proving_grounds(drivers, played.motion, played.network, settings.entity),
+        _is_replay(settings, depends),
+        _without_proving_grounds(drivers, played.motion, played.network, settings.entity),
+        continuous,
         context,
-        _unwritable(played, settings, {*egos, *controllers}),
+        _unwritable(played, settings, version, {*egos, *controllers}),
+        LateralActions.of(scenario),
     )
     if settings.lane_changes is LaneChanges.LIFELIKE:
-        _refuse_steps(scenario, plan.on_trajectories(drivers))
+        _refuse_steps(scenario, continuous)
     return plan
+
+
+def _is_replay(settings: ConvertSettings, depends: Dependence) -> bool:
+    if settings.mode is OutputMode.LANE_OFFSET:
+        return False
+    return settings.target.player is Player.CARLA or not (depends.entities or settings.only is not None)
+
+
+def _on_trajectories(
+    scenario: Scenario, settings: ConvertSettings, depends: Dependence, names: frozenset[str]
+) -> frozenset[str]:
+    """Those of the named entities that follow trajectories if they get offsets."""
+    if settings.mode is OutputMode.LANE_OFFSET:
+        return frozenset()
+    if settings.mode is OutputMode.TRAJECTORY or _is_replay(settings, depends):
+        return names
+    return separable(scenario, names - depends.entities)
 
 
 def chosen_egos(scenario: Scenario, settings: ConvertSettings) -> dict[str, str]:
@@ -192,22 +186,9 @@ def chosen_egos(scenario: Scenario, settings: ConvertSettings) -> dict[str, str]
     return egos
 
 
-def _kept_controllers(scenario: Scenario, settings: ConvertSettings, egos: Collection[str]) -> dict[str, Control]:
-    """Entities that a conversion leaves to the controllers of its player; none where everybody is replayed."""
-    if not heeds_controllers(settings):
-        return {}
-    return {name: control for name, control in controlled_entities(scenario).items() if name not in egos}
-
-
 def heeds_controllers(settings: ConvertSettings) -> bool:
     """Whether what a controller drives stays its own; else the default driver drives it."""
     return settings.mode is not OutputMode.TRAJECTORY and (settings.ego is None or bool(settings.ego))
-
-
-def _is_replay(settings: ConvertSettings, depends: Dependence) -> bool:
-    if settings.mode is OutputMode.LANE_OFFSET:
-        return False
-    return settings.target.player is Player.CARLA or not (depends.entities or settings.only is not None)
 
 
 def _extended_run(played: Played, settings: ConvertSettings, depends: Dependence, egos: tuple[str, ...]) -> Played:
@@ -222,7 +203,9 @@ def _extended_run(played: Played, settings: ConvertSettings, depends: Dependence
     return play_until(played, end, step=settings.step) if end > played.motion.end_time else played
 
 
-def _unwritable(played: Played, settings: ConvertSettings, unforeseeable: Collection[str]) -> dict[str, str]:
+def _unwritable(
+    played: Played, settings: ConvertSettings, version: Version, unforeseeable: Collection[str]
+) -> dict[str, str]:
     """See `Plan`: of those alone that `only` leaves out; the others follow trajectories anyway."""
     if settings.only is None or settings.mode is OutputMode.LANE_OFFSET:
         return {}
@@ -230,7 +213,7 @@ def _unwritable(played: Played, settings: ConvertSettings, unforeseeable: Collec
     others = [entity.name for entity in played.motion.entities if entity.name not in left]
     if settings.target.player is Player.CARLA:
         return dict.fromkeys(others, "CARLA's ScenarioRunner plays maneuvers in ways of its own")
-    return motion_unknown_to(settings.target.version_for(played.scenario), played.scenario, played.motion, others)
+    return motion_unknown_to(version, played.scenario, played.motion, others)
 
 
 def _frozen(scenario: Scenario, depends: Dependence, entities: Collection[str] | None) -> tuple[str, ...]:
@@ -263,9 +246,96 @@ def _refuse_lane_offsets_for_carla(scenario: Scenario, settings: ConvertSettings
 
 def _refuse_steps(scenario: Scenario, names: Collection[str]) -> None:
     """Raise `FormatError` where a lane change of these entities takes no time, but is to be lifelike."""
-    for _, act, group in scenario.storyboard.groups():
-        for _, event in group.events():
-            for content in (action.content for action in event.actions):
-                is_step = isinstance(content, LaneChangeAction) and content.dynamics.shape is DynamicsShape.STEP
-                if is_step and set(actors_of(act, group, event)) & set(names):
-                    raise content.place.error("a step has no way across: take --lane-changes written")
+    for at in scenario.storyboard.events():
+        for content in (action.content for action in at.event.actions):
+            is_step = isinstance(content, LaneChangeAction) and content.dynamics.shape is DynamicsShape.STEP
+            if is_step and set(at.actors) & set(names):
+                raise content.place.error("a step has no way across: take --lane-changes written")
+
+
+NO_DRIVER = {
+    VehicleCategory.TRAILER: "a trailer has no driver",
+    VehicleCategory.TRAIN: "a train is bound to its track",
+    VehicleCategory.TRAM: "a tram is bound to its track",
+    VehicleCategory.BICYCLE: "there is no profile for bicycles; name one with --entity",
+}
+"""Vehicles that "auto" leaves alone, and why."""
+
+PROVING_GROUND_WIDTH = 6.0
+"""A lane wider than this, alone in its direction, is none of a road (2 to 6 m are), but a proving ground's: vehicles
+keep to lines that the scenario's geometry draws, and not to a lane. [m]"""
+
+
+def choose_drivers(
+    scenario: Scenario,
+    settings: ConvertSettings,
+    egos: Mapping[str, str] | None = None,
+    controllers: Mapping[str, Control] | None = None,
+) -> Drivers:
+    """Per entity its profile, or why it gets none.
+
+    `egos`: the vehicles under test, and why each is one; `controllers`: those of entities that are left to them.
+
+    Raises `FormatError`: if the settings name an entity that the scenario doesn't have; `DriverProfileError`: if a
+    profile is not known.
+    """
+    known = {entity.name for entity in scenario.entities}
+    asked = (("--entity", settings.entity), ("--only", settings.only or ()), ("--ego", settings.ego or ()))
+    for option, names in () if settings.names_may_lack else asked:
+        for name in sorted(names):
+            if name not in known:
+                raise FormatError(
+                    f"{option} {name!r}: no such entity{did_you_mean(name, known)}; "
+                    f"there are {', '.join(sorted(known)) or 'none'}",
+                    path=scenario.path,
+                )
+    left = {name: f"vehicle under test: {why}" for name, why in (egos or {}).items()}
+    left |= {name: f"driven by controller {control}" for name, control in (controllers or {}).items()}
+    read = cache(partial(read_profile, folders=settings.library))
+    return {entity.name: left.get(entity.name) or _driver(entity, settings, read) for entity in scenario.entities}
+
+
+def _driver(entity: Entity, settings: ConvertSettings, read: Callable[[str], DriverProfile]) -> DriverProfile | str:
+    if not entity.is_vehicle:
+        return f"a {entity.category.value}, no vehicle"
+    if settings.only is not None and entity.name not in settings.only:
+        return "not chosen (--only)"
+    named = settings.entity.get(entity.name, settings.profile)
+    if named == AUTO:
+        category = entity.vehicle_category or VehicleCategory.CAR
+        if category in NO_DRIVER:
+            return NO_DRIVER[category]
+        named = AUTO_PROFILE
+    return named if isinstance(named, DriverProfile) else read(named)
+
+
+def hidden_by_libraries(libraries: tuple[Path, ...]) -> tuple[str, ...]:
+    """A line where "auto" takes one of the user's profiles in place of the shipped one."""
+    path = find_profile(AUTO_PROFILE, libraries)
+    return () if path.parent == SHIPPED else (f"{path} hides the shipped profile {AUTO_PROFILE!r}: auto takes it",)
+
+
+def _without_proving_grounds(
+    drivers: Drivers, motion: NominalMotion, network: RoadNetwork, named: Iterable[str]
+) -> Drivers:
+    """Drivers, but for vehicles in a lone lane that is none of a road: why they get none. `named` ones keep theirs."""
+    kept = set(named)
+    moved = dict(drivers)
+    for entity in motion.entities:
+        if isinstance(moved.get(entity.name), DriverProfile) and entity.name not in kept:
+            width, lanes = _usual_lane(entity, network)
+            if width > PROVING_GROUND_WIDTH and lanes <= 1.0:
+                moved[entity.name] = (
+                    f"lane of {width:.1f} m, a proving ground's: keeps its line (--entity NAME=PROFILE moves it)"
+                )
+    return moved
+
+
+def _usual_lane(entity: EntityMotion, network: RoadNetwork) -> tuple[float, float]:
+    """Medians over a row a second: width of its lane [m], and driving lanes of its direction; 0 where it is in none."""
+    step = max(1, len(entity.time) // max(1, round(float(entity.time[-1] - entity.time[0]))))
+    rows = np.flatnonzero((entity.road[::step] >= 0) & (entity.lane[::step] != 0)) * step
+    if not len(rows):
+        return 0.0, 0.0
+    road, lane, s = entity.road[rows], entity.lane[rows], entity.s[rows]
+    return float(np.median(network.lane_width(road, lane, s))), float(np.median(network.lane_index(road, lane, s)[1]))

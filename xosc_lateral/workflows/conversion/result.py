@@ -12,16 +12,15 @@ import numpy as np
 from msgspec import Struct
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.fitting.neighbours import borrows, responses_in_words
-from xosc_lateral.drivers.model.drivability import Bound
-from xosc_lateral.drivers.model.profile import SIDES, DriverProfile
+from xosc_lateral.drivers.model.plausibility import Bound
+from xosc_lateral.drivers.model.profile import SIDES, Basis, DriverProfile
 from xosc_lateral.world.motion.crossings import Crossing
 from xosc_lateral.world.motion.gaps import Gap
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.world.motion.segments import SegmentSpan
 from xosc_lateral.world.motion.trajectory import WorldTrajectory, leaps
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario.dependence import Control
+from xosc_lateral.world.scenario.controllers import Control
 
 
 class Neighbours(StrEnum):
@@ -38,6 +37,9 @@ class LaneChanges(StrEnum):
     WRITTEN = "written"
     LIFELIKE = "lifelike"
 
+
+Drivers = Mapping[str, DriverProfile | str]
+"""Per entity the profile that drives it, or the reason why it gets none."""
 
 WRITTEN_AS = {"trajectory": "a trajectory", "lane-offset": "lane offsets"}
 """Modes of vehicles in words."""
@@ -92,8 +94,8 @@ class EntityResult:
         if self.profile is None or neighbours == Neighbours.NONE:
             return "beside vehicles: does not move (--neighbours none)"
         may_borrow = neighbours == Neighbours.BORROW
-        sides = [side for side in SIDES if may_borrow and borrows(self.profile, side)]
-        return responses_in_words(self.profile, sides)
+        sides = [side for side in SIDES if may_borrow and self.profile.basis_of(side) is Basis.UNKNOWN]
+        return self.profile.responses_in_words(sides)
 
     @property
     def segment_seconds(self) -> float:
@@ -170,6 +172,11 @@ class Enriched:
         return tuple(
             gap for gap in self.gaps_after if gap.touches and not (gap.names in before and before[gap.names].touches)
         )
+
+    @property
+    def trouble(self) -> int:
+        """Contacts and lane departures that nominally are none. [-]"""
+        return len(self.new_contacts) + len(self.departures)
 
     def warnings(self) -> tuple[str, ...]:
         """What a user has to know, a line each."""

@@ -17,7 +17,6 @@ from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.rows import blocks, stored
 from xosc_lateral.base.segment import Segment
-from xosc_lateral.drivers.fitting.neighbours import basis_of
 from xosc_lateral.drivers.model.profile import COLUMNS, SIDES, Basis, DriverProfile
 from xosc_lateral.drivers.model.sampled_offsets import FUTURE_CONTEXT, PAST_CONTEXT
 from xosc_lateral.drivers.model.sampling import Responses, responses_to
@@ -113,7 +112,7 @@ def seen_by(
 
 def sides_known(driver: DriverProfile, known: set[Basis], *, other_hand: bool) -> set[str]:
     """Sides of the road, "left" and "right", on which the driver's answer to neighbours is known in such a way."""
-    return {other_side(side) if other_hand else side for side in SIDES if basis_of(driver, side) in known}
+    return {other_side(side) if other_hand else side for side in SIDES if driver.basis_of(side) in known}
 
 
 def _refuse_no_width(entity: EntityMotion, span: SegmentSpan, network: RoadNetwork) -> None:

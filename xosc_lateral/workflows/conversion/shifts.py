@@ -19,13 +19,12 @@ from math import inf
 import numpy as np
 from msgspec import Struct
 
-from xosc_lateral.workflows.conversion.consequences import touching
 from xosc_lateral.workflows.conversion.result import EventShift
+from xosc_lateral.world.motion.gaps import gaps_of
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion, PlayedAction
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario import Scenario
 from xosc_lateral.world.scenario.conditions import StoryboardElementStateCondition
-from xosc_lateral.world.scenario.dependence import conditions_of, entity_references, refers_to
+from xosc_lateral.world.scenario.dependence import entity_references, refers_to
 from xosc_lateral.world.scenario.enums import DynamicsDimension, StoryboardElementState
 from xosc_lateral.world.scenario.private_actions import (
     LATERAL,
@@ -33,7 +32,7 @@ from xosc_lateral.world.scenario.private_actions import (
     LaneOffsetAction,
     LateralDistanceAction,
 )
-from xosc_lateral.world.scenario.scenario import Condition, Trigger
+from xosc_lateral.world.scenario.scenario import Condition, Scenario, conditions_of
 
 EVENT_TOLERANCE = 0.05
 """By which an event may be earlier or later beyond what is explained: a frame of a coarse player. [s]"""
@@ -110,10 +109,12 @@ def compare_runs(
     others = [*_other_order(then, now), *_other_lanes(before, after, ignored)]
     for change in (*others, *(_other_end(shifts, before, after) if ends else ())):
         changes.setdefault(change.what, change)
-    for pair, time in touching(after).items() if len(before.entities) > 1 else ():
-        if pair not in touching(before) and not set(pair) <= set(ignored):
-            what = f"contact of '{pair[0]}' and '{pair[1]}' at {time:.1f} s"
-            changes.setdefault(what, Change(what, pair[0], time, "is new"))
+    contacts = [gap for gap in gaps_of(after, after.entities) if gap.touches and not set(gap.names) <= set(ignored)]
+    touching = {gap.names for gap in gaps_of(before, before.entities) if gap.touches} if contacts else set()
+    for gap in contacts:
+        if gap.names not in touching:
+            what = f"contact of '{gap.names[0]}' and '{gap.names[1]}' at {gap.time:.1f} s"
+            changes.setdefault(what, Change(what, gap.names[0], gap.time, "is new"))
     return Comparison(tuple(event_shifts), tuple(changes.values()))
 
 
@@ -254,13 +255,10 @@ def _nearest(shift: float, causes: Sequence[float]) -> float:
 
 def _triggers_of(scenario: Scenario) -> dict[Path, tuple[Condition, ...]]:
     """Conditions that the start of each event waits for."""
-    conditions: dict[Path, tuple[Condition, ...]] = {}
-    for story, act, group in scenario.storyboard.groups():
-        for maneuver, event in group.events():
-            triggers: tuple[Trigger | None, ...] = (act.start_trigger, event.start_trigger)
-            path = (story.name, act.name, group.name, maneuver.name, event.name)
-            conditions[path] = tuple(condition for trigger in triggers for condition in conditions_of(trigger))
-    return conditions
+    return {
+        at.path: (*conditions_of(at.act.start_trigger), *conditions_of(at.event.start_trigger))
+        for at in scenario.storyboard.events()
+    }
 
 
 def _other_order(then: Mapping[Key, PlayedAction], now: Mapping[Key, PlayedAction]) -> Iterator[Change]:

@@ -13,7 +13,7 @@ from xosc_lateral.workflows.detection.scoring import Case, Curve
 from xosc_lateral.workflows.detection.tracks import STEP, Track
 from xosc_lateral.workflows.playing.scene import scene_of
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
-from xosc_lateral.world.scenario import BoundingBox, Entity
+from xosc_lateral.world.scenario.entity import BoundingBox, Entity
 from xosc_lateral.world.scenario.enums import EntityCategory
 from xosc_lateral.world.scenario.place import Place
 

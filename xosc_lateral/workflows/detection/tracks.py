@@ -11,7 +11,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS
-from xosc_lateral.workflows.recordings.lateral import SETTLED, Course, lateral_speed
+from xosc_lateral.workflows.recordings.lateral import SETTLED_OFFSET, Course, lateral_speed
 from xosc_lateral.workflows.recordings.recorded import lane_levels
 from xosc_lateral.world.road.network import RoadNetwork
 
@@ -149,7 +149,7 @@ def truth_of(track: Track) -> Truth:
     """Lane changes and lane keeping of a track, by its movement across the lanes alone: the same for every source."""
     n, time = len(track), track.time
     width = track.size.width
-    room = np.maximum(0.5 * (track.rows.lane_width - width), SETTLED)
+    room = np.maximum(0.5 * (track.rows.lane_width - width), SETTLED_OFFSET)
     course = Course(time, track.lateral, track.base, track.level, lateral_speed(time, track.lateral), room)
     keeping = track.rows.following.copy()
     keeping[:EDGE], keeping[max(n - EDGE, 0) :] = False, False

@@ -10,7 +10,7 @@ from xosc_lateral.files.pages.page import Page
 from xosc_lateral.workflows.playing.figures import speeds_over_time
 from xosc_lateral.workflows.playing.scene import scene_of
 from xosc_lateral.world.motion.nominal import NominalMotion, Note
-from xosc_lateral.world.road import RoadNetwork
+from xosc_lateral.world.road.network import RoadNetwork
 
 
 def view_page(

@@ -15,9 +15,9 @@ from xosc_lateral.base.rows import true_slices
 from xosc_lateral.workflows.conversion.result import EntityResult
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
-from xosc_lateral.world.road import RoadNetwork
 from xosc_lateral.world.road.geometry import simplify
-from xosc_lateral.world.road.network import DRIVING
+from xosc_lateral.world.road.lanes import DRIVING
+from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.road.positions import RoadMark
 
 RowArray = NDArray[np.int64]

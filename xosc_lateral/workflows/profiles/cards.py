@@ -14,7 +14,6 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, MovementSummary, figures_of
 from xosc_lateral.drivers.evaluation.metrics import free_runs
 from xosc_lateral.drivers.evaluation.spectra import spectrum
-from xosc_lateral.drivers.fitting.neighbours import basis_of, responses_in_words
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.drivers.model.profile import SIDES, DriverProfile, Provenance
 from xosc_lateral.files.pages.chart import SAMPLED
@@ -93,7 +92,7 @@ def card(profile: DriverProfile) -> dict[str, Any]:
         "validity": profile.validity.to_dict(),
         **_identity(profile),
         "effects": [effect.to_dict() for effect in profile.effects],
-        "neighbours": {side: basis_of(profile, side).value for side in SIDES},
+        "neighbours": {side: profile.basis_of(side).value for side in SIDES},
         "lane_width": profile.lane_width,
         **figures_record(*figures_of(profile)),
         "provenance": profile.provenance.to_dict(),
@@ -134,7 +133,7 @@ def card_rows(profile: DriverProfile, summary: MovementSummary, keeping: LaneKee
         ("valid", profile.validity.in_words()),
         ("model", f"{profile.model.kind}, {effects}, lane width {profile.lane_width:.2f} m"),
         *(("effect", effect_line(effect)) for effect in profile.effects),
-        ("neighbours", responses_in_words(profile)),
+        ("neighbours", profile.responses_in_words()),
         ("mean", f"{keeping.line('mean', 'm')}, {_side(keeping)} of the lane centre"),
         ("spread", f"{_spread(known, summary)}; 90 % within {summary.low:+.2f} to {summary.high:+.2f} m"),
         ("speed", f"{summary.lateral_speed:.3f} m/s lateral (rms)"),

@@ -105,7 +105,7 @@ def _unexplained(result: LoopResult) -> dict[str, Any]:
 
 
 def finding_record(finding: Finding) -> dict[str, Any]:
-    """One finding, as DESIGN has it, with its uncertainty and what the profile got."""
+    """One finding of the JSON result, with its uncertainty and what the profile got."""
     return {
         "effect": finding.effect,
         "kind": finding.kind,

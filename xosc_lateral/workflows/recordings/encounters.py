@@ -11,11 +11,11 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.workflows.recordings.plan import VehiclePlan
 from xosc_lateral.world.road.network import RoadNetwork
 
-REACH = 150.0  # who is farther away has nothing to do with it: 5 s at 30 m/s [m]
-BRAKING = 1.0  # deceleration from which it is braking: coasting in gear gives about 0.5 at 100 km/h [m/s2]
+ENCOUNTER_DISTANCE = 150.0  # who is farther away has nothing to do with it: 5 s at 30 m/s [m]
+BRAKING_DECELERATION = 1.0  # from which it is braking: coasting in gear gives about 0.5 at 100 km/h [m/s2]
 SURE_RATE = 1.0  # a distance that passes its value more slowly is no trigger: 0.1 m of error is more than 0.1 s [m/s]
-WATCHED = 5.0  # so long before, a trigger is not armed: the same distance may come earlier, behind the other [s]
-BORNE_OUT = 0.2  # so near to the recorded moment the trigger has to come [s]
+UNARMED_DURATION = 5.0  # before a trigger is armed: the same distance may come earlier, behind the other [s]
+TRIGGER_TOLERANCE = 0.2  # so near to the recorded moment the trigger has to come [s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,9 +51,8 @@ class RelativeTrigger:
 
 def brakings(plan: VehiclePlan) -> list[int]:
     """Numbers of the speed profile's corners at which braking begins."""
-    step = np.diff(plan.speed.time)
-    hard = np.diff(plan.speed.speed) / step <= -BRAKING
-    return [k for k in range(len(hard)) if hard[k] and (k == 0 or not hard[k - 1]) and k > 0]
+    hard = np.diff(plan.speed.speed) / np.diff(plan.speed.time) <= -BRAKING_DECELERATION
+    return (1 + np.flatnonzero(hard[1:] & ~hard[:-1])).tolist()
 
 
 def encounters(plans: Sequence[VehiclePlan], network: RoadNetwork) -> tuple[Encounter, ...]:
@@ -66,26 +65,18 @@ def encounters(plans: Sequence[VehiclePlan], network: RoadNetwork) -> tuple[Enco
                 beside = _beside(plan, plans, time, network, lane)
                 met.append(Encounter("lane change", plan.name, time, side, *beside))
         for time in plan.speed.time[brakings(plan)].tolist():
-            met.append(Encounter("braking", plan.name, time, "", *_beside(plan, plans, time, network, None)))
-    return tuple(sorted(met, key=lambda transition: (transition.time, transition.vehicle)))
+            met.append(Encounter("braking", plan.name, time, "", *_beside(plan, plans, time, network)))
+    return tuple(sorted(met, key=lambda encounter: (encounter.time, encounter.vehicle)))
 
 
-def _row(plan: VehiclePlan, time: float) -> int | None:
-    """Recorded row at a moment; None: it is not there."""
+def _lane_at(plan: VehiclePlan, time: float, network: RoadNetwork) -> tuple[int, int, int] | None:
+    """Road, lane and direction along s of the recorded vehicle at a moment; None: it is not there."""
     vehicle = plan.vehicle
     if not plan.present[0] - 1e-9 <= time <= vehicle.time[-1]:
         return None
-    return min(int(np.searchsorted(vehicle.time, time)), len(vehicle.time) - 1)
-
-
-def _lane(plan: VehiclePlan, row: int, network: RoadNetwork) -> tuple[int, int, int]:
-    vehicle = plan.vehicle
+    row = min(int(np.searchsorted(vehicle.time, time)), len(vehicle.time) - 1)
     road, lane = int(vehicle.road[row]), int(vehicle.lane[row])
     return road, lane, network.travel_direction(road, lane) * int(vehicle.way[row])
-
-
-def _speed(plan: VehiclePlan, time: float) -> float:
-    return float(np.interp(time, plan.speed.time, plan.speed.speed))
 
 
 def _along(plan: VehiclePlan, time: FloatArray) -> FloatArray:
@@ -94,48 +85,44 @@ def _along(plan: VehiclePlan, time: FloatArray) -> FloatArray:
 
 
 def _beside(
-    plan: VehiclePlan, plans: Sequence[VehiclePlan], time: float, network: RoadNetwork, lane: int | None
+    plan: VehiclePlan, plans: Sequence[VehiclePlan], time: float, network: RoadNetwork, lane: int | None = None
 ) -> tuple[Beside | None, Beside | None]:
     """Nearest vehicle ahead and behind in a lane of the same road; None: the lane that it is in."""
-    row = _row(plan, time)
-    if row is None:
+    place = _lane_at(plan, time, network)
+    if place is None:
         return None, None
-    road, here_lane, way = _lane(plan, row, network)
-    wanted = road, here_lane if lane is None else lane, way
-    at = np.array([time])
-    here, speed = way * float(_along(plan, at)[0]) + plan.vehicle.centre, _speed(plan, time)
+    road, here_lane, way = place
+    wanted, at = (road, here_lane if lane is None else lane, way), np.array([time])
+    here, speed = way * float(_along(plan, at)[0]) + plan.vehicle.centre, float(plan.speed.at(at)[0])
     best: list[Beside | None] = [None, None]
     for other in plans:
-        row = None if other is plan else _row(other, time)
-        if row is None or _lane(other, row, network) != wanted:
+        if other is plan or _lane_at(other, time, network) != wanted:
             continue
         middle = way * float(_along(other, at)[0]) + other.vehicle.centre - here
         gap = max(abs(middle) - 0.5 * (other.vehicle.length + plan.vehicle.length), 0.0)
-        k = 0 if middle > 0.0 else 1
-        closing = (speed - _speed(other, time)) * (1.0 if middle > 0.0 else -1.0)
-        known = best[k]
-        if gap <= REACH and (known is None or gap < known.gap):
+        k, ahead = (0, 1.0) if middle > 0.0 else (1, -1.0)
+        closing, known = (speed - float(other.speed.at(at)[0])) * ahead, best[k]
+        if gap <= ENCOUNTER_DISTANCE and (known is None or gap < known.gap):
             best[k] = Beside(other.name, gap, gap / closing if closing > 1e-3 else np.inf)
     return best[0], best[1]
 
 
-def relative_triggers(
-    plan: VehiclePlan, plans: Sequence[VehiclePlan], network: RoadNetwork
-) -> tuple[dict[int, RelativeTrigger], dict[int, RelativeTrigger]]:
-    """Triggers that the plans bear out: of transitions by their number, of brakings by their corner's."""
+Triggers = tuple[dict[int, RelativeTrigger], dict[int, RelativeTrigger]]
+"""Of transitions by their number, of brakings by the number of their corner in the speed profile."""
+
+
+def relative_triggers(plan: VehiclePlan, plans: Sequence[VehiclePlan], network: RoadNetwork) -> Triggers:
+    """Triggers that the plans bear out."""
     changes, braking = dict[int, RelativeTrigger](), dict[int, RelativeTrigger]()
     for k, (transition, lane) in enumerate(zip(plan.lateral.transitions, plan.targets, strict=True)):
         if transition.lanes:
-            _, behind = _beside(plan, plans, transition.start, network, lane)
-            ahead, _ = _beside(plan, plans, transition.start, network, None)
-            if trigger := _trigger(plan, behind, plans, transition.start) or _trigger(
-                plan, ahead, plans, transition.start
-            ):
+            time = transition.start
+            behind, ahead = _beside(plan, plans, time, network, lane)[1], _beside(plan, plans, time, network)[0]
+            if trigger := _trigger(plan, behind, plans, time) or _trigger(plan, ahead, plans, time):
                 changes[k] = trigger
     for k in brakings(plan):
         time = float(plan.speed.time[k])
-        ahead, _ = _beside(plan, plans, time, network, None)
-        if trigger := _trigger(plan, ahead, plans, time):
+        if trigger := _trigger(plan, _beside(plan, plans, time, network)[0], plans, time):
             braking[k] = trigger
     return changes, braking
 
@@ -144,10 +131,10 @@ def _trigger(
     plan: VehiclePlan, beside: Beside | None, plans: Sequence[VehiclePlan], time: float
 ) -> RelativeTrigger | None:
     """The distance to another vehicle as a trigger, if it passes its value at that time and not in a while before."""
-    other = next((one for one in plans if beside is not None and one.name == beside.name), None)
+    other = next((other for other in plans if beside is not None and other.name == beside.name), None)
     if other is None:
         return None
-    first = max(plan.present[0], other.present[0], time - WATCHED)
+    first = max(plan.present[0], other.present[0], time - UNARMED_DURATION)
     roads = np.unique(np.r_[plan.vehicle.road, other.vehicle.road])
     if time - first < 1.0 or len(roads) > 1:  # distances over several roads depend on the player's way
         return None
@@ -157,6 +144,6 @@ def _trigger(
     grows = ahead > before
     passed = distance > at if grows else distance < at
     moment = float(t[int(np.argmax(passed))]) if passed.any() else np.inf
-    if abs(ahead - before) < SURE_RATE or abs(moment - time) > BORNE_OUT:
+    if abs(ahead - before) < SURE_RATE or abs(moment - time) > TRIGGER_TOLERANCE:
         return None
     return RelativeTrigger(other.name, at, grows, first)

@@ -131,7 +131,7 @@ def neighbour_columns(
     return {name: values[pool.of_row] for name, values in near.items()}
 
 
-REACH = 200.0  # [m]; who is farther away is none, as in `surroundings.around`
+NEIGHBOUR_DISTANCE = 200.0  # [m]; who is farther away is none, as in `surroundings.around`
 MAXIMUM_LENGTH = 30.0  # [m]; no vehicle is longer (German road traffic regulations: 25.25 m)
 
 
@@ -148,16 +148,16 @@ def find_neighbours(
 ) -> dict[str, FloatArray]:
     """Leader in the same lane and nearest vehicle in the lanes beside: columns of the drive table, shape (n,) each.
 
-    Distances are free space along the road, 0 while side by side; infinite where nobody is within `REACH`, NaN where
-    there is no such lane [m]. `frame`: equal for rows of one instant and carriageway. `lane`: 0 = rightmost driving
-    lane, counting up to the left; negative: in none. `s`: vehicle centres, growing in the direction of travel. [m]
+    Distances are free space along the road, 0 while side by side; infinite: nobody is near, NaN: no such lane. [m]
+    `frame`: equal for rows of one instant and carriageway. `lane`: 0 = rightmost driving lane, counting up to the left;
+    negative: in none. `s`: vehicle centres, growing in the direction of travel. [m]
     `scale`: metres along the own lane per metre of `s`. [-]
     """
     known = lane >= 0
     group = np.where(known, frame * 64 + lane, -1)
     order = np.lexsort((s, group))
     # One sorted axis for all groups: each gets its own, far apart from the next.
-    span = float(np.ptp(s)) + 4.0 * (REACH + MAXIMUM_LENGTH) if len(s) else 1.0
+    span = float(np.ptp(s)) + 4.0 * (NEIGHBOUR_DISTANCE + MAXIMUM_LENGTH) if len(s) else 1.0
     base = float(s.min()) if len(s) else 0.0
     axis = group[order] * span + (s[order] - base)
 
@@ -170,7 +170,7 @@ def find_neighbours(
             other = order[np.clip(candidate, 0, len(axis) - 1)]
             free = np.maximum(scale * np.abs(s[other] - s) - 0.5 * (length[other] + length), 0.0)
             gap = np.where(inside & (group[other] == target), free, np.inf)
-            closer = (gap < best) & (gap <= REACH)
+            closer = (gap < best) & (gap <= NEIGHBOUR_DISTANCE)
             best, truck = np.where(closer, gap, best), np.where(closer, is_truck[other], truck)
         return np.where(there & known | np.isfinite(best), best, np.nan), truck
 

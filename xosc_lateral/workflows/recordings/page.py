@@ -13,13 +13,15 @@ from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import KeyFigure, Page
 from xosc_lateral.workflows.conversion.result import EntityResult, SampledSegment
 from xosc_lateral.workflows.playing.scene import scene_of
-from xosc_lateral.workflows.recordings.plan import Residuals, VehiclePlan, planned_motion
-from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
+from xosc_lateral.workflows.recordings.plan import FRAME, VehiclePlan
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.motion.segments import SegmentKind, SegmentSpan
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.road.network import RoadNetwork
+from xosc_lateral.world.scenario.entity import BoundingBox, Entity
+from xosc_lateral.world.scenario.enums import EntityCategory
+from xosc_lateral.world.scenario.place import Place
 
-FRAME = 0.1  # rows of the page's player [s]
 VEHICLES = {
     "entity": "entity", "recorded_as": "recorded as", "class": "class", "from": "from [s]", "to": "to [s]",
     "corners": "changes of acceleration", "along_rms": "along, rms [m]", "along_largest": "along, largest [m]",
@@ -39,9 +41,7 @@ ENCOUNTERS = {
 """Columns of the page's tables: keys of the rows, and headings."""
 
 
-def page_of(
-    facts: dict[str, Any], plans: Sequence[VehiclePlan], residuals: Sequence[Residuals], network: RoadNetwork
-) -> str:
+def page_of(facts: dict[str, Any], plans: Sequence[VehiclePlan], network: RoadNetwork) -> str:
     """HTML page, self-contained: the recorded paths in the player, the planned ones as ghosts."""
     numbers = facts["summary"]
     page = Page(f"{facts['name']}: from the recording to maneuvers")
@@ -74,7 +74,7 @@ def page_of(
         f"{numbers['across_in_maneuvers_rms']} m in them.",
     )
     page.figure(
-        _spread(residuals),
+        _spread(plans),
         "Distribution of the residuals of all vehicles.",
         "Histograms of recorded less planned position, along and across the road",
     )
@@ -103,7 +103,7 @@ def _scene(plans: Sequence[VehiclePlan], network: RoadNetwork, duration: float) 
     time = np.arange(0.0, duration + 1e-9, FRAME)
     motions, results = list[EntityMotion](), list[EntityResult]()
     for plan in plans:
-        motion = planned_motion(plan, time, network)
+        motion = _planned_motion(plan, time, network)
         across = np.interp(time, plan.vehicle.time, plan.vehicle.offset + plan.vehicle.levels[0])
         deviation = across - plan.lateral.at(np.clip(time, *plan.present))
         span = SegmentSpan(SegmentKind.ROAD_FOLLOWING, 0, len(time) - 1, 0.0, float(time[-1]))
@@ -114,11 +114,36 @@ def _scene(plans: Sequence[VehiclePlan], network: RoadNetwork, duration: float) 
     return scene_of(nominal, network, results)
 
 
-def _spread(residuals: Sequence[Residuals]) -> Figure:
+def _planned_motion(plan: VehiclePlan, time: FloatArray, network: RoadNetwork) -> EntityMotion:
+    """Where the plan has the vehicle at times [s], shape (n,): what any player makes of it, but for its frames."""
+    vehicle = plan.vehicle
+    begin, end = plan.present
+    held = np.clip(time, begin, end)
+    way = plan.speed.way(held)
+    recorded = plan.time_at(way)
+    row = np.clip(np.searchsorted(vehicle.time, recorded, side="right") - 1, 0, len(vehicle.time) - 2)
+    share = (recorded - vehicle.time[row]) / (vehicle.time[row + 1] - vehicle.time[row])
+    same = (vehicle.road[row] == vehicle.road[row + 1]) & (vehicle.lane[row] == vehicle.lane[row + 1])
+    s = vehicle.s[row] + np.where(same, share * (vehicle.s[row + 1] - vehicle.s[row]), 0.0)
+    road, lane = vehicle.road[row].astype(np.int32), vehicle.lane[row].astype(np.int32)
+    offset = plan.lateral.at(held) - vehicle.levels[0][row]
+    way_on_lane = vehicle.way[row]
+    poses = network.lane_to_world(road, lane, s, way_on_lane * offset)
+    speed = plan.speed.at(held)
+    active = (time >= begin - 1e-9) & (time <= end + FRAME)
+    activity = np.where(active, np.uint8(Activity.ACTIVE), np.uint8(0)).astype(np.uint8)
+    heading = poses.heading + np.where(way_on_lane < 0, np.pi, 0.0)
+    turned = poses.x, poses.y, poses.z, heading, poses.pitch, poses.roll
+    box = BoundingBox(vehicle.centre, 0.0, 0.5 * vehicle.height, vehicle.length, vehicle.width, vehicle.height)
+    entity = Entity(plan.name, EntityCategory.VEHICLE, Place("", 0, ""), box)
+    return EntityMotion(entity, time, *turned, speed, road, lane, s, offset, np.zeros(len(time)), activity)
+
+
+def _spread(plans: Sequence[VehiclePlan]) -> Figure:
     figure = Figure(1, 2, height=130.0, legend=True)
     left, right = figure.panels
     along, across, in_lane = (
-        np.concatenate([getattr(one, name) for one in residuals]) for name in ("along", "across", "in_lane")
+        np.concatenate([getattr(plan.residuals, name) for plan in plans]) for name in ("along", "across", "in_lane")
     )
     density, edges = np.histogram(np.clip(along, -1.0, 1.0), np.linspace(-1.0, 1.0, 81), density=True)
     left.steps(edges, density, SAMPLED)

@@ -29,10 +29,10 @@ from xosc_lateral.drivers.evaluation.metrics import free_runs
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.mapping import MappingLike
 from xosc_lateral.files.profiles import find_profile, list_profiles, read_profile
-from xosc_lateral.workflows.conversion.drivers import AUTO_PROFILE
-from xosc_lateral.workflows.conversion.options import spelled_out, values_of
+from xosc_lateral.workflows.conversion.settings import AUTO_PROFILE
+from xosc_lateral.workflows.options import spelled_out, values_of
 from xosc_lateral.workflows.recordings.encounters import encounters, relative_triggers
-from xosc_lateral.workflows.recordings.plan import Residuals, VehiclePlan, plan_vehicles, residuals_of
+from xosc_lateral.workflows.recordings.plan import VehiclePlan, plan_vehicles
 from xosc_lateral.workflows.recordings.reconstruction import ChosenDriver, Reconstruction
 from xosc_lateral.workflows.recordings.recorded import Track, place_tracks
 from xosc_lateral.workflows.recordings.recordings import RecordedTraffic, read_recording
@@ -42,7 +42,7 @@ from xosc_lateral.workflows.result import PathLike
 
 LONG_DRIVE = 100.0  # of road-following, for a profile of one vehicle: ten windows that the evaluation compares [s]
 LONGEST_WINDOW = 3600.0  # a scenario of more can't be looked at, and times in ms or us instead of s give it [s]
-AROUND = 100.0  # who comes as near as this to the vehicle in question, along or across, belongs to its surroundings [m]
+SURROUNDING_DISTANCE = 100.0  # who comes as near to a vehicle, along or across, belongs to its surroundings [m]
 NO_HOST = "none"  # stands for no vehicle under test
 
 
@@ -51,8 +51,6 @@ def reconstruct(
     recording: PathLike,
     output: PathLike | None = None,
     *,
-    format: str | None = None,  # noqa: A002 (as in `import_drives`)
-    road: PathLike | None = None,
     columns: MappingLike | None = None,
     force: bool = False,
     **options: Unpack[ReconstructKeywords],
@@ -65,10 +63,6 @@ def reconstruct(
         Tracks of several vehicles: DLR Highway Traffic, levelX, OSI traces, CommonRoad, SUMO's FCD output, or a table.
     output : str or Path, optional
         Folder to write to, see `Reconstruction.write`; without it nothing is written.
-    format : str, optional
-        "dlr-ht", "levelx", "osi", "commonroad", "fcd" or "tracks"; without it, told from the file.
-    road : str or Path, optional
-        OpenDRIVE file, for recordings that come without their lanes; SUMO's network, for its FCD output.
     columns : dict, path or TableMapping, optional
         Name -> ``COLUMN[:UNIT]`` for tables of tracks, or a saved mapping's file.
     force : bool
@@ -81,7 +75,7 @@ def reconstruct(
     FormatError, NotEnoughDataError
     """
     settings = ReconstructSettings(**values_of(ReconstructSettings, options))
-    traffic = read_recording(Path(recording), kind=format, road=None if road is None else Path(road), columns=columns)
+    traffic = read_recording(Path(recording), kind=settings.format, road=settings.road, columns=columns)
     result = reconstruct_recording(traffic, settings)
     if output is not None:
         result.write(output, force=force)
@@ -95,14 +89,15 @@ def reconstruct_recording(traffic: RecordedTraffic, settings: ReconstructSetting
     no_host = settings.host == NO_HOST and all(track.name != NO_HOST for track in traffic.tracks)
     host = None if no_host else settings.host or traffic.host
     tracks, begin, end = chosen(traffic, settings, settings.host and host)
-    recording, network = place_tracks(tracks, traffic.network, begin, end), traffic.network
+    network = traffic.network
+    recording = place_tracks(tracks, network, begin, end)
     plans = plan_vehicles(recording, network, error=settings.error)
     entity = next((plan.name for plan in plans if plan.vehicle.name == host), None)
     if settings.host is not None and host is not None and entity is None:
         raise FormatError(f"host {settings.host!r} is not among the reconstructed vehicles", path=traffic.sources[0])
-    relative = {}
-    if settings.relative and not settings.exact:
-        relative = {plan.name: relative_triggers(plan, plans, network) for plan in plans}
+    met = encounters(plans, network)
+    is_relative = settings.relative and not settings.exact
+    relative = {plan.name: relative_triggers(plan, plans, network) for plan in plans if is_relative}
     major, minor = map(int, settings.version.split("."))
     scenario = reconstructed_scenario(
         plans,
@@ -115,14 +110,11 @@ def reconstruct_recording(traffic: RecordedTraffic, settings: ReconstructSetting
         relative=relative,
         exact=settings.exact,
     )
-    residuals = tuple(map(residuals_of, plans))
-    drivers, fitted = _drivers(plans, residuals, settings)
-    met = encounters(plans, network)
-    return Reconstruction(traffic, recording, plans, scenario, residuals, met, relative, drivers, fitted, entity)
+    return Reconstruction(traffic, recording, plans, scenario, met, relative, *_drivers(plans, settings), entity)
 
 
 def _drivers(
-    plans: Sequence[VehiclePlan], residuals: Sequence[Residuals], settings: ReconstructSettings
+    plans: Sequence[VehiclePlan], settings: ReconstructSettings
 ) -> tuple[tuple[ChosenDriver, ...], dict[str, DriverProfile]]:
     from xosc_lateral.drivers.fitting.fitting import fit_profile
 
@@ -130,16 +122,18 @@ def _drivers(
     paths = {path.stem: path for path in reversed(list_profiles(settings.library))}
     models = {name: _window_model(path, path.stat().st_mtime_ns) for name, path in paths.items()}
     drivers, fitted = list[ChosenDriver](), dict[str, DriverProfile]()
-    for plan, residual in zip(plans, residuals, strict=True):
+    for plan in plans:
         if plan.lateral.is_played:
             drivers.append(ChosenDriver("", 0.0, 0.0, "stands still in its lane: no person drove it"))
             continue
-        stretches = in_lane_offsets(plan, residual)
+        stretches = in_lane_offsets(plan)
         driver = choose_driver([offset for _, offset, _ in stretches], models, population.stem)
         if settings.fit and driver.seconds >= LONG_DRIVE:
-            drive = drive_of(plan, residual)
-            assert drive is not None
+            time, offset, width = (np.concatenate(columns) for columns in zip(*stretches, strict=True))
+            context = {"speed": plan.speed.at(time), "lane_width": width}
+            run = np.repeat(np.arange(len(stretches)), [len(stretch[0]) for stretch in stretches])
             try:
+                drive = Drive(plan.name, time, offset, width, context, run=run)
                 fitted[plan.name] = fit_profile([drive], name=plan.name)
                 driver = replace(driver, profile=f"drivers/{plan.name}.json", why="fitted to its own drive")
             except XoscLateralError as error:
@@ -176,13 +170,12 @@ def chosen(
     if settings.vehicles is not None:
         tracks = [track for track in tracks if track.name in settings.vehicles]
     begin, end = max(begin, first), min(end, last)
-    wrong = ""
     if end - begin < 1.0:
-        wrong = f"from {begin:g} to {end:g} s is no second; it lasts from {first:g} to {last:g} s"
-    elif end - begin > LONGEST_WINDOW:
-        wrong = f"{end - begin:g} s are more than {LONGEST_WINDOW:g} s: take a part with --from and --to"
-    if wrong:
-        raise FormatError(wrong, path=source)
+        what = f"from {begin:g} to {end:g} s is no second; it lasts from {first:g} to {last:g} s"
+        raise FormatError(what, path=source)
+    if end - begin > LONGEST_WINDOW:
+        what = f"{end - begin:g} s are more than {LONGEST_WINDOW:g} s: take a part with --from and --to"
+        raise FormatError(what, path=source)
     return tracks, begin, end
 
 
@@ -193,7 +186,7 @@ def _comes_near(track: Track, centre: Track, begin: float, end: float) -> bool:
         np.interp(time, track.time, getattr(track, axis)) - np.interp(time, centre.time, getattr(centre, axis))
         for axis in "xy"
     ]
-    return bool((np.hypot(*away) <= AROUND).any())  # nobody where they are not there at once
+    return bool((np.hypot(*away) <= SURROUNDING_DISTANCE).any())  # nobody where they are not there at once
 
 
 WINDOW, STEP = 10.0, 0.2  # of movement that is summed up, as the evaluation's snippets; of rows, as in profiles [s]
@@ -202,12 +195,11 @@ FREE_RUNS = 40  # of each profile, five minutes each: 30 windows of 40 drivers
 LEAST_SPREAD = 1e-4  # of a path in a window, below which its logarithm would say something about digits [m]
 
 
-def in_lane_offsets(plan: VehiclePlan, residuals: Residuals) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
+def in_lane_offsets(plan: VehiclePlan) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
     """Stretches of road-following of `WINDOW` and more: time [s], offset and lane width [m] every `STEP`."""
-    vehicle = plan.vehicle
-    rows = len(vehicle.time) - len(residuals.time)
-    time, width = residuals.time, vehicle.lane_width[rows:]
-    following = residuals.in_lane & (np.interp(time, plan.speed.time, plan.speed.speed) >= MINIMUM_SPEED)
+    residuals = plan.residuals
+    time, width = residuals.time, plan.vehicle.lane_width[-len(residuals.time) :]
+    following = residuals.in_lane & (plan.speed.at(time) >= MINIMUM_SPEED)
     parts = []
     for part in true_slices(following):
         even = np.arange(time[part.start], time[part.stop - 1] + 1e-9, STEP)
@@ -249,8 +241,8 @@ class WindowModel:
         every = max(1, round(STEP / profile.model.step))
         runs = free_runs(profile, seed, drivers=FREE_RUNS)[:, ::every]
         each = [_summaries(_windows(run)) for run in runs]
-        means = np.array([one.mean(axis=0) for one in each])
-        within = np.mean([np.cov(one.T) for one in each], axis=0)
+        means = np.array([windows.mean(axis=0) for windows in each])
+        within = np.mean([np.cov(windows.T) for windows in each], axis=0)
         between = np.cov(means.T) - within / len(each[0])
         values, vectors = np.linalg.eigh(between)
         between = (vectors * np.maximum(values, 0.0)) @ vectors.T
@@ -273,14 +265,3 @@ def _summaries(windows: FloatArray) -> FloatArray:
     spread = np.maximum(windows.std(axis=1), LEAST_SPREAD)
     speed = np.sqrt((np.diff(windows, axis=1) ** 2).mean(axis=1)) / STEP
     return np.column_stack([windows.mean(axis=1), np.log(spread), np.log(np.maximum(speed, LEAST_SPREAD))])
-
-
-def drive_of(plan: VehiclePlan, residuals: Residuals) -> Drive | None:
-    """A vehicle's road-following as a drive that a profile can be fitted to; None: there is none."""
-    parts = in_lane_offsets(plan, residuals)
-    if not parts:
-        return None
-    time, offset, width = (np.concatenate([part[k] for part in parts]) for k in range(3))
-    run = np.repeat(np.arange(len(parts)), [len(part[0]) for part in parts])
-    speed = np.interp(time, plan.speed.time, plan.speed.speed)
-    return Drive(plan.name, time, offset, width, {"speed": speed, "lane_width": width}, run=run)

@@ -17,14 +17,13 @@ from xosc_lateral.files.output_paths import claim, output_folder
 from xosc_lateral.files.output_tables import write_frame
 from xosc_lateral.files.profiles import profile_bytes
 from xosc_lateral.files.source import parsed_hashes
-from xosc_lateral.workflows.recordings.encounters import Encounter
-from xosc_lateral.workflows.recordings.plan import Residuals, VehiclePlan
+from xosc_lateral.workflows.recordings.encounters import Encounter, Triggers
+from xosc_lateral.workflows.recordings.plan import VehiclePlan
 from xosc_lateral.workflows.recordings.recorded import Recording
 from xosc_lateral.workflows.recordings.recordings import RecordedTraffic
-from xosc_lateral.workflows.recordings.scenario import Triggers
 from xosc_lateral.workflows.result import PathLike, Result
 
-WORTH_NAMING = 1.0  # a position off by more is named as not expressed, across beside the lane's own spread [m]
+NAMED_RESIDUAL = 1.0  # a position off by more is named as not expressed, across beside the lane's own spread [m]
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,10 +44,9 @@ class Reconstruction(Result):
     recording: Recording
     plans: tuple[VehiclePlan, ...]
     scenario: str  # the OpenSCENARIO document
-    residuals: tuple[Residuals, ...]  # residuals, drivers: in the order of the plans
     encounters: tuple[Encounter, ...]
     relative: Mapping[str, Triggers]  # by entity, triggers that are distances
-    drivers: tuple[ChosenDriver, ...]
+    drivers: tuple[ChosenDriver, ...]  # in the order of the plans
     fitted: Mapping[str, DriverProfile]  # by name, profiles of single vehicles
     host: str | None  # entity that is the vehicle under test
     outputs: tuple[Path, ...] = ()  # files that were written
@@ -99,7 +97,7 @@ class Reconstruction(Result):
             self.traffic.road_name: self.traffic.road,
             f"{self.name}.xosc": self.scenario,
             **{f"drivers/{name}.json": profile_bytes(profile) for name, profile in self.fitted.items()},
-            "report.html": page_of(facts, self.plans, self.residuals, self.traffic.network),
+            "report.html": page_of(facts, self.plans, self.traffic.network),
             "report.json": canonical_json(facts),
         }
         table, paths = place / "drivers.csv", {place / name: data for name, data in files.items()}
@@ -124,25 +122,26 @@ def drivers_table(made: Reconstruction, path: Path) -> None:
 
 def facts_of(made: Reconstruction) -> dict[str, Any]:
     """Everything that is known of a reconstruction, as plain values."""
-    recording, plans, residuals = made.recording, made.plans, made.residuals
+    recording, plans = made.recording, made.plans
     return {
         "name": made.traffic.name,
         "recording": made.traffic.sources[0].name,
         "window": [round(recording.start, 3), round(recording.end, 3)],
         "host": made.host,
-        "summary": summary(plans, residuals, recording.end - recording.start),
-        "vehicles": vehicle_rows(plans, residuals, made.drivers),
+        "summary": summary(plans, recording.end - recording.start),
+        "vehicles": vehicle_rows(plans, made.drivers),
         "maneuvers": maneuver_rows(plans, made.relative),
         "encounters": encounter_rows(made.encounters),
-        "not_expressed": [*made.traffic.notes, *not_expressed(plans, residuals, recording.left_out)],
+        "not_expressed": [*made.traffic.notes, *not_expressed(plans, recording.left_out)],
         "provenance": {"package_version": __version__, "inputs": parsed_hashes(made.files)},
     }
 
 
-def summary(plans: Sequence[VehiclePlan], residuals: Sequence[Residuals], duration: float) -> dict[str, float]:
+def summary(plans: Sequence[VehiclePlan], duration: float) -> dict[str, float]:
     """Counts, and residuals of all vehicles together. [m], [s]"""
-    along, across = (np.concatenate([getattr(one, name) for one in residuals]) for name in ("along", "across"))
-    in_lane = np.concatenate([one.in_lane for one in residuals])
+    along, across, in_lane = (
+        np.concatenate([getattr(plan.residuals, name) for plan in plans]) for name in ("along", "across", "in_lane")
+    )
     driven = sum(float(plan.speed.time[-1] - plan.speed.time[0]) for plan in plans)
     corners = sum(len(plan.speed.time) - 2 for plan in plans)
     return {
@@ -163,9 +162,7 @@ def _rms(values: FloatArray) -> float:
     return float(np.sqrt((values**2).mean())) if len(values) else 0.0
 
 
-def vehicle_rows(
-    plans: Sequence[VehiclePlan], residuals: Sequence[Residuals], drivers: Sequence[ChosenDriver]
-) -> list[dict[str, Any]]:
+def vehicle_rows(plans: Sequence[VehiclePlan], drivers: Sequence[ChosenDriver]) -> list[dict[str, Any]]:
     """One row per vehicle. [s], [m]"""
     return [
         {
@@ -176,18 +173,19 @@ def vehicle_rows(
             "to": round(plan.present[1], 3),
             "corners": len(plan.speed.time) - 2,
             "lane_changes": len(plan.changes),
-            "along_rms": round(_rms(one.along), 4),
-            "along_largest": round(float(np.abs(one.along).max()), 4) if len(one.along) else 0.0,
-            "across_in_lane_rms": round(_rms(one.across[one.in_lane]), 4),
-            "across_in_maneuvers_rms": round(_rms(one.across[~one.in_lane]), 4),
+            "along_rms": round(_rms(residuals.along), 4),
+            "along_largest": round(float(np.abs(residuals.along).max(initial=0.0)), 4),
+            "across_in_lane_rms": round(_rms(residuals.across[residuals.in_lane]), 4),
+            "across_in_maneuvers_rms": round(_rms(residuals.across[~residuals.in_lane]), 4),
             "profile": driver.profile,
             "why": driver.why,
         }
-        for plan, one, driver in zip(plans, residuals, drivers, strict=True)
+        for plan, driver in zip(plans, drivers, strict=True)
+        for residuals in [plan.residuals]
     ]
 
 
-def maneuver_rows(plans: Sequence[VehiclePlan], relative: Any) -> list[dict[str, Any]]:
+def maneuver_rows(plans: Sequence[VehiclePlan], relative: Mapping[str, Triggers]) -> list[dict[str, Any]]:
     """One row per lateral maneuver, in order of time. [s], [m]"""
     rows = []
     for plan in plans:
@@ -195,23 +193,21 @@ def maneuver_rows(plans: Sequence[VehiclePlan], relative: Any) -> list[dict[str,
         for number, transition in enumerate(plan.lateral.transitions):
             kind = "lane change" if transition.lanes else "aborted lane change" if transition.aborted else "lane offset"
             trigger = distances.get(number)
-            rows.append(
-                {
-                    "entity": plan.name,
-                    "kind": kind,
-                    "side": "left" if transition.change > 0 else "right",
-                    "start": round(transition.start, 3),
-                    "duration": round(transition.duration, 3),
-                    "shape": transition.shape.value,
-                    "lanes": abs(transition.lanes),
-                    "residual": round(transition.residual, 4),
-                    "bell_residual": round(transition.bell_residual, 4)
-                    if np.isfinite(transition.bell_residual)
-                    else None,
-                    "cut_off": transition.cut,
-                    "begins": "by the clock" if trigger is None else f"{trigger.distance:.1f} m from {trigger.other}",
-                }
-            )
+            bell = transition.bell_residual
+            row = {
+                "entity": plan.name,
+                "kind": kind,
+                "side": "left" if transition.change > 0 else "right",
+                "start": round(transition.start, 3),
+                "duration": round(transition.duration, 3),
+                "shape": transition.shape.value,
+                "lanes": abs(transition.lanes),
+                "residual": round(transition.residual, 4),
+                "bell_residual": round(bell, 4) if np.isfinite(bell) else None,
+                "cut_off": transition.cut,
+                "begins": "by the clock" if trigger is None else f"{trigger.distance:.1f} m from {trigger.other}",
+            }
+            rows.append(row)
     return sorted(rows, key=lambda row: (row["start"], row["entity"]))
 
 
@@ -232,21 +228,20 @@ def encounter_rows(met: Sequence[Encounter]) -> list[dict[str, Any]]:
     return rows
 
 
-def not_expressed(plans: Sequence[VehiclePlan], residuals: Sequence[Residuals], left_out: Sequence[str]) -> list[str]:
+def not_expressed(plans: Sequence[VehiclePlan], left_out: Sequence[str]) -> list[str]:
     """What the scenario does not say, or not as well as asked for: a line each."""
     lines = list(left_out)
-    for plan, residual in zip(plans, residuals, strict=True):
-        cut = sum(each.cut for each in plan.lateral.transitions)
-        if cut:
+    for plan in plans:
+        if cut := sum(transition.cut for transition in plan.lateral.transitions):
             lines.append(f"{plan.name}: {cut} lateral maneuvers begin or end outside of the recording")
-        for word, values in (("along the road", residual.along), ("beside its maneuvers", residual.across)):
-            if len(values) and (worst := float(np.abs(values).max())) > WORTH_NAMING:
-                row = int(np.abs(values).argmax())
-                lines.append(f"{plan.name}: up to {worst:.2f} m {word}, at {residual.time[row]:.1f} s")
-    fitted = [
-        residual for plan in plans for residual in plan.lateral.transitions if np.isfinite(residual.bell_residual)
-    ]
-    if bells := sum(residual.is_bell for residual in fitted):
+        for word, name in (("along the road", "along"), ("beside its maneuvers", "across")):
+            away = np.abs(getattr(plan.residuals, name))
+            if away.max(initial=0.0) > NAMED_RESIDUAL:
+                time = plan.residuals.time[int(away.argmax())]
+                lines.append(f"{plan.name}: up to {away.max():.2f} m {word}, at {time:.1f} s")
+    transitions = [transition for plan in plans for transition in plan.lateral.transitions]
+    fitted = [transition for transition in transitions if np.isfinite(transition.bell_residual)]
+    if bells := sum(transition.is_bell for transition in fitted):
         lines.append(
             f"{bells} of {len(fitted)} lane changes are nearer to the bell of drivers than to a maneuver's shape: "
             "convert --lane-changes lifelike has it"

@@ -13,13 +13,13 @@ from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.road.positions import Poses
 
-BESIDE = 1.0  # so far beside every driving lane a vehicle still keeps to one: it drives on its marking [m]
+MARKING_TOLERANCE = 1.0  # so far beside every driving lane a vehicle still keeps to one: it drives on its marking [m]
 LONGEST_GAP = 1.0  # rows farther apart than this are not of one passage, as in `recordings.cuts` [s]
-FARTHEST = 1e8  # no map projection gives such a position: the Earth's circumference is 4e7 m [m]
+MAXIMUM_COORDINATE = 1e8  # no map projection gives such a position: the Earth's circumference is 4e7 m [m]
 SHORTEST_STEP = 1e-4  # rows that follow sooner are of the same moment: no sensor has 10 kHz [s]
 MINIMUM_PASSAGE = 2.0  # passages below this are left out: a speed and its change can't be told in less [s]
-LEAP = 1.5  # farther than it can have driven (half a narrow lane): an identifier that has gone to another vehicle [m]
-BACKWARDS = 0.5  # who falls back so far drives backwards; less is an error of standing vehicles' positions [m]
+LEAP_DISTANCE = 1.5  # farther than it can have driven (half a narrow lane): the identifier is another vehicle's now [m]
+BACKWARDS_DISTANCE = 0.5  # who falls back so far drives backwards; less is an error of standing vehicles' positions [m]
 MOVING_SPEED = 0.25  # below, a vehicle stands, and its direction is that of errors: half a walking pace [m/s]
 VELOCITY_WINDOW = 2.0  # rows whose positions a velocity is fitted to: 0.2 m of noise at 10 Hz are 0.08 m/s in it [s]
 HEADING_WINDOW = 2.0  # way over which a heading is averaged, so that positions' noise does not turn a slow vehicle [m]
@@ -99,7 +99,7 @@ def place_tracks(tracks: Sequence[Track], network: RoadNetwork, start: float, en
     """Each vehicle's longest passage in driving lanes within a window of time. Raises `NotEnoughDataError`."""
     vehicles, left_out = list[RecordedVehicle](), list[str]()
     for track in tracks:
-        inside = (np.hypot(track.x, track.y) < FARTHEST) & np.isfinite(track.heading)
+        inside = (np.hypot(track.x, track.y) < MAXIMUM_COORDINATE) & np.isfinite(track.heading)
         rows = np.flatnonzero(inside & (track.time >= start - 1e-9) & (track.time <= end + 1e-9))
         if len(rows):
             rows = rows[np.r_[True, np.diff(track.time[rows]) > SHORTEST_STEP]]
@@ -118,7 +118,7 @@ def _place(track: Track, rows: NDArray[np.intp], network: RoadNetwork, left_out:
     heading = _steady_heading(time, x, y, velocity, track.heading[rows], network)
     x, y = x - track.ahead * np.cos(heading), y - track.ahead * np.sin(heading)
     place_on_road = network.world_to_lane(x, y, heading=heading)
-    on_lane = (place_on_road.distance <= BESIDE) & (place_on_road.lane != 0)
+    on_lane = (place_on_road.distance <= MARKING_TOLERANCE) & (place_on_road.lane != 0)
     if not on_lane.any():
         left_out.append(f"{track.name}: on no driving lane")
         return None
@@ -204,7 +204,7 @@ def _across(velocity: FloatArray, lane_heading: FloatArray) -> NDArray[np.bool_]
 def _backwards(x: FloatArray, y: FloatArray, heading: FloatArray) -> NDArray[np.bool_]:
     steps = np.diff(x) * np.cos(heading[1:]) + np.diff(y) * np.sin(heading[1:])
     driven = np.cumsum(np.r_[0.0, steps])
-    return np.asarray(driven < np.maximum.accumulate(driven) - BACKWARDS)
+    return np.asarray(driven < np.maximum.accumulate(driven) - BACKWARDS_DISTANCE)
 
 
 def _passages(time: FloatArray, x: FloatArray, y: FloatArray, rows: NDArray[np.intp]) -> list[NDArray[np.intp]]:
@@ -219,7 +219,7 @@ def _passages(time: FloatArray, x: FloatArray, y: FloatArray, rows: NDArray[np.i
         about = np.maximum(np.hypot(vx, vy), 1.0)
         across = (moved[1] * vx - moved[0] * vy) / about
         # twice as far as about that time, or turned by more than 30 degrees
-        broken |= np.hypot(*moved) > 2.0 * about * step + LEAP
-        broken |= np.abs(across) > 0.5 * about * step + LEAP
+        broken |= np.hypot(*moved) > 2.0 * about * step + LEAP_DISTANCE
+        broken |= np.abs(across) > 0.5 * about * step + LEAP_DISTANCE
     parts = np.split(rows, np.flatnonzero(broken) + 1)
     return [part for part in parts if len(part) > 3 and time[part[-1]] - time[part[0]] >= MINIMUM_PASSAGE]

@@ -11,8 +11,8 @@ from lxml import etree
 from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.build import Version, decimal, sub
 from xosc_lateral.files.output_paths import template_mark
-from xosc_lateral.workflows.recordings.encounters import RelativeTrigger
-from xosc_lateral.workflows.recordings.motion_fits import Transition, peak_acceleration
+from xosc_lateral.workflows.recordings.encounters import RelativeTrigger, Triggers
+from xosc_lateral.workflows.recordings.lateral import Transition, peak_acceleration
 from xosc_lateral.workflows.recordings.plan import VehiclePlan
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.enums import Priority
@@ -24,10 +24,6 @@ MODELS |= {"motorcycle": "motorbike", "motorbike": "motorbike", "bicycle": "bicy
 
 LIMITS = {"maxSpeed": "80", "maxAcceleration": "12", "maxDeceleration": "12"}
 """Above what is recorded: the speed profile alone says how it drives. [m/s], [m/s2]"""
-
-
-Triggers = tuple[Mapping[int, RelativeTrigger], Mapping[int, RelativeTrigger]]
-"""Of transitions by their number, of brakings by the number of their corner in the speed profile."""
 
 HALF_FRAME = 0.01
 """Players set the speed of a frame's end and drive the whole frame with it: they are half a frame ahead of a profile,

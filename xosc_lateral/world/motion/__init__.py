@@ -1,1 +1,1 @@
-"""Nominal motion, and what follows from it: segments, context, deviations, trajectories, gaps."""
+"""Nominal motion, and what follows from it: segments, deviations, trajectories, gaps."""

@@ -19,12 +19,17 @@ from msgspec import Struct
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
-from xosc_lateral.base.rows import BLOCK
+from xosc_lateral.base.rows import BLOCK, stored
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
+from xosc_lateral.world.motion.trajectory import WorldTrajectory
+from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.surroundings.around import stretches_within
+
+GAP_STEP = 0.1
+"""Between rows that gaps are measured on. [s]"""
 
 MAXIMUM_GAP = 30.0
 """Boxes farther apart than this at all times are no pair worth naming. [m]"""
-
 
 LEAST_SIZE = 1e-9
 """A box is at least this long and wide: sides without a length have no direction. [m]"""
@@ -61,6 +66,22 @@ class Gap(Struct, frozen=True):
     def touches(self) -> bool:
         """Whether the boxes overlap or meet."""
         return self.distance <= 0.0
+
+
+def gaps_of(motion: NominalMotion, paths: Sequence[WorldTrajectory | EntityMotion]) -> tuple[Gap, ...]:
+    """Smallest gap of each pair of vehicles of a run that meet; `paths`: one per entity."""
+    every = max(1, round(GAP_STEP / motion.step))
+    vehicles = [both for both in zip(motion.entities, paths, strict=True) if both[0].entity.is_vehicle]
+    if len(vehicles) < 2:
+        return ()
+    boxes = []
+    for entity, path in vehicles:
+        box = entity.entity.bounding_box
+        absent = (entity.activity[::every] & Activity.ACTIVE) == 0
+        x = np.where(absent, np.nan, path.x[::every])
+        x, y, heading = (stored(values) for values in (x, path.y[::every], path.heading[::every]))
+        boxes.append(BoxPath(entity.name, x, y, heading, box.length, box.width, box.center_x))
+    return smallest_gaps(motion.entities[0].time[::every], boxes)
 
 
 def smallest_gaps(time: FloatArray, paths: Sequence[BoxPath], *, reach: float = MAXIMUM_GAP) -> tuple[Gap, ...]:
@@ -174,6 +195,24 @@ class RoadPath:
     length: float  # of the box [m]
     width: float  # [m]
     centre: float  # box centre ahead of the reference point [m]
+
+
+def road_path(
+    motion: EntityMotion, network: RoadNetwork, path: WorldTrajectory | EntityMotion, deviation: FloatArray | float
+) -> RoadPath:
+    """Way of a vehicle that drives a path beside its nominal motion, `deviation` to the left. [m]"""
+    box = motion.entity.bounding_box
+    every = max(1, round(GAP_STEP / (motion.time[1] - motion.time[0]))) if len(motion.time) > 1 else 1
+    road, lane, s = motion.road[::every], motion.lane[::every], motion.s[::every]
+    present = (motion.activity[::every] & Activity.ACTIVE) != 0
+    along = np.where(np.cos(motion.heading_relative[::every]) >= 0.0, 1, -1)
+    offset = motion.offset[::every] + along * np.broadcast_to(deviation, len(motion.time))[::every]
+    t, forward = np.full(len(s), np.nan), np.ones(len(s), dtype=np.int_)
+    on_road = road >= 0
+    t[on_road] = network.offset_to_t(road[on_road], lane[on_road], s[on_road], offset[on_road])
+    forward[on_road] = along[on_road] * network.travel_directions(road[on_road], lane[on_road])
+    x, y = (np.where(present, values[::every], np.nan) for values in (path.x, path.y))
+    return RoadPath(motion.name, x, y, road, s, t, forward, path.speed[::every], box.length, box.width, box.center_x)
 
 
 @dataclass(frozen=True, slots=True)

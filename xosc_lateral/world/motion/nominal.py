@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray, Int32Array
 from xosc_lateral.base.errors import locate
-from xosc_lateral.world.scenario import Entity
+from xosc_lateral.world.scenario.entity import Entity
 
 
 def axes(yaw: FloatArray, pitch: FloatArray, roll: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

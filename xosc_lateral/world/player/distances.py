@@ -135,10 +135,7 @@ def _across(here: Spot, spot: Spot, path: RoadPath) -> float:
 
 
 class Measure(Struct, frozen=True):
-    """How a distance is measured: in which coordinate system, which part of it, between boxes or reference points.
-
-    A distance is None where no way leads along the roads.
-    """
+    """How a distance is measured, between boxes or reference points; None where no way leads along the roads."""
 
     system: CoordinateSystem
     kind: RelativeDistanceType

@@ -7,19 +7,14 @@ from math import atan2, cos, hypot, inf, nan, pi, sin
 
 from xosc_lateral.world.player.state import NO_ROAD, EntityState, free
 from xosc_lateral.world.player.transition import EPSILON
-from xosc_lateral.world.road import LaneLink
-from xosc_lateral.world.road.links import most_turning
-from xosc_lateral.world.road.positions import wrap
+from xosc_lateral.world.road.positions import LaneLink, wrap
 
 _TIGHT = 1e-3
 """Beyond this share of the radius, the centre of a curve is so near that lengths beside the line say nothing. [-]"""
 
 
 def drive(state: EntityState, distance: float) -> None:
-    """Let the default driver move an entity, `distance` [m] on its own track; negative: backwards.
-
-    Without a road there is no lane to follow: the entity stops.
-    """
+    """Let the default driver move an entity, `distance` on its own track; it stops where there is no road. [m]"""
     state.follow_lane()
     if state.road == NO_ROAD:
         state.set_speed(0.0)
@@ -31,19 +26,14 @@ def drive(state: EntityState, distance: float) -> None:
 def move_along_lane(state: EntityState, distance: float) -> None:
     """Move an entity along its lane as far as it goes, lateral offset and relative heading kept.
 
-    The way along the reference line follows from the curvature at the START of the step (explicit Euler, as the
-    reference player does it).
-
-    `distance`: way on the entity's own track; negative: backwards. [m]
+    `distance` is on its own track, negative backwards; the way along the reference line follows from the curvature at
+    the START of the step (explicit Euler, as the reference player does it). [m]
     """
     travel(state, 1 if state.is_forward else -1, along_reference(state, state.s, distance))
 
 
 def halt_at_road_end(state: EntityState, step: float) -> None:
-    """Who has not moved at a road's end in the frame before stops, whoever drives it.
-
-    `state`: after it was moved in this frame; `step`: [s]
-    """
+    """An entity that has not moved at a road's end in the frame before stops, whoever drives it; `step` in [s]."""
     if state.free_pose is not None:
         state.last_place, state.stuck = None, False
         return
@@ -86,14 +76,9 @@ def travel(state: EntityState, way: int, distance: float) -> None:
         state._pose = None
         state.at_road_end = False
         return
-    _travel_far(state, way, distance)
-
-
-def _travel_far(state: EntityState, way: int, distance: float) -> None:
-    network = state.network
     links_passed = 0
     while True:
-        moved = network.advance(
+        moved = state.network.advance(
             state.road, state.lane, state.s, distance, direction=way, choose=lambda options: _choose(state, options)
         )
         if moved.direction != way:
@@ -125,7 +110,7 @@ def _choose(state: EntityState, options: Sequence[LaneLink]) -> LaneLink:
     if state.route is not None:
         return state.route.choose(state.road, options) or first
     if first.direction != network.travel_direction(first.road, first.lane):
-        return most_turning(network.roads, options)
+        return network.most_turning(options)
     return network.straightest(options)
 
 

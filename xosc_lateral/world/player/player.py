@@ -23,10 +23,10 @@ from xosc_lateral.world.player.simulation import Simulation
 from xosc_lateral.world.player.state import NO_ROAD, EntityState
 from xosc_lateral.world.player.storyboard_builder import build_storyboard, init_actions
 from xosc_lateral.world.player.transition import EPSILON
-from xosc_lateral.world.road import RoadNetwork
-from xosc_lateral.world.scenario import Scenario
+from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.enums import StoryboardElementState
 from xosc_lateral.world.scenario.private_actions import FollowTrajectoryAction, TeleportAction
+from xosc_lateral.world.scenario.scenario import Scenario
 
 _LATERAL = int(Activity.LATERAL)  # plain: arithmetic of flags takes ten times as long
 
@@ -96,13 +96,10 @@ class _Player:
         unwatched.wake_all()
         ended_by = "time limit" if going else "stop trigger"
         place, cut_off = simulation.scenario.storyboard.place, None
-        if going and (_has_end(simulation.scenario) or self._goes_on()):
+        goes_on = any(story.state is not StoryboardElementState.COMPLETE for story in self.root.children)
+        if going and (_has_end(simulation.scenario) or goes_on):
             cut_off = Note(f"{CUT_OFF} of {time_limit:g} s", place.path, place.line, place.element)
         return self._result(ended_by, cut_off)
-
-    def _goes_on(self) -> bool:
-        """Whether a story still has something to do."""
-        return any(story.state is not StoryboardElementState.COMPLETE for story in self.root.children)
 
     def _begin(self) -> bool:
         """The moment in which everything starts; whether there is another."""

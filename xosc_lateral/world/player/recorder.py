@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, Int32Array, IntArray
-from xosc_lateral.base.errors import PlaybackError
+from xosc_lateral.base.errors import FormatError, PlaybackError
 from xosc_lateral.base.rows import BLOCK, columns, stored
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
 from xosc_lateral.world.player.state import NO_ROAD, EntityState
-from xosc_lateral.world.road import RoadNetwork
+from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.road.tables import turned_in_surface
 
 NO_LANE = "none"
@@ -50,7 +50,7 @@ class Rows:
         self._road = array("i")
         self._lane = array("i")
         self._activity = array("B")
-        self._columns = (
+        self._columns: tuple[array[Any], ...] = (
             self._s, self._offset_t, self._relative_heading, self._speed, self._road, self._lane, self._activity
         )  # fmt: skip
         self._put_away: list[NDArray[np.uint8]] = []
@@ -85,27 +85,16 @@ class Rows:
 
     def follow(self, s: FloatArray) -> None:
         """Write down rows along a lane that differ in s alone, shape (n,). [m]"""
-        state, n = self.state, len(s)
+        state = self.state
         self._s.frombytes(s.tobytes())
-        for column, value in (
-            (self._road, state.road),
-            (self._lane, state.lane),
-            (self._offset_t, state.offset_t),
-            (self._relative_heading, state.relative_heading),
-            (self._speed, state.speed),
-            (self._activity, state.activity),
-        ):
-            column.frombytes(np.full(n, value, dtype=column.typecode).tobytes())
+        same = state.offset_t, state.relative_heading, state.speed, state.road, state.lane, state.activity
+        for column, value in zip(self._columns[1:], same, strict=True):
+            column.frombytes(np.full(len(s), value, dtype=column.typecode).tobytes())
 
-    def _implausible(self, time: float, what: str) -> PlaybackError:
-        place = self.state.entity.place
-        return PlaybackError(
-            f"'{self.state.name}' leaves every plausible bound at {time:.2f} s ({what}; limits "
-            f"{MAXIMUM_COORDINATE:g} m and {MAXIMUM_SPEED:g} m/s): the scenario can't be played",
-            path=place.path,
-            line=place.line,
-            element=place.element,
-        )
+    def _implausible(self, time: float, what: str) -> FormatError:
+        limits = f"limits {MAXIMUM_COORDINATE:g} m and {MAXIMUM_SPEED:g} m/s"
+        where = f"'{self.state.name}' leaves every plausible bound at {time:.2f} s ({what}; {limits})"
+        return self.state.entity.place.error(f"{where}: the scenario can't be played", PlaybackError)
 
     def put_away(self) -> None:
         """Make place for rows to come."""
@@ -124,15 +113,10 @@ class Rows:
     def motion(self, network: RoadNetwork, time: FloatArray) -> EntityMotion:
         """All rows, with world poses and directions of travel; what was written down is gone."""
         self.put_away()
-        names = (
-            "x", "y", "z", "heading", "pitch", "roll",
-            "speed", "road", "lane", "s", "offset", "heading_relative", "activity",
-        )  # fmt: skip
-        worked_out = columns(len(time), self._worked_out(network, time))
-        return EntityMotion(entity=self.state.entity, time=time, **dict(zip(names, worked_out, strict=True)))
+        return EntityMotion(self.state.entity, time, *columns(len(time), self._worked_out(network, time)))
 
     def _worked_out(self, network: RoadNetwork, time: FloatArray) -> Iterator[tuple[NDArray[Any], ...]]:
-        """Columns of `motion`, in blocks of rows."""
+        """Columns of `EntityMotion` from x on, in blocks of rows."""
         begin, before = 0, tuple[NDArray[Any], ...]()
         for s, offset, along, speed, road, lane, activity in self._blocks():
             n, where = len(s), _Where(road, lane, s, offset)
@@ -144,9 +128,15 @@ class Rows:
             if known.any():
                 direction[known] = network.travel_directions(road[known], lane[known])
             offset *= direction
-            if len(looked_up):
+            if len(looked_up) and network.road_ids:
                 height = free[unknown, 2] if self._knows_height else None
-                _look_up(network, looked_up, free[unknown], height, where, direction, self.state.lane_types)
+                x, y, lane_types = free[unknown, 0], free[unknown, 1], self.state.lane_types
+                located = network.world_to_lane(x, y, height, lane_types=lane_types)
+                road[looked_up], lane[looked_up] = located.road, located.lane
+                s[looked_up], offset[looked_up] = located.s, located.offset
+                direction[looked_up] = network.travel_directions(located.road, located.lane)
+            elif len(looked_up):
+                road[looked_up] = NO_ROAD
             to_lane = along - np.where(direction > 0, 0.0, pi)
             on_road = road >= 0
             pose = _poses(network, where, to_lane)
@@ -228,29 +218,6 @@ def _poses(network: RoadNetwork, where: _Where, to_lane: FloatArray) -> FloatArr
         turn, pose[sloped, 4], pose[sloped, 5] = turned_in_surface(to_lane[sloped], pose[sloped, 4], pose[sloped, 5])
         pose[sloped, 3] += turn
     return pose
-
-
-def _look_up(
-    network: RoadNetwork,
-    rows: IntArray,
-    free: FloatArray,
-    height: FloatArray | None,
-    where: _Where,
-    direction: FloatArray,
-    lane_types: frozenset[str],
-) -> None:
-    """Road coordinates of rows that only have a world pose."""
-    if not network.road_ids:
-        where.road[rows] = NO_ROAD
-        return
-    located = network.world_to_lane(free[:, 0], free[:, 1], height, lane_types=lane_types)
-    where.road[rows], where.lane[rows], where.s[rows], where.offset[rows] = (
-        located.road,
-        located.lane,
-        located.s,
-        located.offset,
-    )
-    direction[rows] = network.travel_directions(located.road, located.lane)
 
 
 def _beside_road(network: RoadNetwork, where: _Where, pose: FloatArray) -> BoolArray:

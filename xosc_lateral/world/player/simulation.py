@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime, timedelta
 from math import isnan
 from typing import Any
@@ -20,9 +20,9 @@ from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.player.values import Values
 from xosc_lateral.world.road.geometry import Arc, Line
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario import Action, Place, Scenario, TrafficSignalController
 from xosc_lateral.world.scenario.controllers import DrivingControllers
-from xosc_lateral.world.scenario.scenario import TrafficSignalPhase
+from xosc_lateral.world.scenario.place import Place
+from xosc_lateral.world.scenario.scenario import Scenario, TrafficSignalController, TrafficSignalPhase
 
 
 @dataclass
@@ -119,8 +119,8 @@ class Simulation:
         )
         self.unwatched = Unwatched(self.entities)
         self.by_name = {state.name: state for state in self.entities}
-        self.parameters = Values(scenario.parameters)
-        self.variables = Values(scenario.variables)
+        self.parameters = Values("parameter", scenario.parameters)
+        self.variables = Values("variable", scenario.variables)
         self.signals = TrafficSignals(scenario.traffic_signal_controllers)
         self.time = 0.0
         """Time at the start of the present frame. [s]"""
@@ -173,22 +173,17 @@ class Simulation:
             self._noted.add(key)
             self.notes.append(Note(what, place.path, place.line, place.element))
 
+    def values_of(self, content: object) -> tuple[Values, str]:
+        """Parameters or variables, whichever an action or a condition refers to, and the name that it gives."""
+        name = getattr(content, "parameter_ref", None)
+        return (self.variables, getattr(content, "variable_ref", "")) if name is None else (self.parameters, name)
+
     def clock(self) -> datetime | None:
         """Time of day now; None if no environment has set it."""
         if self.time_of_day is None:
             return None
         date_time, goes_on, set_at = self.time_of_day
         return date_time + timedelta(seconds=self.time - set_at) if goes_on else date_time
-
-    # ---- what was played ---------------------------------------------------------------------------------------------
-    def record_start(self, action: Action, actor: str | None, path: tuple[str, ...]) -> int:
-        """Note the start of an action; returns the number under which to note its end."""
-        self.played.append(PlayedAction(action, actor, path, self.time, None))
-        return len(self.played) - 1
-
-    def record_end(self, number: int) -> None:
-        """Note the end of an action."""
-        self.played[number] = replace(self.played[number], end=self.stamp)
 
 
 # ---- entities that only follow their lanes and that nobody looks at: many frames at once, with the same numbers ----
@@ -255,7 +250,7 @@ def _follows_its_lane(state: EntityState) -> bool:
         and state.trailer is None
         and not state.at_road_end
         and not state.longitudinal_taken
-        and not state.acts()
+        and not state.running
     )
 
 

@@ -9,12 +9,12 @@ from typing import NamedTuple, Protocol
 
 from xosc_lateral.world.motion.nominal import Activity
 from xosc_lateral.world.player.paths.base import PathProgress
-from xosc_lateral.world.road import LaneLink, Pose, RoadNetwork, RouteStep
 from xosc_lateral.world.road.lanes import DRIVING, WALKED
-from xosc_lateral.world.road.positions import difference, is_forward, wrap
+from xosc_lateral.world.road.network import RoadNetwork
+from xosc_lateral.world.road.positions import LaneLink, Pose, RouteStep, difference, is_forward, wrap
 from xosc_lateral.world.road.road import turn_for_heading, turned_in_surface
-from xosc_lateral.world.scenario import Entity
 from xosc_lateral.world.scenario.controllers import DrivingControllers
+from xosc_lateral.world.scenario.entity import Entity
 from xosc_lateral.world.scenario.enums import EntityCategory
 
 NO_ROAD = -1
@@ -22,21 +22,14 @@ NO_ROAD = -1
 
 
 class Placement(NamedTuple):
-    """A place and an orientation, in road coordinates and, where it was not given in them, in world coordinates too.
+    """A place and an orientation, in road coordinates and, where it was not given in them, in world coordinates too."""
 
-    - `road`: index of the road; -1 where there is none
-    - `s`: [m]
-    - `offset_t`: from the lane's centre along the road's t-axis. [m]
-    - `relative_heading`: relative to the road's s-direction (slope of the lane included). [rad]
-    - `pose`: world pose; None: it follows from the road coordinates. NaN in z, pitch, roll: those of the road
-    """
-
-    road: int
+    road: int  # index; -1 where there is none
     lane: int
-    s: float
-    offset_t: float
-    relative_heading: float
-    pose: Pose | None = None
+    s: float  # [m]
+    offset_t: float  # from the lane's centre along the road's t-axis [m]
+    relative_heading: float  # to the road's s-direction (slope of the lane included) [rad]
+    pose: Pose | None = None  # in the world; None: by the road coordinates; NaN in z, pitch, roll: as the road
 
 
 @dataclass(frozen=True, slots=True)
@@ -273,10 +266,6 @@ class EntityState:
         """An action moves the entity in this frame, both ways; the default driver must not."""
         self.longitudinal_taken = True
         self.activity |= int(activity)
-
-    def acts(self) -> bool:
-        """Whether one of its actions runs."""
-        return bool(self.running)
 
     def body_frame(self, vector: tuple[float, float, float]) -> tuple[float, float, float]:
         """A world vector along the entity's own axes (in the plane)."""

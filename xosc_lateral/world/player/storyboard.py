@@ -42,7 +42,6 @@ class StoryboardElement:
     """None: its parent has not started it."""
     count: int = field(default=0, init=False)
     parent: StoryboardElement | None = field(default=None, init=False, repr=False)
-    path: tuple[str, ...] = field(default=(), init=False)
     watchers: list[Watcher] = field(default_factory=list, init=False)
 
     def __post_init__(self) -> None:
@@ -56,11 +55,11 @@ class StoryboardElement:
         return self.state is _RUNNING
 
     # ---- the tree ----------------------------------------------------------------------------------------------------
-    def settle(self, path: tuple[str, ...] = ()) -> None:
-        """Tell the whole tree its paths (names from the story down)."""
-        self.path = (*path, self.name) if self.kind is not None else ()
-        for child in self.children:
-            child.settle(self.path)
+    @property
+    def path(self) -> tuple[str, ...]:
+        """Names from the story down."""
+        above = () if self.parent is None else self.parent.path
+        return above if self.kind is None else (*above, self.name)
 
     def walk(self) -> Iterator[StoryboardElement]:
         """This element and all under it, parents first."""
@@ -203,16 +202,21 @@ class EventElement(StoryboardElement):
 # after a trigger was armed never gives an edge; a delayed condition looks at the history of its (edge-filtered)
 # values.
 Check = Callable[[], bool]
+"""Whether a condition holds, now."""
+
+EntityCheck = Callable[[EntityState], bool]
+"""Whether it holds for one triggering entity, now."""
+
+Checks: TypeAlias = dict[type, Callable[[Any, Simulation], Check]]
+EntityChecks: TypeAlias = dict[type, Callable[[Any, Simulation], EntityCheck]]
+"""What a file says -> a function that makes the check of it."""
 
 
 class Watch:
-    """What is told of changes; a check that goes by it gives the same until then.
+    """What is told of changes; a check that goes by it gives the same until then."""
 
-    `wake`: tells the trigger that looks at it; `is_settled`: the next look gives what the last one gave.
-    """
-
-    wake: Callable[[], None] | None = None
-    is_settled = False
+    wake: Callable[[], None] | None = None  # tells the trigger that looks at it
+    is_settled = False  # the next look gives what the last one gave
 
     def forget(self) -> None:
         """Before the owner waits again: what happened until then no longer counts."""
@@ -220,21 +224,22 @@ class Watch:
 
 @dataclass(slots=True, eq=False)
 class RunningCondition:
-    """One condition: its present value, edge-filtered and delayed.
-
-    `check`: the bare condition, at the present moment; `delay`: [s]; `watch`: what tells the bare condition of changes.
-    """
+    """One condition: the bare `check` at the present moment, edge-filtered and delayed [s]."""
 
     check: Check
     edge: ConditionEdge
     delay: float
-    watch: Watch | None = None
+    watch: Watch | None = field(init=False)
+    """The check itself, if it is told of changes."""
     _last: bool = False
     _armed: bool = False
     _history: list[tuple[float, bool]] = field(default_factory=list)
     _read: int = 0
     _time: float = -inf
     _value: bool = False
+
+    def __post_init__(self) -> None:
+        self.watch = self.check if isinstance(self.check, Watch) else None
 
     def evaluate(self, time: float) -> bool:
         """Value at `time` [s]. At the same time again, as at time 0, the new value replaces the old one."""
@@ -298,10 +303,7 @@ class RunningCondition:
 
 @dataclass(slots=True, eq=False)
 class RunningTrigger:
-    """A trigger.
-
-    `when_empty`: value of a trigger without groups: true for start, false for stop triggers.
-    """
+    """A trigger. `when_empty`: value of a trigger without groups: true for start, false for stop triggers."""
 
     groups: tuple[tuple[RunningCondition, ...], ...]
     when_empty: bool = field(kw_only=True)
@@ -359,14 +361,3 @@ def _stays_false(group: tuple[RunningCondition, ...]) -> bool:
             return False
         holds = holds and value is True
     return not holds
-
-
-EntityCheck = Callable[[EntityState], bool]
-"""Whether the condition holds for one triggering entity, now."""
-
-ValueCheck = Callable[[], bool]
-"""Whether the condition holds, now."""
-
-EntityChecks: TypeAlias = dict[type, Callable[[Any, Simulation], EntityCheck]]
-ValueChecks: TypeAlias = dict[type, Callable[[Any, Simulation], ValueCheck]]
-"""What a file says -> a function that makes the check of it."""

@@ -15,21 +15,22 @@ from xosc_lateral.world.player.actions import (
 )
 from xosc_lateral.world.player.actions.base import Maker, RunningAction
 from xosc_lateral.world.player.conditions import distance, motion, value
-from xosc_lateral.world.player.conditions.value import StateWatch
-from xosc_lateral.world.player.positions.on_road import reference_of
 from xosc_lateral.world.player.simulation import Simulation
 from xosc_lateral.world.player.state import EntityState
 from xosc_lateral.world.player.storyboard import (
     Check,
-    EntityCheck,
+    Checks,
     EntityChecks,
     EventElement,
     RunningCondition,
     RunningTrigger,
     StoryboardElement,
-    ValueChecks,
 )
-from xosc_lateral.world.scenario import (
+from xosc_lateral.world.scenario.enums import StoryboardElementType, TriggeringEntitiesRule
+from xosc_lateral.world.scenario.place import Unsupported
+from xosc_lateral.world.scenario.position import reference_of
+from xosc_lateral.world.scenario.private_actions import TeleportAction
+from xosc_lateral.world.scenario.scenario import (
     Act,
     Action,
     Condition,
@@ -39,10 +40,7 @@ from xosc_lateral.world.scenario import (
     Private,
     Storyboard,
     Trigger,
-    Unsupported,
 )
-from xosc_lateral.world.scenario.enums import StoryboardElementType, TriggeringEntitiesRule
-from xosc_lateral.world.scenario.private_actions import TeleportAction
 
 
 def build_storyboard(storyboard: Storyboard, simulation: Simulation) -> StoryboardElement:
@@ -51,8 +49,7 @@ def build_storyboard(storyboard: Storyboard, simulation: Simulation) -> Storyboa
         StoryboardElement(story.name, StoryboardElementType.STORY, [_act(act, simulation) for act in story.acts])
         for story in storyboard.stories
     ]
-    root = StoryboardElement("", None, stories, stop_trigger=_stop(storyboard.stop_trigger, simulation))
-    root.settle()
+    root = StoryboardElement("", None, stories, stop_trigger=_trigger(storyboard.stop_trigger, simulation))
     for look in simulation.when_built:
         look(root)
     if storyboard.stop_trigger is None:
@@ -97,21 +94,13 @@ def _references(private: Private) -> set[str]:
     return {name for name in names if name is not None}
 
 
-def _start(trigger: Trigger | None, simulation: Simulation) -> RunningTrigger | None:
-    return None if trigger is None else prepare_trigger(trigger, simulation, when_empty=True)
-
-
-def _stop(trigger: Trigger | None, simulation: Simulation) -> RunningTrigger | None:
-    return None if trigger is None else prepare_trigger(trigger, simulation, when_empty=False)
-
-
 def _act(act: Act, simulation: Simulation) -> StoryboardElement:
     return StoryboardElement(
         act.name,
         StoryboardElementType.ACT,
         [_group(group, simulation) for group in act.maneuver_groups],
-        _start(act.start_trigger, simulation),
-        _stop(act.stop_trigger, simulation),
+        _trigger(act.start_trigger, simulation, when_empty=True),
+        _trigger(act.stop_trigger, simulation),
     )
 
 
@@ -135,7 +124,7 @@ def _event(event: Event, group: ManeuverGroup, simulation: Simulation) -> EventE
         event.name,
         StoryboardElementType.EVENT,
         [one for action in event.actions for one in _actions(action, group, simulation)],
-        _start(event.start_trigger, simulation) or RunningTrigger((), when_empty=True),
+        _trigger(event.start_trigger, simulation, when_empty=True) or RunningTrigger((), when_empty=True),
         maximum_count=event.maximum_execution_count,
         priority=event.priority,
     )
@@ -174,19 +163,18 @@ def prepare_action(action: Action, actor: EntityState | None, simulation: Simula
 ENTITY_CHECKS: EntityChecks = {
     content: check for family in (distance, motion) for content, check in family.CHECKS.items()
 }
-VALUE_CHECKS: ValueChecks = dict(value.CHECKS)
+VALUE_CHECKS: Checks = dict(value.CHECKS)
 
 
-def prepare_trigger(trigger: Trigger, simulation: Simulation, *, when_empty: bool) -> RunningTrigger:
+def _trigger(trigger: Trigger | None, simulation: Simulation, *, when_empty: bool = False) -> RunningTrigger | None:
     """A trigger ready to be evaluated frame by frame."""
-    groups = tuple(tuple(_prepare(condition, simulation) for condition in group.conditions) for group in trigger.groups)
-    return RunningTrigger(groups, when_empty=when_empty)
-
-
-def _prepare(condition: Condition, simulation: Simulation) -> RunningCondition:
-    check = _check(condition, simulation)
-    watch = check if isinstance(check, StateWatch) else None
-    return RunningCondition(check, condition.edge, condition.delay, watch)
+    if trigger is None:
+        return None
+    groups = (
+        tuple(RunningCondition(_check(c, simulation), c.edge, c.delay) for c in group.conditions)
+        for group in trigger.groups
+    )
+    return RunningTrigger(tuple(groups), when_empty=when_empty)
 
 
 def _check(condition: Condition, simulation: Simulation) -> Check:
@@ -201,14 +189,8 @@ def _check(condition: Condition, simulation: Simulation) -> Check:
     names = () if triggering is None else triggering.entity_refs
     states = tuple(simulation.entity(name, condition.place) for name in names)
     if triggering is not None and triggering.rule is TriggeringEntitiesRule.ALL:
-        return lambda: _all(check, states)
+        return lambda: any(state.active for state in states) and all(check(state) for state in states if state.active)
     if len(states) == 1:
         only = states[0]
         return lambda: only.active and check(only)
     return lambda: any(state.active and check(state) for state in states)
-
-
-def _all(check: EntityCheck, states: tuple[EntityState, ...]) -> bool:
-    """Entities that don't exist are passed over; without any that does, nothing holds."""
-    active = [state for state in states if state.active]
-    return bool(active) and all(check(state) for state in active)

@@ -3,23 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from operator import eq, ge, gt, le, lt, ne
 
 from xosc_lateral.world.player.transition import EPSILON
-from xosc_lateral.world.scenario import Parameter
 from xosc_lateral.world.scenario.enums import ParameterType, Rule
 from xosc_lateral.world.scenario.global_actions import ModifyOperation
+from xosc_lateral.world.scenario.scenario import Parameter
 
 Value = bool | float | int | str
 
-_EXACT_COMPARISONS = {
-    Rule.EQUAL_TO: eq,
-    Rule.GREATER_THAN: gt,
-    Rule.LESS_THAN: lt,
-    Rule.GREATER_OR_EQUAL: ge,
-    Rule.LESS_OR_EQUAL: le,
-    Rule.NOT_EQUAL_TO: ne,
-}
 _INTEGER_TYPES = frozenset({ParameterType.INT, ParameterType.UNSIGNED_INT, ParameterType.UNSIGNED_SHORT})
 
 
@@ -39,15 +30,11 @@ def holds(left: float, rule: Rule, right: float) -> bool:
     return (abs(beyond) < EPSILON) is (rule is Rule.EQUAL_TO)
 
 
-def holds_exactly(left: Value, rule: Rule, right: Value) -> bool:
-    """Compare whole numbers, truth values and texts."""
-    return bool(_EXACT_COMPARISONS[rule](left, right))
-
-
 class Values:
-    """Named values with their types: the parameters, or the variables, of a run."""
+    """Named values with their types: the parameters, or the variables, of a run; `kind`: what messages call one."""
 
-    def __init__(self, declared: Mapping[str, Parameter]) -> None:
+    def __init__(self, kind: str, declared: Mapping[str, Parameter]) -> None:
+        self.kind = kind
         self._types = {name: parameter.type for name, parameter in declared.items()}
         self._values: dict[str, Value] = {}
         for name, parameter in declared.items():
@@ -80,7 +67,7 @@ class Values:
             return holds(value, rule, other)
         if isinstance(value, str) != isinstance(other, str):
             value, other = str(value), str(other)
-        return holds_exactly(value, rule, other)
+        return rule.holds(value, other)
 
 
 def _read(text: str, kind: ParameterType) -> Value:

@@ -155,10 +155,7 @@ class Arc(Struct, frozen=True):
     curvature: float
 
     def at(self, ds: float) -> tuple[float, float, float]:
-        """x, y, heading at ds, along the chord: exact for any curvature, also one near zero.
-
-        Everything in [m], [rad].
-        """
+        """x, y, heading at ds, along the chord: exact for any curvature, also one near zero. [m], [rad]"""
         half = 0.5 * self.curvature * ds
         # sin(h) / h loses nothing above 1e-8 and is 1 to the last bit below
         chord = ds * sin(half) / half if abs(half) > 1e-8 else ds

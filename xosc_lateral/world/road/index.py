@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from xosc_lateral.base.arrays import FloatArray, Int32Array
-from xosc_lateral.world.road.positions import LaneCoordinates, LanePositions
-from xosc_lateral.world.road.projection import Feet, project, project_at
-from xosc_lateral.world.road.road import lane_at
+from xosc_lateral.world.road.lane_tables import CHUNK
+from xosc_lateral.world.road.lanes import DRIVING
+from xosc_lateral.world.road.positions import LanePositions
+from xosc_lateral.world.road.road import CONVERGED_STEP, ITERATIONS, MAX_STEP, Road
 from xosc_lateral.world.road.samples import Candidates, Samples
 from xosc_lateral.world.road.tables import NetworkTables
 
@@ -25,12 +26,21 @@ LANE_TOLERANCE = 1e-6
 """A point no further off than this is on the lane that it was expected on. [m]"""
 
 
-class SurfaceIndex:
+class _Feet(NamedTuple):
+    """Feet of perpendiculars: s, t in the leaning surface, heading, and how far a point is ahead, beyond an end. [m]"""
+
+    s: FloatArray
+    t: FloatArray
+    ahead: FloatArray
+    heading: FloatArray
+
+
+class SurfaceIndex(NetworkTables):
     """World to lane over a whole network."""
 
-    def __init__(self, tables: NetworkTables) -> None:
+    def __init__(self, roads: Sequence[Road], path: str) -> None:
         """Samples are laid when they are first asked for, once per choice of lane types."""
-        self._tables = tables
+        super().__init__(roads, path)
         self._samples: dict[frozenset[str] | None, Samples] = {}
         self._wanted: dict[frozenset[str] | None, NDArray[np.bool_]] = {}
 
@@ -38,12 +48,16 @@ class SurfaceIndex:
         self,
         x: ArrayLike,
         y: ArrayLike,
-        z: ArrayLike | None,
-        heading: ArrayLike | None,
+        z: ArrayLike | None = None,
+        heading: ArrayLike | None = None,
         *,
-        lane_types: Collection[str] | None,
+        lane_types: Collection[str] | None = DRIVING,
     ) -> LanePositions:
-        """Nearest lanes (see `RoadNetwork.world_to_lane`)."""
+        """Nearest lane of the given types (None: any) under each point.
+
+        `z` distinguishes roads on top of each other; `heading` prefers lanes driven that way. Everything is found,
+        however far off: look at `distance`.
+        """
         inputs = [x, y, *(a for a in (z, heading) if a is not None)]
         arrays = np.broadcast_arrays(*(np.asarray(a, dtype=np.float64) for a in inputs))
         flat = [a.ravel() for a in arrays]
@@ -61,13 +75,13 @@ class SurfaceIndex:
 
     def _candidates(self, x: FloatArray, y: FloatArray, types: frozenset[str] | None) -> Candidates:
         if types not in self._samples:
-            self._samples[types] = Samples(self._tables, types)
+            self._samples[types] = Samples(self, types)
         return self._samples[types].near_pieces(x, y)
 
     def path_to_lane(
-        self, x: ArrayLike, y: ArrayLike, road: ArrayLike, s: ArrayLike, *, lane_types: Collection[str] | None
+        self, x: ArrayLike, y: ArrayLike, road: ArrayLike, s: ArrayLike, *, lane_types: Collection[str] | None = DRIVING
     ) -> LanePositions:
-        """Nearest lanes on known roads (see `RoadNetwork.path_to_lane`)."""
+        """Like `world_to_lane`, on known roads and from a guess of `s` per point (a written path, say): cheap."""
         arrays = np.broadcast_arrays(*(np.asarray(a, dtype=np.float64) for a in (x, y, s)), np.asarray(road, np.int32))
         flat = [a.ravel() for a in arrays]
         _refuse_nan(flat[:3])
@@ -83,26 +97,6 @@ class SurfaceIndex:
             self._score(best, candidates._replace(point=lost[candidates.point]), flat[0], flat[1], None, None, types)
         return best.positions(arrays[0].shape)
 
-    def world_to_lane_at(
-        self,
-        x: float,
-        y: float,
-        z: float | None,
-        heading: float | None,
-        *,
-        near: tuple[int, float] | None,
-        lane_types: Collection[str] | None,
-    ) -> LaneCoordinates:
-        """Nearest lane of one point (see `RoadNetwork.world_to_lane_at`). [m], [rad]"""
-        if near is not None and near[0] >= 0:
-            road = self._tables.roads[near[0]]
-            s, t, ahead = project_at(road, x, y, near[1])
-            here = lane_at(road, near[0], s, t, lane_types)
-            if abs(ahead) <= LANE_TOLERANCE and here.distance <= LANE_TOLERANCE and here.lane != 0:
-                return here
-        best = self.world_to_lane(x, y, z, heading, lane_types=lane_types)
-        return LaneCoordinates(int(best.road), int(best.lane), *(float(values) for values in best[2:]))
-
     # ---- choosing ----------------------------------------------------------------------------------------------------
     def _score(
         self,
@@ -116,44 +110,43 @@ class SurfaceIndex:
     ) -> None:
         """Project each point onto its candidate road, find the lane there, keep what beats the best so far."""
         point, road, guess = candidates
-        feet = project(self._tables, road, x[point], y[point], guess)
-        row, centre, width = self._lanes(road, feet, types)
+        feet = self._project(road, x[point], y[point], guess)
+        row, centre, width = self._lanes_under(road, feet, types)
         away = np.abs(feet.t - centre)
         outside = np.hypot(np.maximum(away - 0.5 * width, 0.0), feet.ahead)
         outside[row < 0] = np.inf
-        direction = self._tables.directions[row]
+        direction = self._lane_directions[row]
         score = outside
         if z is not None:
-            above = np.abs(z[point] - self._tables.height(road, feet.s, feet.t))
+            above = np.abs(z[point] - self._height(road, feet.s, feet.t))
             score = score + np.maximum(above - SAME_LEVEL, 0.0)
         if heading is not None:
             lane_heading = feet.heading + np.where(direction < 0, np.pi, 0.0)
             score = score + 0.5 * WRONG_WAY * (1.0 - np.cos(heading[point] - lane_heading))
-        lane = np.where(row < 0, 0, self._tables.ids[row])
+        lane = np.where(row < 0, 0, self._lane_ids[row])
         offset = direction * (feet.t - centre)
         best.offer(point, score, away, LanePositions(road, lane, feet.s, offset, feet.t, outside))
 
-    def _lanes(
-        self, road: Int32Array, feet: Feet, types: frozenset[str] | None
+    def _lanes_under(
+        self, road: Int32Array, feet: _Feet, types: frozenset[str] | None
     ) -> tuple[Int32Array, FloatArray, FloatArray]:
         """Row, centre and width of the lane of these types that holds t, else of the nearest; row -1: there is none."""
-        tables = self._tables
         if types not in self._wanted:
             self._wanted[types] = np.array(
-                [lane.id != 0 and (types is None or lane.type in types) for lane in tables.lanes]
+                [lane.id != 0 and (types is None or lane.type in types) for lane in self._lanes]
             )
         wanted = self._wanted[types]
-        section = np.broadcast_to(np.asarray(tables.section_of(road, feet.s)), feet.s.shape)
-        first, count = tables.section_first[section], tables.section_count[section]
+        section = np.broadcast_to(np.asarray(self.section_numbers(road, feet.s)), feet.s.shape)
+        first, count = self._section_first[section], self._section_count[section]
         row = np.full(len(feet.s), -1, dtype=np.int32)
         centre, width = np.zeros(len(feet.s)), np.zeros(len(feet.s))
         lowest, closest = np.full(len(feet.s), np.inf), np.full(len(feet.s), np.inf)
         for rank in range(int(count.max(initial=0))):
             here = np.flatnonzero(rank < count)
             here = here[wanted[first[here] + rank]]
-            profile = tables.profile_of(first[here] + rank, feet.s[here])
+            profile = self._profile_of(first[here] + rank, feet.s[here])
             away = np.abs(feet.t[here] - profile.centre)
-            # lanes of no width only where there is nothing else, as in `places.lane_at`
+            # lanes of no width only where there is nothing else, as in `road.lane_at`
             score = np.maximum(away - 0.5 * profile.width, 0.0) + np.where(profile.width <= 1e-6, 1e3, 0.0)
             better = (score < lowest[here]) | ((score == lowest[here]) & (away < closest[here]))
             to = here[better]
@@ -161,6 +154,49 @@ class SurfaceIndex:
             centre[to], width[to] = profile.centre[better], profile.width[better]
             lowest[to], closest[to] = score[better], away[better]
         return row, centre, width
+
+    def _project(self, road: Int32Array, x: FloatArray, y: FloatArray, guess: FloatArray) -> _Feet:
+        """Feet on the given roads, from guesses of s; arrays of one length. Shape (n,). [m]"""
+        parts = [
+            self._project_chunk(road[part], x[part], y[part], guess[part])
+            for part in (slice(begin, begin + CHUNK) for begin in range(0, len(x), CHUNK))
+        ]
+        if not parts:
+            return _Feet(*(np.empty(0) for _ in _Feet._fields))
+        return _Feet(*(np.concatenate(field) for field in zip(*parts, strict=True)))
+
+    def _project_chunk(self, road: Int32Array, x: FloatArray, y: FloatArray, guess: FloatArray) -> _Feet:
+        length = self._lengths[road]
+        s = np.minimum(np.maximum(guess, 0.0), length)
+        low, high = np.full(len(x), -1.0), length + 1.0  # beyond the ends: nothing is known yet
+        active = np.arange(len(x))
+        for _ in range(ITERATIONS):
+            at = s[active]
+            frame = self._lines.at(road[active], at, derivatives=True)
+            dx, dy = x[active] - frame.x, y[active] - frame.y
+            ahead = dx * frame.cos + dy * frame.sin
+            across = dy * frame.cos - dx * frame.sin
+            lead = self._lead(road[active], at, across)
+            ahead = ahead if lead is None else ahead - lead
+            # The foot lies where `ahead` is 0; its derivative is -(1 - k t) |dC/ds|, held off 0 near the evolute.
+            lo, hi = np.where(ahead >= 0.0, at, low[active]), np.where(ahead <= 0.0, at, high[active])
+            rate = np.maximum(1.0 - frame.curvature * across, 0.2) * np.maximum(frame.speed, 1e-3)
+            step = np.clip(ahead / rate, -MAX_STEP, MAX_STEP)
+            moved = at + step
+            outside = ((moved <= lo) | (moved >= hi)) & (np.abs(step) > CONVERGED_STEP)
+            moved = np.where(outside, 0.5 * (lo + hi), moved)
+            moved = np.minimum(np.maximum(moved, 0.0), length[active])
+            s[active], low[active], high[active] = moved, lo, hi
+            active = active[np.abs(moved - at) > CONVERGED_STEP]
+            if not len(active):
+                break
+        frame = self._lines.at(road, s)
+        dx, dy = x - frame.x, y - frame.y
+        t = (dy * frame.cos - dx * frame.sin) / self._shrink(road, s)
+        ahead = dx * frame.cos + dy * frame.sin
+        lead = self._lead(road, s, dy * frame.cos - dx * frame.sin)
+        ahead = ahead if lead is None else ahead - lead
+        return _Feet(s, t, np.where(np.abs(ahead) < 1e-9, 0.0, ahead), frame.heading)
 
 
 class _Best:

@@ -35,48 +35,45 @@ class LaneProfile(NamedTuple):
 class LaneTables:
     """Roads, lane sections and lanes of a network as flat arrays.
 
-    Lane rows: all lanes of all sections, lane 0 included, in one list; `row_of` turns (section, lane id) into a row.
-    The lanes of a section but lane 0 are the `section_count` rows from `section_first` on, from left to right.
+    Lane rows: all lanes of all sections, lane 0 included, in one list; `_row_of` turns (section, lane id) into a row.
+    The lanes of a section but lane 0 are the `_section_count` rows from `_section_first` on, from left to right.
     """
 
     def __init__(self, roads: Sequence[Road], path: str) -> None:
         self.roads = roads
-        self._path = path
-        self.lengths = np.array([road.length for road in roads])
+        self.path = path
+        self._lengths = np.array([road.length for road in roads])
         self._sections = Lookup([road.section_starts for road in roads])
         sections = [section for road in roads for section in road.sections]
-        self.lanes: list[Lane] = [lane for section in sections for lane in (*section.lanes, section.centre)]
-        ids = [lane.id for lane in self.lanes]
+        self._lanes: list[Lane] = [lane for section in sections for lane in (*section.lanes, section.centre)]
+        ids = [lane.id for lane in self._lanes]
         self._lowest = min(ids, default=0)  # a file may hold no road at all
         self._slots = max(ids, default=0) - self._lowest + 1
-        self._row_of = np.full(len(sections) * self._slots, -1, dtype=np.intp)
-        row = 0
-        self.section_first = np.empty(len(sections), dtype=np.intp)
-        self.section_count = np.array([len(section.lanes) for section in sections], dtype=np.int32)
-        for i, section in enumerate(sections):
-            self.section_first[i] = row
-            for lane in (*section.lanes, section.centre):
-                self._row_of[i * self._slots + lane.id - self._lowest] = row
-                row += 1
-        self.ids = np.array(ids, dtype=np.int32)
-        self.directions = np.array([lane.direction for lane in self.lanes], dtype=np.int32)
-        self._lane_lookup = Lookup([lane.starts for lane in self.lanes])
+        self._section_count = np.array([len(section.lanes) for section in sections], dtype=np.int32)
+        lanes = self._section_count + 1  # lane 0 is the last of its section
+        self._section_first = np.cumsum(lanes, dtype=np.intp) - lanes
+        self._rows = np.full(len(sections) * self._slots, -1, dtype=np.intp)
+        slot = np.repeat(np.arange(len(sections)), lanes) * self._slots + np.array(ids, dtype=np.intp) - self._lowest
+        self._rows[slot] = np.arange(len(ids))
+        self._lane_ids = np.array(ids, dtype=np.int32)
+        self._lane_directions = np.array([lane.direction for lane in self._lanes], dtype=np.int32)
+        self._lane_lookup = Lookup([lane.starts for lane in self._lanes])
         self._lane_table = np.array(
-            [(*c, *w) for lane in self.lanes for c, w in zip(lane.centre, lane.width, strict=True)]
+            [(*c, *w) for lane in self._lanes for c, w in zip(lane.centre, lane.width, strict=True)]
         ).T.copy()
 
-    def section_of(self, road: IndexLike, s: FloatArray) -> IndexLike:
-        """Index of the lane section, counted over all roads. Shape as `s` [m]."""
+    def section_numbers(self, road: IndexLike, s: FloatArray) -> IndexLike:
+        """Numbers of lane sections, counted over all roads; s in [m]. Shape as `s`."""
         return self._sections.find(road, s)
 
-    def row_of(self, road: IndexLike, lane: IndexLike, s: FloatArray) -> IndexLike:
+    def _row_of(self, road: IndexLike, lane: IndexLike, s: FloatArray) -> IndexLike:
         """Row in the lane table; raises `PlaybackError` for the first lane that is not there. Shape as `s` [m]."""
-        section = self.section_of(road, s)
+        section = self.section_numbers(road, s)
         slot = lane - self._lowest
         outside = (slot < 0) | (slot >= self._slots)
         if np.any(outside):
             self._complain(road, lane, s, outside)
-        row = self._row_of[section * self._slots + slot]
+        row = self._rows[section * self._slots + slot]
         if np.any(row < 0):
             self._complain(road, lane, s, row < 0)
         return int(row) if np.ndim(row) == 0 else row
@@ -84,9 +81,9 @@ class LaneTables:
     def _complain(self, road: IndexLike, lane: IndexLike, s: FloatArray, wrong: ArrayLike) -> None:
         i = int(np.argmax(np.broadcast_to(wrong, s.shape)))
         here = self.roads[int(np.broadcast_to(road, s.shape)[i])]
-        find_lane(here, int(np.broadcast_to(lane, s.shape)[i]), float(s[i]), self._path or None)
+        find_lane(here, int(np.broadcast_to(lane, s.shape)[i]), float(s[i]), self.path or None)
 
-    def profile_of(self, row: IndexLike, s: FloatArray) -> LaneProfile:
+    def _profile_of(self, row: IndexLike, s: FloatArray) -> LaneProfile:
         """Centre, slope and width of rows of the lane table. Shape as `s`; [m], [-], [m]."""
         piece = self._lane_lookup.find(row, s)
         ds = s - self._lane_lookup.starts[piece]
@@ -96,21 +93,21 @@ class LaneTables:
             a + ds * (b + ds * (c + ds * d)),
             b + ds * (2.0 * c + (3.0 * ds) * d),
             e + ds * (f + ds * (g + ds * h)),
-            self.directions[row],
+            self._lane_directions[row],
         )
 
     def lane_profile(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> LaneProfile:
         """Lanes at places, as arrays of the broadcast shape."""
 
         def evaluate(road: IndexLike, s: FloatArray, lane: IndexLike) -> tuple[FloatArray, ...]:
-            profile = self.profile_of(self.row_of(road, lane, s), s)
+            profile = self._profile_of(self._row_of(road, lane, s), s)
             return tuple(np.broadcast_to(part, s.shape) for part in profile)
 
         row, centre, slope, width, direction = self._batch(evaluate, 5, road, s, lane=lane)
         return LaneProfile(row.astype(np.int32), centre, slope, width, direction.astype(np.int32))
 
     def travel_directions(self, road: ArrayLike, lane: ArrayLike) -> Int32Array:
-        """+1 along s, -1 against s. Shape as the arguments. [-]"""
+        """`travel_direction` for arrays. Shape as the arguments. [-]"""
         road_, lane_ = np.broadcast_arrays(np.asarray(road, dtype=np.int32), np.asarray(lane, dtype=np.int32))
         pair = [_one_or_many(index, road_.shape) for index in (road_, lane_)]
         if road_.size and isinstance(pair[0], int) and isinstance(pair[1], int):
@@ -121,14 +118,11 @@ class LaneTables:
         return np.array(ways, dtype=np.int32)[inverse.ravel()].reshape(road_.shape)
 
     def lane_index(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[Int32Array, Int32Array]:
-        """Index from the right in travel direction among driving lanes of one direction, and their count.
-
-        Shape as the arguments. [-]
-        """
+        """Index among driving lanes of its direction (0 = rightmost in travel; -1: it is none), and their count. [-]"""
 
         def evaluate(road: IndexLike, s: FloatArray, lane: IndexLike) -> tuple[FloatArray, ...]:
-            rows = np.broadcast_to(self.row_of(road, lane, s), s.shape)
-            section = np.broadcast_to(self.section_of(road, s), s.shape)
+            rows = np.broadcast_to(self._row_of(road, lane, s), s.shape)
+            section = np.broadcast_to(self.section_numbers(road, s), s.shape)
             index, count = np.full(len(s), -1.0), np.zeros(len(s))
             for which in np.flatnonzero(np.bincount(section)):
                 here = np.flatnonzero(section == which)
@@ -139,16 +133,16 @@ class LaneTables:
         return index.astype(np.int32), count.astype(np.int32)
 
     def _section_index(self, section: int, rows: Int32Array, s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        first, n = int(self.section_first[section]), int(self.section_count[section])
-        direction = self.directions[rows]
+        first, n = int(self._section_first[section]), int(self._section_count[section])
+        direction = self._lane_directions[rows]
         index, count, is_driving = np.zeros(len(s)), np.zeros(len(s)), np.zeros(len(s), dtype=bool)
         for row in range(first, first + n):
-            if self.lanes[row].type not in DRIVING:
+            if self._lanes[row].type not in DRIVING:
                 continue
             itself = rows == row
             is_driving |= itself
-            there = ((self.profile_of(row, s).width > MINIMUM_LANE_WIDTH) | itself) & (
-                self.directions[row] == direction
+            there = ((self._profile_of(row, s).width > MINIMUM_LANE_WIDTH) | itself) & (
+                self._lane_directions[row] == direction
             )
             count += there
             # rows run from left to right looking along s
@@ -156,14 +150,14 @@ class LaneTables:
         return np.where(is_driving, index, -1.0), count
 
     def speed_limit(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> FloatArray:
-        """Of the lane, else of the road; inf: none. Shape as the arguments. [m/s]"""
+        """Speed limit of the lane, else of the road; inf where none is given. Shape as the arguments. [m/s]"""
 
         def evaluate(road: IndexLike, s: FloatArray, lane: IndexLike) -> tuple[FloatArray, ...]:
-            rows = np.broadcast_to(self.row_of(road, lane, s), s.shape)
+            rows = np.broadcast_to(self._row_of(road, lane, s), s.shape)
             roads = np.broadcast_to(road, s.shape)
             limits = np.full(len(s), np.inf)
             for index, row in np.unique(np.stack([roads, rows]), axis=1).T.tolist():
-                speeds = self.lanes[row].speeds or self.roads[index].speeds
+                speeds = self._lanes[row].speeds or self.roads[index].speeds
                 if speeds:
                     here = np.flatnonzero((roads == index) & (rows == row))
                     limits[here] = [limit_at(speeds, at) for at in s[here].tolist()]

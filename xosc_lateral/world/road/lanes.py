@@ -31,9 +31,12 @@ MINIMUM_LANE_WIDTH = 0.1
 """A lane narrower than this at some s does not count as one there (it opens or closes). [m]"""
 
 
-def beside(lane: int, step: int) -> int:
-    """Id of the lane on the left (+1) or right (-1), looking along s; lane 0 is none."""
-    return lane + step if lane + step else lane + 2 * step
+def beside(lane: int, lanes: int) -> int:
+    """Id of the lane so many further along +t; there is no lane 0 to drive on."""
+    target = lane + lanes
+    if lane != 0 and (target == 0 or (target > 0) != (lane > 0)):
+        target += 1 if lanes > 0 else -1
+    return target
 
 
 class LaneFacts(Struct, frozen=True):
@@ -76,10 +79,7 @@ class Lane(LaneFacts, frozen=True, kw_only=True):
         return LaneState(a + s * (b + s * (c + s * d)), b + s * (2.0 * c + 3.0 * s * d), e + s * (f + s * (g + s * h)))
 
     def height_at(self, s: float, across: float) -> float:
-        """Height over the road surface, `across` the lane from its inner (0) to its outer edge (1). [m]
-
-        Linear in s from one record to the next, as the reference player has it: files draw kerb ramps so.
-        """
+        """Height over the road, `across` from inner (0) to outer edge (1); linear in s, as files draw ramps. [m]"""
         i = max(bisect_right(self.heights, s, key=lambda record: record[0]) - 1, 0)
         start, inner, outer = self.heights[i]
         if i + 1 < len(self.heights) and s > start:

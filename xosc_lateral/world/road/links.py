@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from math import hypot, inf, nextafter
 
-from xosc_lateral.world.road.index import LANE_TOLERANCE
 from xosc_lateral.world.road.lanes import Lane, LaneSection
-from xosc_lateral.world.road.positions import Advance, LaneCoordinates, LaneLink
-from xosc_lateral.world.road.projection import project_at
-from xosc_lateral.world.road.road import (
-    Connection,
-    Junction,
-    Road,
-    RoadLink,
-    find_lane,
-    lane_at,
-    lane_pose,
-    normal_angle,
-)
+from xosc_lateral.world.road.positions import Advance, LaneLink
+from xosc_lateral.world.road.road import Connection, Junction, Road, RoadLink, find_lane, lane_pose, normal_angle
 
 End = tuple[int, int]
 """A road as entered: its index, and +1 (at its start, to go along s) or -1 (at its end)."""
+
+
+Chooser = Callable[[Sequence[LaneLink]], LaneLink]
+"""Picks one of several ways on; gets at least one."""
 
 
 class Links:
@@ -30,12 +23,12 @@ class Links:
     def __init__(self, roads: Sequence[Road], junctions: Sequence[Junction]) -> None:
         self.roads = roads
         self._index = {road.id: i for i, road in enumerate(roads)}
-        self._junctions = {junction.id: junction for junction in junctions}
+        self.junctions = {junction.id: junction for junction in junctions}
         self._links: dict[tuple[int, int, int], tuple[LaneLink, ...]] = {}
         self._ends: dict[End, tuple[End, ...]] = {}
 
     def next_lanes(self, road: int, lane: int, direction: int) -> tuple[LaneLink, ...]:
-        """Lanes that follow when leaving the road at its end (+1) or start (-1)."""
+        """Lanes that follow a lane of the last (first) section when leaving the road at its end (+1) or start (-1)."""
         key = (road, lane, direction)
         if key not in self._links:
             self._links[key] = tuple(dict.fromkeys(self._find_links(*key)))
@@ -58,17 +51,27 @@ class Links:
         if other is None:
             return
         contact = link.contact or self._contact_of(road, direction, other)
-        for target in self._linked_ids(here, lane_here, direction, self.roads[other], contact):
+        # as the lane says, else as the other side says
+        ids = lane_here.successors if direction > 0 else lane_here.predecessors
+        there = _end_section(self.roads[other], contact).by_id
+        if ids:
+            targets = [target for target in ids if target in there and target != 0]
+        else:
+            targets = _lanes_linked_to(here, lane_here, direction, self.roads[other], contact)
+        for target in targets:
             yield self._enter(other, target, contact)
 
     def _through_junction(self, here: Road, lane: Lane, link: RoadLink, direction: int) -> Iterator[LaneLink]:
-        junction = self._junctions.get(link.element_id)
+        junction = self.junctions.get(link.element_id)
         for connection in junction.connections if junction else ():
             other = self._index.get(connection.connecting_road)
             if connection.incoming_road != here.id or other is None:
                 continue
             contact = connection.contact or "start"
-            for target in self._connected_ids(connection, here, lane, direction, self.roads[other], contact):
+            targets = [to for source, to in connection.lanes if source == lane.id]
+            if not connection.lanes:  # those that name the lane as their own link
+                targets = _lanes_linked_to(here, lane, direction, self.roads[other], contact)
+            for target in targets:
                 if target in _end_section(self.roads[other], contact).by_id:
                     yield self._enter(other, target, contact)
 
@@ -90,7 +93,7 @@ class Links:
 
     def _direct_connections(self, here: Road, link: RoadLink, direction: int) -> Iterator[tuple[Connection, int, str]]:
         """Connections of a direct junction that end where this road is left; incoming road, and its end there."""
-        junction = self._junctions.get(link.element_id)
+        junction = self.junctions.get(link.element_id)
         for connection in junction.connections if junction and here.junction != link.element_id else ():
             other = self._index.get(connection.incoming_road)
             touches = "end" if direction > 0 else "start"
@@ -100,21 +103,6 @@ class Links:
             for back, contact in ((incoming.successor, "end"), (incoming.predecessor, "start")):
                 if back and back.element_type == "junction" and back.element_id == link.element_id:
                     yield connection, other, contact
-
-    def _connected_ids(
-        self, connection: Connection, here: Road, lane: Lane, direction: int, other: Road, contact: str
-    ) -> list[int]:
-        """Lanes of the connecting road; without any laneLink, those that name the lane as their own link."""
-        if connection.lanes:
-            return [to for source, to in connection.lanes if source == lane.id]
-        return _lanes_linked_to(here, lane, direction, other, contact)
-
-    def _linked_ids(self, here: Road, lane: Lane, direction: int, other: Road, contact: str) -> list[int]:
-        """Lanes of the linked road: as the lane says, else as the other side says."""
-        ids = lane.successors if direction > 0 else lane.predecessors
-        if ids:
-            return [i for i in ids if i in _end_section(other, contact).by_id and i != 0]
-        return _lanes_linked_to(here, lane, direction, other, contact)
 
     def _contact_of(self, road: int, direction: int, other: int) -> str:
         """Contact point that a file leaves out: the end of the other road that is nearer."""
@@ -146,7 +134,7 @@ class Links:
             if other is not None:
                 yield other, 1 if (link.contact or self._contact_of(road, direction, other)) == "start" else -1
             return
-        junction = self._junctions.get(link.element_id)
+        junction = self.junctions.get(link.element_id)
         for connection in junction.connections if junction else ():
             other = self._index.get(connection.connecting_road)
             if connection.incoming_road == here.id and other is not None:
@@ -168,6 +156,68 @@ class Links:
                 if (back.contact or self._contact_of(index, way, self._index[here.id])) == touched:
                     yield index, contact
 
+    # ---- moving along lanes over sections, roads and junctions -------------------------------------------------------
+    def advance(
+        self,
+        road: int,
+        lane: int,
+        s: float,
+        distance: float,
+        *,
+        choose: Chooser | None = None,
+        direction: int | None = None,
+    ) -> Advance:
+        """Move along s by `distance` [m] (negative: backwards) over sections, roads and junctions, by lane links.
+
+        `direction` of positive distance: +1 along s, -1 against; default the lane's travel direction. `choose` picks
+        one of several links; default the straightest. Ends at the lane's end, saying what remains.
+        """
+        way = self.roads[road].directions.get(lane, 1) if direction is None else direction
+        if distance < 0.0:
+            way, distance = -way, -distance
+        here = self.roads[road]
+        section = here.section_at(s)
+        links_passed = 0
+        while True:
+            room = section.end - s if way > 0 else s - section.start
+            last = section.end >= here.length if way > 0 else section.start <= 0.0
+            # a section does not hold its own end: whoever reaches it exactly is in the next one
+            if distance < room or (distance == room and (last or way < 0)):
+                return Advance(road, lane, s + way * distance, way, 0.0)
+            distance -= max(room, 0.0)
+            if not last:
+                beyond = here.section_at(section.end if way > 0 else _just_before(section.start))
+                follower = follow_section(here, section, beyond, lane, way)
+                if follower is None:
+                    return Advance(road, lane, _just_before(section.end) if way > 0 else section.start, way, distance)
+                s = section.end if way > 0 else section.start
+                lane, section = follower, beyond
+                continue
+            s = section.end if way > 0 else section.start
+            options = self.next_lanes(road, lane, way)
+            links_passed += 1
+            # A ring of roads without length would never end.
+            if not options or links_passed > 100_000:
+                return Advance(road, lane, s, way, distance)
+            link = options[0]
+            if len(options) > 1:
+                link = choose(options) if choose else self.straightest(options)
+            road, lane, s, way = link
+            here = self.roads[road]
+            section = here.sections[0 if way > 0 else -1]
+
+    def straightest(self, options: Sequence[LaneLink]) -> LaneLink:
+        """The link whose road turns least from entry to exit; of equals the first."""
+        return min(options, key=self._turn)
+
+    def most_turning(self, options: Sequence[LaneLink]) -> LaneLink:
+        """The link whose road turns most; of equals the first."""
+        return max(options, key=self._turn)
+
+    def _turn(self, link: LaneLink) -> float:
+        road = self.roads[link.road]
+        return abs(normal_angle(road.reference_at(road.length)[2] - road.reference_at(0.0)[2]))
+
 
 def _lanes_linked_to(here: Road, lane: Lane, direction: int, other: Road, contact: str) -> list[int]:
     """Lanes at an end of another road that name this lane as their own link, the one that it touches first."""
@@ -184,72 +234,8 @@ def _end_section(road: Road, contact: str) -> LaneSection:
     return road.sections[0 if contact == "start" else -1]
 
 
-# ---- moving along lanes over sections, roads and junctions ----
-Chooser = Callable[[Sequence[LaneLink]], LaneLink]
-"""Picks one of several ways on; gets at least one."""
-
 _JOINT_TOLERANCE = 1e-3
 """Lanes of two sections touch with a gap of no more, such as one that has closed and one that opens beside it. [m]"""
-
-
-def advance(
-    links: Links,
-    road: int,
-    lane: int,
-    s: float,
-    distance: float,
-    *,
-    choose: Chooser | None = None,
-    direction: int | None = None,
-) -> Advance:
-    """Move along s, following lane links (see `RoadNetwork.advance`). `s` and `distance` in [m]."""
-    way = links.roads[road].directions.get(lane, 1) if direction is None else direction
-    if distance < 0.0:
-        way, distance = -way, -distance
-    here = links.roads[road]
-    section = here.section_at(s)
-    links_passed = 0
-    while True:
-        room = section.end - s if way > 0 else s - section.start
-        last = section.end >= here.length if way > 0 else section.start <= 0.0
-        # a section does not hold its own end: whoever reaches it exactly is in the next one
-        if distance < room or (distance == room and (last or way < 0)):
-            return Advance(road, lane, s + way * distance, way, 0.0)
-        distance -= max(room, 0.0)
-        if not last:
-            beyond = here.section_at(section.end if way > 0 else _just_before(section.start))
-            follower = follow_section(here, section, beyond, lane, way)
-            if follower is None:
-                return Advance(road, lane, _just_before(section.end) if way > 0 else section.start, way, distance)
-            s = section.end if way > 0 else section.start
-            lane, section = follower, beyond
-            continue
-        s = section.end if way > 0 else section.start
-        options = links.next_lanes(road, lane, way)
-        links_passed += 1
-        # A ring of roads without length would never end.
-        if not options or links_passed > 100_000:
-            return Advance(road, lane, s, way, distance)
-        link = options[0]
-        if len(options) > 1:
-            link = choose(options) if choose else straightest(links.roads, options)
-        road, lane, s, way = link
-        here = links.roads[road]
-        section = here.sections[0 if way > 0 else -1]
-
-
-def straightest(roads: Sequence[Road], options: Sequence[LaneLink]) -> LaneLink:
-    """The link whose road turns least; of equals the first."""
-    return min(options, key=lambda link: abs(_turn(roads[link.road])))
-
-
-def most_turning(roads: Sequence[Road], options: Sequence[LaneLink]) -> LaneLink:
-    """The link whose road turns most; of equals the first."""
-    return max(options, key=lambda link: abs(_turn(roads[link.road])))
-
-
-def _turn(road: Road) -> float:
-    return normal_angle(road.reference_at(road.length)[2] - road.reference_at(0.0)[2])
 
 
 def follow_section(road: Road, section: LaneSection, beyond: LaneSection, lane: int, way: int) -> int | None:
@@ -273,35 +259,3 @@ def follow_section(road: Road, section: LaneSection, beyond: LaneSection, lane: 
 def _just_before(s: float) -> float:
     """The last place of the section that ends at s."""
     return nextafter(s, -inf)
-
-
-def gone_on(
-    links: Links,
-    located: LaneCoordinates,
-    near: tuple[int, float],
-    point: tuple[float, float],
-    *,
-    lane_types: Collection[str] | None,
-) -> LaneCoordinates:
-    """Of the roads that hold a point, the one that its lane leads on to, and of several the least bent there.
-
-    At the entry of a junction its roads lie on each other, and a point that is between two vertices of a path has no
-    other sign of where it goes. Without such a road it stays where it was found. So the reference player has it.
-
-    `located`: where it is without regard to where it came from. `near`: road and s [m] where it was a moment ago.
-    `lane_types`: those that count.
-    """
-    before, s = near
-    if located.road == before or located.distance > LANE_TOLERANCE:
-        return located
-    road = links.roads[before]
-    s, t, _ = project_at(road, *point, s)
-    lane = lane_at(road, before, s, t, lane_types).lane
-    options = [link for way in (1, -1) for link in links.next_lanes(before, lane, way)]
-    for link in sorted(options, key=lambda link: abs(links.roads[link.road].curvature_at(link.s))):
-        other = links.roads[link.road]
-        s, t, ahead = project_at(other, *point, link.s)
-        onward = lane_at(other, link.road, s, t, lane_types)
-        if abs(ahead) <= LANE_TOLERANCE and onward.distance <= LANE_TOLERANCE and onward.lane != 0:
-            return onward
-    return located

@@ -40,10 +40,7 @@ class PiecewiseCubic(Struct, frozen=True):
     def from_records(
         cls, records: Iterable[tuple[float, Cubic]], *, begin: float, before: Cubic = ZERO
     ) -> PiecewiseCubic:
-        """From (s, cubic) records in any order; the later of two at the same s counts; before the first: `before`.
-
-        `s` in [m].
-        """
+        """From (s, cubic) records in any order; of two at the same s [m] the later; before the first: `before`."""
         ordered = dict(sorted(records, key=lambda record: record[0]))
         if not ordered or min(ordered) > begin:
             ordered = {begin: before, **ordered}

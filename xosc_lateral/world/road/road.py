@@ -1,4 +1,9 @@
-"""One road: reference line, lane sections, surface, links; everything that is known about one place on it."""
+"""One road: reference line, lane sections, surface, links; everything that is known about one place on it.
+
+References
+----------
+.. [1] W. H. Press et al., "Numerical Recipes", 3rd ed., 2007, section 9.4: Newton's method kept within a bracket.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +15,7 @@ from math import asin, atan, atan2, ceil, cos, inf, nan, pi, sin
 from xosc_lateral.base.errors import PlaybackError
 from xosc_lateral.world.road.geometry import Line, ReferenceElement
 from xosc_lateral.world.road.lanes import Lane, LaneSection
-from xosc_lateral.world.road.positions import LaneCoordinates, Pose
+from xosc_lateral.world.road.positions import TWO_PI, LaneCoordinates, Pose
 from xosc_lateral.world.road.surface import Surface
 
 
@@ -25,10 +30,7 @@ class RoadLink:
 
 @dataclass(frozen=True, slots=True)
 class Connection:
-    """A way through a junction: from an incoming road onto a connecting one.
-
-    `lanes` holds (from, to) lane ids; empty: the file gives none.
-    """
+    """From an incoming road onto a connecting one; `lanes`: (from, to) lane ids, empty where the file gives none."""
 
     incoming_road: str
     connecting_road: str
@@ -115,7 +117,6 @@ class Road:
 # ---- one place at a time, in plain floats: what the player asks for in every frame ----
 # Derived here: the surface's axes are the reference line's, turned by its pitch and then by its roll; heading, pitch
 # and roll of a vehicle follow from the axes that its own heading gives within that surface.
-TWO_PI = 2.0 * pi
 
 
 def normal_angle(angle: float) -> float:
@@ -196,10 +197,7 @@ def turned_in_surface(turn: float, pitch: float, roll: float) -> tuple[float, fl
 
 
 def turn_for_heading(change: float, pitch: float, roll: float) -> float:
-    """Turn within a surface that pitches and rolls, for a change of heading: the reverse of `turned_in_surface`.
-
-    [rad]
-    """
+    """Turn within a surface that pitches and rolls, for a change of heading: undoes `turned_in_surface`. [rad]"""
     sideways, ahead = sin(change), cos(change)
     return atan2(cos(pitch) * sideways, cos(roll) * ahead - sin(pitch) * sin(roll) * sideways)
 
@@ -213,10 +211,7 @@ def across_lane(lane: Lane, t: float, centre: float, width: float) -> float:
 
 
 def lane_at(road: Road, index: int, s: float, t: float, lane_types: Collection[str] | None) -> LaneCoordinates:
-    """The lane of these types that holds t, else the nearest; lanes of no width only where there is nothing else.
-
-    `s`, `t` in [m].
-    """
+    """The lane of these types that holds t, else the nearest; lanes of no width only as a last resort. [m]"""
     best: tuple[float, float, float] | None = None
     nearest: tuple[Lane, float] | None = None
     for lane in road.section_at(s).lanes:
@@ -240,3 +235,50 @@ def limit_at(speeds: tuple[tuple[float, float], ...], s: float) -> float:
         if start <= s:
             limit = value
     return limit
+
+
+# ---- from x, y to s, t: the foot of the perpendicular on the reference line ----
+ITERATIONS = 40
+"""Newton takes 3-6; bisection, where the reference line has a corner, 40 for 1e-11 m."""
+
+MAX_STEP = 25.0
+"""Longest step: a guess is never much further off. [m]"""
+
+CONVERGED_STEP = 1e-11
+"""A step this short is the last. [m]"""
+
+
+def project_at(road: Road, x: float, y: float, guess: float) -> tuple[float, float, float]:
+    """s, t in the leaning surface, and how far a point lies ahead of the foot: beyond an end, outside a corner. [m]"""
+    length = road.length
+    s = min(max(guess, 0.0), length)
+    low, high = -1.0, length + 1.0
+    leans = not road.surface.superelevation.is_zero and not road.surface.elevation.is_zero
+    for _ in range(ITERATIONS):
+        line_x, line_y, heading = road.reference_at(s)
+        dx, dy, c, d = x - line_x, y - line_y, cos(heading), sin(heading)
+        ahead, across = dx * c + dy * d, dy * c - dx * d
+        if leans:
+            ahead -= road.surface.lead_at(s, across)
+        if ahead >= 0.0:
+            low = s
+        if ahead <= 0.0:
+            high = s
+        step = min(max(ahead / max(1.0 - road.curvature_at(s) * across, 0.2), -MAX_STEP), MAX_STEP)
+        moved = s + step
+        if abs(step) > CONVERGED_STEP and (moved <= low or moved >= high):
+            moved = 0.5 * (low + high)
+        moved = min(max(moved, 0.0), length)
+        done = abs(moved - s) <= CONVERGED_STEP
+        s = moved
+        if done:
+            break
+    line_x, line_y, heading = road.reference_at(s)
+    dx, dy, c, d = x - line_x, y - line_y, cos(heading), sin(heading)
+    ahead = dx * c + dy * d
+    t = dy * c - dx * d
+    if leans:
+        ahead -= road.surface.lead_at(s, t)
+    if not road.surface.is_level:
+        t /= cos(road.surface.superelevation.at(s))
+    return s, t, 0.0 if abs(ahead) < 1e-9 else ahead

@@ -68,10 +68,7 @@ class Samples:
         return ((x - self._x0) // CELL).astype(np.int64), ((y - self._y0) // CELL).astype(np.int64)
 
     def near_pieces(self, x: FloatArray, y: FloatArray) -> Candidates:
-        """Every piece of road that may be the nearest one, once per point; at least one for every point.
-
-        `x`, `y` of shape (n,). [m]
-        """
+        """Every piece of road that may be the nearest one, once per point, at least one; `x`, `y` of shape (n,). [m]"""
         limit = 1e9  # keeps the cell numbers of absurdly distant points within integers
         column, line = self._cell(np.clip(x, -limit, limit), np.clip(y, -limit, limit))
         inside = (line >= 0) & (line < self._lines)

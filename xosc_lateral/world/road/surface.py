@@ -136,10 +136,7 @@ class HeaderOffset(Struct, frozen=True):
     def apply(
         self, x: FloatArray, y: FloatArray, z: FloatArray, heading: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Inertial x, y, z [m] and heading from 0 to 2 pi [rad] of places in the coordinates of the file.
-
-        Shape (n,) each.
-        """
+        """Inertial x, y, z [m] and heading from 0 to 2 pi [rad] of places in the file's coordinates, shape (n,)."""
         c, s = cos(self.heading), sin(self.heading)
         x, y = x + self.x, y + self.y
         return c * x - s * y, s * x + c * y, z + self.z, (heading + self.heading) % (2.0 * np.pi)
@@ -153,3 +150,6 @@ class HeaderOffset(Struct, frozen=True):
         """An inertial direction along the axes of the file. [m]"""
         c, s = cos(self.heading), sin(self.heading)
         return c * dx + s * dy, c * dy - s * dx
+
+
+NO_OFFSET = HeaderOffset()

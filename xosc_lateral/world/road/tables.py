@@ -84,21 +84,24 @@ class NetworkTables(LaneTables):
 
     def __init__(self, roads: Sequence[Road], path: str) -> None:
         super().__init__(roads, path)
-        self.lines = ReferenceLines(roads)
+        self._lines = ReferenceLines(roads)
         self._elevation = Cubics([road.surface.elevation for road in roads])
         self._superelevation = Cubics([road.surface.superelevation for road in roads])
         self._is_shaped = np.array([bool(r.surface.crossfall or r.surface.shape) for r in roads])
-        self._heights = HeightTable(self.lanes)
+        self._heights = HeightTable(self._lanes)
         self._level = bool(self._superelevation.is_zero and not self._is_shaped.any())
         self._flat = bool(self._elevation.is_zero and self._level)
 
     # ---- poses -------------------------------------------------------------------------------------------------------
-    def lane_to_world(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, offset: ArrayLike) -> Poses:
-        """Poses of driving along lanes."""
+    def lane_to_world(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, offset: ArrayLike = 0.0) -> Poses:
+        """World poses; heading, pitch and roll are those of driving along the lane (slope of the lane centre included).
+
+        `s` outside the road is clamped to its ends. Raises `PlaybackError` for a lane that is not there, naming it.
+        """
 
         def evaluate(road: IndexLike, s: FloatArray, lane: IndexLike, offset: FloatArray) -> tuple[FloatArray, ...]:
             s = self._clamped(road, s)
-            profile = self.profile_of(self.row_of(road, lane, s), s)
+            profile = self._profile_of(self._row_of(road, lane, s), s)
             t = profile.centre + profile.direction * offset
             return self._pose(road, s, t, profile)
 
@@ -107,12 +110,12 @@ class NetworkTables(LaneTables):
     def lane_points(
         self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, *offsets: ArrayLike
     ) -> list[tuple[FloatArray, ...]]:
-        """Points x, y, z at each of several offsets from lane centres, at the same s. [m] Shape as the arguments."""
+        """x, y, z as of `lane_to_world`, for each of several offsets at the same `s`. Shape as the arguments. [m]"""
 
         def evaluate(road: IndexLike, s: FloatArray, lane: IndexLike, *offsets: FloatArray) -> tuple[FloatArray, ...]:
             s = self._clamped(road, s)
-            profile = self.profile_of(self.row_of(road, lane, s), s)
-            frame, rising = self.lines.at(road, s), self._elevation.at(road, s)
+            profile = self._profile_of(self._row_of(road, lane, s), s)
+            frame, rising = self._lines.at(road, s), self._elevation.at(road, s)
             parts: tuple[FloatArray, ...] = ()
             for offset in offsets:
                 t = profile.centre + profile.direction * offset
@@ -122,8 +125,8 @@ class NetworkTables(LaneTables):
         parts = self._batch(evaluate, 3 * len(offsets), road, s, *offsets, lane=lane)
         return [parts[k : k + 3] for k in range(0, len(parts), 3)]
 
-    def road_to_world(self, road: ArrayLike, s: ArrayLike, t: ArrayLike) -> Poses:
-        """Poses along reference lines."""
+    def road_to_world(self, road: ArrayLike, s: ArrayLike, t: ArrayLike = 0.0) -> Poses:
+        """World poses; heading along the reference line (+s)."""
 
         def evaluate(road: IndexLike, s: FloatArray, offset: FloatArray) -> tuple[FloatArray, ...]:
             return self._pose(road, self._clamped(road, s), offset, None)
@@ -131,12 +134,12 @@ class NetworkTables(LaneTables):
         return Poses(*self._batch(evaluate, 6, road, s, t))
 
     def _clamped(self, road: IndexLike, s: FloatArray) -> FloatArray:
-        return np.asarray(np.minimum(np.maximum(s, 0.0), self.lengths[road]))
+        return np.asarray(np.minimum(np.maximum(s, 0.0), self._lengths[road]))
 
     def _pose(
         self, road: IndexLike, s: FloatArray, t: FloatArray, profile: LaneProfile | None
     ) -> tuple[FloatArray, ...]:
-        frame = self.lines.at(road, s)
+        frame = self._lines.at(road, s)
         surface = self._surface(road, s, t, self._elevation.at(road, s))
         _, pitch, roll, _, drift, _ = surface
         heading = frame.heading if drift is None else frame.heading + np.arctan(drift)
@@ -156,7 +159,7 @@ class NetworkTables(LaneTables):
         if lead is not None:
             x, y = x + lead * frame.cos, y + lead * frame.sin
         if profile is not None and self._heights.any:
-            z = z + self._heights.at(profile.row, s, t - profile.centre, profile.width, self.ids[profile.row])
+            z = z + self._heights.at(profile.row, s, t - profile.centre, profile.width, self._lane_ids[profile.row])
         return x, y, z
 
     def _surface(
@@ -168,10 +171,7 @@ class NetworkTables(LaneTables):
         *,
         angles: bool = True,
     ) -> _Lie:
-        """What `Surface.at` answers, by the elevation there and its slope.
-
-        Without `angles` no more than height, shrinking and lead.
-        """
+        """What `Surface.at` answers, by elevation and slope; without `angles` height, shrinking and lead alone."""
         nothing = np.zeros(len(s))
         if self._flat:
             return nothing, nothing, nothing, None, None, None
@@ -198,21 +198,18 @@ class NetworkTables(LaneTables):
         roll = np.where(climb == grade, angle, np.arcsin(leaning))
         return height, pitch, roll, shrink, drift, lead
 
-    def lead(self, road: IndexLike, s: FloatArray, across: FloatArray) -> FloatArray | None:
-        """How far along s places lie from the feet of their s, `across` the line; None: nothing leans on a grade.
-
-        Shape as `s`. [m]
-        """
+    def _lead(self, road: IndexLike, s: FloatArray, across: FloatArray) -> FloatArray | None:
+        """How far along s places lie from the feet of their s, `across` the line; None: none leans on a grade. [m]"""
         if self._superelevation.is_zero or self._elevation.is_zero:
             return None
         angle, grade = self._superelevation.at(road, s)[0], self._elevation.at(road, s)[1]
         return np.asarray(-across * np.tan(angle) * grade / np.sqrt(1.0 + grade * grade))
 
-    def shrink(self, road: IndexLike, s: FloatArray) -> FloatArray:
+    def _shrink(self, road: IndexLike, s: FloatArray) -> FloatArray:
         """How t shrinks seen from above: cos(superelevation). Shape as `s`. [-]"""
         return np.ones(len(s)) if self._superelevation.is_zero else np.cos(self._superelevation.at(road, s)[0])
 
-    def height(self, road: IndexLike, s: FloatArray, t: FloatArray) -> FloatArray:
+    def _height(self, road: IndexLike, s: FloatArray, t: FloatArray) -> FloatArray:
         """Height of the road surface, without kerbs. [m] Shape as `s`."""
         return self._surface(road, s, t, self._elevation.at(road, s), angles=False)[0]
 
@@ -228,22 +225,17 @@ class NetworkTables(LaneTables):
 
     # ---- curvature, lean --------------------------------------------------------------------------------------------
     def curvature(self, road: ArrayLike, s: ArrayLike) -> FloatArray:
-        """Of reference lines, along +s. Shape as the arguments. [1/m]"""
+        """Curvature of the reference line along +s, positive in left turns. Shape as the arguments. [1/m]"""
 
         def evaluate(road: IndexLike, s: FloatArray) -> tuple[FloatArray, ...]:
-            return (self.frame(road, s).curvature,)
+            return (self._lines.at(road, s, derivatives=True).curvature,)
 
         return self._batch(evaluate, 1, road, s)[0]
 
-    def frame(self, road: IndexLike, s: FloatArray) -> Frame:
-        """Reference line with derivatives. Shape as `s`. [m], [rad], [1/m]"""
-        return self.lines.at(road, s, derivatives=True)
+    def lane_curvature(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, offset: ArrayLike = 0.0) -> FloatArray:
+        """Curvature of the path at a constant offset from the lane centre, positive turning left in TRAVEL. [1/m]
 
-    def lane_curvature(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, offset: ArrayLike) -> FloatArray:
-        """Curvature of the path at a constant offset from the lane centre, in travel direction.
-
-        The centre's slope t' and bend t'' count, the change of the reference line's own curvature along a sloping path
-        (t t' dk/ds, under 1e-6 1/m on roads) does not.
+        The centre's slope t' and bend t'' count, not the change of the line's own curvature along it (under 1e-6 1/m).
         """
 
         return self._batch(self._curvature_beside, 1, road, s, offset, lane=lane)[0]
@@ -252,38 +244,31 @@ class NetworkTables(LaneTables):
         self, road: IndexLike, s: FloatArray, lane: IndexLike, offset: FloatArray
     ) -> tuple[FloatArray, ...]:
         s = self._clamped(road, s)
-        row = self.row_of(road, lane, s)
-        profile = self.profile_of(row, s)
+        row = self._row_of(road, lane, s)
+        profile = self._profile_of(row, s)
         piece = self._lane_lookup.find(row, s)
         ds = s - self._lane_lookup.starts[piece]
         bend = 2.0 * self._lane_table[2][piece] + 6.0 * ds * self._lane_table[3][piece]
-        kappa = self.frame(road, s).curvature
+        kappa = self._lines.at(road, s, derivatives=True).curvature
         forward = 1.0 - kappa * (profile.centre + profile.direction * offset)
         turn = forward * (bend + kappa * forward) + 2.0 * kappa * profile.slope**2
         return (profile.direction * turn / (forward**2 + profile.slope**2) ** 1.5,)
 
     def lean(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Crossfall (positive falling to the right of travel) and grade (positive uphill), both in percent.
-
-        Shape as the arguments. [%]
-        """
+        """Crossfall and grade in travel direction: falling to the RIGHT, and uphill. Shape as the arguments. [%]"""
 
         def evaluate(road: IndexLike, s: FloatArray, lane: IndexLike) -> tuple[FloatArray, ...]:
             s = self._clamped(road, s)
-            profile = self.profile_of(self.row_of(road, lane, s), s)
-            angle, climb = self._slopes(road, s, profile.centre)
+            profile = self._profile_of(self._row_of(road, lane, s), s)
+            _, grade = self._elevation.at(road, s)
+            angle, twist = self._superelevation.at(road, s)
+            _, lift_along, lean = self._shaped(road, s, profile.centre)
+            climb = grade + profile.centre * np.cos(angle) * twist + lift_along
             percent = 100.0 * profile.direction
-            return np.asarray(percent * np.tan(angle)), percent * climb
+            return np.asarray(percent * np.tan(angle + np.arctan(lean))), percent * climb
 
         crossfall, grade = self._batch(evaluate, 2, road, s, lane=lane)
         return crossfall, grade
-
-    def _slopes(self, road: IndexLike, s: FloatArray, t: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Angle about s and climb along s at (s, t)."""
-        _, grade = self._elevation.at(road, s)
-        angle, twist = self._superelevation.at(road, s)
-        _, lift_along, lean = self._shaped(road, s, t)
-        return angle + np.arctan(lean), grade + t * np.cos(angle) * twist + lift_along
 
 
 def _along_lane(

@@ -157,6 +157,15 @@ Position = (
 )
 
 
+def reference_of(position: Position) -> str | None:
+    """Name of the entity that a position refers to; None: it is absolute."""
+    if isinstance(position, RoutePosition):
+        where = position.in_route
+        return where.entity_ref if isinstance(where, FromCurrentEntity) else None
+    name: str | None = getattr(position, "entity_ref", None)
+    return name
+
+
 class Waypoint(Struct, frozen=True):
     """A place to pass, and how to come to it."""
 

@@ -133,7 +133,7 @@ class RelativeTargetLaneOffset(Struct, frozen=True):
 
 
 class LaneOffsetAction(Content, frozen=True):
-    """Move inside the lane; `max_lateral_acc` None: as fast as can be (DESIGN: the player's default). [m/s2]"""
+    """Move inside the lane; `max_lateral_acc` None: as fast as can be. [m/s2]"""
 
     target: Annotated[AbsoluteTargetLaneOffset | RelativeTargetLaneOffset, called("LaneOffsetTarget")]
     shape: DynamicsShape

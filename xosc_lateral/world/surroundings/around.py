@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.segment import FADES
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario import BoundingBox
+from xosc_lateral.world.scenario.entity import BoundingBox
 
 SIGHT_DISTANCE = 200.0
 """How far a driver looks for others [m]; beyond it there is none (about what a series radar sees)."""
@@ -29,8 +29,8 @@ ALONGSIDE = 10.0
 """A vehicle in the next lane counts half as alongside at this free space lengthwise, wholly at half of it. [m]"""
 
 INFLUENCE_DISTANCE = 40.0
-"""Free space over which the influence of others fades to 37 %, as in `fitting.neighbours`: with so much more free space
-for each factor e that less of a body lies in the lane, its influence is the product of both. [m]"""
+"""Free space over which the influence of others fades to 37 %, as in `fitting.context_effects`: with so much more free
+space for each factor e that less of a body lies in the lane, its influence is the product of both. [m]"""
 
 
 class Reach(NamedTuple):
@@ -130,10 +130,7 @@ def free_space(seen: OtherVehicles, box: BoundingBox | Extent, other: BoundingBo
 
 @dataclass(eq=False, slots=True)
 class Around:
-    """Who is around: on each side of `ZONES`; free space to who comes towards one [m], and how far he is there [-].
-
-    Shape (n,).
-    """
+    """Who is around: on each side of `ZONES`; free space to who comes towards one [m], how far he is there [-]."""
 
     sides: Mapping[str, _Side]
     oncoming: FloatArray
@@ -153,10 +150,7 @@ class Around:
         other_width: float | FloatArray,
         is_truck: BoolArray,
     ) -> None:
-        """Others, seen from the rows, which may come again; free space to them, own lane and their bodies wide. [m]
-
-        Shape (m,) each.
-        """
+        """Others, seen from the rows, which may come again; free space to them, own lane and their bodies wide. [m]"""
         with np.errstate(invalid="ignore"):
             there = (gap <= SIGHT_DISTANCE) & ~np.isnan(seen.left)
             # he comes into sight in the last quarter of it, and is gone within `INFLUENCE_DISTANCE` once he has passed
@@ -238,11 +232,6 @@ BLOCK = 64
 """Rows that one box around a vehicle's path covers: 1.3 s at 50 Hz, 40 m on a motorway. [-]"""
 
 
-def pairs_within(x: Iterable[FloatArray], y: Iterable[FloatArray], reach: float) -> list[tuple[int, int]]:
-    """`stretches_within` over all rows at once."""
-    return sorted({pair for _, pairs in stretches_within(x, y, reach) for pair in pairs})
-
-
 def stretches_within(
     x: Iterable[FloatArray], y: Iterable[FloatArray], reach: float, blocks: int = 16
 ) -> Iterator[tuple[slice, list[tuple[int, int]]]]:
@@ -251,19 +240,8 @@ def stretches_within(
     The boxes around both paths, in blocks of rows, are swept along the longer side of the traffic: the work grows with
     the pairs that are near, not with all there are.
 
-    Parameters
-    ----------
-    x, y : iterables of array, shape (n,)
-        One pair of arrays per point, on one time grid; NaN where it is absent; each is looked at once. [m]
-    reach : float
-        [m]
-    blocks : int
-        Of `BLOCK` rows, in a stretch.
-
-    Yields
-    ------
-    slice, list of (int, int)
-        Rows of a stretch with pairs; indices of these, the smaller one first, in lexical order.
+    `x`, `y`: arrays of shape (n,) for each point on one time grid, NaN where it is absent, looked at once; `reach` in
+    [m]; a stretch has `blocks` of `BLOCK` rows. Yields its rows, and pairs of indices in lexical order, each ascending.
     """
     lows, highs = _bounds(x, y)
     for begin in range(0, lows.shape[1], blocks):
@@ -277,20 +255,14 @@ def stretches_within(
 
 
 def pairs_now(x: FloatArray, y: FloatArray, reach: float) -> tuple[IntArray, IntArray]:
-    """Pairs of points, shape (n,) each [m], within `reach` [m] of each other along both axes; indices, shape (pairs,).
-
-    The smaller index comes first.
-    """
+    """Pairs of points within `reach` along both axes, the smaller index first, shape (pairs,) each. [m]"""
     there = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
     points = np.stack([x[there], y[there]])
     return _overlapping(points, points, there, reach) if len(there) else (there, there)
 
 
 def _bounds(x: Iterable[FloatArray], y: Iterable[FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """Smallest and largest x and y of each point in each block of rows, shape (2, blocks, points) each. [m]
-
-    NaN where a point is absent throughout.
-    """
+    """Smallest and largest x, y of each point in each block, shape (2, blocks, points), NaN where it is absent. [m]"""
     lows, highs = [np.empty((2, 0))], [np.empty((2, 0))]
     for point in zip(x, y, strict=True):
         starts = np.arange(0, len(point[0]), BLOCK)

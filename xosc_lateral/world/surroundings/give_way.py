@@ -73,20 +73,24 @@ class SampledVehicle:
 def give_way(
     motion: NominalMotion, network: RoadNetwork, sampled: Sequence[SampledVehicle], rows: IntArray
 ) -> list[FloatArray | None]:
-    """By how much each vehicle moves aside on the rows, positive left, shape (n,); None: not at all. [m]
+    """By how much each vehicle of a motion, `sampled` in its order, moves aside on evenly spaced rows, positive left.
 
-    `sampled`: all entities, in the motion's order; `rows`: those that are looked at, evenly spaced, shape (n,).
+    None: not at all. Shape (n,). [m]
     """
     count, n = len(sampled), len(rows)
     left, right, none = empty((count, n)), empty((count, n)), np.zeros(n)
-    names = ("x", "y", "heading", "deviation", "can_move", "present")
-    tables = [empty((count, n), bool if name in names[4:] else np.float64) for name in names]
+    kinds = (np.float64, np.float64, np.float64, np.float64, bool, bool)
+    tables = [empty((count, n), kind) for kind in kinds]  # x, y, heading, deviation, can_move, present
     for k, samples in enumerate(sampled):
-        columns = (none, none, *Frame.of(samples, rows)[: len(names)])
+        entity, box, heading = samples.motion, samples.motion.entity.bounding_box, samples.motion.heading[rows]
+        x = entity.x[rows] + box.center_x * np.cos(heading)
+        y = entity.y[rows] + box.center_x * np.sin(heading)
+        present = ((entity.activity[rows] & Activity.ACTIVE) != 0) & entity.entity.is_vehicle
+        columns = (none, none, x, y, heading, samples.deviation, samples.can_move, present)
         for table, values in zip((left, right, *tables), columns, strict=True):
             put(table, slice(k, k + 1), np.asarray(values))
     left_hand = np.array(_left_hand(network, sampled, rows), dtype=bool)
-    x, y = (
+    there_x, there_y = (
         (np.where(there, row, np.nan) for row, there in zip(table, tables[-1], strict=True)) for table in tables[:2]
     )
     boxes = [samples.motion.entity.bounding_box for samples in sampled]
@@ -96,7 +100,7 @@ def give_way(
         np.array([side in getattr(samples, name) for samples in sampled], dtype=bool)
         for name in ("responds", "alone") for side in ("left", "right")
     ))  # fmt: skip
-    for stretch, near_pairs in stretches_within(x, y, FADES + length.max(initial=0.0) + MARGIN):
+    for stretch, near_pairs in stretches_within(there_x, there_y, FADES + length.max(initial=0.0) + MARGIN):
         meeting = [pair for pair in near_pairs if can_move[pair[0]] or can_move[pair[1]]]
         part = [table[:, stretch] for table in tables]
         for vehicle, other in _together(meeting, part[0].shape[1]):
@@ -104,7 +108,8 @@ def give_way(
             number, at = np.divmod(near, part[0].shape[1])
             vehicle, other = vehicle[number], other[number]
             first, second = (
-                Frame._make([*(table[who, at] for table in part), length[who], width[who]]) for who in (vehicle, other)
+                Frame._make([*(table[one, at] for table in part[:-1]), length[one], width[one]])
+                for one in (vehicle, other)
             )
             response = Response._make(column[vehicle] for column in responses)
             aside = moved_aside(first, second, response, left_hand[vehicle])
@@ -140,9 +145,8 @@ def give_way_now(
     vehicle, other = np.concatenate([a, b]), np.concatenate([b, a])
     vehicle, other = vehicle[can_move[vehicle]], other[can_move[vehicle]]
     x, y = x + lateral * sin, y - lateral * cos  # on the lane's centre line, from which a deviation counts
-    present = np.ones(n, dtype=np.bool_)
-    columns = (x, y, places.heading, deviation, can_move, present, places.length, places.width)
-    first, second = (Frame._make(column[who] for column in columns) for who in (vehicle, other))
+    columns = (x, y, places.heading, deviation, can_move, places.length, places.width)
+    first, second = (Frame._make(column[one] for column in columns) for one in (vehicle, other))
     aside = moved_aside(first, second, Response._make(column[vehicle] for column in response), left_hand)
     left, right = np.zeros((2, n))
     np.maximum.at(right, vehicle, np.maximum(0.0 - aside, 0.0))
@@ -159,7 +163,7 @@ def _together(meeting: Sequence[tuple[int, int]], n: int) -> Iterator[tuple[IntA
 
 
 def _rows_near(tables: Sequence[NDArray[Any]], length: FloatArray, vehicle: IntArray, other: IntArray) -> BoolArray:
-    """Where pairs of vehicles are near enough for `widened`, shape (pairs, n); `tables`: x, y ... of all vehicles."""
+    """Where pairs of vehicles are near enough for `moved_aside`, shape (pairs, n); `tables`: x, y ... of all."""
     x, y, present = tables[0], tables[1], tables[-1]
     reach = (FADES + 0.5 * (length[vehicle] + length[other]) + MARGIN)[:, None]
     away = (x[other] - x[vehicle]) ** 2 + (y[other] - y[vehicle]) ** 2
@@ -171,63 +175,15 @@ MARGIN = 10.0
 
 
 class Frame(NamedTuple):
-    """A vehicle on the rows that are looked at: middle, heading, size, and where it is present and may move.
-
-    Or one of two vehicles each row, of a moment: size is then an array, too. Shape (n,).
-    """
+    """Vehicles on rows: middle, heading, size, where present and free to move; one, or another in each row."""
 
     x: FloatArray
     y: FloatArray
     heading: FloatArray
     deviation: FloatArray
     can_move: BoolArray
-    present: BoolArray
-    length: float | FloatArray
-    width: float | FloatArray
-
-    @classmethod
-    def of(cls, sampled: SampledVehicle, rows: IntArray) -> Frame:
-        """Of one vehicle at some rows of its motion, shape (n,)."""
-        motion = sampled.motion
-        box = motion.entity.bounding_box
-        heading = motion.heading[rows]
-        present = ((motion.activity[rows] & Activity.ACTIVE) != 0) & motion.entity.is_vehicle
-        return cls(
-            motion.x[rows] + box.center_x * np.cos(heading),
-            motion.y[rows] + box.center_x * np.sin(heading),
-            heading,
-            sampled.deviation,
-            sampled.can_move,
-            present,
-            box.length,
-            box.width,
-        )
-
-
-def widened(
-    vehicle: Frame, other: Frame, responds_left: bool | BoolArray, responds_right: bool | BoolArray
-) -> tuple[FloatArray, BoolArray, BoolArray] | None:
-    """By how much the gap to the other is widened, whether it is to the left, and whether the profile responds to it.
-
-    None if the other never is near.
-    """
-    ahead_x, ahead_y = other.x - vehicle.x, other.y - vehicle.y
-    reach = FADES + 0.5 * (vehicle.length + other.length)
-    near = vehicle.present & other.present & (ahead_x**2 + ahead_y**2 < (reach + MARGIN) ** 2)
-    if not near.any():
-        return None
-    cos, sin = np.cos(vehicle.heading), np.sin(vehicle.heading)
-    along, aside = ahead_x * cos + ahead_y * sin, ahead_y * cos - ahead_x * sin
-    same_way = np.cos(other.heading - vehicle.heading) > 0.9
-    half = 0.5 * (vehicle.width + other.width)
-    is_left = aside > 0
-    nominal = np.abs(aside) - half
-    gap = nominal + np.where(is_left, 1.0, -1.0) * (other.deviation - vehicle.deviation)
-    free = np.maximum(np.abs(along) - 0.5 * (vehicle.length + other.length), 0.0)
-    responding = np.where(is_left, responds_left, responds_right)
-    weight = 1.0 - smooth_step(free / np.where(responding, RESPONDING_FADES, FADES))
-    weight *= smooth_step(nominal / ENTERING) * (near & same_way)
-    return weight * np.where(responding, wider(gap, responding=True), wider(gap, responding=False)), is_left, responding
+    length: FloatArray
+    width: FloatArray
 
 
 class Response(NamedTuple):
@@ -240,26 +196,29 @@ class Response(NamedTuple):
 
 
 def moved_aside(vehicle: Frame, other: Frame, response: Response, left_hand: bool | BoolArray) -> FloatArray:
-    """By how much each moves aside for another, positive left, shape (n,). [m]"""
-    widening = widened(vehicle, other, response.responds_left, response.responds_right)
-    if widening is None:
-        return np.zeros(len(vehicle.deviation))
-    aside, is_left, responding = widening
-    alone = np.where(is_left, response.alone_left, response.alone_right)
-    aside = aside * own_share(is_left == left_hand, responding, other.can_move, alone) * vehicle.can_move
-    return np.where(is_left, 0.0 - aside, aside)  # no negative zeros
+    """By how much each moves aside for another that is near, positive left, shape (n,). [m]
 
-
-def own_share(overtakes: BoolArray, responding: BoolArray, other_moves: BoolArray, alone: BoolArray) -> FloatArray:
-    """Share that a vehicle has of a widening, shape (n,). [-]
-
-    By whether it is the overtaking one, responds to the other by its profile, the other can move, and its answer is
-    known of the driver alone, who then has no share. By itself `motorway` moves 0.209 m from whom it overtakes and
-    0.083 m from who overtakes it, where real vehicles move 0.239 and 0.045 m: the second has done more than its part
-    already.
+    By itself `motorway` moves 0.209 m from whom it overtakes and 0.083 m from who overtakes it, where real vehicles
+    move 0.239 and 0.045 m: the second has done more than its part already. One whose answer is known of the driver
+    alone has no part at all.
     """
+    ahead_x, ahead_y = other.x - vehicle.x, other.y - vehicle.y
+    cos, sin = np.cos(vehicle.heading), np.sin(vehicle.heading)
+    along, aside = ahead_x * cos + ahead_y * sin, ahead_y * cos - ahead_x * sin
+    same_way = np.cos(other.heading - vehicle.heading) > 0.9
+    is_left = aside > 0
+    nominal = np.abs(aside) - 0.5 * (vehicle.width + other.width)
+    gap = nominal + np.where(is_left, 1.0, -1.0) * (other.deviation - vehicle.deviation)
+    free = np.maximum(np.abs(along) - 0.5 * (vehicle.length + other.length), 0.0)
+    responding = np.where(is_left, response.responds_left, response.responds_right)
+    weight = 1.0 - smooth_step(free / np.where(responding, RESPONDING_FADES, FADES))
+    weight *= smooth_step(nominal / ENTERING) * same_way
+    widened = weight * np.where(responding, wider(gap, responding=True), wider(gap, responding=False))
     share = np.where(responding, 1.0, OVERTAKING_SHARE)
-    return np.where(other_moves, np.where(overtakes, share, 1.0 - share), 1.0) * ~alone
+    share = np.where(other.can_move, np.where(is_left == left_hand, share, 1.0 - share), 1.0)
+    share *= ~np.where(is_left, response.alone_left, response.alone_right)
+    moved = widened * share * vehicle.can_move
+    return np.where(is_left, 0.0 - moved, moved)  # no negative zeros
 
 
 def wider(gap: FloatArray, *, responding: bool) -> FloatArray:

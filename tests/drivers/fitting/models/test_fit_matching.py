@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from tests.kit.core_models import POPULATION, STEADY
 from xosc_lateral.drivers.fitting.models.autoregressive_coarse import DEFAULT_SETTINGS, scaled_spectrum
-from xosc_lateral.drivers.fitting.models.autoregressive_matching import (
+from xosc_lateral.drivers.fitting.models.autoregressive_fit import (
     LARGEST_STEP,
     MOST_CORRELATED,
     NUDGE,

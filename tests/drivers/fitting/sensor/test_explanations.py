@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from tests.drivers.fitting.sensor.test_likelihood import COLOURED, driver_density, measured
-from xosc_lateral.drivers.fitting.sensor.likelihood import Colour, Measured, explanations
+from xosc_lateral.drivers.fitting.sensor.likelihood import Colour, Measured
 from xosc_lateral.drivers.fitting.sensor.periodogram import Periodogram
+from xosc_lateral.drivers.fitting.sensor.separation import explanations
 
 
 def best_of(data: Periodogram):  # type: ignore[no-untyped-def]

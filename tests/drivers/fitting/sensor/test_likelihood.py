@@ -8,9 +8,18 @@ from scipy.integrate import quad
 from scipy.optimize import approx_fprime
 
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.drivers.fitting.sensor.likelihood import Colour, Known, Measured, _Problem, solve
+from xosc_lateral.drivers.fitting.sensor.likelihood import (
+    KNOTS,
+    N_KNOTS,
+    Colour,
+    Known,
+    Measured,
+    _Problem,
+    density,
+    interpolation,
+    solve,
+)
 from xosc_lateral.drivers.fitting.sensor.periodogram import Periodogram, periodogram, windows_of
-from xosc_lateral.drivers.fitting.sensor.vehicle_bound import KNOTS, N_KNOTS, density, interpolation
 
 WHITE, COLOURED, CORNER = 2e-5, 4e-4, 0.8
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.drivers.fitting.sensor.vehicle_bound import (
+from xosc_lateral.drivers.fitting.sensor.likelihood import (
     BEND_SD,
     BRISKER_SD,
     BRISKEST_CORNER,

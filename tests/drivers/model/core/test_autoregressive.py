@@ -15,8 +15,7 @@ from tests.kit.profiles import as_drive
 from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
 from xosc_lateral.drivers.drives.cuts import PAPER_RULES, all_runs
 from xosc_lateral.drivers.fitting.models.autoregressive_coarse import FitSettings
-from xosc_lateral.drivers.fitting.models.autoregressive_fit import fit_autoregressive
-from xosc_lateral.drivers.fitting.models.autoregressive_matching import simulate
+from xosc_lateral.drivers.fitting.models.autoregressive_fit import fit_autoregressive, simulate
 from xosc_lateral.drivers.loop.timeline import Timeline, join_drives, local_mean
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
 from xosc_lateral.drivers.model.core.autoregressive.parameters import Volatility

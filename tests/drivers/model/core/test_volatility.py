@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from xosc_lateral.base.errors import DriverProfileError
-from xosc_lateral.drivers.fitting.models.autoregressive_matching import autocovariance, fit_volatility, log_power
+from xosc_lateral.drivers.fitting.models.autoregressive_fit import autocovariance, fit_volatility, log_power
 from xosc_lateral.drivers.model.core.autoregressive.parameters import Volatility, averaged_covariance
 
 

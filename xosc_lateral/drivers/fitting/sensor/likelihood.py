@@ -1,23 +1,138 @@
-"""Whittle's likelihood [1]_ of driver plus sensor, and the colours of noise that may lie behind measured runs.
+"""Most likely driver and sensor behind measured runs: Whittle's likelihood [4]_, with what driver and vehicle can do to
+the side as a prior on the spectrum of the offset.
+
+The logarithm of the driver's power density is a polygon over the logarithm of frequency. Its slope is free below
+0.1 Hz, where a lane is kept as somebody likes. Above, what is expected is, up to its level::
+
+    1 / (f * (1 + (f / corner)^5) * (1 + (f / 1 Hz)^2)^1.5)
+
+- Below the corner of the driver's corrections the power falls with the frequency.
+- Beyond it, with its sixth power: a lateral acceleration takes two integrations to become an offset, -4; steering comes
+  in corrections that last some tenths of a second and are never undone within them [1]_ [2]_, which a lag of first
+  order describes, -2.
+- Muscles and vehicle follow the command with lags that add up to a corner of about 1 Hz [1]_ [3]_: up to -3 more where
+  the sensor is good enough to see it.
+
+How brisk corrections are differs from driver to driver, so that the corner is fitted with the rest: at
+`BRISKEST_CORNER` or below. Where noise hides the driver, his spectrum goes on as the part of it that is seen lets
+expect. A corner that were as free upwards would make a driver of every low-passed error; and beside such an error,
+whose own corner is estimated, it is `BRISKEST_CORNER`: a slower driver and a slower error are one spectrum.
+
+The prior is a normal one, of standard deviation `SLOPE_SD` on each slope and `BEND_SD` on the change from one to the
+next: data with little noise override it.
 
 References
 ----------
-.. [1] P. Whittle, "Estimation and information in stationary time series", Arkiv för Matematik 2, 1953.
-.. [2] G. Schwarz, "Estimating the dimension of a model", Annals of Statistics 6, 1978: the criterion.
+.. [1] D. T. McRuer, R. W. Allen, D. H. Weir, R. H. Klein, "New results in driver steering control models",
+   Human Factors 19(4), 1977: cross-over frequencies of lane keeping, neuromuscular lags.
+.. [2] G. Markkula et al., "Sustained sensorimotor control as intermittent decisions about prediction errors",
+   Biological Cybernetics 112, 2018.
+.. [3] ISO 7401:2011, lateral transient response: the yaw response of passenger cars at 80 to 120 km/h falls from
+   about 1 Hz on.
+.. [4] P. Whittle, "Estimation and information in stationary time series", Arkiv för Matematik 2, 1953.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.numbers import significant
 from xosc_lateral.drivers.fitting.sensor.periodogram import LEVEL_SD, Periodogram, SecondView, climb
-from xosc_lateral.drivers.fitting.sensor.vehicle_bound import KNOTS, N_KNOTS, N_STATE, interpolation, prior
+from xosc_lateral.drivers.model.sensor import butterworth
 
+KNOTS = np.array([0.01, 0.02, 0.035, 0.05, 0.075, 0.1, 0.14, 0.2, 0.27, 0.35, 0.45, 0.6, 0.8, 1.1, 1.5])
+"""[Hz]"""
+
+FREE_BELOW = 0.1
+LAGS = 1.0
+"""Corners: of lane keeping at will, of muscles and vehicle. [Hz]"""
+
+BRISKEST_CORNER = 0.27
+"""Corner of the briskest corrections: that of drive tables whose sensor is good enough to see it. [Hz]"""
+
+POWER_BELOW, POWER_BEYOND, MOST_LAG = 1.0, 6.0, 3.0
+"""Powers of the frequency by which the density falls below the corner, beyond it, and more beyond that of the lags."""
+
+SLOWER_SD, BRISKER_SD = 0.5, 0.05
+"""Of the logarithm of the corner over `BRISKEST_CORNER`, below it and above. [-]"""
+
+SLOPE_SD, BEND_SD, FREE_BEND_SD = 0.9, 1.0, 1.5
+"""Of log power over log frequency. [-] `docs/design/sensor.md` shows how little the split depends on them."""
+
+STEEPEST_KNOWN = -4.0
+"""Beyond the last knot the density falls at least like this. [-]"""
+
+_LOG = np.log(KNOTS)
+N_KNOTS = len(KNOTS)
+
+N_STATE = N_KNOTS + 1
+"""Knots, then the logarithm of the corner over `BRISKEST_CORNER`: what the prior is on."""
+
+
+def expected_log_density(frequency: FloatArray, shift: float = 0.0) -> FloatArray:
+    """Mean of the prior on log power, up to its level. Shape as `frequency` [Hz]. [-]
+
+    `shift` is the logarithm of the corner over `BRISKEST_CORNER`.
+    """
+    steps = POWER_BEYOND - POWER_BELOW
+    bend = np.logaddexp(0.0, steps * (np.log(frequency / BRISKEST_CORNER) - shift))
+    return np.asarray(-POWER_BELOW * np.log(frequency) - bend - 0.5 * MOST_LAG * np.log1p((frequency / LAGS) ** 2))
+
+
+SLOPES = np.diff(np.eye(N_KNOTS), axis=0) / np.diff(_LOG)[:, None]
+"""From knot values to slopes, shape (n - 1, n)."""
+
+_BOUND = np.flatnonzero(0.5 * (_LOG[1:] + _LOG[:-1]) > np.log(FREE_BELOW))
+_BENDS = np.diff(SLOPES, axis=0)
+_ROWS = np.concatenate([SLOPES[_BOUND] / SLOPE_SD, _BENDS[_BOUND[:-1]] / BEND_SD, _BENDS[: _BOUND[0]] / FREE_BEND_SD])
+"""Slopes and their changes in units of the prior, from knot values."""
+
+
+def _of_slopes(values: FloatArray) -> FloatArray:
+    """What slopes between the knots of such values are in units of the prior, shape (len(_ROWS),). [-]"""
+    slopes = (SLOPES @ values)[_BOUND]
+    return np.concatenate([slopes / SLOPE_SD, np.diff(slopes) / BEND_SD, np.zeros(_BOUND[0])])
+
+
+def prior(state: FloatArray, *, is_corner_free: bool = True) -> tuple[FloatArray, FloatArray]:
+    """Residuals of a state, shape (m,), each standard normal by the prior, and their Jacobian, shape (m, N_STATE).
+
+    Where the corner is not free, the slopes expected are those of `BRISKEST_CORNER`, whatever the state says.
+    """
+    knots, excess = state[:N_KNOTS], float(state[N_KNOTS])
+    shift, deviation = excess if is_corner_free else 0.0, SLOWER_SD if excess < 0.0 else BRISKER_SD
+    jacobian = np.zeros((len(_ROWS) + 1, N_STATE))
+    jacobian[:-1, :N_KNOTS] = _ROWS
+    if is_corner_free:
+        steps = POWER_BEYOND - POWER_BELOW
+        change = steps / (1.0 + np.exp(-steps * (np.log(KNOTS / BRISKEST_CORNER) - shift)))
+        jacobian[:-1, N_KNOTS] = -_of_slopes(change)  # of the expected density, with the shift
+    jacobian[-1, N_KNOTS] = 1.0 / deviation
+    residuals = _ROWS @ knots - _of_slopes(expected_log_density(KNOTS, shift))
+    return np.append(residuals, excess / deviation), jacobian
+
+
+def interpolation(frequency: FloatArray) -> FloatArray:
+    """From knot values to log densities at these frequencies, constant outside the knots, shape (len(frequency), n)."""
+    log = np.clip(np.log(np.maximum(frequency, 1e-9)), _LOG[0], _LOG[-1])
+    left = np.clip(np.searchsorted(_LOG, log) - 1, 0, N_KNOTS - 2)
+    share = (log - _LOG[left]) / (_LOG[left + 1] - _LOG[left])
+    matrix = np.zeros((len(log), N_KNOTS))
+    rows = np.arange(len(log))
+    matrix[rows, left], matrix[rows, left + 1] = 1.0 - share, share
+    return matrix
+
+
+def density(knots: FloatArray, frequency: FloatArray) -> FloatArray:
+    """Driver's power density from the logarithms at the knots. [m2/Hz] Shape as `frequency` [Hz]."""
+    beyond = np.maximum(np.log(np.maximum(frequency, 1e-9)) - _LOG[-1], 0.0)
+    last = min(float((SLOPES @ knots)[-1]), STEEPEST_KNOWN)
+    return np.asarray(np.exp(interpolation(frequency) @ knots + last * beyond))
+
+
+# ---- driver plus sensor ----
 NOISE_FREQUENCY = 1.0
 """No driver is seen above this in a sensor worth splitting: where white noise is estimated at first. [Hz]"""
 
@@ -56,7 +171,7 @@ class Colour:
         """Density over that at frequency 0 [-], or of the second view [m2/Hz]. Shape as `frequency` [Hz]."""
         if self.view is not None:
             return self.view.density(frequency)
-        return np.asarray(1.0 / (1.0 + (frequency / self.corner) ** (2 * self.order)))
+        return butterworth(frequency, self.order, self.corner)
 
     def integral(self, highest: float) -> float:
         """Of the shape over all frequencies; of a second view, up to `highest`, that of the rows [Hz]."""
@@ -70,25 +185,20 @@ class Colour:
 class Known:
     """A sensor whose error is known."""
 
-    deviation: float
-    """Standard deviation on the table's rows. [m]"""
-    rate: float
-    """Rows per second. [Hz]"""
-    rounding: float = 0.0
-    """What rounding has of its square, which is known from the rows. [m2]"""
+    deviation: float  # Standard deviation on the table's rows. [m]
+    rate: float  # Rows per second. [Hz]
+    rounding: float = 0.0  # What rounding has of its square, which is known from the rows. [m2]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Solution:
     """The maximum."""
 
+    # The driver, shape (N_STATE,): log density at the knots, and the corner of corrections, see `KNOTS`.
     state: FloatArray
-    """The driver, shape (N_STATE,): log density at the knots, and the corner of corrections, see `vehicle_bound`."""
-    white: float
-    """Log densities of the sensor's two parts, of `colour` over its shape; -inf where there is none."""
+    white: float  # Log densities of the sensor's two parts, of `colour` over its shape; -inf where there is none.
     colour: float
-    loss: float
-    """Minus log posterior."""
+    loss: float  # Minus log posterior.
 
     @property
     def knots(self) -> FloatArray:
@@ -105,8 +215,7 @@ class Measured:
     """What driver and sensor are to explain."""
 
     data: Periodogram
-    base: FloatArray
-    """Density of the sensor's that is known already, at the data's frequencies, shape (n,). [m2/Hz]"""
+    base: FloatArray  # Density of the sensor's that is known already, at the data's frequencies, shape (n,). [m2/Hz]
     known: Known | None = None
 
 
@@ -199,82 +308,3 @@ def solve(measured: Measured, colour: Colour, start: Solution | None = None) -> 
     point, loss = climb(problem.at, point)
     coloured = float(point[N_STATE + 1]) if colour.is_there else -np.inf
     return Solution(point[:N_STATE], float(point[N_STATE]), coloured, loss)
-
-
-ORDERS = (1, 2, 4)
-LOWEST_CORNER, HIGHEST_CORNER, GRID = 0.05, 1.4, 1.3
-"""Corners of the sensor's low-passed part from which the climb begins [Hz], and the factor from one to the next [-].
-Slower ones lie where a driver's spectrum is free: nothing would separate them from him."""
-
-LEAST_CORNER = {1: 0.0, 2: 0.38, 4: 0.38}
-"""By order. A steep fall from a lower corner looks like a driver's own. [Hz]"""
-
-CLIMB = 10
-"""Steps of the climb between the best corner's neighbours: a hundredth of the corner. [-]"""
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Explanation:
-    """A colour, what is most likely with it, and the Bayesian information criterion: the lower, the better. [-]"""
-
-    solution: Solution
-    colour: Colour
-    criterion: float
-
-
-def explanations(measured: Measured, view: SecondView | None = None, *, only_view: bool = False) -> list[Explanation]:
-    """All that were tried; of a second view, also or only what it shows.
-
-    A low-passed sensor needs no white noise beside it, and a white level that is there to spare lets a steeper low-pass
-    imitate a flatter one, whose slow part would then be the driver's. So each order is tried with white noise and
-    without, and its corner is climbed to: one that is off by a tenth moves a sensor's variance by as much.
-    """
-    seen = [] if view is None else [Colour(alone=alone, view=view) for alone in (False, True)]
-    candidates = [_explanation(measured, colour) for colour in seen]
-    if candidates and only_view:
-        return candidates
-    candidates.append(_explanation(measured, Colour()))
-    for order in ORDERS:
-        for alone in (False, True):
-            candidates += _of_family(measured, order, alone)
-    return candidates
-
-
-def _of_family(measured: Measured, order: int, alone: bool) -> Iterator[Explanation]:
-    """Over a grid of corners, and between the neighbours of the best."""
-    from scipy.optimize import minimize_scalar
-
-    count = int(np.ceil(np.log(HIGHEST_CORNER / LOWEST_CORNER) / np.log(GRID))) + 1
-    corners = [_in_digits(c) for c in np.geomspace(LOWEST_CORNER, HIGHEST_CORNER, count) if c >= LEAST_CORNER[order]]
-    grid = [_explanation(measured, Colour(order, corner, alone)) for corner in corners]
-    yield from grid
-    at = int(np.argmin([one.criterion for one in grid]))
-    low, high = (float(np.log(corners[k])) for k in (max(at - 1, 0), min(at + 1, len(corners) - 1)))
-    tried: list[Explanation] = []
-
-    def lacking(log_corner: float) -> float:
-        colour = Colour(order, _in_digits(np.exp(log_corner)), alone)
-        tried.append(_explanation(measured, colour, grid[at].solution))
-        return tried[-1].criterion
-
-    minimize_scalar(lacking, bounds=(low, high), method="bounded", options={"maxiter": CLIMB, "xatol": 0.01})
-    yield from tried
-
-
-def _in_digits(corner: float) -> float:
-    """To the digits that the climb resolves: the same on any machine. [Hz]"""
-    return significant(corner, 3)
-
-
-def _explanation(measured: Measured, colour: Colour, start: Solution | None = None) -> Explanation:
-    """White noise has a level, a low-passed part a level and a corner: so many numbers are paid for.
-
-    A second view has a level, too, and a shape that is known from as many windows as the data: its own chance costs a
-    likelihood as much as fitting its knots would gain, half for each, which is given back.
-    """
-    solution = solve(measured, colour, start)
-    numbers = 2 * bool(colour.order) + (colour.view is not None) + (not colour.alone)
-    own_chance = 0 if colour.view is None else len(colour.view.knots)
-    return Explanation(
-        solution, colour, 2.0 * solution.loss + numbers * float(np.log(measured.data.count)) - own_chance
-    )

@@ -1,13 +1,14 @@
-"""Driver and sensor, separated in measured runs.
+"""Driver and sensor, separated in measured runs: by Whittle's likelihood of all colours that the noise may have.
 
 References
 ----------
 .. [1] P. Whittle, "Estimation and information in stationary time series", Arkiv för Matematik 2, 1953: the likelihood.
+.. [2] G. Schwarz, "Estimating the dimension of a model", Annals of Statistics 6, 1978: the criterion.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from dataclasses import replace as replaced
 from functools import partial
@@ -16,17 +17,9 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError
-from xosc_lateral.base.numbers import NORMAL_95, all_significant
+from xosc_lateral.base.numbers import NORMAL_95, all_significant, significant
 from xosc_lateral.drivers.drives.filters import scale_frequencies
-from xosc_lateral.drivers.fitting.sensor.likelihood import (
-    Colour,
-    Explanation,
-    Known,
-    Measured,
-    Solution,
-    explanations,
-    solve,
-)
+from xosc_lateral.drivers.fitting.sensor.likelihood import Colour, Known, Measured, Solution, density, solve
 from xosc_lateral.drivers.fitting.sensor.periodogram import (
     COARSE_STEP_RATIO,
     LEVEL_SD,
@@ -40,7 +33,6 @@ from xosc_lateral.drivers.fitting.sensor.periodogram import (
     uniform_variance,
     windows_of,
 )
-from xosc_lateral.drivers.fitting.sensor.vehicle_bound import density
 from xosc_lateral.drivers.model.sensor import SensorModel
 
 CRITERION_MARGIN = 6.0
@@ -62,11 +54,10 @@ MOST_NOISE = 0.9
 class Separation:
     """Densities of driver and sensor."""
 
-    knots: FloatArray
-    """Of the driver's density, see `vehicle_bound`."""
+    knots: FloatArray  # Of the driver's density, see `KNOTS`.
     sensor: SensorModel
+    # Density of what the sensor's numbers don't hold: of rounding, and of errors seen in a second view. [m2/Hz]
     beside: Callable[[FloatArray], FloatArray]
-    """Density of what the sensor's numbers don't hold: of rounding, and of errors seen in a second view. [m2/Hz]"""
 
     def driver_part(self, offset: FloatArray, step: float) -> FloatArray:
         """The offset with every frequency scaled down to the driver's share of the power, about its own mean.
@@ -107,16 +98,16 @@ def separate(
 
     Parameters
     ----------
-    runs, step : sequence of array, float
+    runs, step
         Offsets [m] at an even step [s].
-    rows, durations : sequence of array, optional
+    rows, durations
         The offsets of the same runs as recorded: variances are counted, and rounding is detected, in these [m]; and how
         long each row stands for, where rows are not even in time [s].
-    rate : float, optional
+    rate
         Rows per second; without, as many as there are in the time of the runs. [Hz]
-    sensor_noise : float, optional
+    sensor_noise
         Standard deviation of the sensor's error on the rows, rounding included, where it is known. [m]
-    half_widths, one_camera : sequence of array, bool, optional
+    half_widths, one_camera
         Half the lane width in the same runs, where a camera measured it: a second view of its errors [m]; and whether
         that is known to be the camera that measured the offset: else what the width shows is taken where plausible.
     """
@@ -136,15 +127,19 @@ def separate(
         grain > COARSE_STEP_RATIO * np.sqrt(variance) or len(np.unique(np.concatenate(measured))) < LEAST_LEVELS
     )
     is_rounded = grain > 0.0 and not too_coarse
-    rounding = _rounding(data, grain, variance, per_second) if is_rounded else _no_density
-    rounded_off = uniform_variance(grain) if is_rounded else 0.0
+    rounding: Callable[[FloatArray], FloatArray] = np.zeros_like
+    rounded_off = 0.0
+    if is_rounded:
+        rounding, rounded_off = _rounding(data, grain, variance, per_second), uniform_variance(grain)
     known = None if sensor_noise is None else Known(sensor_noise, per_second, rounded_off)
     asked = Measured(data, rounding(data.frequency), known)
     view = second_view(half_widths, step) if half_widths else None
     candidates = explanations(asked, view, only_view=one_camera)
     least = _taken(candidates)
     best, colour = least.solution, least.colour
-    beside = _with_view(rounding, best, colour)
+    beside = rounding
+    if colour.view is not None:
+        beside = lambda frequency: rounding(frequency) + best.coloured(colour, frequency)  # noqa: E731
     result = Separation(best.knots, _sensor(best, colour, grain), beside)
     driver = float(np.concatenate([result.driver_part(run, step) for run in runs]).var())
     error = _in_band(best, colour, data)
@@ -177,15 +172,6 @@ def _variance(rows: Sequence[FloatArray], durations: Sequence[FloatArray] | None
     return float(np.average((values - np.average(values, weights=weights)) ** 2, weights=weights))
 
 
-def _with_view(
-    rounding: Callable[[FloatArray], FloatArray], solution: Solution, colour: Colour
-) -> Callable[[FloatArray], FloatArray]:
-    """Density of rounding, and of errors that a second view shows, where one does."""
-    if colour.view is None:
-        return rounding
-    return lambda frequency: rounding(frequency) + solution.coloured(colour, frequency)
-
-
 def _other_views(colour: Colour, view: SecondView) -> list[Colour]:
     """The same, if no lane ever widened, and as far as 95 % of what pitch or errors of both markings alike make go."""
     shift = NORMAL_95 * LEVEL_SD
@@ -210,10 +196,6 @@ def _sensor(
 
 DIGITS = 7
 """Significant digits kept of a sensor's numbers: what differs beyond is the processor's rounding. [-]"""
-
-
-def _no_density(frequency: FloatArray) -> FloatArray:
-    return np.zeros(np.shape(frequency))
 
 
 def _rounding(data: Periodogram, grain: float, variance: float, rate: float) -> Callable[[FloatArray], FloatArray]:
@@ -275,3 +257,82 @@ def _interval(
     low = share - span * (float(levels.max()) + NORMAL_95 * float(error))
     high = share - span * (float(levels.min()) - NORMAL_95 * float(error))
     return float(np.clip(low, 0.0, share)), float(np.clip(high, share, 1.0))
+
+
+# ---- what may explain the runs ----
+ORDERS = (1, 2, 4)
+LOWEST_CORNER, HIGHEST_CORNER, GRID = 0.05, 1.4, 1.3
+"""Corners of the sensor's low-passed part from which the climb begins [Hz], and the factor from one to the next [-].
+Slower ones lie where a driver's spectrum is free: nothing would separate them from him."""
+
+LEAST_CORNER = {1: 0.0, 2: 0.38, 4: 0.38}
+"""By order. A steep fall from a lower corner looks like a driver's own. [Hz]"""
+
+CORNER_DIGITS = 3
+"""That the climb resolves: the same on any machine. [-]"""
+
+CLIMB_STEPS = 10
+"""Steps of the climb between the best corner's neighbours: a hundredth of the corner. [-]"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Explanation:
+    """A colour, what is most likely with it, and the Bayesian information criterion: the lower, the better. [-]"""
+
+    solution: Solution
+    colour: Colour
+    criterion: float
+
+
+def explanations(measured: Measured, view: SecondView | None = None, *, only_view: bool = False) -> list[Explanation]:
+    """All that were tried; of a second view, also or only what it shows.
+
+    A low-passed sensor needs no white noise beside it, and a white level that is there to spare lets a steeper low-pass
+    imitate a flatter one, whose slow part would then be the driver's. So each order is tried with white noise and
+    without, and its corner is climbed to: one that is off by a tenth moves a sensor's variance by as much.
+    """
+    seen = [] if view is None else [Colour(alone=alone, view=view) for alone in (False, True)]
+    candidates = [_explanation(measured, colour) for colour in seen]
+    if candidates and only_view:
+        return candidates
+    candidates.append(_explanation(measured, Colour()))
+    for order in ORDERS:
+        for alone in (False, True):
+            candidates += _of_family(measured, order, alone)
+    return candidates
+
+
+def _of_family(measured: Measured, order: int, alone: bool) -> Iterator[Explanation]:
+    """Over a grid of corners, and between the neighbours of the best."""
+    from scipy.optimize import minimize_scalar
+
+    count = int(np.ceil(np.log(HIGHEST_CORNER / LOWEST_CORNER) / np.log(GRID))) + 1
+    tried_at = np.geomspace(LOWEST_CORNER, HIGHEST_CORNER, count)
+    corners = all_significant(tried_at[tried_at >= LEAST_CORNER[order]], CORNER_DIGITS)
+    grid = [_explanation(measured, Colour(order, corner, alone)) for corner in corners]
+    yield from grid
+    at = int(np.argmin([one.criterion for one in grid]))
+    low, high = (float(np.log(corners[k])) for k in (max(at - 1, 0), min(at + 1, len(corners) - 1)))
+    tried: list[Explanation] = []
+
+    def lacking(log_corner: float) -> float:
+        colour = Colour(order, significant(np.exp(log_corner), CORNER_DIGITS), alone)
+        tried.append(_explanation(measured, colour, grid[at].solution))
+        return tried[-1].criterion
+
+    minimize_scalar(lacking, bounds=(low, high), method="bounded", options={"maxiter": CLIMB_STEPS, "xatol": 0.01})
+    yield from tried
+
+
+def _explanation(measured: Measured, colour: Colour, start: Solution | None = None) -> Explanation:
+    """White noise has a level, a low-passed part a level and a corner: so many numbers are paid for.
+
+    A second view has a level, too, and a shape that is known from as many windows as the data: its own chance costs a
+    likelihood as much as fitting its knots would gain, half for each, which is given back.
+    """
+    solution = solve(measured, colour, start)
+    numbers = 2 * bool(colour.order) + (colour.view is not None) + (not colour.alone)
+    own_chance = 0 if colour.view is None else len(colour.view.knots)
+    return Explanation(
+        solution, colour, 2.0 * solution.loss + numbers * float(np.log(measured.data.count)) - own_chance
+    )

@@ -38,8 +38,9 @@ from xosc_lateral.files.openscenario.write.moving import Moving, add_vertices, w
 from xosc_lateral.files.openscenario.write.older import add_missing_overrides
 from xosc_lateral.world.motion.nominal import Activity, NominalMotion
 from xosc_lateral.world.motion.path_pieces import VERTEX_SPACING, PathPiece, vertex_times
-from xosc_lateral.world.scenario import Entity, Scenario
+from xosc_lateral.world.scenario.entity import Entity
 from xosc_lateral.world.scenario.enums import EntityCategory, Priority
+from xosc_lateral.world.scenario.scenario import Scenario
 
 CONTROL = "vehicle_velocity_control"
 """Its only control that keeps to the times of waypoints and does not move them to the lane (since 0.9.16)."""

@@ -18,9 +18,9 @@ from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.build import Version, Vertices, named
 from xosc_lateral.files.xml import parse_xml, read_document
 from xosc_lateral.world.motion.nominal import NominalMotion
-from xosc_lateral.world.scenario import Action, Scenario
 from xosc_lateral.world.scenario.parameters import Scope
 from xosc_lateral.world.scenario.place import Unsupported
+from xosc_lateral.world.scenario.scenario import Action, Scenario
 
 VERSIONS: tuple[Version, ...] = ((1, 0), (1, 1), (1, 2), (1, 3), (1, 4))
 """That can be written."""
@@ -54,13 +54,6 @@ class TargetPlayer(Struct, frozen=True):
             return (1, 0)
         return min(scenario.header.version, VERSIONS[-1])
 
-    def adapts(self, scenario: Scenario) -> bool:
-        """Whether the output is more than the input in its own version: in another one, or for a strict reader.
-
-        Else what an input has beyond its version stays as it is.
-        """
-        return self.player is Player.CARLA or self.version_for(scenario) != scenario.header.version
-
 
 STANDARD = TargetPlayer()
 
@@ -86,25 +79,24 @@ class Draft:
     """
 
     def __init__(self, scenario: Scenario, motion: NominalMotion, target: TargetPlayer = STANDARD) -> None:
-        self.scenario, self.motion, self.target = scenario, motion, target
+        self.scenario, self.motion, self.player = scenario, motion, target.player
         self.root = parse_xml(scenario.source, scenario.path)
-        self._refuse()
+        refuse_converted(self.root, scenario.path)
+        if motion.end_time <= 0.0:
+            trigger = scenario.storyboard.stop_trigger
+            place = scenario.storyboard.place if trigger is None else trigger.place
+            what = f"the scenario is over at 0 s ({motion.ended_by}): there is nothing to convert"
+            raise place.error(what, PlaybackError)
         self.version = target.version_for(scenario)
-        self.scope = global_scope(scenario)
+        self.is_adapted = self.player is Player.CARLA or self.version != scenario.header.version
+        """In another version, or for a strict reader; else what an input has beyond its version stays as it is."""
+        self.scope = Scope({name: final(parameter.value) for name, parameter in scenario.parameters.items()})
+        """The values that the scenario was played with."""
         self.vertices = Vertices(scenario.source)
         self.removed: list[Unsupported] = []
         """Controllers and actions that are no longer in the output although they are no motion, with reasons."""
         self.notes: list[str] = []
         """What else there is to say of the output, a line each."""
-
-    def _refuse(self) -> None:
-        """What was converted before, or is over before anything has moved."""
-        refuse_converted(self.root, self.scenario.path)
-        if self.motion.end_time <= 0.0:
-            trigger = self.scenario.storyboard.stop_trigger
-            place = self.scenario.storyboard.place if trigger is None else trigger.place
-            what = f"the scenario is over at 0 s ({self.motion.ended_by}): there is nothing to convert"
-            raise place.error(what, PlaybackError)
 
     @property
     def storyboard(self) -> etree._Element:
@@ -157,16 +149,10 @@ def unchanged(path: Path, scenario: Scenario) -> etree._Element:
     return document.root
 
 
-def global_scope(scenario: Scenario) -> Scope:
-    """The values that the scenario was played with."""
-    return Scope({name: final(parameter.value) for name, parameter in scenario.parameters.items()})
-
-
 @dataclass(frozen=True, slots=True)
 class WrittenScenario:
     """What was written."""
 
-    path: Path
     sha256: str  # of the file's bytes
     content_sha256: str  # of the file without its provenance
     converted: tuple[str, ...]  # entities that move otherwise than in the input

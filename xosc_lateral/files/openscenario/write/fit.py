@@ -1,4 +1,4 @@
-"""Make a written scenario one of its target's: another version of the standard, a player's own ways; and write it."""
+"""Write a played scenario with lateral movement in it: its motion changed, and made one of its target's."""
 
 from __future__ import annotations
 
@@ -12,52 +12,97 @@ from xosc_lateral.files.openscenario.provenance import mark, write_sealed
 from xosc_lateral.files.openscenario.read import is_town
 from xosc_lateral.files.openscenario.write.build import named
 from xosc_lateral.files.openscenario.write.carla import fit_carla
-from xosc_lateral.files.openscenario.write.draft import Draft, Player, WrittenScenario
+from xosc_lateral.files.openscenario.write.draft import STANDARD, Draft, Player, TargetPlayer, WrittenScenario
+from xosc_lateral.files.openscenario.write.lane_offset_scenario import LateralActions, add_lane_offsets
 from xosc_lateral.files.openscenario.write.literal import fill_in, inline_catalogs
 from xosc_lateral.files.openscenario.write.losses import Losses
+from xosc_lateral.files.openscenario.write.replay import replay
 from xosc_lateral.files.openscenario.write.versions import fit_version
-from xosc_lateral.world.scenario import Scenario
-from xosc_lateral.world.scenario.expressions import ExpressionError
+from xosc_lateral.world.motion.nominal import NominalMotion
+from xosc_lateral.world.motion.offset_chain import OffsetChain
+from xosc_lateral.world.motion.trajectory import WorldTrajectory
+from xosc_lateral.world.scenario.parameters import ExpressionError
+from xosc_lateral.world.scenario.scenario import Scenario
 
 
-def fit(draft: Draft, converted: Sequence[str] | None) -> None:
-    """Change what the target does not know, and note it; `FormatError` for what the scenario can't do without.
-
-    Its file references are still as seen from the scenario; `converted`: entities that follow trajectories; None:
-    maneuvers are still maneuvers.
-    """
-    target, scenario = draft.target, draft.scenario
-    losses = Losses(draft.root, scenario.path, f"version {named(draft.version)}", converted is None, draft.notes)
-    if target.adapts(scenario):
-        inline_catalogs(losses, draft)
-        if draft.version == (1, 0):
-            fill_in(losses, draft.scope, parameters=target.player is Player.CARLA)
-        fit_version(losses, scenario.header.version, draft.version)
-    if target.player is Player.ESMINI:
-        losses.target = "esmini"
-        fit_esmini(losses)
-    elif target.player is Player.CARLA:
-        losses.target = "CARLA's ScenarioRunner"
-        fit_carla(losses, draft, converted or ())
-
-
-def finish(
-    draft: Draft,
-    output: Path,
-    converted: Sequence[str],
+def write_converted(
+    scenario: Scenario,
+    motion: NominalMotion,
+    trajectories: Mapping[str, WorldTrajectory],
+    output: Path | str,
     *,
-    reactive: bool,
+    chains: Sequence[OffsetChain] | None = None,
+    lateral: LateralActions | None = None,
     provenance: Mapping[str, Any],
     summary: str,
-    save: bool,
+    save: bool = True,
+    target: TargetPlayer = STANDARD,
 ) -> WrittenScenario:
-    """Fit a draft to its target, mark it as ours and write it; see the writers."""
+    """Write a scenario in which entities follow trajectories, or keep their maneuvers and get lane offsets on top.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        As read: its bytes are the starting point, so that comments, catalogs and vendor extensions survive.
+    motion : NominalMotion
+        The run: gives the times of kept actions, standstill, teleports, and the end; how often an action runs.
+    trajectories : mapping of str to WorldTrajectory
+        Per entity, on the rows of `motion`. Trailers follow whoever pulls them: theirs are ignored in a replay.
+    output : path
+    chains : sequence of OffsetChain, optional
+        One for each entity with lane offsets from its start, and one for each of its lateral actions: the scenario
+        stays reactive. Without: a replay, in which all that is no trajectory happens when it happened in the run.
+    lateral : LateralActions, optional
+        Those of the scenario, where they are known.
+    provenance : mapping
+        JSON values: goes into the file as it is.
+    summary : str
+        A few words of it for the file header's description.
+    save : bool
+        Write it; else the bytes are only handed back.
+    target : TargetPlayer
+        Player and version that it is made for.
+
+    Raises
+    ------
+    FormatError
+        The scenario was converted before, or can't be expressed for the target.
+    OSError
+        The output can't be written; nothing is left half-written.
+    ValueError
+        A trajectory holds NaN or does not fit the motion.
+    """
+    draft = Draft(scenario, motion, target)
+    if chains is None:
+        converted = replay(draft, trajectories)
+    else:
+        converted = add_lane_offsets(draft, chains, lateral or LateralActions.of(scenario), trajectories)
     draft.override_parameters()
-    fit(draft, None if reactive else converted)
-    rewrite_paths(draft, output)
+    _fit(draft, converted, is_reactive=chains is not None)
+    rewrite_paths(draft, Path(output))
     mark(draft.root, provenance, summary)
-    sha256, content, data = write_sealed(output, draft.vertices.document(draft.root), save=save)
-    return WrittenScenario(output, sha256, content, tuple(converted), tuple(draft.removed), data, tuple(draft.notes))
+    sha256, content, data = write_sealed(Path(output), draft.vertices.document(draft.root), save=save)
+    return WrittenScenario(sha256, content, converted, tuple(draft.removed), data, tuple(draft.notes))
+
+
+def _fit(draft: Draft, converted: Sequence[str], *, is_reactive: bool) -> None:
+    """Change what the target does not know, and note it; `FormatError` for what the scenario can't do without.
+
+    Its file references are still as seen from the scenario.
+    """
+    scenario = draft.scenario
+    losses = Losses(draft.root, scenario.path, f"version {named(draft.version)}", is_reactive, draft.notes)
+    if draft.is_adapted:
+        inline_catalogs(losses, draft)
+        if draft.version == (1, 0):
+            fill_in(losses, draft.scope, parameters=draft.player is Player.CARLA)
+        fit_version(losses, scenario.header.version, draft.version)
+    if draft.player is Player.ESMINI:
+        losses.target = "esmini"
+        fit_esmini(losses)
+    elif draft.player is Player.CARLA:
+        losses.target = "CARLA's ScenarioRunner"
+        fit_carla(losses, draft, () if is_reactive else converted)
 
 
 # ---- files that a scenario names, as seen from the folder that it is written to ----

@@ -11,25 +11,26 @@ planned from wherever an action has left it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Any
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from lxml import etree
+from msgspec import Struct
 
 from xosc_lateral.files.openscenario.write import build
-from xosc_lateral.files.openscenario.write.draft import STANDARD, Draft, TargetPlayer, WrittenScenario
-from xosc_lateral.files.openscenario.write.fit import finish
-from xosc_lateral.files.openscenario.write.lateral_actions import LateralAction, changing_speed, lateral_actions
+from xosc_lateral.files.openscenario.write.draft import Draft
 from xosc_lateral.files.openscenario.write.literal import inline_maneuvers, name_literally
 from xosc_lateral.files.openscenario.write.moving import moving_entities
 from xosc_lateral.files.openscenario.write.replaced_maneuvers import ReplacedManeuvers
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_chain import REST_TIME, Move, OffsetChain, OffsetPath, Ring
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
-from xosc_lateral.world.scenario import Scenario
+from xosc_lateral.world.scenario.controllers import Domains, controlled_entities, gives_lateral
 from xosc_lateral.world.scenario.enums import Priority
+from xosc_lateral.world.scenario.global_actions import AddEntityAction
+from xosc_lateral.world.scenario.private_actions import LATERAL, LONGITUDINAL, TeleportAction
+from xosc_lateral.world.scenario.scenario import Scenario
 
 CHAIN = "xosc-lateral offsets"
 TURNS = 10000
@@ -48,52 +49,29 @@ REPEATED = 3
 """Acts more than runs in the nominal run, after an action that may run again. [-]"""
 
 
-def write_lane_offset_scenario(
-    scenario: Scenario,
-    motion: NominalMotion,
+def add_lane_offsets(
+    draft: Draft,
     chains: Sequence[OffsetChain],
-    output: Path | str,
-    *,
-    provenance: Mapping[str, Any],
-    summary: str,
-    save: bool = True,
-    target: TargetPlayer = STANDARD,
-    trajectories: Mapping[str, WorldTrajectory] | None = None,
-) -> WrittenScenario:
-    """Write the scenario with its maneuvers as they are and lane offset actions added.
-
-    `output`, `provenance`, `summary`, `save`, `target`, and what is raised: see `write_trajectory_scenario`.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        As read.
-    motion : NominalMotion
-        The run: says how often an action runs.
-    chains : sequence of OffsetChain
-        One for each entity from its start, and one for each of its lateral actions.
-    trajectories : mapping of str to WorldTrajectory, optional
-        Entities that follow trajectories in place of their maneuvers: none that a chain is for.
-    """
-    draft = Draft(scenario, motion, target)
-    moving = moving_entities(draft, trajectories or {})
+    lateral: LateralActions,
+    trajectories: Mapping[str, WorldTrajectory],
+) -> tuple[str, ...]:
+    """Add lane offset actions to maneuvers that stay as they are; who has them or follows a trajectory instead."""
+    moving = moving_entities(draft, trajectories)
     maneuvers = ReplacedManeuvers(draft, moving)
     story = build.story("xosc-lateral")
-    lateral = lateral_actions(scenario)
-    changing = changing_speed(scenario)
     for chain in chains:
-        acts = _Acts(story, chain, draft, lateral.get(chain.entity, ()), chain.entity in changing)
-        acts.add()
+        _Acts(story, chain, draft, lateral).add()
     _place_aside(draft, chains)
     if len(story):
         # Last: a lane change that starts in the same frame has started before ours are looked at.
         draft.put_last(story)
-    referred = _referred(story)
-    name_literally(draft.root, scenario.path, draft.scope, referred)
+    # Names of the elements that our conditions look at, with those above them where they are needed.
+    references = (item.get("storyboardElementRef") or "" for item in story.iter("StoryboardElementStateCondition"))
+    referred = {name for reference in references for name in reference.split("::")}
+    name_literally(draft.root, draft.scenario.path, draft.scope, referred)
     inline_maneuvers(draft, referred)
     maneuvers.replace()
-    names = tuple(dict.fromkeys([*moving, *(chain.entity for chain in chains)]))
-    return finish(draft, Path(output), names, reactive=True, provenance=provenance, summary=summary, save=save)
+    return tuple(dict.fromkeys([*moving, *(chain.entity for chain in chains)]))
 
 
 def _place_aside(draft: Draft, chains: Sequence[OffsetChain]) -> None:
@@ -113,25 +91,13 @@ def _place_aside(draft: Draft, chains: Sequence[OffsetChain]) -> None:
         build.insert_indented(owner, len(owner), action)
 
 
-def _referred(story: etree._Element) -> set[str]:
-    """Names of the elements that our conditions look at, with those above them where they are needed."""
-    references = (item.get("storyboardElementRef") or "" for item in story.iter("StoryboardElementStateCondition"))
-    return {name for reference in references for name in reference.split("::")}
-
-
 class _Acts:
     """The acts of one chain: one, or several after an action that may run again."""
 
-    def __init__(
-        self,
-        story: etree._Element,
-        chain: OffsetChain,
-        draft: Draft,
-        items: Sequence[LateralAction],
-        changes_speed: bool,
-    ) -> None:
-        self._story, self._chain, self._items, self._version = story, chain, items, draft.version
-        self._changes_speed = changes_speed
+    def __init__(self, story: etree._Element, chain: OffsetChain, draft: Draft, lateral: LateralActions) -> None:
+        self._story, self._chain, self._version = story, chain, draft.version
+        self._items = lateral.by_entity.get(chain.entity, ())
+        self._changes_speed = chain.entity in lateral.changing_speed
         self._moving_speed = _moving_speed(draft.motion, chain)
         self._runs = sum(one.path == chain.after and one.actor == chain.entity for one in draft.motion.actions)
 
@@ -275,3 +241,75 @@ def _lane_offset(owner: etree._Element, dynamics: Mapping[str, str]) -> etree._E
     action = build.sub(owner, "LateralAction/LaneOffsetAction", continuous="false")
     build.sub(action, "LaneOffsetActionDynamics", **dynamics)
     return build.sub(action, "LaneOffsetTarget")
+
+
+# ---- What moves entities sideways in a storyboard or puts them th ----
+class LateralAction(Struct, frozen=True):
+    """A lateral action, a teleport or the adding of an entity."""
+
+    path: tuple[str, ...]  # its names from the story down
+    kind: str  # type and name that a condition refers to it by
+    reference: str
+    repeats: bool = False  # it may run more than once
+    adds: bool = False  # it adds the entity
+    steers: bool | None = None  # it gives the lateral domain to a controller; False: it takes it back
+
+
+class LateralActions(Struct, frozen=True):
+    """Of a scenario's events, by entity, in file order; and who changes its speed or has a controller."""
+
+    by_entity: Mapping[str, tuple[LateralAction, ...]]
+    changing_speed: frozenset[str]
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> LateralActions:
+        """Those of a scenario."""
+        names, controls = Counter(_names(scenario)), controlled_entities(scenario)
+        by_entity: dict[str, dict[LateralAction, None]] = {}
+        changing = set(controls)
+        for at in scenario.storyboard.events():
+            repeats = at.group.maximum_execution_count > 1 or at.event.maximum_execution_count > 1
+            for action in at.event.actions:
+                content, actors, steers = action.content, at.actors, gives_lateral(action.content)
+                if isinstance(content, LONGITUDINAL):
+                    changing |= set(actors)
+                adds = isinstance(content, AddEntityAction)
+                if isinstance(content, AddEntityAction):
+                    actors = (content.entity_ref,)
+                elif steers is not None:
+                    actors = tuple(a for a in actors if a in controls and Domains.LATERAL in controls[a].domains)
+                elif not isinstance(content, (*LATERAL, TeleportAction)):
+                    continue
+                path = (*at.path, action.name)
+                reference = _reference(path, len(at.event.actions) == 1, names)
+                lateral = LateralAction(path, *reference, repeats, adds, steers)
+                for actor in actors:
+                    by_entity.setdefault(actor, {})[lateral] = None
+        return cls({entity: tuple(actions) for entity, actions in by_entity.items()}, frozenset(changing))
+
+
+def _reference(path: tuple[str, ...], is_alone: bool, names: Mapping[str, int]) -> tuple[str, str]:
+    """By its own name where no other element has it, else by its event's, else by the whole path.
+
+    An action without a name, which the standard doesn't allow and some tools write, has only its event's.
+    """
+    if path[-1] and names[path[-1]] == 1:
+        return "action", path[-1]
+    if (is_alone or not path[-1]) and names[path[-2]] == 1:
+        return "event", path[-2]
+    return "action", "::".join(path)
+
+
+def _names(scenario: Scenario) -> Iterator[str]:
+    """Name of every element of the storyboard."""
+    for story in scenario.storyboard.stories:
+        yield story.name
+        for act in story.acts:
+            yield act.name
+            for group in act.maneuver_groups:
+                yield group.name
+                for maneuver in group.maneuvers:
+                    yield maneuver.name
+                    for event in maneuver.events:
+                        yield event.name
+                        yield from (action.name for action in event.actions)

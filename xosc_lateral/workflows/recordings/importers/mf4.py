@@ -41,13 +41,13 @@ from xosc_lateral.files.mapping import ColumnSource, MappingLike, as_mapping, fa
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import LONGEST_MESSAGE, foreign_errors
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
-from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded, paths_of
+from xosc_lateral.workflows.recordings.importers import Imported, imported, importer, paths_of
 
 POSITIONS = (("offset", "lane_width"), ("distance_left", "distance_right"))
 LICENCE = "your own recording"
 
 _NO_MDF = "not an MDF file that asammdf can read"
-LISTED = 40  # channel names in a message, at most
+LISTED_CHANNELS = 40  # channel names in a message, at most
 MAX_CHANNEL_DISTANCE = 0.2  # median distance of two channels of one name that is not one of rates, by the spread [-]
 SPARSE_STEPS = 2.5  # a channel of few samples has a gap where more than two in a row lack: of its median steps [-]
 
@@ -93,7 +93,7 @@ class Channel:
         return values
 
 
-@guarded
+@importer
 def import_mf4(
     sources: Path | Sequence[Path],
     channels: Sequence[str] = (),
@@ -129,14 +129,14 @@ def import_mf4(
     every_unit = {name: " | ".join(sorted(words)) for name, words in units.items()}
     settings = {"step": step, "channels": list(channels), "units": every_unit}
     about = {"format": "mf4", "licence": LICENCE, "settings": settings, "notes": tuple(dict.fromkeys(notes))}
-    return finished(pd.concat(tables, ignore_index=True), keep_cut=False, sources=files, step=step, **about)
+    return imported(pd.concat(tables, ignore_index=True), sources=files, step=step, **about)
 
 
 def channels_wanted(source: Path) -> str:
     """What the channel map has to name, and the channels that there are to choose from: for who has no map yet."""
     with _opened(source) as log:
         names = _names(log)
-    listed = ", ".join(names[:LISTED]) + (", ..." if len(names) > LISTED else "")
+    listed = ", ".join(names[:LISTED_CHANNELS]) + (", ..." if len(names) > LISTED_CHANNELS else "")
     return (
         "the channel map needs --map offset=CHANNEL[:UNIT] and --map lane_width=CHANNEL[:UNIT], or "
         "--map distance_left=CHANNEL[:UNIT] and --map distance_right=CHANNEL[:UNIT]; "

@@ -1,1 +1,1 @@
-"""Actions while playing, one per file. A new one is a file here and a line in the tuple of `registry`."""
+"""Actions while playing; each family's module lists its own in `RUNNING`."""

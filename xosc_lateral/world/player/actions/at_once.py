@@ -7,86 +7,53 @@ from xosc_lateral.world.player.actions.base import AtOnce, Domain, Maker, Runnin
 from xosc_lateral.world.player.drive import align_trailers, connect, disconnect
 from xosc_lateral.world.player.positions.resolve import resolve, route_guide
 from xosc_lateral.world.player.state import guide
-from xosc_lateral.world.player.values import Values
-from xosc_lateral.world.scenario import Unsupported
+from xosc_lateral.world.scenario import global_actions, private_actions
 from xosc_lateral.world.scenario.controllers import Domains
 from xosc_lateral.world.scenario.enums import RouteStrategy
-from xosc_lateral.world.scenario.global_actions import (
-    AddEntityAction,
-    DeleteEntityAction,
-    EnvironmentAction,
-    ParameterModifyAction,
-    ParameterSetAction,
-    SetMonitorAction,
-    TrafficAction,
-    TrafficSignalControllerAction,
-    TrafficSignalStateAction,
-    UserDefinedAction,
-    VariableModifyAction,
-    VariableSetAction,
-)
-from xosc_lateral.world.scenario.private_actions import (
-    AcquirePositionAction,
-    ActivateControllerAction,
-    AnimationAction,
-    AssignControllerAction,
-    AssignRouteAction,
-    ConnectTrailerAction,
-    DisconnectTrailerAction,
-    LightStateAction,
-    OverrideControllerValueAction,
-    TeleportAction,
-    VisibilityAction,
-)
+from xosc_lateral.world.scenario.place import Unsupported
+
+SetAction = global_actions.ParameterSetAction | global_actions.VariableSetAction
+ModifyAction = global_actions.ParameterModifyAction | global_actions.VariableModifyAction
 
 
-def environment(content: EnvironmentAction, action: AtOnce) -> None:
+def environment(content: global_actions.EnvironmentAction, action: AtOnce) -> None:
     """Only the time of day matters to playback; the rest is recorded with the start of the action."""
     clock = content.environment.time_of_day
     if clock is not None:
         action.simulation.time_of_day = (clock.date_time, clock.animation, action.simulation.time)
 
 
-def set_value(content: ParameterSetAction | VariableSetAction, action: AtOnce) -> None:
+def set_value(content: SetAction, action: AtOnce) -> None:
     """Conditions see the new value from now on; what was read from the file before does not change."""
-    kind, values, name = _values(content, action)
+    values, name = action.simulation.values_of(content)
     if name in values:
         values.set(name, content.value)
     else:
-        action.note(f"{kind} '{name}' is not declared: nothing is set")
+        action.note(f"{values.kind} '{name}' is not declared: nothing is set")
 
 
-def modify_value(content: ParameterModifyAction | VariableModifyAction, action: AtOnce) -> None:
+def modify_value(content: ModifyAction, action: AtOnce) -> None:
     """Add to a value, or multiply it."""
-    kind, values, name = _values(content, action)
+    values, name = action.simulation.values_of(content)
     if name not in values:
-        action.note(f"{kind} '{name}' is not declared: nothing is modified")
+        action.note(f"{values.kind} '{name}' is not declared: nothing is modified")
     elif not values.modify(name, content.operation, content.value):
-        action.note(f"{kind} '{name}' is not a number: nothing is modified")
+        action.note(f"{values.kind} '{name}' is not a number: nothing is modified")
 
 
-def _values(
-    content: ParameterSetAction | ParameterModifyAction | VariableSetAction | VariableModifyAction, action: AtOnce
-) -> tuple[str, Values, str]:
-    """What it is called in notes, all of its kind, and its name."""
-    if isinstance(content, ParameterSetAction | ParameterModifyAction):
-        return "parameter", action.simulation.parameters, content.parameter_ref
-    return "variable", action.simulation.variables, content.variable_ref
-
-
-def signal_state(content: TrafficSignalStateAction, action: AtOnce) -> None:
+def signal_state(content: global_actions.TrafficSignalStateAction, action: AtOnce) -> None:
     """A signal shows a state from now on."""
     action.simulation.signals.set_state(content.name, content.state, action.simulation.time)
 
 
-def signal_phase(content: TrafficSignalControllerAction, action: AtOnce) -> None:
+def signal_phase(content: global_actions.TrafficSignalControllerAction, action: AtOnce) -> None:
     """A signal controller goes to a phase."""
     controller, phase = content.controller_ref, content.phase
     if not action.simulation.signals.go_to_phase(controller, phase, action.simulation.time):
         action.note(f"no signal controller '{controller}' with a phase '{phase}'")
 
 
-def add_entity(content: AddEntityAction, action: AtOnce) -> None:
+def add_entity(content: global_actions.AddEntityAction, action: AtOnce) -> None:
     """The entity appears at the position, with the speed that it had when it was taken out (at first: none)."""
     state = action.simulation.entity(content.entity_ref, content.place)
     if state.active:
@@ -98,7 +65,7 @@ def add_entity(content: AddEntityAction, action: AtOnce) -> None:
     state.activity = Activity.ACTIVE | Activity.TELEPORTED
 
 
-def delete_entity(content: DeleteEntityAction, action: AtOnce) -> None:
+def delete_entity(content: global_actions.DeleteEntityAction, action: AtOnce) -> None:
     """The entity is gone, and with it what it was doing; trailers are left behind."""
     state = action.simulation.entity(content.entity_ref, content.place)
     state.active = False
@@ -111,7 +78,7 @@ def delete_entity(content: DeleteEntityAction, action: AtOnce) -> None:
             running.end()
 
 
-def traffic(content: TrafficAction, action: AtOnce) -> None:
+def traffic(content: global_actions.TrafficAction, action: AtOnce) -> None:
     """Traffic of a tool's own making: no file says where its cars are."""
     action.note(f"{content.kind}: its vehicles are made by the simulator and are not played")
 
@@ -126,7 +93,7 @@ def recorded(content: object, action: AtOnce) -> None:
 
 
 # ---- Private actions that are done at once, or only take time: te ----
-def teleport(content: TeleportAction, action: AtOnce) -> None:
+def teleport(content: private_actions.TeleportAction, action: AtOnce) -> None:
     """To a place, with all trailers. A towed vehicle stays behind its tractor."""
     state = action.actor
     place = resolve(content.position, action.simulation, route=state.route)
@@ -140,7 +107,7 @@ def teleport(content: TeleportAction, action: AtOnce) -> None:
     align_trailers(state)
 
 
-def assign_route(content: AssignRouteAction, action: AtOnce) -> None:
+def assign_route(content: private_actions.AssignRouteAction, action: AtOnce) -> None:
     """The route holds until another one is assigned."""
     others = {waypoint.strategy for waypoint in content.route.waypoints} - {RouteStrategy.SHORTEST}
     if others:
@@ -150,7 +117,7 @@ def assign_route(content: AssignRouteAction, action: AtOnce) -> None:
         action.note(f"no way leads along route '{content.route.name}': it is not followed")
 
 
-def acquire_position(content: AcquirePositionAction, action: AtOnce) -> None:
+def acquire_position(content: private_actions.AcquirePositionAction, action: AtOnce) -> None:
     """The shortest way from here to there becomes the route; nothing stops the entity there."""
     state = action.actor
     state.locate()
@@ -159,9 +126,7 @@ def acquire_position(content: AcquirePositionAction, action: AtOnce) -> None:
         action.note("no way leads to the position: it is not acquired")
 
 
-def controller(
-    content: ActivateControllerAction | AssignControllerAction | OverrideControllerValueAction, action: AtOnce
-) -> None:
+def controller(content: object, action: AtOnce) -> None:
     """Who drives which domain from now on is written down; the default driver drives all the same."""
     state, controllers = action.actor, action.actor.controllers
     controllers.follow(content)
@@ -173,7 +138,7 @@ def controller(
     action.end()
 
 
-def connect_trailer(content: ConnectTrailerAction, action: AtOnce) -> None:
+def connect_trailer(content: private_actions.ConnectTrailerAction, action: AtOnce) -> None:
     """Hitch a trailer; one that hangs on already is left behind."""
     trailer = action.simulation.entity(content.trailer_ref, content.place)
     if trailer is not action.actor.trailer:
@@ -181,7 +146,7 @@ def connect_trailer(content: ConnectTrailerAction, action: AtOnce) -> None:
         connect(action.actor, trailer)
 
 
-def disconnect_trailer(content: DisconnectTrailerAction, action: AtOnce) -> None:
+def disconnect_trailer(content: private_actions.DisconnectTrailerAction, action: AtOnce) -> None:
     """Leave the trailer where it is."""
     if action.actor.trailer is None:
         action.note(f"'{action.actor.name}' has no trailer")
@@ -191,10 +156,10 @@ def disconnect_trailer(content: DisconnectTrailerAction, action: AtOnce) -> None
 class RunningForTime(RunningPrivateAction):
     """Over after its time; what flashes or loops does so until something else is asked of it. [s]"""
 
-    content: LightStateAction | AnimationAction
+    content: private_actions.LightStateAction | private_actions.AnimationAction
 
     def _begin(self) -> None:
-        if isinstance(self.content, LightStateAction):
+        if isinstance(self.content, private_actions.LightStateAction):
             self._left, self._goes_on = self.content.transition_time, self.content.mode == "flashing"
         else:
             self._left, self._goes_on = self.content.duration, self.content.loop
@@ -206,29 +171,29 @@ class RunningForTime(RunningPrivateAction):
 
 
 RUNNING: dict[type, Maker] = {
-    EnvironmentAction: at_once(environment),
-    ParameterModifyAction: at_once(modify_value),
-    ParameterSetAction: at_once(set_value),
-    TrafficSignalControllerAction: at_once(signal_phase),
-    TrafficSignalStateAction: at_once(signal_state),
-    VariableModifyAction: at_once(modify_value),
-    VariableSetAction: at_once(set_value),
-    AddEntityAction: at_once(add_entity),
-    DeleteEntityAction: at_once(delete_entity),
-    SetMonitorAction: at_once(recorded),
-    TrafficAction: at_once(traffic),
+    global_actions.EnvironmentAction: at_once(environment),
+    global_actions.ParameterModifyAction: at_once(modify_value),
+    global_actions.ParameterSetAction: at_once(set_value),
+    global_actions.TrafficSignalControllerAction: at_once(signal_phase),
+    global_actions.TrafficSignalStateAction: at_once(signal_state),
+    global_actions.VariableModifyAction: at_once(modify_value),
+    global_actions.VariableSetAction: at_once(set_value),
+    global_actions.AddEntityAction: at_once(add_entity),
+    global_actions.DeleteEntityAction: at_once(delete_entity),
+    global_actions.SetMonitorAction: at_once(recorded),
+    global_actions.TrafficAction: at_once(traffic),
     Unsupported: at_once(unsupported),
-    UserDefinedAction: at_once(recorded),
-    TeleportAction: at_once(teleport, Domain.BOTH),
+    global_actions.UserDefinedAction: at_once(recorded),
+    private_actions.TeleportAction: at_once(teleport, Domain.BOTH),
     # as in the reference player: an action on speed or distance ends when it begins
-    AcquirePositionAction: at_once(acquire_position, Domain.LONGITUDINAL),
-    AssignRouteAction: at_once(assign_route),
-    ActivateControllerAction: at_once(controller),
-    AssignControllerAction: at_once(controller),
-    OverrideControllerValueAction: at_once(controller),
-    ConnectTrailerAction: at_once(connect_trailer),
-    DisconnectTrailerAction: at_once(disconnect_trailer),
-    AnimationAction: RunningForTime,
-    LightStateAction: RunningForTime,
-    VisibilityAction: at_once(recorded),
+    private_actions.AcquirePositionAction: at_once(acquire_position, Domain.LONGITUDINAL),
+    private_actions.AssignRouteAction: at_once(assign_route),
+    private_actions.ActivateControllerAction: at_once(controller),
+    private_actions.AssignControllerAction: at_once(controller),
+    private_actions.OverrideControllerValueAction: at_once(controller),
+    private_actions.ConnectTrailerAction: at_once(connect_trailer),
+    private_actions.DisconnectTrailerAction: at_once(disconnect_trailer),
+    private_actions.AnimationAction: RunningForTime,
+    private_actions.LightStateAction: RunningForTime,
+    private_actions.VisibilityAction: at_once(recorded),
 }

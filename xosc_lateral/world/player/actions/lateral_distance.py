@@ -14,8 +14,7 @@ from xosc_lateral.world.player.distances import ahead_and_left, road_gap, spot_o
 from xosc_lateral.world.player.drive import move_along_lane
 from xosc_lateral.world.player.state import NO_ROAD, EntityState, free
 from xosc_lateral.world.player.transition import EPSILON
-from xosc_lateral.world.road import Pose
-from xosc_lateral.world.road.positions import difference
+from xosc_lateral.world.road.positions import Pose, difference
 from xosc_lateral.world.scenario.enums import CoordinateSystem, LateralDisplacement
 from xosc_lateral.world.scenario.private_actions import DynamicConstraints, LateralDistanceAction
 
@@ -143,12 +142,10 @@ PEAK = 1.5
 
 
 class BesideEntity:
-    """Moves an entity to the line, and along it.
+    """Moves an entity to the line, `wanted` to the left of the other [m], and along it.
 
     Without a limit of acceleration it is on the line at once. With one, it heads for the line, and turns into it when
     it is nearer than the radius of its turn.
-
-    `wanted`: of the line, to the left of the other entity. [m]
     """
 
     def __init__(self, state: EntityState, other: EntityState, wanted: float, limits: DynamicConstraints) -> None:

@@ -21,7 +21,7 @@ from msgspec.structs import asdict
 
 from xosc_lateral.world.player.actions.base import Domain, Maker, RunningPrivateAction
 from xosc_lateral.world.player.transition import EPSILON
-from xosc_lateral.world.scenario import Performance
+from xosc_lateral.world.scenario.entity import Performance
 from xosc_lateral.world.scenario.enums import FollowingMode
 from xosc_lateral.world.scenario.private_actions import DynamicConstraints, SpeedProfileAction
 

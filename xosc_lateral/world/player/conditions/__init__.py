@@ -1,1 +1,1 @@
-"""Conditions while playing, one per file. A new one is a file here and a line in the tuples of `registry`."""
+"""Conditions while playing; each family's module lists its own in `CHECKS`."""

@@ -18,24 +18,15 @@ from xosc_lateral.world.player.state import NO_ROAD, EntityState
 from xosc_lateral.world.player.storyboard import EntityCheck, EntityChecks
 from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.player.values import holds
-from xosc_lateral.world.road.network import DRIVING
+from xosc_lateral.world.road.lanes import DRIVING
 from xosc_lateral.world.road.positions import difference
-from xosc_lateral.world.scenario.conditions import (
-    CollisionCondition,
-    DistanceCondition,
-    Measured,
-    ReachPositionCondition,
-    RelativeClearanceCondition,
-    RelativeDistanceCondition,
-    TimeHeadwayCondition,
-    TimeToCollisionCondition,
-)
+from xosc_lateral.world.scenario import conditions
 from xosc_lateral.world.scenario.enums import CoordinateSystem, RelativeDistanceType, RoutingAlgorithm
 
 _SHORTEST_ROUTE_ALGORITHMS = (None, RoutingAlgorithm.UNDEFINED, RoutingAlgorithm.SHORTEST)
 
 
-def measure_of(content: Measured | RelativeDistanceCondition, simulation: Simulation) -> Measure:
+def measure_of(content: conditions.Measured | conditions.RelativeDistanceCondition, simulation: Simulation) -> Measure:
     """Defaults of the standard: entity frame, euclidian. `alongRoute` of version 1.0 names the road, but not which
     component of the distance; a euclidian one is the same in every frame (so the reference player has it, too).
 
@@ -65,14 +56,14 @@ def _amount(measure: Measure, state: EntityState, target: Spot | EntityState) ->
     return abs(measure.between(state, target))
 
 
-def prepare_distance(content: DistanceCondition, simulation: Simulation) -> EntityCheck:
+def prepare_distance(content: conditions.DistanceCondition, simulation: Simulation) -> EntityCheck:
     """Its amount counts. [m]"""
     measure = measure_of(content, simulation)
     spot = spot_at(content.position, simulation)
     return lambda state: holds(_amount(measure, state, spot()), content.rule, content.value)
 
 
-def prepare_relative_distance(content: RelativeDistanceCondition, simulation: Simulation) -> EntityCheck:
+def prepare_relative_distance(content: conditions.RelativeDistanceCondition, simulation: Simulation) -> EntityCheck:
     """Its amount counts. [m]"""
     other = simulation.entity(content.entity_ref, content.place)
     measure = measure_of(content, simulation)
@@ -83,7 +74,7 @@ ANGULAR_TOLERANCE = 0.05
 """How far heading, pitch and roll may be from an orientation that is given; the reference player's value. [rad]"""
 
 
-def prepare_reach_position(content: ReachPositionCondition, simulation: Simulation) -> EntityCheck:
+def prepare_reach_position(content: conditions.ReachPositionCondition, simulation: Simulation) -> EntityCheck:
     """Straight distance in the plane [m]; an orientation that the position gives has to be met, too."""
     spot = spot_at(content.position, simulation)
     oriented = getattr(content.position, "orientation", None) is not None
@@ -103,7 +94,7 @@ def prepare_reach_position(content: ReachPositionCondition, simulation: Simulati
     return check
 
 
-def prepare_time_headway(content: TimeHeadwayCondition, simulation: Simulation) -> EntityCheck:
+def prepare_time_headway(content: conditions.TimeHeadwayCondition, simulation: Simulation) -> EntityCheck:
     """Not defined, hence false, when the other is behind or the entity does not move forward. [s]"""
     other = simulation.entity(content.entity_ref, content.place)
     measure = measure_of(content, simulation)
@@ -117,7 +108,7 @@ def prepare_time_headway(content: TimeHeadwayCondition, simulation: Simulation) 
     return check
 
 
-def prepare_time_to_collision(content: TimeToCollisionCondition, simulation: Simulation) -> EntityCheck:
+def prepare_time_to_collision(content: conditions.TimeToCollisionCondition, simulation: Simulation) -> EntityCheck:
     """Not defined, hence false, when they don't come closer. [s]"""
     measure, target = measure_of(content, simulation), content.target
     if isinstance(target, str):
@@ -130,7 +121,7 @@ def prepare_time_to_collision(content: TimeToCollisionCondition, simulation: Sim
     return lambda state: _collides(measure.between(state, spot()), state.speed, content)
 
 
-def _collides(distance: float, closing: float, content: TimeToCollisionCondition) -> bool:
+def _collides(distance: float, closing: float, content: conditions.TimeToCollisionCondition) -> bool:
     if abs(distance) < EPSILON or abs(closing) < EPSILON or distance / closing < 0.0:
         return False
     return holds(distance / closing, content.rule, content.value)
@@ -145,7 +136,7 @@ def _closing_speed(state: EntityState, other: EntityState) -> float:
     return copysign(1.0, state.speed) * copysign(1.0, along) * (along - abs(other.speed))
 
 
-def prepare_collision(content: CollisionCondition, simulation: Simulation) -> EntityCheck:
+def prepare_collision(content: conditions.CollisionCondition, simulation: Simulation) -> EntityCheck:
     """With one entity, or with any other of a category. Who is named touches itself, as in the reference player."""
     if content.entity_ref is not None:
         named = simulation.entity(content.entity_ref, content.place)
@@ -159,11 +150,8 @@ _MANY_LANES = 1000
 """Wider than any road: an open end of a lane range."""
 
 
-def prepare_relative_clearance(content: RelativeClearanceCondition, simulation: Simulation) -> EntityCheck:
-    """True when the lanes of the range exist and hold nobody between `-distance_backward` and `distance_forward`. [m]
-
-    Lanes count along the road's lane ids, without lane 0, as in the reference player.
-    """
+def prepare_relative_clearance(content: conditions.RelativeClearanceCondition, simulation: Simulation) -> EntityCheck:
+    """Whether the lanes of the range exist and hold nobody; ids along the road, as in the reference player. [m]"""
     ranges = tuple(
         (
             -_MANY_LANES if lanes.from_lane is None else lanes.from_lane,
@@ -212,11 +200,11 @@ def _lanes_between(lane: int, other: int) -> int:
 
 
 CHECKS: EntityChecks = {
-    DistanceCondition: prepare_distance,
-    RelativeDistanceCondition: prepare_relative_distance,
-    ReachPositionCondition: prepare_reach_position,
-    TimeHeadwayCondition: prepare_time_headway,
-    TimeToCollisionCondition: prepare_time_to_collision,
-    CollisionCondition: prepare_collision,
-    RelativeClearanceCondition: prepare_relative_clearance,
+    conditions.DistanceCondition: prepare_distance,
+    conditions.RelativeDistanceCondition: prepare_relative_distance,
+    conditions.ReachPositionCondition: prepare_reach_position,
+    conditions.TimeHeadwayCondition: prepare_time_headway,
+    conditions.TimeToCollisionCondition: prepare_time_to_collision,
+    conditions.CollisionCondition: prepare_collision,
+    conditions.RelativeClearanceCondition: prepare_relative_clearance,
 }

@@ -3,27 +3,18 @@
 from __future__ import annotations
 
 from xosc_lateral.world.player.simulation import Simulation
-from xosc_lateral.world.player.storyboard import StoryboardElement, ValueCheck, ValueChecks, Watch
-from xosc_lateral.world.player.values import Values, holds
-from xosc_lateral.world.scenario.conditions import (
-    ParameterCondition,
-    SimulationTimeCondition,
-    StoryboardElementStateCondition,
-    TimeOfDayCondition,
-    TrafficSignalCondition,
-    TrafficSignalControllerCondition,
-    UserDefinedValueCondition,
-    VariableCondition,
-)
+from xosc_lateral.world.player.storyboard import Check, Checks, StoryboardElement, Watch
+from xosc_lateral.world.player.values import holds
+from xosc_lateral.world.scenario import conditions
 from xosc_lateral.world.scenario.enums import StoryboardElementState as State
 
 
-def prepare_simulation_time(content: SimulationTimeCondition, simulation: Simulation) -> ValueCheck:
+def prepare_simulation_time(content: conditions.SimulationTimeCondition, simulation: Simulation) -> Check:
     """Compare the time at the start of the frame. [s]"""
     return lambda: holds(simulation.time, content.rule, content.value)
 
 
-def prepare_time_of_day(content: TimeOfDayCondition, simulation: Simulation) -> ValueCheck:
+def prepare_time_of_day(content: conditions.TimeOfDayCondition, simulation: Simulation) -> Check:
     """False while no environment has said what time it is."""
 
     def check() -> bool:
@@ -39,39 +30,32 @@ def prepare_time_of_day(content: TimeOfDayCondition, simulation: Simulation) -> 
     return check
 
 
-def prepare_parameter(content: ParameterCondition, simulation: Simulation) -> ValueCheck:
-    """Compare in the parameter's own type; false for a parameter that is not declared globally."""
-    return _declared(content, content.parameter_ref, "parameter", simulation.parameters, simulation)
+def prepare_value(
+    content: conditions.ParameterCondition | conditions.VariableCondition, simulation: Simulation
+) -> Check:
+    """Compare in the type of the parameter or variable; false for one that is not declared globally."""
+    values, name = simulation.values_of(content)
 
-
-def prepare_variable(content: VariableCondition, simulation: Simulation) -> ValueCheck:
-    """Compare in the variable's own type; false for a variable that is not declared."""
-    return _declared(content, content.variable_ref, "variable", simulation.variables, simulation)
-
-
-def _declared(
-    content: ParameterCondition | VariableCondition, name: str, kind: str, values: Values, simulation: Simulation
-) -> ValueCheck:
     def check() -> bool:
         if name not in values:
-            simulation.note(f"{kind} '{name}' is not declared: the condition stays false", content.place)
+            simulation.note(f"{values.kind} '{name}' is not declared: the condition stays false", content.place)
             return False
         return values.compare(name, content.rule, content.value)
 
     return check
 
 
-def prepare_signal(content: TrafficSignalCondition, simulation: Simulation) -> ValueCheck:
+def prepare_signal(content: conditions.TrafficSignalCondition, simulation: Simulation) -> Check:
     """Whether the signal shows that state (of its controller's phase, or set by an action)."""
     return lambda: simulation.signals.state(content.name, simulation.time) == content.state
 
 
-def prepare_controller(content: TrafficSignalControllerCondition, simulation: Simulation) -> ValueCheck:
+def prepare_controller(content: conditions.TrafficSignalControllerCondition, simulation: Simulation) -> Check:
     """Whether the controller is in that phase."""
     return lambda: simulation.signals.phase(content.controller_ref, simulation.time) == content.phase
 
 
-def prepare_user_defined(content: UserDefinedValueCondition, simulation: Simulation) -> ValueCheck:
+def prepare_user_defined(content: conditions.UserDefinedValueCondition, simulation: Simulation) -> Check:
     """Always false, which is said."""
     simulation.note(f"value '{content.name}' comes from outside the scenario: the condition stays false", content.place)
     return lambda: False
@@ -85,7 +69,7 @@ class StateWatch(Watch):
     to count, but not its transition, which lasts for one look only.
     """
 
-    def __init__(self, content: StoryboardElementStateCondition, simulation: Simulation) -> None:
+    def __init__(self, content: conditions.StoryboardElementStateCondition, simulation: Simulation) -> None:
         self._content = content
         self._simulation = simulation
         self._changes: list[tuple[State, State | None]] = []
@@ -126,20 +110,20 @@ class StateWatch(Watch):
         return any(wanted in change for change in changes)
 
 
-def prepare_storyboard_element_state(content: StoryboardElementStateCondition, simulation: Simulation) -> ValueCheck:
+def prepare_element_state(content: conditions.StoryboardElementStateCondition, simulation: Simulation) -> Check:
     """A watch; it finds its element once the storyboard stands."""
     watch = StateWatch(content, simulation)
     simulation.when_built.append(watch.find)
     return watch
 
 
-CHECKS: ValueChecks = {
-    SimulationTimeCondition: prepare_simulation_time,
-    TimeOfDayCondition: prepare_time_of_day,
-    ParameterCondition: prepare_parameter,
-    VariableCondition: prepare_variable,
-    TrafficSignalCondition: prepare_signal,
-    TrafficSignalControllerCondition: prepare_controller,
-    UserDefinedValueCondition: prepare_user_defined,
-    StoryboardElementStateCondition: prepare_storyboard_element_state,
+CHECKS: Checks = {
+    conditions.SimulationTimeCondition: prepare_simulation_time,
+    conditions.TimeOfDayCondition: prepare_time_of_day,
+    conditions.ParameterCondition: prepare_value,
+    conditions.VariableCondition: prepare_value,
+    conditions.TrafficSignalCondition: prepare_signal,
+    conditions.TrafficSignalControllerCondition: prepare_controller,
+    conditions.UserDefinedValueCondition: prepare_user_defined,
+    conditions.StoryboardElementStateCondition: prepare_element_state,
 }

@@ -29,10 +29,7 @@ class PathPoint(NamedTuple):
 
 
 class Path:
-    """A shape that was laid out in the world: pieces between `lengths` [m], reached at `times` of the path's own clock.
-
-    Times are NaN without any. [s]
-    """
+    """A shape laid out in the world: pieces between `lengths` [m], reached at `times` of its own clock, or NaN. [s]"""
 
     def __init__(self, lengths: Sequence[float], times: Sequence[float]) -> None:
         self.lengths, self.times = tuple(lengths), tuple(times)

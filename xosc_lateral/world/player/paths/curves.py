@@ -153,10 +153,7 @@ class TimedClothoid:
 
 
 class ClothoidPath(Path):
-    """Clothoid pieces one after another.
-
-    `pieces`: at least one; `end_time`: [s]; NaN without times.
-    """
+    """Clothoid pieces one after another. `pieces`: at least one; `end_time`: [s]; NaN without times."""
 
     def __init__(self, pieces: Sequence[TimedClothoid], end_time: float = nan) -> None:
         lengths = accumulate((piece.length for piece in pieces), initial=0.0)

@@ -13,23 +13,11 @@ from xosc_lateral.base.errors import FormatError, PlaybackError, UnsupportedElem
 from xosc_lateral.world.player.paths.base import Path
 from xosc_lateral.world.player.paths.curves import ClothoidPath, Control, NurbsPath, TimedClothoid, clamped_knots
 from xosc_lateral.world.player.paths.polyline import Corner, PolylinePath, fill_times, has_gaps_in_time, merge_close
-from xosc_lateral.world.player.positions.on_road import reference_of
 from xosc_lateral.world.player.simulation import Simulation
 from xosc_lateral.world.player.state import EntityState
-from xosc_lateral.world.road import Pose
-from xosc_lateral.world.scenario import Place, Unsupported
-from xosc_lateral.world.scenario.position import (
-    Clothoid,
-    ClothoidSpline,
-    ClothoidSplineSegment,
-    Nurbs,
-    Polyline,
-    Position,
-    Shape,
-    Trajectory,
-    Vertex,
-    WorldPosition,
-)
+from xosc_lateral.world.road.positions import Pose
+from xosc_lateral.world.scenario import position as positions
+from xosc_lateral.world.scenario.place import Place, Unsupported
 
 MOST_TURNING = 1e4
 """Clothoids that turn by more are refused. [rad]"""
@@ -39,20 +27,16 @@ VERTEX_RADIUS = 0.1
 
 
 class Layout(Struct, frozen=True):
-    """What laying out a path may depend on, besides the world: who follows it, how, and how fast it comes. [m/s]
-
-    `closes`: it goes on from its end to its start.
-    """
+    """What laying out a path depends on: who follows it, how, how fast [m/s], whether it goes on at its start."""
 
     simulation: Simulation
-    locate: Callable[[Position, Simulation], Pose]
+    locate: Callable[[positions.Position, Simulation], Pose]
     place: Place
     follower: EntityState | None
     follow: bool
-    speed: float
     closes: bool
 
-    def pose_of(self, position: Position) -> Pose:
+    def pose_of(self, position: positions.Position) -> Pose:
         """World pose of a position now. [m], [rad]"""
         return self.locate(position, self.simulation)
 
@@ -65,7 +49,7 @@ class Layout(Struct, frozen=True):
         return self.place.error(what, PlaybackError)
 
 
-def _polyline(shape: Polyline, layout: Layout) -> Path:
+def _polyline(shape: positions.Polyline, layout: Layout) -> Path:
     if not shape.vertices:
         raise layout.error("the polyline has no vertices")
     corners = [_corner(vertex, layout) for vertex in shape.vertices]
@@ -80,46 +64,53 @@ def _polyline(shape: Polyline, layout: Layout) -> Path:
     if len(merged) < len(corners):
         left_out = len(corners) - len(merged)
         layout.note(f"{left_out} vertices nearer than {VERTEX_RADIUS:g} m to the one before are left out")
-    return PolylinePath(merged, follow=layout.follow, initial_speed=layout.speed)
+    speed = 0.0 if layout.follower is None else layout.follower.speed
+    return PolylinePath(merged, follow=layout.follow, initial_speed=speed)
 
 
-def _corner(vertex: Vertex, layout: Layout) -> Corner:
+def _corner(vertex: positions.Vertex, layout: Layout) -> Corner:
     """A vertex where it is now; its height counts where the file gives one, and then its pitch and roll do."""
     position = vertex.position
     pose = layout.pose_of(position)
+    orientation = position if isinstance(position, positions.WorldPosition) else getattr(position, "orientation", None)
     heading, pitch, roll = (
-        own if given is not None else nan
-        for own, given in zip((pose.heading, pose.pitch, pose.roll), _given_angles(position), strict=True)
-    )
+        nan if getattr(orientation, angle[0], None) is None else getattr(pose, angle)
+        for angle in ("heading", "pitch", "roll")
+    )  # absolute or relative, where one is written; else the path's own
     if not _gives_height(position):
         pitch, roll = nan, nan
     elif roll != roll:
         roll = pose.roll
-    z, is_fixed = (pose.z if _gives_height(position) else nan), reference_of(position) is None
+    z, is_fixed = (pose.z if _gives_height(position) else nan), positions.reference_of(position) is None
     return Corner(pose.x, pose.y, z, heading, pitch, roll, _or_nan(vertex.time), pose.z, is_fixed)
 
 
-def _clothoid(shape: Clothoid, layout: Layout) -> Path:
+def _clothoid(shape: positions.Clothoid, layout: Layout) -> Path:
     end = shape.curvature + shape.curvature_prime * shape.length
-    start = shape.start_time
-    piece = ClothoidSplineSegment(shape.curvature, end, shape.length, position_start=shape.position, time_start=start)
-    return _clothoid_spline(ClothoidSpline((piece,), shape.stop_time), layout)
+    where, when = shape.position, shape.start_time
+    piece = positions.ClothoidSplineSegment(shape.curvature, end, shape.length, time_start=when, position_start=where)
+    return _clothoid_spline(positions.ClothoidSpline((piece,), shape.stop_time), layout)
 
 
-def _clothoid_spline(shape: ClothoidSpline, layout: Layout) -> Path:
+def _clothoid_spline(shape: positions.ClothoidSpline, layout: Layout) -> Path:
     if not shape.segments:
         raise layout.error("the clothoid spline has no segments")
     pieces: list[TimedClothoid] = []
     for segment in shape.segments:
         x, y, heading = _start_of(segment, pieces, layout)
         begin, end, length = segment.curvature_start, segment.curvature_end, segment.length
-        _check_turning(begin, end, length, layout)
+        # one that makes an entity spin is a mistake in the file (and would take for ever to integrate)
+        if not (length >= 0.0 and max(abs(begin), abs(end)) * length <= MOST_TURNING):
+            raise layout.error(
+                f"a clothoid of {length:g} m with curvatures {begin:g} to {end:g} 1/m: needs a length of at least 0 m "
+                f"and less than {MOST_TURNING:g} rad of turning"
+            )
         pieces.append(TimedClothoid(x, y, heading, begin, end, length, _or_nan(segment.time_start)))
     return ClothoidPath(pieces, _or_nan(shape.time_end))
 
 
 def _start_of(
-    segment: ClothoidSplineSegment, pieces: Sequence[TimedClothoid], layout: Layout
+    segment: positions.ClothoidSplineSegment, pieces: Sequence[TimedClothoid], layout: Layout
 ) -> tuple[float, float, float]:
     """Its own position, the end of the piece before, or where the follower is. [m], [m], [rad]"""
     if segment.position_start is not None:
@@ -135,15 +126,6 @@ def _start_of(
     return x, y, heading + segment.h_offset
 
 
-def _check_turning(start: float, end: float, length: float, layout: Layout) -> None:
-    """A curvature that makes an entity spin is a mistake in the file (and would take for ever to integrate)."""
-    if not (length >= 0.0 and max(abs(start), abs(end)) * length <= MOST_TURNING):
-        raise layout.error(
-            f"a clothoid of {length:g} m with curvatures {start:g} to {end:g} 1/m: needs a length of at least 0 m and "
-            f"less than {MOST_TURNING:g} rad of turning"
-        )
-
-
 def _check_times(times: Sequence[float], what: str, layout: Layout) -> None:
     """Times never run backwards."""
     last = -inf
@@ -153,7 +135,7 @@ def _check_times(times: Sequence[float], what: str, layout: Layout) -> None:
         last = time if time == time else last
 
 
-def _nurbs(shape: Nurbs, layout: Layout) -> Path:
+def _nurbs(shape: positions.Nurbs, layout: Layout) -> Path:
     count = len(shape.control_points)
     knots = shape.knots or clamped_knots(count, shape.order)
     if count < max(shape.order, 2) or len(knots) != count + shape.order:
@@ -170,21 +152,20 @@ def _nurbs(shape: Nurbs, layout: Layout) -> Path:
 
 
 SHAPES: dict[type, Callable[[Any, Layout], Path]] = {
-    Clothoid: _clothoid,
-    ClothoidSpline: _clothoid_spline,
-    Nurbs: _nurbs,
-    Polyline: _polyline,
+    positions.Clothoid: _clothoid,
+    positions.ClothoidSpline: _clothoid_spline,
+    positions.Nurbs: _nurbs,
+    positions.Polyline: _polyline,
 }
 
 
 def path_of(
-    trajectory: Trajectory,
+    trajectory: positions.Trajectory,
     simulation: Simulation,
-    pose_of: Callable[[Position, Simulation], Pose],
+    pose_of: Callable[[positions.Position, Simulation], Pose],
     *,
     follower: EntityState | None = None,
     follow: bool = False,
-    speed: float = 0.0,
     is_timed: bool = False,
 ) -> Path:
     """A trajectory laid out in the world as it is now; `pose_of` tells where a position is.
@@ -195,7 +176,7 @@ def path_of(
     if isinstance(shape, Unsupported):
         raise shape.place.error(shape.reason or f"a {shape.kind} can't be followed", UnsupportedElementError)
     closes = trajectory.closed and not is_timed
-    layout = Layout(simulation, pose_of, trajectory.place, follower, follow, speed, closes)
+    layout = Layout(simulation, pose_of, trajectory.place, follower, follow, closes)
     path = SHAPES[type(shape)](shape, layout)
     start, end = path.at(0.0), path.at(path.length)
     if closes and (gap := hypot(end.x - start.x, end.y - start.y)) > VERTEX_RADIUS:
@@ -203,29 +184,23 @@ def path_of(
     return path
 
 
-def duration(shape: Shape) -> float:
+def duration(shape: positions.Shape) -> float:
     """Time from the first to the last time stamp; 0 where there are none. [s]"""
     times: list[float | None] = []
-    if isinstance(shape, Polyline):
+    if isinstance(shape, positions.Polyline):
         times = [vertex.time for vertex in shape.vertices]
-    elif isinstance(shape, Clothoid):
+    elif isinstance(shape, positions.Clothoid):
         times = [shape.start_time, shape.stop_time]
-    elif isinstance(shape, ClothoidSpline):
+    elif isinstance(shape, positions.ClothoidSpline):
         times = [*(segment.time_start for segment in shape.segments), shape.time_end]
-    elif isinstance(shape, Nurbs) and all(point.time is not None for point in shape.control_points):
+    elif isinstance(shape, positions.Nurbs) and all(point.time is not None for point in shape.control_points):
         times = [point.time for point in shape.control_points]
     start, end = (times[0], times[-1]) if times else (None, None)
     return 0.0 if start is None or end is None else end - start
 
 
-def _given_angles(position: Position) -> tuple[float | None, float | None, float | None]:
-    """Heading, pitch and roll as written, absolute or relative; None: the path's own."""
-    orientation = position if isinstance(position, WorldPosition) else getattr(position, "orientation", None)
-    return (None, None, None) if orientation is None else (orientation.h, orientation.p, orientation.r)
-
-
-def _gives_height(position: Position) -> bool:
-    if isinstance(position, WorldPosition):
+def _gives_height(position: positions.Position) -> bool:
+    if isinstance(position, positions.WorldPosition):
         return position.z is not None
     return getattr(position, "dz", None) is not None
 

@@ -1,1 +1,1 @@
-"""Positions while playing: all of them in `resolve`, from road coordinates in `on_road`, from latitudes in `geo`."""
+"""Positions while playing: all of them in `resolve`, latitudes and longitudes by the projections of `geo`."""

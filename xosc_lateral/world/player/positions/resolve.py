@@ -7,44 +7,31 @@ from math import cos, nan, pi, sin
 
 from xosc_lateral.base.errors import PlaybackError, UnsupportedElementError
 from xosc_lateral.world.player.distances import Spot
+from xosc_lateral.world.player.drive import travel
 from xosc_lateral.world.player.paths.registry import path_of
-from xosc_lateral.world.player.positions.geo import geo_position
-from xosc_lateral.world.player.positions.on_road import (
-    headed,
-    lane_placement,
-    moved_along,
-    on_road,
-    road_index,
-    road_placement,
-    tilted_or_road,
-)
+from xosc_lateral.world.player.positions.geo import ProjectionError, project
 from xosc_lateral.world.player.simulation import Simulation
-from xosc_lateral.world.player.state import NO_ROAD, Placement, RouteGuide, free, guide, locate, world_pose
-from xosc_lateral.world.road import Pose
-from xosc_lateral.world.road.positions import is_forward
-from xosc_lateral.world.scenario import Unsupported
-from xosc_lateral.world.scenario.position import (
-    FromCurrentEntity,
-    FromLaneCoordinates,
-    GeoPosition,
-    LanePosition,
-    Position,
-    RelativeLanePosition,
-    RelativeObjectPosition,
-    RelativeRoadPosition,
-    RelativeWorldPosition,
-    RoadPosition,
-    Route,
-    RoutePosition,
-    TrajectoryPosition,
-    WorldPosition,
-)
+from xosc_lateral.world.player.state import NO_ROAD, EntityState, Placement, RouteGuide, free, guide, locate, world_pose
+from xosc_lateral.world.road.lanes import beside
+from xosc_lateral.world.road.positions import Pose, is_forward
+from xosc_lateral.world.scenario import position as positions
+from xosc_lateral.world.scenario.enums import ReferenceContext
+from xosc_lateral.world.scenario.place import Unsupported
 
-_FIXED_POSITIONS = (GeoPosition, LanePosition, RoadPosition, WorldPosition)
+RelativeOnRoad = positions.RelativeLanePosition | positions.RelativeRoadPosition
+OnRoad = positions.LanePosition | positions.RoadPosition | RelativeOnRoad | positions.RoutePosition
+
+_LENGTH_TOLERANCE = 0.01
+"""Roads are written a little shorter or longer than they are. [m]"""
+
+_RELATIVE_SINCE = (1, 3)
+"""Version from which an orientation without a type is relative; before, it was absolute."""
+
+_FIXED_POSITIONS = (positions.GeoPosition, positions.LanePosition, positions.RoadPosition, positions.WorldPosition)
 """Positions that no entity has an influence on."""
 
 
-def resolve(position: Position, simulation: Simulation, *, route: RouteGuide | None = None) -> Placement:
+def resolve(position: positions.Position, simulation: Simulation, *, route: RouteGuide | None = None) -> Placement:
     """The place that a position means now; raises `PlaybackError` where there is no such place.
 
     `route` is that of the entity which is to go there: a way along the road from another entity follows it, or else the
@@ -52,12 +39,12 @@ def resolve(position: Position, simulation: Simulation, *, route: RouteGuide | N
     """
     if isinstance(position, Unsupported):
         raise position.place.error(position.reason or f"{position.kind} can't be played", UnsupportedElementError)
-    if isinstance(position, RelativeLanePosition | RelativeRoadPosition):
+    if isinstance(position, RelativeOnRoad):
         return POSITIONS[type(position)](position, simulation, route)
     return POSITIONS[type(position)](position, simulation)
 
 
-def spot_at(position: Position, simulation: Simulation) -> Callable[[], Spot]:
+def spot_at(position: positions.Position, simulation: Simulation) -> Callable[[], Spot]:
     """A position to measure distances to, found anew each time only if it may move."""
     if isinstance(position, _FIXED_POSITIONS):
         fixed = _spot(resolve(position, simulation), simulation)
@@ -65,14 +52,14 @@ def spot_at(position: Position, simulation: Simulation) -> Callable[[], Spot]:
     return lambda: _spot(resolve(position, simulation), simulation)
 
 
-def pose_of(position: Position, simulation: Simulation) -> Pose:
+def pose_of(position: positions.Position, simulation: Simulation) -> Pose:
     """World pose of a position now. z, pitch and roll are the road's where none are given. [m], [rad]"""
-    if isinstance(position, WorldPosition) and None not in (position.z, position.p, position.r):
+    if isinstance(position, positions.WorldPosition) and None not in (position.z, position.p, position.r):
         return _world_pose(position)  # nothing of it is the road's, which need not be looked for
     return world_pose(simulation.network, resolve(position, simulation))
 
 
-def route_guide(route_: Route, simulation: Simulation) -> RouteGuide | None:
+def route_guide(route_: positions.Route, simulation: Simulation) -> RouteGuide | None:
     """The way over a route's waypoints; None: no way leads along it."""
     return guide(simulation.network, [resolve(waypoint.position, simulation) for waypoint in route_.waypoints])
 
@@ -86,18 +73,18 @@ def _spot(place: Placement, simulation: Simulation) -> Spot:
     return Spot(pose.x, pose.y, place.road, place.lane, place.s, t)
 
 
-def lane_position(position: LanePosition, simulation: Simulation) -> Placement:
+def lane_position(position: positions.LanePosition, simulation: Simulation) -> Placement:
     """Without an orientation, in the lane's direction of travel."""
-    road = road_index(position, simulation)
-    return lane_placement(position, simulation, road, position.lane_id, position.s, position.offset)
+    road, lane = road_index(position, simulation), position.lane_id
+    return lane_placement(position, simulation, road, lane, position.s, position.offset)
 
 
-def road_position(position: RoadPosition, simulation: Simulation) -> Placement:
+def road_position(position: positions.RoadPosition, simulation: Simulation) -> Placement:
     """Without an orientation, along s."""
     return road_placement(position, simulation, road_index(position, simulation), position.s, position.t)
 
 
-def _world_pose(position: WorldPosition) -> Pose:
+def _world_pose(position: positions.WorldPosition) -> Pose:
     """Heading 0 where none is given; z, pitch and roll, where none are given, are NaN: the road's."""
     return free(
         position.x,
@@ -109,18 +96,18 @@ def _world_pose(position: WorldPosition) -> Pose:
     )
 
 
-def world_position(position: WorldPosition, simulation: Simulation) -> Placement:
+def world_position(position: positions.WorldPosition, simulation: Simulation) -> Placement:
     """Under the pose."""
     return locate(simulation.network, _world_pose(position))
 
 
 def relative_lane_position(
-    position: RelativeLanePosition, simulation: Simulation, route: RouteGuide | None = None
+    position: positions.RelativeLanePosition, simulation: Simulation, route: RouteGuide | None
 ) -> Placement:
     """`ds` goes along s of the reference's road and counts lanes and offset along its +t; `dsLane` goes along the
     direction of travel of the lane and counts them to the left of it.
     """
-    state = on_road(position, simulation)
+    state = entity_on_road(position, simulation)
     network = simulation.network
     along_lane = position.ds_lane is not None
     if position.ds_lane is None:
@@ -139,24 +126,16 @@ def relative_lane_position(
     return lane_placement(position, simulation, there.road, lane, there.s, offset, along_lane=along_lane)
 
 
-def beside(lane: int, lanes: int) -> int:
-    """The lane `lanes` further along +t; there is no lane 0 to drive on."""
-    target = lane + lanes
-    if lane != 0 and (target == 0 or (target > 0) != (lane > 0)):
-        target += 1 if lanes > 0 else -1
-    return target
-
-
 def relative_road_position(
-    position: RelativeRoadPosition, simulation: Simulation, route: RouteGuide | None = None
+    position: positions.RelativeRoadPosition, simulation: Simulation, route: RouteGuide | None
 ) -> Placement:
     """`ds` and `dt` along the road's axes; the way goes on over linked roads."""
-    there = moved_along(on_road(position, simulation), position.ds, 1, route)
+    there = moved_along(entity_on_road(position, simulation), position.ds, 1, route)
     t = simulation.network.lane_state_at(there.road, there.lane, there.s).centre_t + there.offset_t
     return road_placement(position, simulation, there.road, there.s, t + position.dt)
 
 
-def relative_object_position(position: RelativeObjectPosition, simulation: Simulation) -> Placement:
+def relative_object_position(position: positions.RelativeObjectPosition, simulation: Simulation) -> Placement:
     """Along the entity's own axes; its pitch and roll tilt the way there."""
     pose = simulation.entity(position.entity_ref, position.place).pose
     c, s = cos(pose.heading), sin(pose.heading)
@@ -169,7 +148,7 @@ def relative_object_position(position: RelativeObjectPosition, simulation: Simul
     return _nearby_place(position, simulation, pose, x, y, pose.z + rise)
 
 
-def relative_world_position(position: RelativeWorldPosition, simulation: Simulation) -> Placement:
+def relative_world_position(position: positions.RelativeWorldPosition, simulation: Simulation) -> Placement:
     """Along the world's axes."""
     pose = simulation.entity(position.entity_ref, position.place).pose
     dx, dy = simulation.network.header_offset.turned_back(position.dx, position.dy)
@@ -177,7 +156,7 @@ def relative_world_position(position: RelativeWorldPosition, simulation: Simulat
 
 
 def _nearby_place(
-    position: RelativeObjectPosition | RelativeWorldPosition,
+    position: positions.RelativeObjectPosition | positions.RelativeWorldPosition,
     simulation: Simulation,
     pose: Pose,
     x: float,
@@ -186,11 +165,11 @@ def _nearby_place(
 ) -> Placement:
     """There, at that height if the file gives one; relative angles count from the entity's pose."""
     heading = headed(position.orientation, pose.heading, simulation)
-    tilt = tilted_or_road(position.orientation, pose, simulation)
+    tilt = _tilted(position.orientation, pose, simulation)
     return locate(simulation.network, free(x, y, heading, nan if position.dz is None else z, *tilt))
 
 
-def trajectory_position(position: TrajectoryPosition, simulation: Simulation) -> Placement:
+def trajectory_position(position: positions.TrajectoryPosition, simulation: Simulation) -> Placement:
     """Relative headings count from the trajectory's."""
     point = path_of(position.trajectory, simulation, pose_of).at(position.s)
     heading = headed(position.orientation, point.heading, simulation)
@@ -199,12 +178,12 @@ def trajectory_position(position: TrajectoryPosition, simulation: Simulation) ->
     return locate(simulation.network, free(x, y, heading, point.z))
 
 
-def route_position(position: RoutePosition, simulation: Simulation) -> Placement:
+def route_position(position: positions.RoutePosition, simulation: Simulation) -> Placement:
     """The way along the route counts from its first waypoint; an entity on it is where it is."""
     network, where = simulation.network, position.in_route
     if position.route is None or where is None:
         raise position.place.error("names no route or no place on it", PlaybackError)
-    if isinstance(where, FromCurrentEntity):
+    if isinstance(where, positions.FromCurrentEntity):
         state = simulation.entity(where.entity_ref, position.place)
         state.locate()
         return state.place._replace(pose=state.pose if state.road == NO_ROAD else None)
@@ -218,7 +197,7 @@ def route_position(position: RoutePosition, simulation: Simulation) -> Placement
             "(in esmini only with --align_routepositions)",
             position.place,
         )
-    if isinstance(where, FromLaneCoordinates):
+    if isinstance(where, positions.FromLaneCoordinates):
         turned = _is_turned(simulation, road, where.lane_id, direction)
         lane, offset = (-where.lane_id, -where.lane_offset) if turned else (where.lane_id, where.lane_offset)
         return lane_placement(position, simulation, road, lane, s, offset)
@@ -240,15 +219,137 @@ def _is_turned(simulation: Simulation, road: int, lane: int, direction: int) -> 
     return any(-lane in section.by_id for section in network.roads[road].sections)
 
 
+def geo_position(position: positions.GeoPosition, simulation: Simulation) -> Placement:
+    """Needs the road network's geoReference."""
+    try:
+        x, y = project(simulation.network.geo_reference, position.latitude, position.longitude)
+    except ProjectionError as error:
+        raise position.place.error(str(error), PlaybackError) from error
+    offset = simulation.network.header_offset
+    x, y = offset.undo(x, y)
+    z = nan if position.altitude is None else position.altitude - offset.z
+    return locate(simulation.network, free(x, y, headed(position.orientation, 0.0, simulation) - offset.heading, z))
+
+
+# ---- from road coordinates, orientations, and beside an entity ----
+
+
+def road_index(position: positions.LanePosition | positions.RoadPosition, simulation: Simulation) -> int:
+    """Index of its road; raises `PlaybackError` if that is not there."""
+    ids = simulation.network.road_ids
+    if position.road_id not in ids:
+        known = ", ".join(ids[:8]) or "none"
+        raise position.place.error(f"there is no road '{position.road_id}' (roads: {known})", PlaybackError)
+    return simulation.network.index_of(position.road_id)
+
+
+def lane_placement(
+    position: OnRoad,
+    simulation: Simulation,
+    road: int,
+    lane: int,
+    s: float,
+    offset_t: float,
+    *,
+    along_lane: bool = True,
+) -> Placement:
+    """A place on a lane. Relative headings count from the lane's direction of travel, or else from s. [m], [rad]"""
+    network = simulation.network
+    s = _on(position, simulation, road, s)
+    if not network.has_lane_at(road, lane, s):
+        there = ", ".join(str(info.id) for info in network.lanes_at(road, s))
+        what = f"road '{network.road_ids[road]}' has no lane {lane} at s = {s:g} m (lanes: {there})"
+        raise position.place.error(what, PlaybackError)
+    against = along_lane and network.travel_direction(road, lane) < 0
+    return _placement(position, simulation, road, lane, s, offset_t, against=against)
+
+
+def road_placement(position: OnRoad, simulation: Simulation, road: int, s: float, t: float) -> Placement:
+    """A place beside the reference line; relative headings count from s. [m], [rad]"""
+    network = simulation.network
+    s = _on(position, simulation, road, s)
+    lane = network.lane_at(road, s, t).lane
+    offset_t = t - network.lane_state_at(road, lane, s).centre_t
+    return _placement(position, simulation, road, lane, s, offset_t, against=False)
+
+
+def _on(position: OnRoad, simulation: Simulation, road: int, s: float) -> float:
+    """s on the road. [m]"""
+    length = simulation.network.roads[road].length
+    if not -_LENGTH_TOLERANCE <= s <= length + _LENGTH_TOLERANCE:
+        simulation.note(f"s = {s:g} m is beyond the road's {length:g} m: taken as its end", position.place)
+    return min(max(s, 0.0), length)
+
+
+def _placement(
+    position: OnRoad, simulation: Simulation, road: int, lane: int, s: float, offset_t: float, *, against: bool
+) -> Placement:
+    """With the orientation; pitch and roll that are given hold until the entity drives on."""
+    network, orientation = simulation.network, position.orientation
+    heading = headed(orientation, pi if against else 0.0, simulation)
+    if _is_absolute(orientation, simulation):
+        heading -= network.pose_at(road, lane, s).heading
+        heading += 0.0 if network.travel_direction(road, lane) > 0 else pi
+    place = Placement(road, lane, s, offset_t, heading)
+    if orientation is None or not (orientation.p or orientation.r):
+        return place
+    pose = world_pose(network, place)
+    pitch, roll = _tilted(orientation, pose, simulation)
+    return place._replace(pose=pose._replace(pitch=pitch, roll=roll))
+
+
+# ---- orientations ----------------------------------------------------------------------------------------------------
+def headed(orientation: positions.Orientation | None, heading: float, simulation: Simulation) -> float:
+    """That of the reference plus what is given, or what is given alone where it is absolute. [rad]"""
+    turn = 0.0 if orientation is None or orientation.h is None else orientation.h
+    return turn if _is_absolute(orientation, simulation) else turn + heading
+
+
+def _tilted(orientation: positions.Orientation | None, pose: Pose, simulation: Simulation) -> tuple[float, float]:
+    """Pitch and roll, as `headed`; NaN (those of the road) where none are given. [rad]"""
+    if orientation is None or (orientation.p is None and orientation.r is None):
+        return nan, nan
+    p, r = orientation.p or 0.0, orientation.r or 0.0
+    return (p, r) if _is_absolute(orientation, simulation) else (pose.pitch + p, pose.roll + r)
+
+
+def _is_absolute(orientation: positions.Orientation | None, simulation: Simulation) -> bool:
+    """Whether it is meant in the world; no orientation at all is relative (along the road, like the entity)."""
+    if orientation is None:
+        return False
+    if orientation.type is None:
+        return simulation.scenario.header.version < _RELATIVE_SINCE
+    return orientation.type is ReferenceContext.ABSOLUTE
+
+
+# ---- beside an entity ------------------------------------------------------------------------------------------------
+def entity_on_road(position: RelativeOnRoad, simulation: Simulation) -> EntityState:
+    """The entity that it refers to, with its road coordinates; raises `PlaybackError` if it is on no road."""
+    state = simulation.entity(position.entity_ref, position.place)
+    state.locate()
+    if state.road == NO_ROAD:
+        what = f"'{state.name}' is on no road, so there is no place beside it in road coordinates"
+        raise position.place.error(what, PlaybackError)
+    return state
+
+
+def moved_along(state: EntityState, distance: float, way: int, route: RouteGuide | None = None) -> Placement:
+    """Where an entity would be after a way along the road, on `route` or else its own; `way` +1: along s. [m]"""
+    scout = EntityState(state.entity, state.network, route=route or state.route)
+    scout.put(state.place._replace(pose=None))
+    travel(scout, way, distance)
+    return scout.place
+
+
 POSITIONS: dict[type, Callable[..., Placement]] = {
-    GeoPosition: geo_position,
-    LanePosition: lane_position,
-    RelativeLanePosition: relative_lane_position,
-    RelativeObjectPosition: relative_object_position,
-    RelativeRoadPosition: relative_road_position,
-    RelativeWorldPosition: relative_world_position,
-    RoadPosition: road_position,
-    RoutePosition: route_position,
-    TrajectoryPosition: trajectory_position,
-    WorldPosition: world_position,
+    positions.GeoPosition: geo_position,
+    positions.LanePosition: lane_position,
+    positions.RelativeLanePosition: relative_lane_position,
+    positions.RelativeObjectPosition: relative_object_position,
+    positions.RelativeRoadPosition: relative_road_position,
+    positions.RelativeWorldPosition: relative_world_position,
+    positions.RoadPosition: road_position,
+    positions.RoutePosition: route_position,
+    positions.TrajectoryPosition: trajectory_position,
+    positions.WorldPosition: world_position,
 }

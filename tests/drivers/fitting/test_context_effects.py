@@ -11,9 +11,14 @@ from tests.kit.runs import made_run, smooth_runs
 from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
 from xosc_lateral.drivers.drives.cuts import CutRules
 from xosc_lateral.drivers.drives.drive import Drive, Run
+from xosc_lateral.drivers.fitting.context_effects import (
+    FADING_DISTANCE,
+    LEAST_DRIVES,
+    _shrunk,
+    fit_context_effects,
+    without_effects,
+)
 from xosc_lateral.drivers.fitting.fitting import fit_population, fit_profile
-from xosc_lateral.drivers.fitting.neighbours import SCALE
-from xosc_lateral.drivers.fitting.place import LEAST_DRIVES, _shrunk, fit_place, without_place
 from xosc_lateral.drivers.model.core.autoregressive.coarse import split_bands
 from xosc_lateral.drivers.model.effects import Acts, Linear
 from xosc_lateral.drivers.model.sampled_offsets import segment_of
@@ -42,7 +47,7 @@ def population(
 
 
 def test_what_is_planted_is_found_with_its_size():
-    found = fit_place(population(1, truck=-0.5, lane=0.35, spread=0.08, fine=-0.05))
+    found = fit_context_effects(population(1, truck=-0.5, lane=0.35, spread=0.08, fine=-0.05))
     by = {(effect.acts, effect.columns): effect for effect in found}
     for key, size in (
         ((Acts.LOCATION, ("is_truck",)), -0.5),
@@ -60,7 +65,7 @@ def test_what_is_planted_is_found_with_its_size():
 def test_where_nothing_is_most_find_nothing_and_none_finds_much():
     # The three slopes of a response are kept when their squared size is above three, by chance with p = 0.39; of 60
     # responses 23 on average, with a standard deviation of 4.
-    found = [fit_place(population(seed)) for seed in range(10, 30)]
+    found = [fit_context_effects(population(seed)) for seed in range(10, 30)]
     assert sum(map(len, found)) <= 3 * (23 + 3 * 4)
     # Shrunk by three over that size, one of 180 slopes is hardly ever beyond two and a half of its own errors.
     assert sum(abs(effect.coefficients[-1]) > 2.5 * effect.errors[-1] for one in found for effect in one) <= 2
@@ -74,15 +79,15 @@ def test_slopes_lose_what_chance_makes_of_their_squared_size(size: float, share:
 
 
 def test_too_few_drives_and_missing_columns_give_none():
-    assert fit_place(population(2, truck=-0.5, drivers=LEAST_DRIVES - 1)) == ()
-    assert fit_place([]) == ()
+    assert fit_context_effects(population(2, truck=-0.5, drivers=LEAST_DRIVES - 1)) == ()
+    assert fit_context_effects([]) == ()
     bare = [made_run(run.offset, drive=run.drive) for run in population(2, truck=-0.5)]
-    assert fit_place(bare) == ()  # everybody at one speed
+    assert fit_context_effects(bare) == ()  # everybody at one speed
 
 
 def test_what_is_taken_out_is_gone():
     runs = population(3, truck=-0.5, lane=0.35, spread=0.08, fine=-0.05)
-    for effect in fit_place(without_place(runs, fit_place(runs))):
+    for effect in fit_context_effects(without_effects(runs, fit_context_effects(runs))):
         assert abs(effect.coefficients[-1]) < 2.5 * effect.errors[-1]
 
 
@@ -94,7 +99,7 @@ def test_slow_and_fast_movement_are_freed_each_of_its_own():
         Linear(acts=Acts.SPREAD, coefficients=(0.7,), **shape),
         Linear(acts=Acts.FINE, coefficients=(-0.4,), **shape),
     ]
-    (freed,) = without_place([replace(run, context=context)], effects)
+    (freed,) = without_effects([replace(run, context=context)], effects)
     level = run.offset.mean()
     slow, fast = split_bands(run.offset - level, 0.2)
     np.testing.assert_allclose(freed.offset - level, slow * np.exp(-0.7) + fast * np.exp(0.4), atol=1e-12)
@@ -119,22 +124,22 @@ def beside_others(seed: int, left: float, right: float) -> list[Run]:
         side, strength = ("left_distance", left) if k % 2 else ("right_distance", right)
         distance = np.maximum(np.abs(rng.uniform(3.0, 8.0) * (run.time - run.time[0] - rng.uniform(10.0, 50.0))) - 5, 0)
         distance[distance > 150.0] = np.inf if k % 3 else np.nan
-        moved = run.offset + strength * np.exp(-np.nan_to_num(distance, nan=np.inf) / SCALE)
+        moved = run.offset + strength * np.exp(-np.nan_to_num(distance, nan=np.inf) / FADING_DISTANCE)
         runs.append(made_run(moved, drive=run.drive, speed=30.0, **{side: distance}))
     return runs
 
 
 def test_what_neighbours_do_is_found_with_its_size_and_is_nothing_where_there_are_none():
     runs = beside_others(5, left=-0.3, right=0.5)
-    found = {effect.columns[0]: effect for effect in fit_place(runs)}
+    found = {effect.columns[0]: effect for effect in fit_context_effects(runs)}
     for column, size in (("left_distance", -0.3), ("right_distance", 0.5)):
         assert found[column].acts is Acts.LOCATION
         assert found[column].coefficients[0] == pytest.approx(size, abs=4.0 * found[column].errors[0])
         assert found[column].errors[0] < 0.3 * abs(size)
         assert not found[column].strength(0.2, {column: np.full(9, np.inf)}).any()
         assert not found[column].strength(0.2, {column: np.full(9, np.nan)}).any()
-    assert tuple(found.values()) == fit_place(runs, neighbours=True)
-    assert fit_place(runs, neighbours=False) == ()
+    assert tuple(found.values()) == fit_context_effects(runs, neighbours=True)
+    assert fit_context_effects(runs, neighbours=False) == ()
 
 
 def test_a_side_on_which_few_drives_had_anybody_is_left_alone():
@@ -143,9 +148,11 @@ def test_a_side_on_which_few_drives_had_anybody_is_left_alone():
         run if run.drive not in lonely else replace(run, context={"speed": run.context["speed"]})
         for run in beside_others(5, -0.3, 0.5)
     ]
-    assert [effect.columns for effect in fit_place(runs)] == [("right_distance",)]
-    far = [replace(run, context={**run.context, "left_distance": np.full(len(run), SCALE + 1.0)}) for run in runs]
-    assert [effect.columns for effect in fit_place(far)] == [("right_distance",)]
+    assert [effect.columns for effect in fit_context_effects(runs)] == [("right_distance",)]
+    far = [
+        replace(run, context={**run.context, "left_distance": np.full(len(run), FADING_DISTANCE + 1.0)}) for run in runs
+    ]
+    assert [effect.columns for effect in fit_context_effects(far)] == [("right_distance",)]
 
 
 def test_neighbours_that_cannot_be_fitted_are_refused_where_asked_for_and_passed_over_where_not():
@@ -157,8 +164,8 @@ def test_neighbours_that_cannot_be_fitted_are_refused_where_asked_for_and_passed
         (rare, "takes 30 drives that have one within 40 m on the same side, these are 5"),
     ):
         with pytest.raises(NotEnoughDataError, match=why):
-            fit_place(runs, neighbours=True)
-        assert fit_place(runs) == fit_place(runs, neighbours=False)
+            fit_context_effects(runs, neighbours=True)
+        assert fit_context_effects(runs) == fit_context_effects(runs, neighbours=False)
 
 
 def test_the_paper_s_model_has_no_neighbours():
