@@ -84,7 +84,6 @@ class BesideOnRoad:
         if self.is_unlimited:
             self._state.turn(0.0 if self._state.is_forward else pi)
 
-    # ---- in detail ---------------------------------------------------------------------------------------------------
     def _rest(self) -> float:
         """How far to go along +t of the own road. [m]"""
         state, other = self._state, self._other

@@ -73,7 +73,6 @@ class NurbsPath(Path):
         curve = self._curve(self._inside(parameters))
         return np.asarray(curve[:, :2] / curve[:, 2:])
 
-    # ---- in detail ---------------------------------------------------------------------------------------------------
     def _inside(self, parameters: FloatArray) -> FloatArray:
         """Within the knots between which shares sum to 1 (an unclamped curve begins after its first knot)."""
         first, last = self._knots[self._degree], self._knots[len(self.controls)]

@@ -109,7 +109,6 @@ class PolylinePath(Path):
         following = self._speeds[i + 1] if self.follow or i + 2 < len(self.corners) else 0.0
         return self._speeds[i] + u * (following - self._speeds[i])
 
-    # ---- in detail ---------------------------------------------------------------------------------------------------
     def _angle(self, angles: tuple[float, ...], i: int, u: float) -> float:
         if i == len(angles) - 1:
             return angles[i]
