@@ -130,7 +130,7 @@ def decide(
         version,
         inputs,
         played,
-        _extended_run(played, settings, depends, tuple(egos)),
+        _extended_by_trials(played, settings, depends, tuple(egos)),
         egos,
         controllers,
         depends,
@@ -141,8 +141,11 @@ def decide(
         _unwritable(played, settings, version, {*egos, *controllers}),
         LateralActions.of(scenario),
     )
-    if settings.lane_changes is LaneChanges.LIFELIKE:
-        _refuse_steps(scenario, continuous)
+    for at in scenario.storyboard.events() if settings.lane_changes is LaneChanges.LIFELIKE else ():
+        for content in (action.content for action in at.event.actions):
+            is_step = isinstance(content, LaneChangeAction) and content.dynamics.shape is DynamicsShape.STEP
+            if is_step and set(at.actors) & continuous:
+                raise content.place.error("a step has no way across: take --lane-changes written")
     return plan
 
 
@@ -189,7 +192,9 @@ def heeds_controllers(settings: ConvertSettings) -> bool:
     return settings.mode is not OutputMode.TRAJECTORY and (settings.ego is None or bool(settings.ego))
 
 
-def _extended_run(played: Played, settings: ConvertSettings, depends: Dependence, egos: tuple[str, ...]) -> Played:
+def _extended_by_trials(
+    played: Played, settings: ConvertSettings, depends: Dependence, egos: tuple[str, ...]
+) -> Played:
     """The run that offsets are for: a longer one where a vehicle under test decides when trajectories end."""
     ends = depends.of_trigger(played.scenario.storyboard.stop_trigger) and played.motion.cut_off is None
     if settings.mode is not OutputMode.AUTO or _is_replay(settings, depends) or not ends:
@@ -240,15 +245,6 @@ def _refuse_lane_offsets_for_carla(scenario: Scenario, settings: ConvertSettings
             path=scenario.path,
             element="FileHeader",
         )
-
-
-def _refuse_steps(scenario: Scenario, names: Collection[str]) -> None:
-    """Raise `FormatError` where a lane change of these entities takes no time, but is to be lifelike."""
-    for at in scenario.storyboard.events():
-        for content in (action.content for action in at.event.actions):
-            is_step = isinstance(content, LaneChangeAction) and content.dynamics.shape is DynamicsShape.STEP
-            if is_step and set(at.actors) & set(names):
-                raise content.place.error("a step has no way across: take --lane-changes written")
 
 
 NO_DRIVER = {
