@@ -225,10 +225,7 @@ def keep_meaning(
     motion: NominalMotion,
     attempt: Callable[[Sequence[OffsetChain]], tuple[Output, list[Comparison]]],
 ) -> tuple[Output, KeptChains]:
-    """Chains as large as leave what happens as it was, and the output with them.
-
-    `motion`, without offsets, says which chain comes before a conflict; `attempt` writes with some chains and plays.
-    """
+    """Chains as large as leave what happens as it was, and the output with them; `attempt` writes some and plays."""
     sizes: Sizes = {}
     trials = 1
 

@@ -167,10 +167,7 @@ def _on_trajectories(
 
 
 def chosen_egos(scenario: Scenario, settings: ConvertSettings) -> dict[str, str]:
-    """Vehicles under test of a conversion, and why each is one.
-
-    Raises `FormatError`: if one of them was also to be enriched.
-    """
+    """Vehicles under test, and why each is one; `FormatError`: one of them was also to be enriched."""
     if settings.ego is not None and not settings.ego:
         return {}
     egos = vehicles_under_test(scenario)
@@ -266,12 +263,9 @@ def choose_drivers(
     egos: Mapping[str, str] | None = None,
     controllers: Mapping[str, Control] | None = None,
 ) -> Drivers:
-    """Per entity its profile, or why it gets none.
+    """Per entity its profile, or why it gets none: it is under test, or left to a controller.
 
-    `egos`: the vehicles under test, and why each is one; `controllers`: those of entities that are left to them.
-
-    Raises `FormatError`: if the settings name an entity that the scenario doesn't have; `DriverProfileError`: if a
-    profile is not known.
+    Raises `FormatError`: the settings name an entity that there is not; `DriverProfileError`: a profile is not known.
     """
     known = {entity.name for entity in scenario.entities}
     asked = (("--entity", settings.entity), ("--only", settings.only or ()), ("--ego", settings.ego or ()))

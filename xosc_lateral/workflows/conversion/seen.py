@@ -90,7 +90,9 @@ def seen_by(
                 _refuse_no_width(entity, span, network)
         segment = _segment(motion, network, index, knots, every, contexts)
         if neighbours is Neighbours.NONE:
-            segment = _with_nobody_beside(segment)
+            beside = {name: values for name, values in segment.context.items() if name in NEIGHBOURS}
+            emptied = {k: np.full_like(v, np.nan if k.endswith("distance") else 0.0) for k, v in beside.items()}
+            segment = replace(segment, context={**segment.context, **emptied})
         neutral |= {column for column in driver.columns if column not in segment.context}
         is_left_hand = network.roads[int(entity.road[knots[0]])].rule == "LHT"
         other_hand = is_left_hand != driver.left_hand
@@ -145,15 +147,6 @@ def _filled(values: FloatArray, inside: slice) -> FloatArray:
     filled[: inside.start][np.isnan(filled[: inside.start])] = values[inside.start]
     filled[inside.stop :][np.isnan(filled[inside.stop :])] = values[inside.stop - 1]
     return filled
-
-
-def _with_nobody_beside(segment: Segment) -> Segment:
-    emptied = {
-        name: np.full_like(values, np.nan if name.endswith("distance") else 0.0)
-        for name, values in segment.context.items()
-        if name in NEIGHBOURS
-    }
-    return replace(segment, context={**segment.context, **emptied})
 
 
 def going_on(segment: Segment, rows: int) -> Segment:

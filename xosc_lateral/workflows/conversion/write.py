@@ -180,10 +180,7 @@ def _ring(segment: SampledSegment, *, from_middle: bool) -> Ring:
 def _path(
     entity: EntityResult, motion: NominalMotion, network: RoadNetwork, actions: Collection[LateralAction], end: float
 ) -> OffsetPath | None:
-    """From the start along what was sampled before the first lateral action and beyond it, to some offset. [m]
-
-    On one road alone, up to shortly before its end, where the place of each vertex is certain.
-    """
+    """From the start along what was sampled, to the offset `end` [m]; on one road, where each vertex has its place."""
     vehicle, paths = entity.motion, {action.path for action in actions}
     starts = [one.start for one in motion.actions if one.actor == entity.name and one.path in paths]
     until = min(starts, default=np.inf)
@@ -235,10 +232,7 @@ def _vertices(vehicle: EntityMotion, network: RoadNetwork, driven: FloatArray, l
 
 
 def _middle(entity: EntityResult, network: RoadNetwork) -> tuple[float, float]:
-    """Where an entity begins: +1 where +t is to its left, else -1; its nominal place along +t from the lane's centre.
-
-    [m]
-    """
+    """+1 where +t is to an entity's left at its begin, else -1; its place there along +t from the lane's centre [m]."""
     motion = entity.motion
     direction = float(network.travel_directions(motion.road[:1], motion.lane[:1])[0])
     along_lane = 1.0 if np.cos(motion.heading_relative[0]) >= 0.0 else -1.0

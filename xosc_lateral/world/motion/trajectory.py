@@ -63,10 +63,7 @@ def distance_driven(motion: EntityMotion) -> FloatArray:
 
 
 def leaps(motion: EntityMotion) -> list[tuple[float, float]]:
-    """Times [s] and lengths [m] of jumps that nobody asked for: a followed lane closes, roads don't meet.
-
-    What a scenario places anew is none (`Activity.TELEPORTED`).
-    """
+    """Times [s] and lengths [m] of jumps that nobody asked for: a followed lane closes, roads don't meet."""
 
     def moved(around: slice) -> FloatArray:
         return np.hypot(np.diff(motion.x[around]), np.diff(motion.y[around]))
@@ -308,10 +305,7 @@ def smoother_step(u: FloatArray) -> FloatArray:
 def settle(
     distance: FloatArray, reach: float | FloatArray, slope: float | FloatArray, bend: float | FloatArray
 ) -> FloatArray:
-    """Quintic Hermite functions: starts with value 0, the given slope and second derivative; all three 0 at `reach`.
-
-    Shape (n,) as the distances, in units of the slope times theirs.
-    """
+    """Quintic Hermite function: value 0, slope and second derivative at 0 as given; all three 0 at `reach`."""
     if np.all(np.asarray(reach) <= 0.0):
         return np.zeros_like(distance)
     u = np.clip(distance / reach, 0.0, 1.0)

@@ -50,10 +50,7 @@ def remove_controllers(draft: Draft, converted: Collection[str]) -> None:
 
 
 def rewrite_init(draft: Draft, starts: Mapping[str, tuple[build.Pose, float] | None]) -> None:
-    """Replace what moves the converted entities in init by a place and a speed; lights, visibility and others stay.
-
-    A start of None leaves init as it is: the entity is not there at the start.
-    """
+    """A place and a speed in place of what moves entities in init; a start of None (not there yet) changes nothing."""
     actions = draft.init_actions
     done: set[str] = set()
     # The reader's order is the file's: names need no parameters filled in again.
