@@ -100,10 +100,7 @@ def _drives(speed: float) -> tuple[Speeds, ...]:
 
 
 class Meaning:
-    """What happens in a source, nominally and under other egos.
-
-    `played`: the source and its nominal run; `egos`: vehicles under test; `time_limit`: of playback. [s]
-    """
+    """What happens in a source, nominally and under other egos; `egos`: vehicles under test; `time_limit` [s]."""
 
     def __init__(self, played: Played, egos: tuple[str, ...], *, step: float, time_limit: float | None) -> None:
         self._played, self._egos, self._step = played, egos, step

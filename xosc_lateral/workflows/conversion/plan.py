@@ -23,7 +23,7 @@ from xosc_lateral.workflows.conversion.load import Loaded, Played
 from xosc_lateral.workflows.conversion.meaning import meaning_of, play_until
 from xosc_lateral.workflows.conversion.result import Drivers, LaneChanges
 from xosc_lateral.workflows.conversion.settings import AUTO, AUTO_PROFILE, ConvertSettings, OutputMode
-from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
+from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.controllers import Control, controlled_entities, vehicles_under_test
 from xosc_lateral.world.scenario.dependence import Dependence, dependence
@@ -307,23 +307,15 @@ def _without_proving_grounds(
     drivers: Drivers, motion: NominalMotion, network: RoadNetwork, named: Iterable[str]
 ) -> Drivers:
     """Drivers, but for vehicles in a lone lane that is none of a road: why they get none. `named` ones keep theirs."""
-    kept = set(named)
     moved = dict(drivers)
     for entity in motion.entities:
-        if isinstance(moved.get(entity.name), DriverProfile) and entity.name not in kept:
-            width, lanes = _usual_lane(entity, network)
-            if width > PROVING_GROUND_WIDTH and lanes <= 1.0:
+        if isinstance(moved.get(entity.name), DriverProfile) and entity.name not in set(named):
+            step = max(1, len(entity.time) // max(1, round(float(entity.time[-1] - entity.time[0]))))  # a row a second
+            rows = np.flatnonzero((entity.road[::step] >= 0) & (entity.lane[::step] != 0)) * step
+            road, lane, s = entity.road[rows], entity.lane[rows], entity.s[rows]
+            width = float(np.median(network.lane_width(road, lane, s))) if len(rows) else 0.0
+            if width > PROVING_GROUND_WIDTH and float(np.median(network.lane_index(road, lane, s)[1])) <= 1.0:
                 moved[entity.name] = (
                     f"lane of {width:.1f} m, a proving ground's: keeps its line (--entity NAME=PROFILE moves it)"
                 )
     return moved
-
-
-def _usual_lane(entity: EntityMotion, network: RoadNetwork) -> tuple[float, float]:
-    """Medians over a row a second: width of its lane [m], and driving lanes of its direction; 0 where it is in none."""
-    step = max(1, len(entity.time) // max(1, round(float(entity.time[-1] - entity.time[0]))))
-    rows = np.flatnonzero((entity.road[::step] >= 0) & (entity.lane[::step] != 0)) * step
-    if not len(rows):
-        return 0.0, 0.0
-    road, lane, s = entity.road[rows], entity.lane[rows], entity.s[rows]
-    return float(np.median(network.lane_width(road, lane, s))), float(np.median(network.lane_index(road, lane, s)[1]))

@@ -159,17 +159,12 @@ def going_on(segment: Segment, rows: int) -> Segment:
 
 
 def mirrored(segment: Segment) -> Segment:
-    """The segment with left and right exchanged.
-
-    Columns change places whose names differ in the word `left` or `right` alone (`left_distance`, `truck_right`);
-    curvature and crossfall change their sign, the wind its side; lanes are counted from the other edge. A column of
-    another name stays.
-    """
+    """The segment with left and right exchanged; see `mirrored_context`."""
     return replace(segment, context=mirrored_context(segment.context))
 
 
 def mirrored_context(context: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Context columns with left and right exchanged; shapes and units as they are."""
+    """Context columns with left and right exchanged; one whose name has neither word stays."""
     columns = {other_side(name): values for name, values in context.items()}
     for name in OTHER_SIGN:
         if name in columns:

@@ -65,11 +65,7 @@ def target(player: str = Player.STANDARD.value, version: str | None = None) -> T
 
 
 class Draft:
-    """The scenario's tree, changed step by step into the output's.
-
-    The bytes of the scenario are the starting point, so that comments, catalogs and vendor extensions survive. Raises
-    `FormatError` for a scenario that was converted before, `PlaybackError` for a run of 0 s.
-    """
+    """The scenario's tree, changed into the output's; `FormatError`: converted before; `PlaybackError`: it lasts 0 s."""
 
     def __init__(self, scenario: Scenario, motion: NominalMotion, target: TargetPlayer = STANDARD) -> None:
         self.scenario, self.motion, self.player = scenario, motion, target.player

@@ -44,11 +44,7 @@ def fill_in(losses: Losses, scope: Scope, *, parameters: bool) -> None:
 
 
 def name_literally(root: etree._Element, path: Path, scope: Scope, wanted: Collection[str]) -> None:
-    """Storyboard elements and references to them by their names, if one that is wanted is named by an expression.
-
-    Conditions elsewhere refer to such an element by its value; who looks at the file alone would find no element of
-    that name.
-    """
+    """Storyboard elements and references to them by their names, if a wanted one is named by an expression."""
     attributes: list[tuple[etree._Element, str, str]] = []
     for storyboard in elements(root, "Storyboard"):
         for item, within in in_scope(storyboard, path, scope):

@@ -118,11 +118,7 @@ def kept_actions(draft: Draft, played: Iterable[PlayedAction], moving: Collectio
 def add_kept_actions(
     story: etree._Element, name: str, draft: Draft, played: Sequence[PlayedAction], poses: Mapping[int, build.Pose]
 ) -> None:
-    """Add an act with one event for each action that is not replaced, in the order of the run; none for no actions.
-
-    Each run of actions with the same actor has a maneuver group, so that the order holds across actors, too.
-    `poses`: of an AddEntityAction, by index in `played`: where the entity appears on its written path.
-    """
+    """Add an act with an event per action, in order, a group for each run of an actor's; `poses`: of those added."""
     if not played:
         return
     act = build.sub(story, "Act", name=name)
