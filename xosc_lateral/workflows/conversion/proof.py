@@ -10,7 +10,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
-from xosc_lateral.base.shipped import shipped_folder
+from xosc_lateral.base.plugins import shipped_folder
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.workflows.conversion.enrich import enrich
