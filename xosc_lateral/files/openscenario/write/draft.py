@@ -65,7 +65,7 @@ def target(player: str = Player.STANDARD.value, version: str | None = None) -> T
 
 
 class Draft:
-    """The scenario's tree, changed into the output's; `FormatError`: converted before; `PlaybackError`: it lasts 0 s."""
+    """A scenario's tree, changed into the output's; `FormatError`: converted before; `PlaybackError`: a run of 0 s."""
 
     def __init__(self, scenario: Scenario, motion: NominalMotion, target: TargetPlayer = STANDARD) -> None:
         self.scenario, self.motion, self.player = scenario, motion, target.player
