@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
+from textwrap import wrap
 
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.segment import CONTEXT_UNITS
@@ -62,8 +63,9 @@ def c_sources(profile: DriverProfile) -> dict[str, str]:
     """Header, source and numbers of a driver, by file name."""
     name, fields = identifier(profile), _fields(profile)
     sizes, numbers = numbers_of(profile)
+    what = _about(profile)
     words = {
-        "WHAT": f"Driver {re.sub(r'[^ -.0-~]', '_', profile.name)} of xosc-lateral {__version__}, in C99.",
+        "WHAT": what,
         "SIZES": "\n".join(f"#define DRIVER_{key} {value}" for key, value in sizes.items()),
         "MEMORY": str(_memory(sizes)),
         "PREVIEW": repr(round(sizes["LOOKS"] * profile.model.step, 9)),
@@ -76,8 +78,18 @@ def c_sources(profile: DriverProfile) -> dict[str, str]:
     return {
         f"{name}.h": filled("driver.h", profile, words),
         f"{name}.c": filled("driver.c", profile),
-        f"{name}_profile.h": _named("\n".join(numbers) + "\n", profile),
+        f"{name}_profile.h": _named("\n".join([f"/* {what}\n */", *numbers, ""]), profile),
     }
+
+
+def _about(profile: DriverProfile) -> str:
+    """The driver's name, and the licences that its profile states, as lines of a comment."""
+    licences = {"profile": profile.metadata.licence, "drives that it was fitted to": profile.provenance.licence}
+    lines = [f"Driver {profile.name} of xosc-lateral {__version__}, in C99."]
+    for what, licence in licences.items():
+        lines += wrap(f"Licence of the {what}: {licence}", 115) if licence else []
+    text = re.sub(r"[^ -~\n]", "_", "\n * ".join(lines))
+    return re.sub(r"(?<=\*)(?=/)|(?<=/)(?=\*)", " ", text)  # no end of a comment, and no beginning of another
 
 
 def filled(template: str, profile: DriverProfile, words: Mapping[str, str] | None = None) -> str:
