@@ -17,7 +17,7 @@ from xosc_lateral.base.limits import LIVE_RANGES
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, EffectTerms
 from xosc_lateral.drivers.model.effects.base import terms_of
 from xosc_lateral.drivers.model.effects.response import ResponseState
-from xosc_lateral.drivers.model.linear_filters import SAMPLES_AHEAD, extrapolate, piece
+from xosc_lateral.drivers.model.linear_filters import extrapolate, piece
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.records import plain, read_as
 from xosc_lateral.drivers.model.sampling import DriveProcess, Movement, combine, offsets_of
@@ -104,8 +104,7 @@ class ResponseStream:
 class DriverState(msgspec.Struct, kw_only=True):
     """Where a driver of a group is; see `_DRIVER`."""
 
-    process: Any
-    """`DriveState`."""
+    process: Any  # `DriveState`.
     mean: float = 0.0
     drawn: list[list[float]] = msgspec.field(default_factory=list)
     row: int
@@ -148,11 +147,6 @@ class OffsetGroup:
     def __len__(self) -> int:
         return len(self._drives)
 
-    @property
-    def preview(self) -> float:
-        """By how much later drivers respond than those who know what lies ahead. [s]"""
-        return (rows_ahead(self.profile) + SAMPLES_AHEAD) * self.profile.model.step
-
     def add(self, seeds: Sequence[np.random.SeedSequence], time: float = 0.0) -> None:
         """More drivers, whose drives begin with the next sample, at a time of their own clocks. [s]"""
         for drive in self._join(seeds):
@@ -181,7 +175,7 @@ class OffsetGroup:
         Parameters
         ----------
         context : mapping of str to array, shape (n,)
-            Of this moment, all `columns`; a driver responds to it `preview` seconds later.
+            Of this moment, all `columns`; a driver responds `rows_ahead` and `SAMPLES_AHEAD` later.
         width : array, shape (n,)
             Of the lane. [m]
 
@@ -275,29 +269,22 @@ class OffsetGroup:
     # ---- state -------------------------------------------------------------------------------------------------------
     def driver_states(self) -> list[DriverState]:
         """Where everybody is."""
-        return [
-            DriverState(
-                process=drive.state,
-                mean=float(own["mean"]),
-                drawn=own["drawn"][own["at"] : own["at"] + own["left"]].tolist(),
-                row=int(own["row"]),
-                samples=tuple(own["samples"].tolist()),
-            )
-            for drive, own in zip(self._drives, self._state, strict=True)
-        ]
+        states = []
+        for drive, driver in zip(self._drives, self._state, strict=True):
+            rows = driver["drawn"][driver["at"] : driver["at"] + driver["left"]].tolist()
+            mean, row, samples = float(driver["mean"]), int(driver["row"]), tuple(driver["samples"].tolist())
+            states.append(DriverState(process=drive.state, mean=mean, drawn=rows, row=row, samples=samples))
+        return states
 
     def to_dict(self) -> dict[str, Any]:
         """All that changes while driving, as plain JSON values."""
         responses = [response.state.response for response in self.responses]
-        values: dict[str, Any] = plain(
-            {"responses": responses, "drives": self.driver_states(), "columns": self.columns}
-        )
-        return values
+        return plain({"responses": responses, "drives": self.driver_states(), "columns": self.columns})  # type: ignore[no-any-return]
 
     def restore(self, state: Mapping[str, Any], seeds: Sequence[np.random.SeedSequence]) -> None:
         """Go on from a state; the group is empty and of the same profile and columns, the seeds are the drivers'."""
-        drivers = read_as(list[DriverState], state["drives"], "drives")
         responses = read_as(list[ResponseState], state["responses"], "responses")
+        drivers = read_as(list[DriverState], state["drives"], "drives")
         self.go_on_from(drivers, [ResponseStreamState(response) for response in responses], seeds)
 
     def go_on_from(
