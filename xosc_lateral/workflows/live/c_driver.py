@@ -23,18 +23,10 @@ def identifier(profile: DriverProfile) -> str:
 
 
 def export_c(profile: DriverProfile, folder: str | Path, *, force: bool = False) -> list[Path]:
-    """Write a driver as C99: header, source, the profile's numbers, a CMake file and an example loop.
-
-    Parameters
-    ----------
-    profile : DriverProfile
-    folder : path
-        Made where there is none.
-    force : bool
-        Replace files of the same names.
+    """Write a driver as C99 into a folder: header, source, the profile's numbers, a CMake file and an example loop.
 
     Raises `DriverProfileError` if the profile has an effect or a core model of a plug-in; `FormatError` if a file is
-    there.
+    there that is not to be replaced (`force`).
     """
     texts = c_sources(profile) | {name: filled(name, profile) for name in ("CMakeLists.txt", "example.c")}
     written = [output_folder(folder) / name for name in texts]
@@ -62,14 +54,16 @@ def _fields(profile: DriverProfile) -> dict[str, str]:
 def c_sources(profile: DriverProfile) -> dict[str, str]:
     """Header, source and numbers of a driver, by file name."""
     name, fields = identifier(profile), _fields(profile)
-    sizes, numbers = numbers_of(profile)
-    what = _about(profile)
+    (sizes, numbers), what = numbers_of(profile), _about(profile)
     words = {
         "WHAT": what,
         "SIZES": "\n".join(f"#define DRIVER_{key} {value}" for key, value in sizes.items()),
         "MEMORY": str(_memory(sizes)),
         "PREVIEW": repr(round(sizes["LOOKS"] * profile.model.step, 9)),
-        "INPUTS": "\n".join(_input(column, field) for column, field in fields.items()),
+        "INPUTS": "\n".join(
+            f"    double {field}; /* [{CONTEXT_UNITS.get(column, 'as in the profile')}] */"
+            for column, field in fields.items()
+        ),
         "KNOWN": "\n".join(
             f"#define DRIVER_KNOWS_{field} UINT64_C({1 << k})" for k, field in enumerate(fields.values())
         ),
@@ -102,10 +96,6 @@ def filled(template: str, profile: DriverProfile, words: Mapping[str, str] | Non
 
 def _named(text: str, profile: DriverProfile) -> str:
     return re.sub(r"\bDRIVER(?=_|\.h|\b)", identifier(profile), text)
-
-
-def _input(column: str, field: str) -> str:
-    return f"    double {field}; /* [{CONTEXT_UNITS.get(column, 'as in the profile')}] */"
 
 
 def _memory(sizes: Mapping[str, int]) -> int:

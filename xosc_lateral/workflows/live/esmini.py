@@ -64,18 +64,12 @@ class _Lane(NamedTuple):
 
 @dataclass(slots=True)
 class _Rest:
-    """Lateral speed at a maneuver's start [m/s] that runs out over a time [s]; way beside the maneuver so far [m]."""
+    """What is left of the lateral speed at a maneuver's start."""
 
-    rate: float
-    over: float
-    passed: float = 0.0
-    way: float = 0.0
-
-    def on(self, dt: float) -> float:
-        """So much later [s]: the way. [m]"""
-        self.passed += dt
-        self.way = float(settle(np.array([self.passed]), self.over, self.rate, 0.0)[0])
-        return self.way
+    rate: float  # At its start. [m/s]
+    over: float  # It runs out over so long. [s]
+    passed: float = 0.0  # [s]
+    way: float = 0.0  # Beside the maneuver so far. [m]
 
 
 LANE_STEP = 0.5
@@ -89,26 +83,10 @@ class EsminiTraffic:
     """Drivers of the vehicles of a scenario that esmini has opened.
 
     Call `steer` before every ``SE_StepDT``, and `settle` after it; all else stays with the caller: opening, stepping,
-    an external ego.
-
-    Parameters
-    ----------
-    library : path, ctypes.CDLL, or object with the same functions
-        In which ``SE_Init`` was called.
-    scenario : path
-        The one that it plays: it says which actions are lateral, and whose.
-    profile : DriverProfile
-    ego : str or collection of str
-        Vehicles under test: nobody of ours drives them, and they are seen where they are.
-    seed, profiles, neighbours
-        See `Traffic`.
-    on_element : callable, optional
-        Is called with the arguments of esmini's storyboard callback, of which there is one.
-
-    Attributes
-    ----------
-    warnings : list of str
-        What a user has to know, a line each.
+    an external ego. The `library` is its path, a `ctypes.CDLL` or an object with the same functions, in which
+    ``SE_Init`` was called for the `scenario`, which says which actions are lateral, and whose. Nobody of ours drives
+    the `ego`, one or several; they are seen where they are. `on_element` is called as esmini's storyboard callback, of
+    which there is one. For `seed`, `profiles` and `neighbours` see `Traffic`.
     """
 
     def __init__(
@@ -138,6 +116,7 @@ class EsminiTraffic:
         self._lane_of: dict[str, _Lane] = {}
         self._also = on_element
         self.warnings: list[str] = []
+        """What a user has to know, a line each."""
         path = (self.player.SE_GetODRFilename() or b"").decode()
         try:
             self.network = read_opendrive(path)
@@ -196,8 +175,10 @@ class EsminiTraffic:
             elif self._road(state) < 0 or (name not in busy and name not in self._touched):
                 self._rests.pop(name, None)
             elif name in self._rests:  # once more when the action is over: from there on the driver leads over
-                way = self._rests[name].on(dt)
-                self.player.SE_ReportObjectLateralPosition(state.id, state.t + self._direction(state) * way)
+                rest = self._rests[name]
+                rest.passed += dt
+                rest.way = float(settle(np.array([rest.passed]), rest.over, rest.rate, 0.0)[0])
+                self.player.SE_ReportObjectLateralPosition(state.id, state.t + self._direction(state) * rest.way)
 
     def _busy(self) -> set[str]:
         """Whom a lateral action moves now."""
@@ -236,13 +217,9 @@ class EsminiTraffic:
             return False
         numbers = {what: getattr(state, what) for what in ("x", "y", "h", "t", "s", "speed", "offset_t")}
         bad = [what for what, value in numbers.items() if not np.isfinite(value)]
-        if bad:
-            self._say(f"vehicle {name!r}: {bad[0]} is {numbers[bad[0]]}; it is left alone")
-        return not bad
-
-    def _say(self, line: str) -> None:
-        if line not in self.warnings:
+        if bad and (line := f"vehicle {name!r}: {bad[0]} is {numbers[bad[0]]}; it is left alone") not in self.warnings:
             self.warnings.append(line)
+        return not bad
 
     def _road(self, state: ObjectState) -> int:
         return self._roads.get(str(state.road), -1)
@@ -288,16 +265,13 @@ class EsminiTraffic:
         for (name, state), index in zip(seen, road.tolist(), strict=True):
             known = self._lane_of.get(name)
             if known is None or anew or known.place != (index, state.lane):
-                place, s = (index, state.lane), state.s
-                known = _Lane(place, False, False, 1.0, 1.0, state.h)
-                turned = network.header_offset.heading  # x and y are inertial
-                if index >= 0 and state.lane != 0 and network.has_lane_at(index, state.lane, s):
-                    width = float(network.lane_width(index, state.lane, s))
-                    known = _Lane(
-                        place, True, bool(network.lane_index(index, state.lane, s)[0] >= 0) and width > 0.0,
-                        self._direction(state), max(width, 1e-3),
-                        network.pose_at(index, state.lane, s).heading + turned,
-                    )  # fmt: skip
+                where = (index, state.lane, state.s)
+                known = _Lane(where[:2], False, False, 1.0, 1.0, state.h)
+                if index >= 0 and state.lane != 0 and network.has_lane_at(*where):
+                    width, heading = float(network.lane_width(*where)), network.pose_at(*where).heading
+                    is_driving = bool(network.lane_index(*where)[0] >= 0) and width > 0.0
+                    heading += network.header_offset.heading  # x and y are inertial
+                    known = _Lane(where[:2], True, is_driving, self._direction(state), max(width, 1e-3), heading)
                 self._lane_of[name] = known
             lanes.append(known)
         return lanes

@@ -181,21 +181,10 @@ class _Vehicle:
 
 
 class SumoTraffic:
-    """Drivers of the vehicles of a SUMO simulation that runs.
+    """Drivers of the vehicles of a SUMO simulation that runs; call `steer` before (or after) every ``simulationStep``.
 
-    Call `steer` before (or after) every ``simulationStep``.
-
-    Raises `SimulationError` if the sublane model is off.
-
-    Parameters
-    ----------
-    connection : libsumo, or a connection of traci
-        With a loaded simulation.
-    profile : DriverProfile
-    ego : str or collection of str
-        Vehicles that nobody of ours drives.
-    seed, profiles, neighbours
-        See `Traffic`.
+    The `connection` is libsumo, or one of traci, with a loaded simulation. Nobody of ours drives the `ego`, one or
+    several. For `seed`, `profiles`, `neighbours` see `Traffic`. Raises `SimulationError` if the sublane model is off.
     """
 
     def __init__(
