@@ -22,7 +22,7 @@ from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.records import plain, read_as
 from xosc_lateral.drivers.model.sampling import DriveProcess, Movement, combine, offsets_of
 
-BLOCK = 64
+ROWS_DRAWN = 64
 """Model steps drawn at once for a driver. [-]"""
 
 _NO_FACTORS = (0.0, 1.0, 1.0, 1.0)
@@ -30,7 +30,7 @@ _NO_FACTORS = (0.0, 1.0, 1.0, 1.0)
 
 _DRIVER = np.dtype(
     [("mean", float), ("at", np.int64), ("left", np.int64), ("row", np.int64), ("samples", float, 4),
-     ("drawn", float, (2 * BLOCK, 2 + len(_NO_FACTORS)))]
+     ("drawn", float, (2 * ROWS_DRAWN, 2 + len(_NO_FACTORS)))]
 )  # fmt: skip
 """Of one driver: what his coarse part moves about [-], which drawn row is next and how many are left, his next model
 step, his last samples [m], rows drawn ahead: coarse and fine movement [lane widths], parts of his hidden effects."""
@@ -235,23 +235,23 @@ class OffsetGroup:
     def _draw(self, drivers: IntArray) -> None:
         """Have at least one row drawn of each; a few of those with few left, so that not all are due at once."""
         remaining = self._state["left"]
-        if remaining.min(initial=2 * BLOCK) > BLOCK:
+        if remaining.min(initial=2 * ROWS_DRAWN) > ROWS_DRAWN:
             return
         due = set(drivers[remaining[drivers] == 0].tolist())
-        spare = drivers[remaining[drivers] <= BLOCK]
-        few = spare[np.argsort(remaining[spare], kind="stable")[: 1 + 2 * len(self) // BLOCK]]
+        spare = drivers[remaining[drivers] <= ROWS_DRAWN]
+        few = spare[np.argsort(remaining[spare], kind="stable")[: 1 + 2 * len(self) // ROWS_DRAWN]]
         for k in sorted(due | set(few.tolist())):
             driver, left = self._state[k], remaining[k]
             driver["drawn"][:left] = driver["drawn"][driver["at"] : driver["at"] + left]
-            driver["mean"], driver["drawn"][left : left + BLOCK] = self._block(k)
-            driver["at"], driver["left"] = 0, left + BLOCK
+            driver["mean"], driver["drawn"][left : left + ROWS_DRAWN] = self._block(k)
+            driver["at"], driver["left"] = 0, left + ROWS_DRAWN
 
     def _block(self, k: int) -> tuple[float, FloatArray]:
-        """Mean, and the `BLOCK` rows of a drive that come after all that is drawn, shape (BLOCK, parts)."""
+        """Mean, and the `ROWS_DRAWN` rows of a drive that come after all that is drawn, shape (BLOCK, parts)."""
         drive, row = self._drives[k], int(self._state["row"][k] + self._state["left"][k])
-        hidden = drive.hidden_terms_at(np.arange(row, row + BLOCK))
-        movement = drive.movement(BLOCK, hidden.rate)
-        rows = np.empty((BLOCK, 2 + len(_NO_FACTORS)))
+        hidden = drive.hidden_terms_at(np.arange(row, row + ROWS_DRAWN))
+        movement = drive.movement(ROWS_DRAWN, hidden.rate)
+        rows = np.empty((ROWS_DRAWN, 2 + len(_NO_FACTORS)))
         rows[:, 0], rows[:, 1] = movement.coarse, movement.fine
         for column, (values, neutral) in enumerate(zip(hidden.parts, _NO_FACTORS, strict=True)):
             self._hidden[column] |= values is not None

@@ -23,7 +23,7 @@ from xosc_lateral.files.opendrive import read_opendrive
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.live.esmini_library import ObjectState, Player, StoryboardCallback
-from xosc_lateral.workflows.live.paths import LEADING_OVER, TURN, Moves
+from xosc_lateral.workflows.live.paths import LARGEST_TURN_RATE, LEADING_OVER_SHARE, Moves
 from xosc_lateral.workflows.live.traffic import Moment, Traffic
 from xosc_lateral.world.motion.trajectory import SETTLING_TIME, settle
 from xosc_lateral.world.scenario.controllers import Domains, controlled_entities
@@ -37,16 +37,16 @@ from xosc_lateral.world.scenario.private_actions import (
 from xosc_lateral.world.scenario.scenario import Scenario
 from xosc_lateral.world.surroundings.moment import OpenDriveRoads, Places
 
-LATERAL = (LaneChangeAction, LaneOffsetAction, LateralDistanceAction, FollowTrajectoryAction, TeleportAction)
+LATERAL_ACTIONS = (LaneChangeAction, LaneOffsetAction, LateralDistanceAction, FollowTrajectoryAction, TeleportAction)
 """Actions that say where a vehicle is sideways."""
 
 _INIT_NAMES = {TeleportAction: "TeleportAction", FollowTrajectoryAction: "RoutingAction"}
 """What esmini calls actions of Init, apart from ``LateralAction``."""
 
-_ACTION, _RUNNING = 7, 2
+_ACTION_TYPE, _RUNNING_STATE = 7, 2
 """Kind and state of a storyboard element (`StoryBoardElement::ElementType` and `State`)."""
 
-_VEHICLE, _TRUCKS, _PULLED = 1, (2, 3, 4, 5), (3, 4)
+_VEHICLE_TYPE, _TRUCK_CATEGORIES, _PULLED_CATEGORIES = 1, (2, 3, 4, 5), (3, 4)
 """`Object::Type`; `Vehicle::Category` of trucks, trailers and buses, and of what has no driver of its own."""
 
 
@@ -169,7 +169,7 @@ class EsminiTraffic:
             if name in busy and steered:  # begun in this step, in which the driver's place still counts
                 if abs(self.offset_of(state) - offset) > _SAME_PLACE:
                     continue
-                bound = LEADING_OVER * TURN * max(abs(state.speed), MINIMUM_SPEED)
+                bound = LEADING_OVER_SHARE * LARGEST_TURN_RATE * max(abs(state.speed), MINIMUM_SPEED)
                 over = max(SETTLING_TIME, 4.0 * abs(self._rates[name]) / bound)
                 self._rests[name] = _Rest(self._rates[name], over)
             elif self._road(state) < 0 or (name not in busy and name not in self._touched):
@@ -213,7 +213,7 @@ class EsminiTraffic:
 
     def _is_sound(self, name: str, state: ObjectState) -> bool:
         """Whether it is a vehicle that says where it is; one that doesn't is left alone, which is a warning."""
-        if state.type != _VEHICLE:
+        if state.type != _VEHICLE_TYPE:
             return False
         numbers = {what: getattr(state, what) for what in ("x", "y", "h", "t", "s", "speed", "offset_t")}
         bad = [what for what, value in numbers.items() if not np.isfinite(value)]
@@ -238,7 +238,7 @@ class EsminiTraffic:
         heading = np.array([one.heading for one in lanes])
         is_lane = np.array([one.is_driving for one in lanes], dtype=np.bool_)
         width = np.array([one.width for one in lanes])
-        pulled = np.array([state.category in _PULLED for _, state in seen], dtype=np.bool_)
+        pulled = np.array([state.category in _PULLED_CATEGORIES for _, state in seen], dtype=np.bool_)
         others = self._ego | self._steered
         ours = np.array([state.ctrl_type == 0 and name not in others for name, state in seen], dtype=np.bool_)
         busy = self._busy()
@@ -253,7 +253,7 @@ class EsminiTraffic:
         self._touched.clear()
         return Moment(
             names, column["speed"], width, offset, is_lane & ~in_maneuver, ours & ~pulled,
-            np.array([state.category in _TRUCKS for _, state in seen], dtype=np.bool_),
+            np.array([state.category in _TRUCK_CATEGORIES for _, state in seen], dtype=np.bool_),
             base=np.array([self._base[name] for name in names]),
             places=Places(column["x"], column["y"], heading, road, lane, column["s"], column["length"],
                           column["width"], column["center_x"]),
@@ -279,8 +279,8 @@ class EsminiTraffic:
     def _on_element(self, name: bytes, kind: int, state: int, path: bytes) -> None:
         """Esmini's callback: a lateral action takes its vehicles, and gives them back."""
         key = path.decode(errors="replace")
-        if kind == _ACTION and key in self._moved_by:
-            self._running[key] = max(self._running[key] + (1 if state == _RUNNING else -1), 0)
+        if kind == _ACTION_TYPE and key in self._moved_by:
+            self._running[key] = max(self._running[key] + (1 if state == _RUNNING_STATE else -1), 0)
             self._touched |= self._moved_by[key]
         if self._also is not None:
             self._also(name, kind, state, path)
@@ -292,7 +292,7 @@ def lateral_actions(scenario: Scenario) -> dict[str, set[str]]:
     moved_by: defaultdict[str, set[str]] = defaultdict(set)
     for private in scenario.storyboard.init.privates:
         for action in private.actions:
-            if isinstance(action.content, LATERAL):
+            if isinstance(action.content, LATERAL_ACTIONS):
                 word = _INIT_NAMES.get(type(action.content), "LateralAction")
                 moved_by[f"Init {private.entity_ref} {word}"].add(private.entity_ref)
     groups = ((story, act, group) for story in scenario.storyboard.stories for act in story.acts
@@ -302,7 +302,7 @@ def lateral_actions(scenario: Scenario) -> dict[str, set[str]]:
         for maneuver in group.maneuvers:
             for event in maneuver.events:
                 for action in event.actions:
-                    if isinstance(action.content, LATERAL):
+                    if isinstance(action.content, LATERAL_ACTIONS):
                         parts = (story, act, group, maneuver, event, action)
                         moved_by["::".join(part.name for part in parts)] |= actors
     return dict(moved_by)

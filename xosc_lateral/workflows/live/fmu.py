@@ -30,7 +30,7 @@ HOST_COMPILERS = ("cc", "gcc", "clang")
 COMPILER_TIMEOUT = 120.0
 """A driver compiles in a second. [s]"""
 
-STATE = {"2": ("FMUstate", "DeSerializeFMUstate"), "3": ("FMUState", "DeserializeFMUState")}
+NAMES_OF_STATE = {"2": ("FMUstate", "DeSerializeFMUstate"), "3": ("FMUState", "DeserializeFMUState")}
 """What versions of FMI call the state, and reading it back."""
 
 
@@ -64,7 +64,7 @@ def export_fmu(
 
 def _sources(profile: DriverProfile, version: str) -> dict[str, str]:
     sources = c_sources(profile)
-    state, deserialize = STATE[version]
+    state, deserialize = NAMES_OF_STATE[version]
     distances = [
         0 if not column.endswith("_distance") else 1 if column in DISTANCES else 2 for column in inputs_of(profile)
     ]
@@ -125,7 +125,7 @@ def _platform(machine: str, version: str) -> tuple[str, str]:
 
 def _description(profile: DriverProfile, version: str, token: str) -> Element:
     """The model description."""
-    is_2, name, state = version == "2", identifier(profile), STATE[version][0]
+    is_2, name, state = version == "2", identifier(profile), NAMES_OF_STATE[version][0]
     root = Element("fmiModelDescription", {
         "fmiVersion": f"{version}.0", "modelName": name, "guid" if is_2 else "instantiationToken": token,
         "description": f"Driver {profile.name} of xosc-lateral {__version__}: lateral offset in the lane, positive "

@@ -25,7 +25,7 @@ from xosc_lateral.drivers.model.profile import Basis, DriverProfile, sampling_ha
 from xosc_lateral.drivers.model.stream import sealed, unsealed
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.conversion.seen import mirrored_context, sides_known
-from xosc_lateral.workflows.live.paths import DRIVER, SPEEDS, Moves, drive_on
+from xosc_lateral.workflows.live.paths import DRIVER, SPEEDS_REMEMBERED, Moves, drive_on
 from xosc_lateral.world.surroundings.context import STEERING
 from xosc_lateral.world.surroundings.give_way import Response, give_way_now
 from xosc_lateral.world.surroundings.moment import Places, Roads, look_around
@@ -158,7 +158,7 @@ class Traffic:
             k = self._index.get(name)
             if k is not None and self._state["begun"][k]:
                 change = moment.speed[row] - self._state["speeds"][k, 0]
-                columns["acceleration"][row] = change / (SPEEDS - 1) / self._step
+                columns["acceleration"][row] = change / (SPEEDS_REMEMBERED - 1) / self._step
         if moment.places is not None and self._roads is not None:
             columns |= look_around(self._roads, moment.places, moment.offset, moment.is_truck)
         columns |= {name: np.asarray(values, dtype=np.float64) for name, values in moment.context.items()}
