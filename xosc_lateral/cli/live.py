@@ -39,14 +39,9 @@ class Outputs:
 
     def run(self, live: Callable[..., LiveRun], source: Path, reply: Written, **options: Any) -> None:
         """Run a simulation of that source, and write and say what came out."""
-        from xosc_lateral.files.osi import SUFFIXES, osi_wanted
-        from xosc_lateral.files.output_paths import claim, output_file
-        from xosc_lateral.files.tables import TABLE_SUFFIXES
-
-        table = None if self.states is None else output_file(self.states, "states.csv", TABLE_SUFFIXES)
-        trace = None if self.osi is None else output_file(self.osi, f"{source.stem}_gt.mcap", SUFFIXES)
-        claim([table, trace], [source], force=reply.force)
-        osi_wanted(trace)
+        table, trace = reply.claim(
+            [source], table=(self.states, "states.csv"), trace=(self.osi, f"{source.stem}_gt.mcap")
+        )
         run = live(source, **options)
         if table is not None:
             run.write(table, force=reply.force)

@@ -221,6 +221,13 @@ def whole_number(smallest: int) -> Callable[[str | int], int]:
     return read
 
 
+def process_count(stated: int) -> int:
+    """How many processes work."""
+    if stated == 0 or stated < -1:
+        raise ValueError("at least 1, or -1 for one per core")
+    return stated
+
+
 def seconds(stated: str | float) -> float:
     """A length of time. [s]"""
     number = float(stated)
@@ -297,6 +304,12 @@ class Part(StrEnum):
 
 
 PROFILE = flag("--profile", "-p", kind=str, metavar="NAME|PATH", help="Driver profile.")
+MAPPING = flag(
+    "--mapping",
+    kind=Path | None,
+    metavar="FILE.toml",
+    help="Saved mapping of columns (import table --propose FILE...).",
+)
 
 # fmt: off
 SHARED: Mapping[str, Option] = {
@@ -313,6 +326,7 @@ SHARED: Mapping[str, Option] = {
         help='Folder with roads known by name ("Town04"); may be repeated.'),
     "time_limit": flag(kind=float | None, read=seconds, min=0.1, max=86_400, show_default=False,
         help="Cut runs off here [s]; default: 60 without a stop trigger, 3600 with one."),
+    "jobs": flag(kind=int, read=process_count, help="Number of processes; -1: one per core."),
     "with_sensor": flag("--with", kind=list[Part] | None, read=bool,
         help="sensor: add the error of the sensor that measured the drives."),
 }

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.texts import aligned
 from xosc_lateral.drivers.evaluation.lane_keeping import HIGHWAY_DRIVES, HIGHWAY_SPEED
 from xosc_lateral.drivers.evaluation.metrics import METRICS
 from xosc_lateral.drivers.evaluation.profile_comparison import Compared, ComparedProfile
@@ -27,19 +28,13 @@ MAXIMUM_DRAWN = 12  # So many profiles are drawn at most; the distances are of a
 
 def comparison_text(compared: Compared) -> str:
     """A table of the profiles, and one of their pairs: verdict, distance, what they differ by."""
-    lines = [*_table([_row(each) for each in compared.profiles]), f"{FIGURES_NOTE}.", "", *_table(_pairs(compared))]
-    lines.append(f"{_distance_note(compared)}.")
+    profiles, pairs = (
+        aligned([list(rows[0]), *(list(row.values()) for row in rows)])
+        for rows in ([_row(each) for each in compared.profiles], _pairs(compared))
+    )
+    lines = [*profiles, f"{FIGURES_NOTE}.", "", *pairs, f"{_distance_note(compared)}."]
     lines += [f"alike: {', '.join(group)}" for group in compared.groups if len(group) > 1]
     return "\n".join(lines)
-
-
-def _table(rows: list[dict[str, str]]) -> list[str]:
-    """Aligned columns under their names."""
-    widths = [max(len(column), *(len(row[column]) for row in rows)) for column in rows[0]]
-    return [
-        "  ".join(f"{text:<{width}}" for text, width in zip(texts, widths, strict=True)).rstrip()
-        for texts in (list(rows[0]), *(list(row.values()) for row in rows))
-    ]
 
 
 FIGURES_NOTE = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -63,14 +64,13 @@ def evaluate(
     return Evaluation(scores, driver, tables)
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class Evaluation(Result):
     """Scores of a profile on measured drives."""
 
-    __slots__ = ("_given", "_scores", "profile")
-
-    def __init__(self, scores: ProfileScores, profile: DriverProfile, tables: GivenDrives) -> None:
-        self._scores, self._given = scores, tables
-        self.profile = profile
+    _scores: ProfileScores
+    profile: DriverProfile
+    _given: GivenDrives
 
     @property
     def ratio(self) -> float:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -21,8 +21,9 @@ from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.files.drives import file_labels
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.files.xml import read_xml, root_tag
+from xosc_lateral.workflows.options import declare_options
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
-from xosc_lateral.workflows.recordings.importers.table import Imported, guarded, import_each, paths_of
+from xosc_lateral.workflows.recordings.importers.table import KEEP_CUT, Imported, guarded, import_each, paths_of
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks, ground_speed, travel_heading
 from xosc_lateral.workflows.recordings.importers.tracks import import_placed, require_lanes
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
@@ -32,10 +33,14 @@ LICENCE = "that of the CommonRoad scenario and of the recording that it was made
 
 
 @guarded
+@declare_options
 def import_commonroad(
-    sources: Path | Sequence[Path], settings: CutSettings = DEFAULT_CUTS, *, keep_cut: bool = False
+    sources: Path | Sequence[Path],
+    settings: CutSettings = DEFAULT_CUTS,
+    *,
+    keep_cut: Annotated[bool, KEEP_CUT] = False,
 ) -> Imported:
-    """Read one or several scenarios. Raises `FormatError`, `NotEnoughDataError`."""
+    """CommonRoad scenarios (extra `commonroad`): recorded obstacles between the bounds of their lanelets."""
     files = paths_of(sources)
     labels = dict(zip(files, file_labels(files), strict=True))
 

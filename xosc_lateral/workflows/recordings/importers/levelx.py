@@ -21,6 +21,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +30,9 @@ from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.tables import read_table
+from xosc_lateral.workflows.options import declare_options
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings, Rows, cut_table, require_lane_direction
-from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
+from xosc_lateral.workflows.recordings.importers.table import KEEP_CUT, Imported, finished, guarded
 from xosc_lateral.workflows.recordings.lane_graph import NEIGHBOUR_DISTANCE, find_neighbours
 
 LICENCE = (
@@ -48,8 +50,11 @@ VEHICLES = ("car", "van", "truck", "bus", "motorcycle", "trailer")
 
 
 @guarded
-def import_levelx(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cut: bool = False) -> Imported:
-    """Read one recording (its ``XX_tracks.csv``) or a folder of them, of highD or exiD, told by their columns."""
+@declare_options
+def import_levelx(
+    source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cut: Annotated[bool, KEEP_CUT] = False
+) -> Imported:
+    """Recordings of highD or exiD: a folder, or one XX_tracks.csv with its two meta files beside it."""
     tracks_files = sorted(source.glob("*_tracks.csv")) if source.is_dir() else [source]
     if not tracks_files:
         raise FormatError("no XX_tracks.csv in this folder", path=source)

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -22,8 +22,9 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.drives import file_labels
 from xosc_lateral.files.opendrive import parse_opendrive, read_opendrive
 from xosc_lateral.files.osi import osi
+from xosc_lateral.workflows.options import declare_options, flag
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, MOVING_SPEED, CutSettings
-from xosc_lateral.workflows.recordings.importers.table import Imported, guarded, import_each, paths_of
+from xosc_lateral.workflows.recordings.importers.table import KEEP_CUT, Imported, guarded, import_each, paths_of
 from xosc_lateral.workflows.recordings.importers.tracks import (
     PlacedTracks,
     import_placed,
@@ -39,20 +40,19 @@ HOST = "host"  # stands for the trace's own host vehicle
 
 
 @guarded
+@declare_options
 def import_osi(
     sources: Path | Sequence[Path],
     settings: CutSettings = DEFAULT_CUTS,
     *,
-    host: str | None = None,
-    road: Path | str | None = None,
-    channel: str | None = None,
-    keep_cut: bool = False,
-) -> Imported:
-    """Read one or several traces of ground truth or sensor views.
-
-    `host`: keep this vehicle alone: its identifier or name in the trace; "host": the trace's host vehicle. `road`:
-    OpenDRIVE file to take lanes from. `channel`: topic of an MCAP file with several.
-    """
+    host: Annotated[str | None, flag("--host", metavar="ID",
+        help="Keep this vehicle alone: its id or name; host: the host vehicle.")] = None,
+    road: Annotated[Path | str | None, flag("--road", kind=Path | None, metavar="FILE.xodr",
+        help="Take lanes from here, not from the trace.")] = None,
+    channel: Annotated[str | None, flag("--channel", metavar="TOPIC", help="Of an MCAP file.")] = None,
+    keep_cut: Annotated[bool, KEEP_CUT] = False,
+) -> Imported:  # fmt: skip
+    """ASAM OSI traces of ground truth or sensor views (extra `osi`): vehicles between the boundaries of their lanes."""
     files = paths_of(sources)
     labels = dict(zip(files, file_labels(files), strict=True))
 

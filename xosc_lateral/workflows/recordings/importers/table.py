@@ -22,7 +22,10 @@ from xosc_lateral.files.drives import file_label
 from xosc_lateral.files.output_tables import harmless_frame, write_table
 from xosc_lateral.files.source import parsed_hash
 from xosc_lateral.files.tables import foreign_errors
+from xosc_lateral.workflows.options import flag
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
+
+KEEP_CUT = flag("--keep-cut", help="Keep rows that would be cut; the column `state` gives the reason.")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.mapping import MappingLike
 from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.workflows.options import MAPPING, declare_options, flag
 from xosc_lateral.workflows.recordings.cuts import (
     DEFAULT_CUTS,
     MOVING_SPEED,
@@ -26,7 +27,7 @@ from xosc_lateral.workflows.recordings.cuts import (
     cut_table,
     require_lane_direction,
 )
-from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
+from xosc_lateral.workflows.recordings.importers.table import KEEP_CUT, Imported, finished, guarded
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks, rate, read_tracks
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph, neighbour_columns
 from xosc_lateral.world.road.lanes import DRIVING, beside
@@ -39,20 +40,20 @@ Piece = tuple[int, int, int]  # road, lane section, lane
 
 
 @guarded
+@declare_options
 def import_tracks(
-    source: Path,
-    *,
-    road: Path | str,
-    columns: Sequence[str] = (),
-    mapping: MappingLike | None = None,
+    source: Path, *,
+    road: Annotated[Path | str, flag("--road", kind=Path, metavar="FILE.xodr", help="Road on which the tracks lie.")],
+    columns: Annotated[Sequence[str], flag("--map", kind=list[str] | None, metavar="NAME=COLUMN[:UNIT]",
+        help="vehicle, time, x, y, heading, speed, length, vehicle_class, e.g. heading=psi:deg.")] = (),
+    mapping: Annotated[MappingLike | None, MAPPING] = None,
     settings: CutSettings = DEFAULT_CUTS,
-    keep_cut: bool = False,
-) -> Imported:
-    """Read tracks on a known road, an OpenDRIVE file.
+    keep_cut: Annotated[bool, KEEP_CUT] = False,
+) -> Imported:  # fmt: skip
+    """A table of tracks (x, y and heading of any recording) on a known road: lanes, offsets, neighbours.
 
     `source`: table of one row per vehicle and instant, or a log of esmini (``--csv_logger``); x and y are the vehicle's
-    middle, or lie `rear` behind it, in the road's coordinates. `columns`: ``NAME=COLUMN[:UNIT]``; `mapping`: more,
-    saved.
+    middle, or lie `rear` behind it, in the road's coordinates.
     """
     network = read_opendrive(road)
     placed, graph = place_on_road(read_tracks(source, columns, mapping), network)
