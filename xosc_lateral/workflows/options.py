@@ -32,6 +32,7 @@ NO_EGO = "none"
 """In place of a vehicle under test: there is none."""
 
 Verb = TypeVar("Verb", bound=Callable[..., Any])
+Settings = TypeVar("Settings", bound=type)
 
 Cell = Callable[[str, Path], Any]
 """Text of a table's cell and the table's folder -> what a user would say in Python."""
@@ -105,26 +106,41 @@ def declare_options(call: Verb) -> Verb:
 
     Keywords of a name in `SHARED` need no annotation where they have a default.
     """
-    options, entries = dict[str, Option](), list[str]()
-    documented, globals_ = inspect.cleandoc(call.__doc__ or ""), call.__globals__
+    options, kinds = dict[str, Option](), dict[str, str]()
+    globals_ = call.__globals__
     for name, parameter in inspect.signature(call).parameters.items():
         kind = parameter.annotation
         option = SHARED.get(name) if parameter.default is not parameter.empty else None
         if kind.startswith("Annotated["):
             kind, metadata = map(ast.unparse, ast.parse(kind, mode="eval").body.slice.elts)
             call.__annotations__[name], option = kind, eval(metadata, globals_)
-        if option is None:
-            continue
-        options[name] = option if option.kind is not None else replace(option, kind=eval(kind, globals_))
+        if option is not None:
+            options[name] = option if option.kind is not None else replace(option, kind=eval(kind, globals_))
+            kinds[name] = kind
+    call.__doc__ = _documented(call.__doc__ or "", options, kinds)
+    call.__options__ = options  # type: ignore[attr-defined]
+    return call
+
+
+def documented(settings: Settings) -> Settings:
+    """Settings whose docstring has an entry for each."""
+    options = {name: SHARED[name] if known.kind is None else known for name, known in options_of(settings).items()}
+    settings.__doc__ = _documented(settings.__doc__ or "", options, {one.name: one.type for one in settable(settings)})
+    return settings
+
+
+def _documented(text: str, options: Mapping[str, Option], kinds: Mapping[str, Any]) -> str:
+    """A docstring with an entry for each option; what it does not say itself, the option's help says."""
+    documented, entries = inspect.cleandoc(text), list[str]()
+    for name, option in options.items():
         if not re.search(rf"^(\w+, )*{name}(, \w+)*( :|$)", documented, flags=re.MULTILINE):
-            text = re.sub("--([a-z]+)", r"`\1`", option.words["help"].replace("; may be repeated", ""))
-            entries.append(f"{name} : {kind}\n    {text}")
+            words = re.sub("--([a-z]+)", r"`\1`", option.words["help"].replace("; may be repeated", ""))
+            entries.append(f"{name} : {kinds[name]}\n    {words}")
     sections = re.split(r"\n\n(?=\w+\n---)", documented)
     if len(sections) == 1 or not sections[1].startswith("Parameters"):
         sections.insert(1, "Parameters\n----------")
     sections[1] = "\n".join([sections[1], *entries])
-    call.__doc__, call.__options__ = "\n\n".join(sections), options  # type: ignore[attr-defined]
-    return call
+    return "\n\n".join(sections)
 
 
 def settable(settings: type) -> list[Field[Any]]:
