@@ -43,9 +43,9 @@ from xosc_lateral.drivers.model.profile import DriverProfile, Metadata, Provenan
 from xosc_lateral.drivers.model.sensor import SensorModel
 from xosc_lateral.files.drives import drives_of_table, read_drives
 from xosc_lateral.files.source import parsed_hash
+from xosc_lateral.workflows.recordings.importers import ImportedDrives
 from xosc_lateral.workflows.recordings.importers.dlr_ht import HIGHEST_FREQUENCY, import_dlr_ht
 from xosc_lateral.workflows.recordings.importers.openacc import import_openacc
-from xosc_lateral.workflows.recordings.importers.table import write_imported
 
 FloatArray = NDArray[np.float64]
 
@@ -105,7 +105,7 @@ def build_library(
     kind = dict(zip(imported.table["drive"], imported.table["vehicle_class"], strict=True))
     with tempfile.TemporaryDirectory() as folder:
         table = Path(folder) / "dlr-ht.parquet"
-        write_imported(imported, table)
+        ImportedDrives(imported, (source,)).write(table)
         drives = read_drives(table)
     runs = all_runs(drives)
     rural, fast = _rural(gnss, model)

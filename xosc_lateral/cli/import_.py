@@ -40,6 +40,15 @@ class _Table(Written):
             self.say_words(str(imported), {"output": str(written), **imported.to_dict()})
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _CutTable(_Table):
+    """The same of formats from which lane changes and the like are cut."""
+
+    keep_cut: Annotated[
+        bool, typer.Option("--keep-cut", help="Keep rows that would be cut; the column `state` gives the reason.")
+    ] = False
+
+
 class _WithPlugins(TyperGroup):
     """Formats of the package, then those of plug-ins, with ``--set KEY=VALUE``."""
 
@@ -86,12 +95,12 @@ def _add(
             from xosc_lateral.workflows.recordings.importers.mf4 import channels_wanted
 
             raise typer.BadParameter(channels_wanted(sources[0]), param_hint="--map")
-        table.fill(name, sources, **options)
+        table.fill(name, sources, **options, **({"keep_cut": table.keep_cut} if isinstance(table, _CutTable) else {}))
 
     run.__doc__ = str(importer.__doc__).partition("\n\n")[0]
     argument = typer.Argument(metavar=metavar, help=sources, show_default=False)
     run.__annotations__ = {"sources": Annotated[kind, argument], "options": Annotated[Options, importer]}
-    run.__annotations__["table"] = _Table
+    run.__annotations__["table"] = _Table if name in ("mf4", "fcd") else _CutTable
     command(group, name, short, *examples)(run)
 
 

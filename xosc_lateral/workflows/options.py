@@ -136,6 +136,8 @@ def _documented(text: str, options: Mapping[str, Option], kinds: Mapping[str, An
         if not re.search(rf"^(\w+, )*{name}(, \w+)*( :|$)", documented, flags=re.MULTILINE):
             words = re.sub("--([a-z]+)", r"`\1`", option.words["help"].replace("; may be repeated", ""))
             entries.append(f"{name} : {kinds[name]}\n    {words}")
+    if not entries:
+        return documented
     sections = re.split(r"\n\n(?=\w+\n---)", documented)
     if len(sections) == 1 or not sections[1].startswith("Parameters"):
         sections.insert(1, "Parameters\n----------")

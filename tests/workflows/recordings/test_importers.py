@@ -19,9 +19,9 @@ from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.cli import main
 from xosc_lateral.files.output_tables import METADATA_KEY
 from xosc_lateral.workflows.recordings.cuts import CutSettings, lane_changes, long_gaps, name_states, number_runs
+from xosc_lateral.workflows.recordings.importers import Imported
 from xosc_lateral.workflows.recordings.importers.dlr_ht import import_dlr_ht, read_tracks
 from xosc_lateral.workflows.recordings.importers.levelx import import_levelx
-from xosc_lateral.workflows.recordings.importers.table import Imported
 from xosc_lateral.workflows.recordings.lane_graph import NEIGHBOUR_DISTANCE, find_neighbours
 from xosc_lateral.workflows.recordings.lanes_from_tracks import fit_lane_centre
 from xosc_lateral.world.road.reference_line import fit_reference_line

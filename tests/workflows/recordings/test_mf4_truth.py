@@ -11,8 +11,8 @@ from tests.kit.recordings import WIDTH, write_mf4
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.drivers.drives.cuts import cut_runs
 from xosc_lateral.files.drives import drives_of_table
+from xosc_lateral.workflows.recordings.importers import Imported
 from xosc_lateral.workflows.recordings.importers.mf4 import import_mf4
-from xosc_lateral.workflows.recordings.importers.table import Imported
 
 pytest.importorskip("asammdf", reason="extra `mdf` is not installed")
 pytestmark = pytest.mark.filterwarnings("default")

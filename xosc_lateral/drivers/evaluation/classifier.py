@@ -26,9 +26,8 @@ BANDS = 16  # Of the log spectrum, from one period a snippet to the highest freq
 EVEN_BANDS = 25
 # Values of a snippet, and differences over as much, that are shown: more slow a tree down and add nothing. [-]
 VALUES = 20
-MAXIMUM_SNIPPETS = (
-    1500  # Snippets of either kind that a classifier sees, spread evenly: an error of 0.01 in the area. [-]
-)
+# Snippets of either kind that a classifier sees, spread evenly: an error of 0.01 in the area. [-]
+MAXIMUM_SNIPPETS = 1500
 RESAMPLES = 200  # Of the drives, for the interval.
 
 
@@ -182,26 +181,12 @@ def area_under_roc(score: FloatArray, label: NDArray[np.bool_], weight: FloatArr
     return float((yes * (below + 0.5 * no)).sum() / (yes.sum() * no.sum()))
 
 
-# ---- The shape of a snippet in a dozen numbers, whatever its plac ----
+# ---- the shape of a snippet in a dozen numbers, whatever its place and size ----
 # Columns of `shape_features`; most are features of catch22.
 SHAPES = (
-    "mode_5",
-    "mode_10",
-    "longest_above_mean",
-    "longest_decrease",
-    "decay",
-    "first_minimum",
-    "reversibility",
-    "large_changes",
-    "centroid",
-    "low_power",
-    "late_extremes_high",
-    "late_extremes_low",
-    "motifs",
-    "forecast_error",
-    "kurtosis",
-    "change_kurtosis",
-    "sign_changes",
+    *("mode_5", "mode_10", "longest_above_mean", "longest_decrease", "decay", "first_minimum", "reversibility"),
+    *("large_changes", "centroid", "low_power", "late_extremes_high", "late_extremes_low", "motifs"),
+    *("forecast_error", "kurtosis", "change_kurtosis", "sign_changes"),
 )
 
 LARGE_CHANGE = 0.04  # Of a change from row to row, in standard deviations (pNN40 of catch22). [-]
@@ -223,6 +208,8 @@ def shape_features(snippets: FloatArray) -> FloatArray:
     z = (x - x.mean(axis=1, keepdims=True)) / np.where(spread > 0.0, spread, 1.0)
     change = np.diff(z, axis=1)
     lagged = _autocorrelation(z)
+    centred = change - change.mean(axis=1, keepdims=True)
+    variance = (centred**2).mean(axis=1)
     return np.column_stack(
         [
             _mode(z, 5),
@@ -237,9 +224,9 @@ def shape_features(snippets: FloatArray) -> FloatArray:
             _median_place(z > EXTREME_QUANTILE),
             _median_place(z < -EXTREME_QUANTILE),
             _motif_entropy(z),
-            _forecast_error(z),
+            (z[:, 3:] - (z[:, :-3] + z[:, 1:-2] + z[:, 2:-1]) / 3.0).std(axis=1),
             (z**4).mean(axis=1),
-            _kurtosis(change),
+            (centred**4).mean(axis=1) / np.where(variance > 0.0, variance, 1.0) ** 2,
             turns(change),
         ]
     )
@@ -301,14 +288,3 @@ def _motif_entropy(z: FloatArray) -> FloatArray:
     words = 9 * letters[:, :-2] + 3 * letters[:, 1:-1] + letters[:, 2:]
     share = np.array([(words == k).mean(axis=1) for k in range(27)])
     return np.asarray(-(share * np.log2(np.where(share > 0.0, share, 1.0))).sum(axis=0))
-
-
-def _forecast_error(z: FloatArray) -> FloatArray:
-    forecast = (z[:, :-3] + z[:, 1:-2] + z[:, 2:-1]) / 3.0
-    return np.asarray((z[:, 3:] - forecast).std(axis=1))
-
-
-def _kurtosis(values: FloatArray) -> FloatArray:
-    centred = values - values.mean(axis=1, keepdims=True)
-    variance = (centred**2).mean(axis=1)
-    return np.asarray((centred**4).mean(axis=1) / np.where(variance > 0.0, variance, 1.0) ** 2)

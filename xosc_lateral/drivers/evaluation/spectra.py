@@ -120,9 +120,8 @@ def autocorrelation(runs: Sequence[FloatArray], lags: Sequence[int]) -> FloatArr
     return result
 
 
-STOP_FREQUENCY = (
-    0.5  # Where the stop band begins. Drivers steer against what they see below it; beyond it cameras show. [Hz]
-)
+# Where the stop band begins. Drivers steer against what they see below it; beyond it cameras show. [Hz]
+STOP_FREQUENCY = 0.5
 PASS_FREQUENCY = 0.4  # Where the pass band ends: the filter sees 11 s to each side, a quarter of most runs. [Hz]
 # Of the stop band: noise of 1 cm becomes 0.1 mm, far less than a difference between two models. [dB]
 ATTENUATION = 40.0
@@ -165,7 +164,7 @@ def resolution_of(runs: Sequence[Run]) -> float:
     return max((run.resolution for run in runs if run.resolution is not None), default=0.0)
 
 
-# ---- Up to which frequency sampled movement is like that of other ----
+# ---- up to which frequency sampled movement is like that of other real drivers ----
 BAND_EDGES = (0.04, 0.08, 0.12, 0.16, 0.20, 0.25, 0.32, 0.40, 0.50, 0.70, 1.0, PASS_BAND_EDGES)
 """In which power is compared: as wide as windows of 25.6 s resolve, or a quarter of their frequency. [Hz]"""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace as with_fields
 
 import numpy as np
@@ -16,7 +16,7 @@ from xosc_lateral.drivers.drives.cuts import PAPER_RULES, CutRules, all_runs
 from xosc_lateral.drivers.drives.drive import Drive, Run
 from xosc_lateral.drivers.drives.resampling import STEP, resample
 from xosc_lateral.drivers.evaluation.sizes import sizes_of_runs
-from xosc_lateral.drivers.fitting.bands import in_bands, split_by_band
+from xosc_lateral.drivers.fitting.bands import KEEPING_BAND, in_bands, split_by_band
 from xosc_lateral.drivers.fitting.context_effects import (
     LEAST_DRIVES,
     beside_effects,
@@ -42,6 +42,7 @@ def fit_profile(
     sensor_noise: float | None = None,
     neighbours: bool | None = None,
     prior: DriverProfile | None = None,
+    stand_in: Callable[[], DriverProfile] | None = None,
 ) -> DriverProfile:
     """Cut drives into runs, separate driver and sensor, and fit a profile.
 
@@ -64,17 +65,20 @@ def fit_profile(
     prior : DriverProfile, optional
         Where its movement comes from above the band that the drives show (`Drive.valid_below`), if no other drives show
         it: without, there is none above.
+    stand_in : callable, optional
+        Gives the prior, of a model of ours, where the drives state a band that ends below `KEEPING_BAND`.
     """
     slow, fast = split_by_band(drives)
     runs = all_runs(slow, rules)
-    if (
-        model_named(model).model.kind == ModelKind.TWO_LEVEL
-    ):  # to the letter: the paper takes offsets as they were measured
+    if model_named(model).model.kind == ModelKind.TWO_LEVEL:  # the paper takes offsets as they were measured
         if neighbours:
             raise DriverProfileError(f"a {ModelKind.TWO_LEVEL} profile is fitted without what neighbours do")
         if fast or prior is not None:
             raise DriverProfileError(f"a {ModelKind.TWO_LEVEL} profile is fitted to one recording alone")
         return in_bands(fit_runs(runs, name=name, model=model, provenance=provenance), runs)
+    is_partial = not fast and any((drive.valid_below or np.inf) < KEEPING_BAND for drive in slow)
+    if stand_in is not None and is_partial:
+        prior = stand_in()
     cleaned, sensor = driver_runs(runs, slow, sensor_noise=sensor_noise)
     known = provenance or Provenance()
     known = replace(known, fit={**known.fit, **_marking_notes(slow)})

@@ -210,7 +210,13 @@ class DriverProfile(Record, frozen=True):
         Raises `DriverProfileError` if it is no profile, of another version, or contradicts itself; names the field and
         where it stands.
         """
-        present = _checked(values)
+        if not isinstance(values, Mapping) or values.get("format") != FORMAT:
+            raise DriverProfileError(f'not a driver profile: "format" is not "{FORMAT}"')
+        version = values.get("version")
+        if version != VERSION or isinstance(version, bool):
+            cure = ": update the package" if isinstance(version, int) and version > VERSION else ""
+            raise DriverProfileError(f"file format {version!r}; this version of xosc-lateral reads {VERSION}{cure}")
+        present = {name: value for name, value in values.items() if name not in ("format", "version")}
         effects = present.get("effects")
         effects = effects if isinstance(effects, list) else ()
         kinds = [effect.get("kind") for effect in effects if isinstance(effect, Mapping)]
@@ -218,18 +224,6 @@ class DriverProfile(Record, frozen=True):
         kind = model.get("kind") if isinstance(model, Mapping) else None
         read = read_as(file_type(str(kind), frozenset(map(str, kinds))), present)
         return cls(**{name: getattr(read, name) for name in cls.__struct_fields__})
-
-
-def _checked(values: object) -> dict[str, Any]:
-    """A profile file's values without format and version; refused if it is none of ours, or of another version."""
-    if not isinstance(values, Mapping) or values.get("format") != FORMAT:
-        raise DriverProfileError(f'not a driver profile: "format" is not "{FORMAT}"')
-    version = values.get("version")
-    if version != VERSION or isinstance(version, bool):
-        newer = isinstance(version, int) and version > VERSION
-        cure = ": update the package" if newer else ""
-        raise DriverProfileError(f"file format {version!r}; this version of xosc-lateral reads {VERSION}{cure}")
-    return {name: value for name, value in values.items() if name not in ("format", "version")}
 
 
 @lru_cache(maxsize=16)

@@ -86,7 +86,6 @@ def fit(
 
     from xosc_lateral.base.errors import DriverProfileError
     from xosc_lateral.drivers.drives.cleaning import summary_of
-    from xosc_lateral.drivers.fitting.bands import KEEPING_BAND, split_by_band
     from xosc_lateral.drivers.fitting.fitting import fit_profile
     from xosc_lateral.drivers.fitting.models.two_level import correct_two_level
     from xosc_lateral.drivers.model.core.base import ModelKind
@@ -97,12 +96,7 @@ def fit(
     if corrected and model_named(model).model.kind != ModelKind.TWO_LEVEL:
         raise DriverProfileError(f"model {model}: only the two-level model has a corrected fit")
     tables = given_drives(drives, columns).valid_below(valid_below)
-    slow, fast = split_by_band(tables.drives)
-    is_partial = not fast and any(drive.valid_below is not None and drive.valid_below < KEEPING_BAND for drive in slow)
     by_default = isinstance(prior, str) and prior == PRIOR
-    has_prior = prior is not None and (is_partial or not by_default)
-    if by_default and model_named(model).model.kind == ModelKind.TWO_LEVEL:
-        has_prior = False
     known = Provenance(
         source=source or ", ".join(tables.inputs),
         licence=licence,
@@ -117,7 +111,8 @@ def fit(
             provenance=known,
             sensor_noise=sensor_noise,
             neighbours=neighbours,
-            prior=given_profile(prior, library) if has_prior and prior is not None else None,
+            prior=None if prior is None or by_default else given_profile(prior, library),
+            stand_in=(lambda: given_profile(PRIOR, library)) if by_default else None,
         )
     if corrected and isinstance(profile.model, TwoLevelModel):
         provenance = replace(profile.provenance, fit={**profile.provenance.fit, "corrected": True})

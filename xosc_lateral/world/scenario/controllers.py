@@ -9,13 +9,8 @@ from enum import IntFlag
 from msgspec import Struct
 from msgspec.structs import replace
 
+from xosc_lateral.world.scenario import private_actions
 from xosc_lateral.world.scenario.entity import Controller, Entity
-from xosc_lateral.world.scenario.private_actions import (
-    CONTROLLER,
-    ActivateControllerAction,
-    AssignControllerAction,
-    OverrideControllerValueAction,
-)
 from xosc_lateral.world.scenario.scenario import Action, Scenario
 
 
@@ -29,10 +24,7 @@ class Domains(IntFlag):
 
     def words(self) -> str:
         """In words."""
-        return _WORDS[int(self)]
-
-
-_WORDS = ("nothing", "along the road", "across the road", "along and across the road")
+        return ("nothing", "along the road", "across the road", "along and across the road")[self]
 
 
 class ControllerKind(Struct, frozen=True):
@@ -119,14 +111,14 @@ def switches(content: object) -> Iterator[tuple[Domains, bool]]:
     """Domains that an action switches on or off; to override pedals or the wheel is to drive, too."""
     switched: tuple[tuple[Domains, bool | None], ...] = ()
     match content:
-        case AssignControllerAction():
+        case private_actions.AssignControllerAction():
             switched = (
                 (Domains.LONGITUDINAL, content.activate_longitudinal),
                 (Domains.LATERAL, content.activate_lateral),
             )
-        case ActivateControllerAction():
+        case private_actions.ActivateControllerAction():
             switched = (Domains.LONGITUDINAL, content.longitudinal), (Domains.LATERAL, content.lateral)
-        case OverrideControllerValueAction():
+        case private_actions.OverrideControllerValueAction():
             switched = tuple(
                 (Domains.LATERAL if "steering" in name.lower() else Domains.LONGITUDINAL, active)
                 for name, active, _ in content.overrides
@@ -137,7 +129,7 @@ def switches(content: object) -> Iterator[tuple[Domains, bool]]:
 def gives_lateral(content: object) -> bool | None:
     """Whether an action gives the lateral domain to a controller, or takes it back; None: neither."""
     lateral = next((on for domain, on in switches(content) if domain is Domains.LATERAL), None)
-    if isinstance(content, AssignControllerAction) and content.controller is not None:
+    if isinstance(content, private_actions.AssignControllerAction) and content.controller is not None:
         kind = kind_of(content.controller)
         return Domains.LATERAL in kind.drives if kind.at_once else lateral
     return lateral
@@ -145,7 +137,7 @@ def gives_lateral(content: object) -> bool | None:
 
 def is_meant(controller: Controller, content: object) -> bool:
     """Whether an activation may be of this controller: it names it, or none."""
-    name = content.controller_ref if isinstance(content, ActivateControllerAction) else None
+    name = content.controller_ref if isinstance(content, private_actions.ActivateControllerAction) else None
     return not name or name in (controller.object_name, controller.name)
 
 
@@ -168,14 +160,14 @@ class DrivingControllers:
 
     def follow(self, content: object) -> None:
         """An action on controllers has begun."""
-        if isinstance(content, AssignControllerAction) and content.controller is not None:
+        if isinstance(content, private_actions.AssignControllerAction) and content.controller is not None:
             self._assign(content.controller)
-        if isinstance(content, OverrideControllerValueAction):
+        if isinstance(content, private_actions.OverrideControllerValueAction):
             self._overridden = Domains.NONE
             for domain, on in switches(content):
                 self._overridden |= domain if on else Domains.NONE
             return
-        if self._for_carla and isinstance(content, ActivateControllerAction):
+        if self._for_carla and isinstance(content, private_actions.ActivateControllerAction):
             self._assigned = [assigned for assigned in self._assigned if assigned.kind is not AUTOPILOT]
             self._assigned.append(_Assigned(Controller(AUTOPILOT.name, content.place), AUTOPILOT))
         meant = next((each for each in reversed(self._assigned) if is_meant(each.controller, content)), None)
@@ -250,7 +242,7 @@ def controlled_entities(scenario: Scenario) -> dict[str, Control]:
     """Entities that controllers drive at some time, by an action that makes them active, in the scenario's order."""
     assigned, actions = assigned_controllers(scenario), dict[str, list[object]]()
     for actors, action in _private_actions(scenario):
-        for actor in actors if isinstance(action.content, CONTROLLER) else ():
+        for actor in actors if isinstance(action.content, private_actions.CONTROLLER) else ():
             actions.setdefault(actor, []).append(action.content)
     reasons = {}
     for entity in scenario.entities:
@@ -264,7 +256,7 @@ def controlled_entities(scenario: Scenario) -> dict[str, Control]:
             if kind.active(asked):
                 names[named(controller)] = None
                 domains |= kind.active(asked)
-        activations = (content for content in contents if isinstance(content, ActivateControllerAction))
+        activations = (content for content in contents if isinstance(content, private_actions.ActivateControllerAction))
         if scenario.header.is_left_handed and any(_switched_on(activations)):
             names[AUTOPILOT.name] = None
             domains = Domains.BOTH
@@ -282,7 +274,7 @@ def assigned_controllers(scenario: Scenario) -> dict[str, list[Controller]]:
     assigned = {entity.name: list(entity.controllers) for entity in scenario.entities}
     for actors, action in _private_actions(scenario):
         content = action.content
-        if isinstance(content, AssignControllerAction) and content.controller is not None:
+        if isinstance(content, private_actions.AssignControllerAction) and content.controller is not None:
             for actor in actors:
                 assigned.setdefault(actor, []).append(content.controller)
     return assigned

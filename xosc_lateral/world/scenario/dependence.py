@@ -13,16 +13,7 @@ from typing import Any
 
 from msgspec import Struct
 
-from xosc_lateral.world.scenario.conditions import (
-    CollisionCondition,
-    ParameterCondition,
-    RelativeClearanceCondition,
-    StoryboardElementStateCondition,
-    TrafficSignalCondition,
-    TrafficSignalControllerCondition,
-    UserDefinedValueCondition,
-    VariableCondition,
-)
+from xosc_lateral.world.scenario import conditions
 from xosc_lateral.world.scenario.enums import StoryboardElementState, StoryboardElementType
 from xosc_lateral.world.scenario.global_actions import TrafficSignalControllerAction, TrafficSignalStateAction
 from xosc_lateral.world.scenario.private_actions import (
@@ -79,16 +70,16 @@ class Dependence:
         if looked_at & self.entities:
             return True
         match content:
-            case CollisionCondition(entity_ref=None) | RelativeClearanceCondition(entity_refs=()):
+            case conditions.CollisionCondition(entity_ref=None) | conditions.RelativeClearanceCondition(entity_refs=()):
                 return bool(self.entities)  # anybody
-            case StoryboardElementStateCondition():
+            case conditions.StoryboardElementStateCondition():
                 paths = self.begins if content.state is StoryboardElementState.START_TRANSITION else self.ends
                 return any(refers_to(content, path) for path in paths)
-            case ParameterCondition() | VariableCondition() | TrafficSignalCondition():
+            case conditions.ParameterCondition() | conditions.VariableCondition() | conditions.TrafficSignalCondition():
                 return _value(content) in self.values
-            case TrafficSignalControllerCondition():
+            case conditions.TrafficSignalControllerCondition():
                 return content.controller_ref in self.values
-        return isinstance(content, UserDefinedValueCondition)  # comes from whoever drives
+        return isinstance(content, conditions.UserDefinedValueCondition)  # comes from whoever drives
 
     def size(self) -> int:
         """Of what was found."""
@@ -133,7 +124,7 @@ def entity_references(content: object) -> Iterator[str]:
                 yield from entity_references(value)
 
 
-def refers_to(content: StoryboardElementStateCondition, path: Path) -> bool:
+def refers_to(content: conditions.StoryboardElementStateCondition, path: Path) -> bool:
     """Whether a state condition is about the element with these names from the story down."""
     wanted = tuple(content.element_ref.split("::"))
     return _DEPTH.get(content.element_type) == len(path) and path[len(path) - len(wanted) :] == wanted
@@ -179,7 +170,7 @@ def _follow_event(
 
 def _value(content: object) -> str:
     """Name of the parameter, variable or signal that an action sets or a condition looks at; empty: none."""
-    if isinstance(content, TrafficSignalStateAction | TrafficSignalCondition):
+    if isinstance(content, TrafficSignalStateAction | conditions.TrafficSignalCondition):
         return content.name
     if isinstance(content, TrafficSignalControllerAction):
         return content.controller_ref

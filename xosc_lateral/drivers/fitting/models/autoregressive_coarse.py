@@ -203,6 +203,12 @@ def coarse_power(coarse: Autoregression, knots: FloatArray) -> FloatArray:
     return np.asarray(coarse.power(knots * COARSE_EVERY) * gain**2 / COARSE_EVERY)
 
 
+def fine_power(fine: ShapedNoise, knots: FloatArray) -> FloatArray:
+    """Of the fine movement, likewise; white noise of variance 1 has 1."""
+    waves = np.exp(-2j * np.pi * np.outer(knots, np.arange(len(fine.kernel))))
+    return np.asarray(NOISE_VARIANCE * np.abs(waves @ fine.kernel) ** 2)
+
+
 def rise(hertz: FloatArray, settings: FitSettings) -> FloatArray:
     """From 0 to 1 where the fine noise begins, shape of `hertz` [Hz]. [-]"""
     low, high = settings.fine_from

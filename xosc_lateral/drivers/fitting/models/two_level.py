@@ -104,13 +104,17 @@ SEED = 0  # The same each time: same drives, same profile.
 def correct_two_level(model: TwoLevelModel) -> TwoLevelModel:
     """The model whose samples, fitted again, are like the one given: leaving rate of all bins together, and damping."""
     target, corrected = leaving_rate(model.counts), model
-    factor, damping = 1.0, np.array(model.damping)
+    factor, damping, total = 1.0, np.array(model.damping), model.counts.sum(axis=1)
+    out = model.counts * ~np.eye(len(total), dtype=np.bool_)  # transitions out of their bin, at most all of them
     for number in range(ROUNDS):
         stream = corrected.stream(np.random.SeedSequence([SEED, number]))
         again = fit_two_level([np.sum(stream.take(STEPS), axis=0)], model.settings)
         factor *= float(_bounded(target / max(leaving_rate(again.counts), 1e-12)))
         damping = damping * _bounded(model.damping / np.maximum(again.damping, 1e-12))
-        corrected = TwoLevelModel(model.settings, _left_more_often(model.counts, factor), damping)
+        most = np.minimum(factor, total / np.maximum(out.sum(axis=1), 1))
+        parts = np.rint(PARTS * out * most[:, None]).astype(np.int64)
+        counts = parts + np.diag(np.maximum(PARTS * total - parts.sum(axis=1), 0))
+        corrected = TwoLevelModel(model.settings, counts, damping)
     return corrected
 
 
@@ -121,12 +125,3 @@ def leaving_rate(counts: IntArray) -> float:
 
 def _bounded(ratio: FloatArray | float) -> FloatArray:
     return np.clip(ratio, 1.0 / LARGEST_CHANGE, LARGEST_CHANGE)
-
-
-def _left_more_often(counts: IntArray, factor: float) -> IntArray:
-    """Counts, in parts, with so many times the transitions out of each bin, at most all of them."""
-    out = counts * ~np.eye(len(counts), dtype=np.bool_)
-    total, leaving = counts.sum(axis=1), out.sum(axis=1)
-    most = np.minimum(factor, total / np.maximum(leaving, 1))
-    parts = np.rint(PARTS * out * most[:, None]).astype(np.int64)
-    return np.asarray(parts + np.diag(np.maximum(PARTS * total - parts.sum(axis=1), 0)))

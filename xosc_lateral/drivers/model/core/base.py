@@ -156,7 +156,9 @@ def _read(state: ClockState, source: Callable[[int], FloatArray], times: FloatAr
     return np.asarray(result)
 
 
-# ---- Fine movement of the paper's model: uniform white noise shap ----
+# ---- fine movement: uniform white noise shaped by a kernel, phi = R * k (arXiv:2405.17080, section III) ----
+# The amplitude spectrum of the measured fine part, relative to that of the noise, is approximated by a piecewise linear
+# damping function over frequency; its inverse transform is the kernel.
 N_KNOTS = 11
 """Knots of the damping function, evenly from 0 to half the sampling rate. [-]"""
 

@@ -9,8 +9,7 @@ from typing import Any
 
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.plugins import defined_in, entry_points
-from xosc_lateral.drivers.model.effects.base import Acts, Effect, EffectTerms
-from xosc_lateral.drivers.model.effects.column import ColumnEffect
+from xosc_lateral.drivers.model.effects.base import Acts, ColumnEffect, Effect, EffectTerms
 from xosc_lateral.drivers.model.effects.hidden import (
     Adapted,
     Cycle,

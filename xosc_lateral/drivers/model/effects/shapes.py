@@ -18,7 +18,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError
-from xosc_lateral.drivers.model.effects.column import ColumnEffect
+from xosc_lateral.drivers.model.effects.base import ColumnEffect
 from xosc_lateral.drivers.model.records import Record, set_once
 
 

@@ -12,18 +12,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
-from xosc_lateral.files.drives import file_labels
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.files.xml import read_xml, root_tag
-from xosc_lateral.workflows.options import declare_options
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
-from xosc_lateral.workflows.recordings.importers.table import KEEP_CUT, Imported, guarded, import_each, paths_of
+from xosc_lateral.workflows.recordings.importers import Imported, import_each, importer, paths_of
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks, ground_speed, travel_heading
 from xosc_lateral.workflows.recordings.importers.tracks import import_placed, require_lanes
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
@@ -32,26 +30,18 @@ from xosc_lateral.workflows.recordings.lane_shapes import LaneShape, curvature_a
 LICENCE = "that of the CommonRoad scenario and of the recording that it was made from"
 
 
-@guarded
-@declare_options
-def import_commonroad(
-    sources: Path | Sequence[Path],
-    settings: CutSettings = DEFAULT_CUTS,
-    *,
-    keep_cut: Annotated[bool, KEEP_CUT] = False,
-) -> Imported:
+@importer
+def import_commonroad(sources: Path | Sequence[Path], settings: CutSettings = DEFAULT_CUTS) -> Imported:
     """CommonRoad scenarios (extra `commonroad`): recorded obstacles between the bounds of their lanelets."""
-    files = paths_of(sources)
-    labels = dict(zip(files, file_labels(files), strict=True))
 
-    def read(path: Path) -> Imported:
-        tracks, shapes, graph, version = read_obstacles(path, labels[path])
+    def read(path: Path, label: str) -> Imported:
+        tracks, shapes, graph, version = read_obstacles(path, label)
         placed = place_in_shapes(tracks, shapes, graph.left)
         require_lanes(placed, "its lanelets", path)
         about = {"format": "commonroad", "version": version, "licence": LICENCE}
-        return import_placed(placed, graph, settings, keep_cut=True, sources=[path], **about)
+        return import_placed(placed, graph, settings, sources=[path], **about)
 
-    return import_each(files, read, keep_cut=keep_cut)
+    return import_each(paths_of(sources), read)
 
 
 def read_obstacles(path: Path, label: str) -> tuple[Tracks, list[_Lanelet], LaneGraph, str]:

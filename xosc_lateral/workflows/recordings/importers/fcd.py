@@ -34,9 +34,9 @@ from xosc_lateral.files.sumo import (
     usual_length,
     wrong_element,
 )
-from xosc_lateral.workflows.options import declare_options, flag
+from xosc_lateral.workflows.options import flag
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS, is_right_to_left
-from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
+from xosc_lateral.workflows.recordings.importers import Imported, imported, importer
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph, neighbour_columns
 from xosc_lateral.workflows.recordings.roads_from_lanes import DrivenLane
@@ -47,8 +47,7 @@ NET_ENDINGS = (".net.xml", ".net.xml.gz")
 REAR_FROM_FRONT = 0.8  # rear axle behind the front bumper, as a share of the length: 3.7 m of a car of 4.6 m [-]
 
 
-@guarded
-@declare_options
+@importer
 def import_fcd(
     source: Path, *,
     net: Annotated[str | Path | None, flag(kind=Path | None,
@@ -83,7 +82,7 @@ def import_fcd(
     settings = {"lane_width": lane_width if net is None else None}
     about = {"format": "fcd", "licence": LICENCE, "settings": settings, "notes": notes}
     step = float(np.median(np.diff(np.unique(table["time"])))) if table["time"].nunique() > 1 else 0.0
-    return finished(table, keep_cut=False, sources=sources, step=step, **about)
+    return imported(table, sources=sources, step=step, **about)
 
 
 def _rows(vehicles: Iterator[tuple[float, Any]], source: Path) -> Iterator[tuple[Any, ...]]:

@@ -40,9 +40,9 @@ from xosc_lateral.files.drives import file_labels, from_middle
 from xosc_lateral.files.mapping import ColumnSource, MappingLike, as_mapping, factor, is_measured, parse_map, spelled
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import LONGEST_MESSAGE, foreign_errors
-from xosc_lateral.workflows.options import MAPPING, declare_options, flag
+from xosc_lateral.workflows.options import MAPPING, flag
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
-from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded, paths_of
+from xosc_lateral.workflows.recordings.importers import Imported, imported, importer, paths_of
 
 POSITIONS = (("offset", "lane_width"), ("distance_left", "distance_right"))
 LICENCE = "your own recording"
@@ -94,13 +94,11 @@ class Channel:
         return values
 
 
-@guarded
-@declare_options
+@importer
 def import_mf4(
     sources: Path | Sequence[Path],
     channels: Annotated[Sequence[str], flag("--map", kind=list[str] | None, metavar="NAME=CHANNEL[:UNIT]",
-        help="Channel of a column, e.g. speed=v_veh:km/h; default unit: the file's.")] = (),
-    *,
+        help="Channel of a column, e.g. speed=v_veh:km/h; default unit: the file's.")] = (), *,
     mapping: Annotated[MappingLike | None, MAPPING] = None,
     step: Annotated[float, flag(help="Time step of the table, to which channels are interpolated [s].", min=0.001,
         max=1)] = 0.04,
@@ -133,7 +131,7 @@ def import_mf4(
     every_unit = {name: " | ".join(sorted(words)) for name, words in units.items()}
     settings = {"step": step, "channels": list(channels), "units": every_unit}
     about = {"format": "mf4", "licence": LICENCE, "settings": settings, "notes": tuple(dict.fromkeys(notes))}
-    return finished(pd.concat(tables, ignore_index=True), keep_cut=False, sources=files, step=step, **about)
+    return imported(pd.concat(tables, ignore_index=True), sources=files, step=step, **about)
 
 
 def channels_wanted(source: Path) -> str:
