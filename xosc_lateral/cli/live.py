@@ -26,7 +26,7 @@ app.add_typer(group, name="live", short_help=VERBS["live"])
 export = typer.Typer(help="Drivers as parts for other tools.", no_args_is_help=True)
 app.add_typer(export, name="export", short_help=VERBS["export"])
 
-FCD = "x,y,angle,type,speed,pos,posLat,lane"  # What `import fcd` reads; SUMO leaves `posLat` out unless told.
+FCD_COLUMNS = "x,y,angle,type,speed,pos,posLat,lane"  # What `import fcd` reads; SUMO leaves `posLat` out unless told.
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +74,7 @@ def sumo(
     options: Annotated[Options, xl.live_sumo], outputs: Outputs, reply: Written,
 ) -> None:
     """Run a SUMO simulation with the sublane model and drivers in its vehicles; lane changes stay SUMO's."""
-    words = () if fcd_output is None else ("--fcd-output", str(fcd_output), "--fcd-output.attributes", FCD)
+    words = () if fcd_output is None else ("--fcd-output", str(fcd_output), "--fcd-output.attributes", FCD_COLUMNS)
     outputs.run(xl.live_sumo, config, reply, options=words, **options)
 
 

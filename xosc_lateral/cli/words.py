@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 Verb = TypeVar("Verb", bound=Callable[..., Any])
 
-PAGES = {
+DOCS_PAGES = {
     "close_loop": "docs/closing_the_loop.md",
     "convert": "docs/scenarios.md, docs/pipeline.md",
     "detect": "docs/how_to/detect.md",
@@ -286,7 +286,7 @@ def command(group: typer.Typer, name: str, short: str, *examples: str, cls: Any 
     """Add a verb to a group, with examples and its page at the end of its help; `cli.verb` gives it its options."""
 
     def add(verb: Verb) -> Verb:
-        page = PAGES[verb.__module__.rpartition(".")[2]]
+        page = DOCS_PAGES[verb.__module__.rpartition(".")[2]]
         lines = "".join(f"\n  xosc-lateral {line}" for line in examples)
         epilog = f"\b\nExamples:{lines}\n\n\b\nMore: {page}"
         group.command(name, cls=cls, short_help=short, epilog=epilog)(verb)

@@ -21,7 +21,7 @@ from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import KeyFigure, Page, format_value
 from xosc_lateral.files.profiles import FIELDS, Entry, facts_of, profile_hash
 
-CHANGED: Mapping[Acts, str] = {
+TARGET_WORDS: Mapping[Acts, str] = {
     Acts.LOCATION: "mean offset",
     Acts.SPREAD: "spread",
     Acts.RATE: "rate of mean reversion",
@@ -154,7 +154,7 @@ def effect_line(effect: Effect) -> str:
         lag = f", {abs(effect.lag_s):g} s {'ahead' if effect.lag_s < 0 else 'behind'}" if effect.lag_s else ""
         response = f", response time {effect.response_time:g} s" if effect.response_time else ""
         course = ", a course over time" if effect.course else ""
-        return f"{CHANGED[effect.acts]} by {' and '.join(effect.columns)} ({effect.shape}{lag}{response}{course})"
+        return f"{TARGET_WORDS[effect.acts]} by {' and '.join(effect.columns)} ({effect.shape}{lag}{response}{course})"
     plain = {name: value for name, value in effect.to_dict().items() if not isinstance(value, list | dict)}
     kind = str(plain.pop("kind")).replace("-", " ")
     return f"{kind}: " + ", ".join(f"{name} {format_value(value)}" for name, value in plain.items())

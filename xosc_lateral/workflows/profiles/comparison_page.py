@@ -22,7 +22,7 @@ from xosc_lateral.files.profiles import profile_hash
 from xosc_lateral.workflows.profiles.cards import figures_record
 
 SHOWN_S = 120.0  # Length of the sample paths in the figure. [s]
-SPACING = 0.8  # Between the zero lines of two sample paths. [m]
+PATH_SPACING = 0.8  # Between the zero lines of two sample paths. [m]
 MAXIMUM_DRAWN = 12  # So many profiles are drawn at most; the distances are of all.
 
 
@@ -158,12 +158,12 @@ def comparison_figure(compared: Compared) -> Figure:
         heights, edges = np.histogram(each.runs, np.linspace(-1.0, 1.0, 81), density=True)
         place.line(0.5 * (edges[1:] + edges[:-1]), heights, color, label=name)
         power.line(each.spectrum.frequency, each.spectrum.density, color, label=name)
-        run = each.runs[0][: round(SHOWN_S / step)] + SPACING * (len(shown) - number)
+        run = each.runs[0][: round(SHOWN_S / step)] + PATH_SPACING * (len(shown) - number)
         paths.line(step * np.arange(len(run)), run, color, label=name)
     power.x.log = power.y.log = True
     place.title, place.x.label, place.y.label = "Distribution", "offset [m], positive to the left", "density [1/m]"
     power.title, power.x.label, power.y.label = "Spectrum", "frequency [Hz]", "power density [m²/Hz]"
-    paths.title, paths.x.label, paths.y.ticks = f"Sample paths, {SPACING:g} m apart", "time [s]", []
+    paths.title, paths.x.label, paths.y.ticks = f"Sample paths, {PATH_SPACING:g} m apart", "time [s]", []
     return figure
 
 
