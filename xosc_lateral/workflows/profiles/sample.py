@@ -108,7 +108,7 @@ class Offsets(Result):
     profile: DriverProfile
     _made: Sequence[SampledOffsets]
     seed: int
-    _given: GivenDrives | None
+    _tables: GivenDrives | None
     _settings: dict[str, Any]
     warnings: tuple[str, ...]
     """What a user has to know, a line each."""
@@ -179,7 +179,7 @@ class Offsets(Result):
         from xosc_lateral.files.output_tables import output_suffixes, write_frame
 
         output = output_file(path, f"{self.profile.name}.csv", output_suffixes())
-        claim([output], () if self._given is None else self._given.files, force=force)
+        claim([output], () if self._tables is None else self._tables.files, force=force)
         write_frame(self.to_frame(), output, self._provenance())
         return output
 
@@ -190,6 +190,6 @@ class Offsets(Result):
             "seed": self.seed,
             "profile": self.profile.name,
             "profile_sha256": profile_hash(self.profile),
-            "inputs": {} if self._given is None else dict(self._given.inputs),
+            "inputs": {} if self._tables is None else dict(self._tables.inputs),
             **self._settings,
         }
