@@ -13,7 +13,7 @@ from typer.core import TyperGroup
 from xosc_lateral.base.plugins import plugin_names
 from xosc_lateral.cli import TYPER_STYLE, VERBS, group_of_verbs
 from xosc_lateral.cli.words import Mapped, Options, Written, command, pairs, with_options, write_stdout
-from xosc_lateral.workflows.recordings.importers import GROUP, find_importer
+from xosc_lateral.workflows.recordings.importers import GROUP, IMPORTERS, find_importer
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,17 +50,17 @@ class _CutTable(_Table):
 
 
 class _WithPlugins(TyperGroup):
-    """Formats of the package, then those of plug-ins, with ``--set KEY=VALUE``."""
+    """Formats with options of their own, then others, of the package or of plug-ins, with ``--set KEY=VALUE``."""
 
     def list_commands(self, ctx: Any) -> list[str]:
-        return [*super().list_commands(ctx), *plugin_names(GROUP)]
+        return list(dict.fromkeys([*super().list_commands(ctx), *IMPORTERS, *plugin_names(GROUP)]))
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         known = super().get_command(ctx, cmd_name)
-        return _plugin_command(cmd_name) if known is None and cmd_name in plugin_names(GROUP) else known
+        return _plain_command(cmd_name) if known is None and cmd_name in self.list_commands(ctx) else known
 
 
-def _plugin_command(name: str) -> Any:
+def _plain_command(name: str) -> Any:
     formats = typer.Typer(context_settings=TYPER_STYLE["context_settings"], rich_markup_mode=None)
 
     def run(

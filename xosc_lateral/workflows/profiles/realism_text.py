@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from xosc_lateral.drivers.evaluation.classifier import TwoSampleResult
 from xosc_lateral.drivers.evaluation.lane_keeping import INDICATORS
 from xosc_lateral.drivers.evaluation.realism import ConditionScores, Realism
 from xosc_lateral.drivers.model.core.base import ModelKind
@@ -64,12 +63,18 @@ def ratio_rows(group: list[ConditionScores]) -> list[dict[str, object]]:
     rows: list[dict[str, object]] = []
     for family, label in FAMILY_LABELS.items():
         if any(family in each.families for each in group):
-            cells = {_length(each): _ratio(each, family) for each in group}
+            cells = {
+                _length(each): f"{each.families[family].ratio:.2f}" if family in each.families else "" for each in group
+            }
             rows.append({"ratio to real drivers": label, **cells})
     for key, label in AREA_LABELS.items():
         areas = {_length(each): getattr(each, key) for each in group}
         if any(area is not None for area in areas.values()):
-            rows.append({"ratio to real drivers": label, **{length: _area(area) for length, area in areas.items()}})
+            cells = {
+                length: "" if area is None else f"{area.auc:.2f} ({area.low:.2f}-{area.high:.2f})"
+                for length, area in areas.items()
+            }
+            rows.append({"ratio to real drivers": label, **cells})
     return rows
 
 
@@ -117,11 +122,3 @@ def realism_lines(realism: Realism) -> list[str]:
 
 def _length(each: ConditionScores) -> str:
     return f"{each.condition.seconds:g} s"
-
-
-def _ratio(each: ConditionScores, family: str) -> str:
-    return f"{each.families[family].ratio:.2f}" if family in each.families else ""
-
-
-def _area(area: TwoSampleResult | None) -> str:
-    return "" if area is None else f"{area.auc:.2f} ({area.low:.2f}-{area.high:.2f})"
