@@ -83,13 +83,11 @@ class Plan:
 
 @dataclass(frozen=True, slots=True)
 class WrittenAs:
-    """Who follows a trajectory, and who keeps its maneuvers and may get lane offsets; all others stay as they are.
-
-    `frozen`: triggers that depend on a vehicle under test and no longer do in the output, a line each.
-    """
+    """Who follows a trajectory, and who keeps its maneuvers and may get lane offsets; all others stay as they are."""
 
     trajectories: frozenset[str]
     lane_offsets: frozenset[str]
+    # frozen: triggers that depend on a vehicle under test and no longer do in the output, a line each
     frozen: tuple[str, ...] = ()
 
 
@@ -209,8 +207,8 @@ def _unwritable(
     """See `Plan`: of those alone that `only` leaves out; the others follow trajectories anyway."""
     if settings.only is None or settings.mode is OutputMode.LANE_OFFSET:
         return {}
-    left = {*settings.only, *unforeseeable}
-    others = [entity.name for entity in played.motion.entities if entity.name not in left]
+    excluded = {*settings.only, *unforeseeable}
+    others = [entity.name for entity in played.motion.entities if entity.name not in excluded]
     if settings.target.player is Player.CARLA:
         return dict.fromkeys(others, "CARLA's ScenarioRunner plays maneuvers in ways of its own")
     return motion_unknown_to(version, played.scenario, played.motion, others)

@@ -47,27 +47,21 @@ Contexts = Mapping[str, tuple[FloatArray, FloatArray]]
 class SeenSegment(NamedTuple):
     """A road-following segment as its driver sees it, or several and what lies between and beside them."""
 
-    spans: tuple[SegmentSpan, ...]
-    """One after another; see `movement_runs`."""
-    knots: IntArray
-    """Rows of the motion that are sampled, shape (n,)."""
-    segment: Segment
-    """In a mirror where the profile is one of the other hand's traffic: `side` is -1 then, else 1."""
+    spans: tuple[SegmentSpan, ...]  # one after another; see `movement_runs`
+    knots: IntArray  # rows of the motion that are sampled, shape (n,)
+    segment: Segment  # in a mirror where the profile is one of the other hand's traffic: `side` is -1 then, else 1
     side: float
-    responses: Responses
-    """See `responses_to`."""
+    responses: Responses  # see `responses_to`
 
 
 class Seen(NamedTuple):
     """All that a driver sees on his way, and how he answers to neighbours."""
 
     segments: tuple[SeenSegment, ...] = ()
-    neutral: tuple[str, ...] = ()
-    """Context columns that his profile asks for and that are not known."""
+    neutral: tuple[str, ...] = ()  # context columns that his profile asks for and that are not known
     responds: frozenset[str] = frozenset()
     """Sides on which the profile responds to neighbours by itself, as its population does."""
-    alone: frozenset[str] = frozenset()
-    """Sides on which that is known of the driver himself: nothing is borrowed."""
+    alone: frozenset[str] = frozenset()  # sides on which that is known of the driver himself: nothing is borrowed
 
 
 NOTHING_SEEN = Seen()
@@ -82,10 +76,7 @@ def seen_by(
     contexts: Contexts,
     neighbours: Neighbours,
 ) -> Seen:
-    """What the driver of an entity sees on runs of spans.
-
-    `motion` is the run of the scenario with those alone whose place beside him is certain.
-    """
+    """What the driver of an entity sees on runs of spans; in `motion` are those whose place beside him is certain."""
     index = next(k for k, one in enumerate(motion.entities) if one is entity)
     every = max(1, round(SAMPLE_STEP / motion.step))
     segments: list[SeenSegment] = []

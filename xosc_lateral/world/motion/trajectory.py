@@ -39,18 +39,14 @@ _MAXIMUM_LATERAL_SPEED = 10.0
 class WorldTrajectory:
     """A path in the world over time, on the rows of the nominal motion; arrays of shape (n,)."""
 
-    time: FloatArray
-    """[s]"""
+    time: FloatArray  # [s]
     x: FloatArray
     y: FloatArray
-    z: FloatArray
-    """[m]"""
+    z: FloatArray  # x, y, z [m]
     heading: FloatArray
     pitch: FloatArray
-    roll: FloatArray
-    """[rad]"""
-    speed: FloatArray
-    """Along the path, negative when driving backwards. [m/s]"""
+    roll: FloatArray  # heading, pitch, roll [rad]
+    speed: FloatArray  # along the path, negative when driving backwards [m/s]
 
 
 def distance_driven(motion: EntityMotion) -> FloatArray:
@@ -237,10 +233,8 @@ SETTLING_TIME = 3.0
 class SampledDeviation(Struct, frozen=True, eq=False):
     """Offsets sampled on one road-following segment."""
 
-    distance: FloatArray
-    """Shape (n,). Distance driven at each sample, strictly increasing; n >= 2. [m]"""
-    deviation: FloatArray
-    """Shape (n,). Sampled offset, positive left. [m]"""
+    distance: FloatArray  # driven at each sample, strictly increasing, shape (n,), n >= 2 [m]
+    deviation: FloatArray  # sampled offset, positive left, shape (n,) [m]
     settling: tuple[float, float]
     """Distances before the first and after the last sample within which lateral movement may settle. [m]"""
 
@@ -248,10 +242,8 @@ class SampledDeviation(Struct, frozen=True, eq=False):
 class Deviation(Struct, frozen=True, eq=False):
     """Deviation from nominal motion, twice continuously differentiable in the distance driven."""
 
-    splines: tuple[NaturalSpline, ...]
-    """One per sampled segment, in order of distance."""
-    settling: tuple[tuple[float, float], ...]
-    """As in `SampledDeviation`."""
+    splines: tuple[NaturalSpline, ...]  # one per sampled segment, in order of distance
+    settling: tuple[tuple[float, float], ...]  # as in `SampledDeviation`
 
     def __call__(self, distance: FloatArray) -> FloatArray:
         """Evaluate at distances driven, shape (n,). [m]"""

@@ -35,14 +35,12 @@ class Player(StrEnum):
 
 
 class TargetPlayer(Struct, frozen=True):
-    """Player and version; `ValueError` for a version that can't be written, or that the player does not read."""
+    """Player and version; `ValueError` for a version that the player does not read."""
 
     player: Player = Player.STANDARD
     version: Version | None = None  # (1, 0) to (1, 4). Without: the input's own, or the only one that the player reads.
 
     def __post_init__(self) -> None:
-        if self.version is not None and self.version not in VERSIONS:
-            raise ValueError(f"version {named(self.version)} can't be written; {_VERSION_LIST} can")
         if self.player is Player.CARLA and self.version not in (None, (1, 0)):
             raise ValueError("CARLA's ScenarioRunner reads version 1.0 alone")
 
@@ -60,15 +58,10 @@ STANDARD = TargetPlayer()
 
 def target(player: str = Player.STANDARD.value, version: str | None = None) -> TargetPlayer:
     """From a user's words: a player's name, and a version such as "1.2"; `ValueError` for words that are neither."""
-    if version is None:
-        return TargetPlayer(Player(player))
     known = {named(one): one for one in VERSIONS}
-    if version not in known:
-        raise ValueError(f"version {version!r} can't be written; {_VERSION_LIST} can")
-    return TargetPlayer(Player(player), known[version])
-
-
-_VERSION_LIST = ", ".join(named(one) for one in VERSIONS)
+    if version is not None and version not in known:
+        raise ValueError(f"version {version!r} can't be written; {', '.join(known)} can")
+    return TargetPlayer(Player(player), None if version is None else known[version])
 
 
 class Draft:

@@ -118,7 +118,11 @@ def rewrite_paths(draft: Draft, output: Path) -> None:
     """
     scenario = draft.scenario
     old, new = _absolute(scenario.path).parent, _absolute(output).parent
-    found_elsewhere = _catalogs_found_elsewhere(scenario)
+    # Folders of catalogs that lie in none of the scenario's catalog locations.
+    known = [_absolute(path) for path in scenario.catalog_locations.values()]
+    known += [path.parent for path in known if path.suffix.lower() == ".xosc"]
+    folders = dict.fromkeys(_absolute(path).parent for path in scenario.input_files[1:])
+    found_elsewhere = [folder for folder in folders if folder not in known]
     for element in elements(draft.root):
         tag = local_name(element)
         attribute = _REFERENCES.get(tag, "model3d")
@@ -140,14 +144,6 @@ def rewrite_paths(draft: Draft, output: Path) -> None:
         stays = old == new or Path(text).is_absolute() or text[1:2] == ":"
         if text and not (target == leads_to and stays):
             element.set(attribute, Path(os.path.relpath(target, new)).as_posix())
-
-
-def _catalogs_found_elsewhere(scenario: Scenario) -> list[Path]:
-    """Folders of catalogs that lie in none of the scenario's catalog locations."""
-    known = [_absolute(path) for path in scenario.catalog_locations.values()]
-    known += [path.parent for path in known if path.suffix.lower() == ".xosc"]
-    folders = dict.fromkeys(_absolute(path).parent for path in scenario.input_files[1:])
-    return [folder for folder in folders if folder not in known]
 
 
 def _absolute(path: Path) -> Path:

@@ -19,9 +19,7 @@ from xosc_lateral.files.openscenario.write.draft import Draft
 from xosc_lateral.files.openscenario.write.moving import Moving, add_trajectories
 from xosc_lateral.files.openscenario.write.replay import (
     add_kept_actions,
-    dropped_reason,
-    is_replaced,
-    note_dropped,
+    kept_actions,
     remove_controllers,
     rewrite_init,
 )
@@ -171,13 +169,14 @@ class ReplacedManeuvers:
         if not self._moving:
             return
         remove_controllers(self._draft, self._moving)
-        theirs = [played for played in self._draft.motion.actions if self._is_theirs(played)]
-        note_dropped(self._draft, theirs)
+        actions = self._draft.motion.actions
+        theirs = (one for one in actions if one.path[:3] in self._gone or one.actor in self._moving)
+        kept = kept_actions(self._draft, theirs, self._moving)
         notes = [note for note in map(self._freeze, self._frozen) if note]
         self._draft.notes += dict.fromkeys(notes)
         rewrite_init(self._draft, {name: item.start for name, item in self._moving.items()})
         self._take_out()
-        self._put_in([played for played in theirs if self._is_kept(played)])
+        self._put_in(kept)
 
     def _freeze(self, frozen: tuple[StoryboardElementStateCondition, etree._Element, Path]) -> str:
         content, element, path = frozen
@@ -217,14 +216,6 @@ class ReplacedManeuvers:
             build.time_trigger(act, "StartTrigger", 0.0, self._draft.version)
         if len(story):
             self._draft.put_last(story)
-
-    def _is_theirs(self, played: PlayedAction) -> bool:
-        return played.path[:3] in self._gone or played.actor in self._moving
-
-    def _is_kept(self, played: PlayedAction) -> bool:
-        if played.path == ("Init",) or is_replaced(played.action, played.actor, self._moving):
-            return False
-        return dropped_reason(played.action, self._draft.scenario) is None
 
 
 def _remove(element: etree._Element, kinds: tuple[str, ...]) -> None:

@@ -46,8 +46,10 @@ def fit_version(losses: Losses, source: Version, version: Version) -> None:
 
     Raises `FormatError`: a condition or, if the scenario is reactive, a maneuver that the version does not know.
     """
-    _orientations(losses.root, source, version)
-    if version[1] >= _STRICT_SINCE_MINOR:
+    was_strict, is_strict = (one[1] >= _STRICT_SINCE_MINOR for one in (source, version))
+    for item in elements(losses.root, "Orientation") if was_strict != is_strict else ():
+        item.set("type", item.get("type") or ("relative" if was_strict else "absolute"))  # what it meant without
+    if is_strict:
         _be_strict(losses)
     for minor in range(NEWEST_MINOR, version[1], -1):
         _take_back(losses, minor)
@@ -105,15 +107,6 @@ def _write_older_value(losses: Losses, item: etree._Element, name: str) -> None:
         losses.refuse(item, f"{name} '{value}'")
     else:
         losses.action(item, f"{losses.target} has no {name} '{value}'")
-
-
-def _orientations(root: etree._Element, source: Version, version: Version) -> None:
-    """Say what an orientation without a type meant, where that changes."""
-    if (source[1] >= _STRICT_SINCE_MINOR) == (version[1] >= _STRICT_SINCE_MINOR):
-        return
-    meant = "relative" if source[1] >= _STRICT_SINCE_MINOR else "absolute"
-    for item in elements(root, "Orientation"):
-        item.set("type", item.get("type") or meant)
 
 
 def _be_strict(losses: Losses) -> None:
