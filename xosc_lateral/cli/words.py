@@ -227,13 +227,13 @@ def _naming_missing(stated: Mapping[str, Any]) -> Iterator[None]:
     try:
         yield
     except (XoscLateralError, OSError) as error:
-        missing = getattr(error, "unknown", None)
         path = error.filename if isinstance(error, OSError) else getattr(error, "path", None)
-        if path is not None and not Path(path).exists():
-            missing = str(path)
+        missing = str(path) if path is not None and not Path(path).exists() else getattr(error, "unknown", None)
         for option, value in stated.items():
-            texts = [str(text).rpartition("=")[2] for text in (value if isinstance(value, list) else [value])]
-            if missing is not None and str(missing) in texts:
+            words = [
+                str(word) for word in (value if isinstance(value, list) else [value]) if isinstance(word, str | Path)
+            ]
+            if missing in (*words, *(word.partition("=")[2] for word in words)):
                 error.add_note(option)
                 break
         raise
