@@ -44,9 +44,7 @@ class Option:
 
     read: Callable[[Any], Any]  # what they say in Python, a word or a cell -> the field's value; or `ValueError`
     flags: tuple[str, ...] = ()  # on the command line; empty: its name
-    kind: Any = (
-        None  # of the command line's value; None: that of a call's keyword, or several verbs share it (`SHARED`)
-    )
+    kind: Any = None  # of the command line's value; None: that of a call's keyword, or verbs share it (`SHARED`)
     words: Mapping[str, Any] = field(default_factory=dict)  # what else the command line says of it (help, limits)
     cell: Cell | None = None  # reads the column of its name; None: a table has no such column
     prefix: str = ""  # prefix, entry: of columns that hold one entry each of a mapping

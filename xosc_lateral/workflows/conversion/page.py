@@ -88,26 +88,19 @@ def conversion_page(conversion: ConvertedScenario) -> str:
 
 def _provenance(conversion: ConvertedScenario) -> dict[str, object]:
     made = conversion.provenance
+    driven = {one: one.profile for one in conversion.movement.entities if one.is_enriched and one.profile is not None}
     return {
         "scenario": conversion.source.name,
         "output": (conversion.output or conversion.source).name,
         "under test": list(made.ego) or "none",
         "written as": [f"{name}: {MODE_WORDS[mode]}" for name, mode in made.modes.items()],
-        "neighbours": [
-            f"{one.name}: {one.beside(made.options['neighbours'])}"
-            for one in conversion.movement.entities
-            if one.is_enriched and one.profile is not None
-        ],
+        "neighbours": [f"{one.name}: {one.beside(made.options['neighbours'])}" for one in driven],
         "seed": made.options["seed"],
         "variant": made.variant,
         "parameters set": [f"{name} = {value}" for name, value in made.options["parameters"].items()],
         "profiles": [f"{entity}: {name} ({sha[:12]})" for entity, (name, sha) in made.profiles.items()],
         "profiles are valid for": sorted(
-            {
-                f"{one.profile.name}: {one.profile.validity.in_words() or 'not stated'}"
-                for one in conversion.movement.entities
-                if one.is_enriched and one.profile is not None
-            }
+            {f"{profile.name}: {profile.validity.in_words() or 'not stated'}" for profile in driven.values()}
         ),
         "inputs": [f"{name} ({sha[:12]})" for name, sha in made.inputs.items()],
         "output hash": conversion.sha256,

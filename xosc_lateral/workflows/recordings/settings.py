@@ -22,7 +22,7 @@ def _version(text: str) -> str:
 @say.documented
 @dataclass(frozen=True, slots=True)
 class ReconstructSettings:
-    """What is reconstructed, and how: keywords of `reconstruct`, and options of the command line.
+    """What is reconstructed, and how: keywords of `reconstruct`, and the options of the command line.
 
     Parameters
     ----------

@@ -45,7 +45,7 @@ from xosc_lateral.workflows.recordings.cuts import (
     name_states,
     number_runs,
 )
-from xosc_lateral.workflows.recordings.importers import Imported, imported, importer
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer
 from xosc_lateral.workflows.recordings.lane_graph import find_neighbours
 from xosc_lateral.workflows.recordings.lanes_from_tracks import LaneCentreLine, fit_lane_centre
 from xosc_lateral.world.road.reference_line import ReferenceLine, fit_reference_line
@@ -79,7 +79,7 @@ def import_dlr_ht(
     max_gap: Annotated[
         float, flag(help="Longest gap between two cameras that is kept [s].", min=0, max=60)
     ] = DEFAULT_CUTS.max_gap,
-) -> Imported:
+) -> ImportedDrives:
     """DLR Highway Traffic: the wheel of tasi 0.15.4, the data set's zip, or its trajectory CSV."""
     settings = replace(settings, max_gap=max_gap) if settings is DEFAULT_CUTS else settings
     tracks = read_tracks(source)

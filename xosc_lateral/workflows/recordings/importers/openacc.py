@@ -36,7 +36,7 @@ from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import unpacked_text
 from xosc_lateral.workflows.options import flag
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
-from xosc_lateral.workflows.recordings.importers import Imported, imported, importer, paths_of
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer, paths_of
 
 LICENCE = (
     "OpenACC, AstaZero campaign: (c) European Union, Joint Research Centre, CC BY 4.0 (doi:10.1016/j.trc.2021.103047). "
@@ -65,7 +65,7 @@ def import_openacc(
     source: Path | Sequence[Path],
     *,
     lane_width: Annotated[float, flag(help="Of the road, which the files don't give. [m]", min=2, max=6)] = LANE_WIDTH,
-) -> Imported:
+) -> ImportedDrives:
     """OpenACC's platoons on the closed loop of AstaZero: lane centre from all passes of all files."""
     paths = paths_of(source)
     cars = [car for path in paths for car in _cars(path)]

@@ -23,7 +23,7 @@ from xosc_lateral.files.opendrive import parse_opendrive, read_opendrive
 from xosc_lateral.files.osi import osi
 from xosc_lateral.workflows.options import flag
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, MOVING_SPEED, CutSettings
-from xosc_lateral.workflows.recordings.importers import Imported, import_each, importer, paths_of
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, import_each, importer, paths_of
 from xosc_lateral.workflows.recordings.importers.tracks import import_placed, place_on_road, require_lanes
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
 from xosc_lateral.workflows.recordings.lane_shapes import Strip, lane_graph, middle, place_in_shapes
@@ -43,11 +43,11 @@ def import_osi(
     road: Annotated[Path | str | None, flag("--road", kind=Path | None, metavar="FILE.xodr",
         help="Take lanes from here, not from the trace.")] = None,
     channel: Annotated[str | None, flag("--channel", metavar="TOPIC", help="Of an MCAP file.")] = None,
-) -> Imported:  # fmt: skip
+) -> ImportedDrives:  # fmt: skip
     """ASAM OSI traces of ground truth or sensor views (extra `osi`): vehicles between the boundaries of their lanes."""
     files = paths_of(sources)
 
-    def read(path: Path, label: str) -> Imported:
+    def read(path: Path, label: str) -> ImportedDrives:
         recorded = read_osi(path, channel)
         only = None if host is None else _named(recorded, host, path)
         if len(files) > 1:

@@ -28,7 +28,7 @@ from xosc_lateral.workflows.recordings.cuts import (
     cut_table,
     require_lane_direction,
 )
-from xosc_lateral.workflows.recordings.importers import Imported, imported, importer
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks, rate, read_tracks
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph, neighbour_columns
 from xosc_lateral.world.road.lanes import DRIVING, beside
@@ -47,7 +47,7 @@ def import_tracks(
         help="vehicle, time, x, y, heading, speed, length, vehicle_class, e.g. heading=psi:deg.")] = (),
     mapping: Annotated[MappingLike | None, MAPPING] = None,
     settings: CutSettings = DEFAULT_CUTS,
-) -> Imported:  # fmt: skip
+) -> ImportedDrives:  # fmt: skip
     """A table of tracks (x, y and heading of any recording) on a known road: lanes, offsets, neighbours.
 
     `source`: table of one row per vehicle and instant, or a log of esmini (``--csv_logger``); x and y are the vehicle's
@@ -149,7 +149,7 @@ def require_lanes(placed: PlacedTracks, where: str, path: Path) -> None:
 
 def import_placed(
     placed: PlacedTracks, graph: LaneGraph, settings: CutSettings, *, only: Collection[str] | None = None, **about: Any
-) -> Imported:
+) -> ImportedDrives:
     """Neighbours, cuts and record, see `imported`; of the vehicles in `only` alone, if it is given."""
     table = _drive_table(placed, graph, settings)
     if only is not None:
