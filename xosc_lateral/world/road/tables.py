@@ -141,8 +141,16 @@ class NetworkTables(LaneTables):
         surface = self._surface(road, s, t, self._elevation.at(road, s))
         _, pitch, roll, _, drift, _ = surface
         heading = frame.heading if drift is None else frame.heading + np.arctan(drift)
-        if profile is not None:
-            heading, pitch, roll = _along_lane(profile, heading, pitch, roll)
+        if profile is not None:  # as the lane's traffic goes: turned by its slope, and round where it runs against s
+            if profile.slope.any():
+                turn = np.arctan(profile.slope)
+                if pitch.any() or roll.any():
+                    turn, pitch, roll = turned_in_surface(turn, pitch, roll)
+                heading = heading + turn
+            backwards = profile.direction < 0
+            if np.any(backwards):
+                heading = heading + np.pi * backwards
+                pitch, roll = pitch * profile.direction, roll * profile.direction
         # into [-pi, pi]
         heading = heading - (2.0 * np.pi) * np.rint(heading / (2.0 * np.pi))
         return *self._point(frame, surface, s, t, profile), heading, pitch, roll
@@ -268,22 +276,6 @@ class NetworkTables(LaneTables):
 
         crossfall, grade = self._batch(evaluate, 2, road, s, lane=lane)
         return crossfall, grade
-
-
-def _along_lane(
-    profile: LaneProfile, heading: FloatArray, pitch: FloatArray, roll: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """As the lane's traffic goes: turned by its slope, and round where it runs against s. [rad]"""
-    if profile.slope.any():
-        turn = np.arctan(profile.slope)
-        if pitch.any() or roll.any():
-            turn, pitch, roll = turned_in_surface(turn, pitch, roll)
-        heading = heading + turn
-    backwards = profile.direction < 0
-    if np.any(backwards):
-        heading = heading + np.pi * backwards
-        pitch, roll = pitch * profile.direction, roll * profile.direction
-    return heading, pitch, roll
 
 
 def turned_in_surface(
