@@ -1,4 +1,4 @@
-"""Lateral gaps of vehicles side by side, beside those of any two vehicles of the two lanes: for `give_way.GAP_QUANTILES`.
+"""Lateral gaps of vehicles side by side, beside those of any two of the two lanes: for `give_way.GAP_QUANTILES`.
 
     python -m laboratory.give_way WHEEL [--profile motorway motorway-refined] [--seeds 12] [--write PAGE.md]
 
