@@ -171,8 +171,8 @@ def unbiased(
     process: MovementProcess, valid: BoolArray, drive: IndexArray, order: int, *, longest: int | None = None
 ) -> MovementProcess:
     """A process freed of what each short drive's level does to it (Nickell's bias, an eighth of an error) [3]_."""
-    if process.order == 0:
-        return process
+    if process.order == 0 or np.abs(_reflections(process.lags[-1])).max() >= (1.0 - 1e-9) * MAX_REFLECTION:
+        return process  # at the edge of what is stationary, runs of it would grow without end
     rng = np.random.default_rng(BIAS_SEED)
     lags, log_variance = np.zeros(process.order), 0.0
     whitener = Whitener(process, valid, drive, np.ones(len(valid)))

@@ -1,15 +1,24 @@
-"""Forward selection of terms: test, add, test again, until nothing is left that chance would not produce."""
+"""Forward selection of terms: test, add, test again, until nothing is left that chance would not produce.
+
+References
+----------
+.. [1] Y. Mundlak, "On the pooling of time series and cross section data", Econometrica 46, 1978: an effect within
+       groups beside that between them, in `is_undone_by_levels`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.base.plugins import defined_in
+from xosc_lateral.drivers.fitting.regression import clustered_least_squares, small_sample_factor
 from xosc_lateral.drivers.loop import terms
 from xosc_lateral.drivers.loop.dictionary import Search
-from xosc_lateral.drivers.loop.model import Fitted, Stage, Term, fit_model
+from xosc_lateral.drivers.loop.model import Fitted, Stage, Term, design_of, fit_model
 from xosc_lateral.drivers.loop.significance import BUDGET
 
 # Every term that a file of `terms` defines, by the file's name.
@@ -31,6 +40,10 @@ def shared_among(kinds: tuple[type[Term], ...]) -> dict[str, float]:
 STAGES = in_stages(TERMS)  # Of a stage, what has the smallest p-value is added first.
 ERROR_BUDGET = shared_among(TERMS)  # Of all kinds of term.
 MAX_TERMS = 8  # Terms of one table, at most.
+FEWEST_DRIVES = 8  # Between fewer drives nothing is compared.
+UNDONE_LEVEL = 0.01  # Probability with which an effect between drives that is as within them is taken back.
+# Why a term of the movement's size is taken back that holds within drives alone.
+UNDONE = "significant within drives, but between them the movement's size does not follow it"
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +146,31 @@ def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
     selection = Selection(tuple(accepted), tuple(rejected.values()), start, fitted)
     for candidate in accepted:
         selection = _tested_again(search, selection, candidate)
-    return selection
+    undone = [one.term for one in selection.accepted if is_undone_by_levels(selection.final, one.term)]
+    return selection.without(undone, UNDONE) if undone else selection
+
+
+def is_undone_by_levels(fitted: Fitted, term: Term) -> bool:
+    """Whether the drives' own levels of the movement's size undo more than half of what a term says of them, clearly.
+
+    Terms are sized within drives [1]_. A profile has no levels of these very drives, so an effect that they undo, of a
+    place that few drives cross, say, would be a factor of ten between drives that nobody measured.
+    """
+    from scipy.stats import t
+
+    coarse, part = fitted.coarse, fitted.scale_part(term)
+    _, scales, known = design_of(coarse, fitted.terms)
+    seconds = np.bincount(coarse.drive[coarse.valid], minlength=coarse.drives).astype(np.float64)
+    counted = int(np.count_nonzero(seconds))
+    if scales[:, part].shape[1] == 0 or counted < FEWEST_DRIVES:
+        return False
+    says = coarse.by_drive(scales[:, part] @ fitted.log_sizes[part])
+    level = coarse.by_drive(np.log(fitted.scale) - scales @ fitted.log_sizes - known)
+    says, level = (np.sqrt(seconds) * (one - np.average(one, weights=seconds)) for one in (says, level))
+    drives = np.arange(coarse.drives)
+    (slope,), ((variance,),) = clustered_least_squares(says[:, None], level, drives)
+    error = float(np.sqrt(variance * small_sample_factor(counted, counted, 2)))
+    return error > 0.0 and float(t.cdf((slope + 0.5) / error, counted - 2)) < UNDONE_LEVEL
 
 
 def _tested_again(search: Search, selection: Selection, candidate: Accepted) -> Selection:
