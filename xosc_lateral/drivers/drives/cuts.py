@@ -18,7 +18,7 @@ MIN_SPEED = 40.0 / 3.6
 LANE_CHANGE_MARGIN = 4.0
 """Cut on each side of the moment in which the marking is crossed: a lane change takes 4-6 s, half of it before. [s]"""
 
-JUMP = 0.5
+LANE_JUMP_SHARE = 0.5
 """A change of the relative offset between two rows that means another lane. [-]"""
 
 HALF_WIDTH = 0.9
@@ -102,7 +102,7 @@ def lane_change_rows(drive: Drive, rules: CutRules = PAPER_RULES) -> BoolArray:
 
 def lane_steps(offset: FloatArray, lane_width: FloatArray) -> BoolArray:
     """Steps from row to row by which the offset jumps into another lane, shape (n - 1,); both [m] of shape (n,)."""
-    return np.asarray(np.abs(np.diff(offset)) > JUMP * np.minimum(lane_width[1:], lane_width[:-1]))
+    return np.asarray(np.abs(np.diff(offset)) > LANE_JUMP_SHARE * np.minimum(lane_width[1:], lane_width[:-1]))
 
 
 def _changes(drive: Drive, rules: CutRules) -> BoolArray:

@@ -48,7 +48,7 @@ LEAST_NOISE = 0.05
 WAVERS_WITHIN = 51
 """Blocks, 10 s, about whose median a camera's noise is seen. [-]"""
 
-IMPOSSIBLE = 6.0
+MAXIMUM_ERROR_RATIO = 6.0
 """No noise is so many standard deviations off: a drive without it is left as it is. [-]"""
 
 LEAST_TRUST = 0.15
@@ -149,7 +149,7 @@ class BothMarkings:
             ):
                 break
         worst = max(float(np.abs(one).max()) for one in scaled)
-        return (offset, width) if worst > IMPOSSIBLE else None
+        return (offset, width) if worst > MAXIMUM_ERROR_RATIO else None
 
     def _prior(self) -> FloatArray:
         """Lower bands of the prior's precision; unknowns are offset and width of each block in turn, shape (5, 2 n)."""
@@ -206,6 +206,6 @@ def _jump_together(offset: FloatArray, width: FloatArray) -> bool:
 
     By half as much, that is; an offset from elsewhere, a satellite say, never does.
     """
-    jumps = np.abs(np.diff(width)) > IMPOSSIBLE * LEAST_NOISE
-    follows = np.abs(np.diff(offset)) > 0.5 * IMPOSSIBLE * LEAST_NOISE
+    jumps = np.abs(np.diff(width)) > MAXIMUM_ERROR_RATIO * LEAST_NOISE
+    follows = np.abs(np.diff(offset)) > 0.5 * MAXIMUM_ERROR_RATIO * LEAST_NOISE
     return not jumps.any() or bool(follows[jumps].any())

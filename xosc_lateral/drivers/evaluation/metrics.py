@@ -72,13 +72,18 @@ def cut_snippets(series: FloatArray, length: int) -> FloatArray:
     return np.asarray(series[: count * length].reshape(count, length))
 
 
-SPEED = 30.0  # Of the free runs: about 108 km/h. [m/s]
+FREE_SPEED = 30.0  # Of the free runs: about 108 km/h. [m/s]
 # Free runs of a profile and their length [s]: 5 h, so that drivers who differ are all met.
-DRIVERS, DURATION = 60, 300.0
+DRIVER_COUNT, RUN_SECONDS = 60, 300.0
 
 
 def free_runs(
-    profile: DriverProfile, seed: int, *, drivers: int = DRIVERS, duration: float = DURATION, speed: float = SPEED
+    profile: DriverProfile,
+    seed: int,
+    *,
+    drivers: int = DRIVER_COUNT,
+    duration: float = RUN_SECONDS,
+    speed: float = FREE_SPEED,
 ) -> FloatArray:
     """Offsets of several drivers in even traffic, shape (drivers, n). [m]"""
     segment = Segment.even(duration, profile.model.step, profile.lane_width, speed)

@@ -11,16 +11,23 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, MovementSummary, figures_of, highway_drives
 from xosc_lateral.drivers.evaluation.metrics import (
-    DRIVERS,
-    DURATION,
+    DRIVER_COUNT,
     METRICS,
+    RUN_SECONDS,
     cut_snippets,
     free_runs,
     snippet_metrics,
     wasserstein,
 )
 from xosc_lateral.drivers.evaluation.scores import SNIPPET
-from xosc_lateral.drivers.evaluation.sizes import LEVEL, Difference, Sizes, differences, sizes_of_samples, surest
+from xosc_lateral.drivers.evaluation.sizes import (
+    SIGNIFICANCE_LEVEL,
+    Difference,
+    Sizes,
+    differences,
+    sizes_of_samples,
+    surest,
+)
 from xosc_lateral.drivers.evaluation.spectra import Spectrum, spectrum
 from xosc_lateral.drivers.model.profile import DriverProfile
 
@@ -92,7 +99,7 @@ class Compared:
         from scipy.cluster.hierarchy import fcluster, linkage
 
         apart = np.array([surest(parts) for parts in self.differences.values()])
-        labels = fcluster(linkage(1.0 - apart, "complete"), 1.0 - LEVEL, "distance")
+        labels = fcluster(linkage(1.0 - apart, "complete"), 1.0 - SIGNIFICANCE_LEVEL, "distance")
         names = self.names
         return tuple(tuple(names[k] for k in np.flatnonzero(labels == label)) for label in dict.fromkeys(labels))
 
@@ -127,7 +134,7 @@ def _distances(profiles: Sequence[ComparedProfile], seed: int) -> tuple[FloatArr
     scale = np.where(scale > 0.0, scale, 1.0)
     distances = np.empty((len(profiles), len(profiles), len(METRICS)))
     for row in range(len(profiles)):
-        fitted = round(_fitted_drives(profiles[row].profile)[1] / DURATION)
+        fitted = round(_fitted_drives(profiles[row].profile)[1] / RUN_SECONDS)
         distances[row, row] = _from_itself(drivers[row], fitted, scale, np.random.default_rng([seed, row]))
         for column in range(row):
             distances[row, column] = distances[column, row] = _per_metric(pooled[row], pooled[column]) / scale
@@ -138,7 +145,7 @@ def _fitted_drives(profile: DriverProfile) -> tuple[int, float]:
     """How many drives a profile was fitted on, and how long they are [s]; half of the free runs' if unknown."""
     known = profile.provenance
     if not known.hours or "derived_from" in known.fit:
-        return DRIVERS // 2, DURATION * (DRIVERS // 2)
+        return DRIVER_COUNT // 2, RUN_SECONDS * (DRIVER_COUNT // 2)
     return max(known.drives, 1), 3600.0 * known.hours
 
 

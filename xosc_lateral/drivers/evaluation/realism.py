@@ -54,7 +54,7 @@ def variance_parts(windows: FloatArray, drivers: NDArray[np.generic]) -> Varianc
 SPLITS = 8  # Random halves of the drives that both are averaged over.
 MINIMUM_GROUPS = 20  # Fewer snippets of a length: it is left out.
 # Sampled snippets for each of so many real ones of 10 s, spread evenly: proper scores need several of each.
-ENSEMBLE, SCORED = 8, 200
+ENSEMBLE_SIZE, SCORED_SNIPPETS = 8, 200
 
 
 @dataclass(frozen=True)
@@ -216,11 +216,11 @@ def _beside(
 
 def _with_proper_scores(scores: ConditionScores, profile: DriverProfile, cut: Snippets, seed: int) -> ConditionScores:
     """Energy and variogram score of several sampled snippets, beside other drivers' snippets with the same start."""
-    chosen = np.unique(np.linspace(0, len(cut) - 1, min(len(cut), SCORED)).astype(np.int64))
+    chosen = np.unique(np.linspace(0, len(cut) - 1, min(len(cut), SCORED_SNIPPETS)).astype(np.int64))
     some = cut.take(chosen)
-    members = [snippets.sample_snippets(profile, some, seed + 10 + k, with_sensor=True) for k in range(ENSEMBLE)]
+    members = [snippets.sample_snippets(profile, some, seed + 10 + k, with_sensor=True) for k in range(ENSEMBLE_SIZE)]
     rng, starts = np.random.default_rng(seed), (some.offset[:, 0], some.group, cut.offset[:, 0], cut.group)
-    drivers = measures.windows_with_the_same_start(*starts, rng, count=ENSEMBLE)
+    drivers = measures.windows_with_the_same_start(*starts, rng, count=ENSEMBLE_SIZE)
     sampled = proper_scores(some.offset, np.stack(members, axis=1))
     real = proper_scores(some.offset, cut.offset[drivers])
     added = {name: Beside(sampled[name], real[name], SCORE_UNITS[name]) for name in sampled}

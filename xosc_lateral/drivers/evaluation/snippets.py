@@ -26,7 +26,9 @@ from xosc_lateral.drivers.model.sampled_offsets import Snippet, cut_snippets, re
 from xosc_lateral.drivers.model.sampling import OffsetSampler, sample_offsets
 from xosc_lateral.drivers.model.seeds import child
 
-BLOCK = 120.0  # Where there are too few drives to split between them, blocks of this length are split instead. [s]
+BLOCK_SECONDS = (
+    120.0  # Where there are too few drives to split between them, blocks of this length are split instead. [s]
+)
 FEW_DRIVES = 6
 
 
@@ -76,7 +78,7 @@ def snippets_of(runs: Sequence[Run], seconds: float, step: float, *, by_block: b
     items = tuple(cut_snippets(runs, seconds, step)) if any(len(run) >= length for run in runs) else ()
     if by_block is None:
         by_block = len({run.drive for run in runs}) < FEW_DRIVES
-    block = max(BLOCK, 2.0 * seconds)
+    block = max(BLOCK_SECONDS, 2.0 * seconds)
     groups = [f"{one.run.drive} {int(one.time[0] // block)}" if by_block else one.run.drive for one in items]
     numbers = {id(run): number for number, run in enumerate(runs)}
     return Snippets(

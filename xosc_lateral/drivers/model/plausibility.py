@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 MINIMUM_LANE_WIDTH = 2.5
 """Where a lane is narrower than this (it opens or closes), an offset is held against a lane of this width. [m]"""
 
-TRIAL = 150
+TRIAL_STEPS = 150
 """Model steps that a profile is tried with: half a minute. [-]"""
 
 TRIAL_SPEED = 30.0
@@ -104,11 +104,11 @@ def check_profile(profile: DriverProfile) -> None:
     """
     from xosc_lateral.drivers.model.sampling import sample_offsets
 
-    time = profile.model.step * np.arange(TRIAL, dtype=np.float64)
-    width = np.full(TRIAL, profile.lane_width)
+    time = profile.model.step * np.arange(TRIAL_STEPS, dtype=np.float64)
+    width = np.full(TRIAL_STEPS, profile.lane_width)
     subject = f"profile {profile.name} in half a minute of even traffic"
     with np.errstate(all="ignore"):
-        offset = sample_offsets(profile, Segment(time, width, np.full(TRIAL, TRIAL_SPEED)), 0)
+        offset = sample_offsets(profile, Segment(time, width, np.full(TRIAL_STEPS, TRIAL_SPEED)), 0)
     check_offsets(offset, width, subject, time)
 
 

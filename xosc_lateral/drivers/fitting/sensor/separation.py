@@ -261,7 +261,7 @@ def _interval(
 
 # ---- what may explain the runs ----
 ORDERS = (1, 2, 4)
-LOWEST_CORNER, HIGHEST_CORNER, GRID = 0.05, 1.4, 1.3
+LOWEST_CORNER, HIGHEST_CORNER, CORNER_FACTOR = 0.05, 1.4, 1.3
 """Corners of the sensor's low-passed part from which the climb begins [Hz], and the factor from one to the next [-].
 Slower ones lie where a driver's spectrum is free: nothing would separate them from him."""
 
@@ -306,7 +306,7 @@ def _of_family(measured: Measured, order: int, alone: bool) -> Iterator[Explanat
     """Over a grid of corners, and between the neighbours of the best."""
     from scipy.optimize import minimize_scalar
 
-    count = int(np.ceil(np.log(HIGHEST_CORNER / LOWEST_CORNER) / np.log(GRID))) + 1
+    count = int(np.ceil(np.log(HIGHEST_CORNER / LOWEST_CORNER) / np.log(CORNER_FACTOR))) + 1
     tried_at = np.geomspace(LOWEST_CORNER, HIGHEST_CORNER, count)
     corners = all_significant(tried_at[tried_at >= LEAST_CORNER[order]], CORNER_DIGITS)
     grid = [_explanation(measured, Colour(order, corner, alone)) for corner in corners]

@@ -43,7 +43,7 @@ from xosc_lateral.drivers.model.core.autoregressive.parts import (
 from xosc_lateral.drivers.model.core.base import ClockState, Start, take_at_rate
 from xosc_lateral.drivers.model.seeds import AutoregressiveSeed, generator
 
-KNEE = 0.8
+KNEE_SHARE = 0.8
 """Coarse movement is bent from this share of the way between the mean and a limit on. [-]"""
 
 HEADROOM = 0.02
@@ -155,7 +155,7 @@ def _bends(model: AutoregressiveParameters, first: FloatArray) -> tuple[FloatArr
     """Knees and limits, each of shape (2, drivers); both lie beyond where a drive starts."""
     knees, limits = np.empty((2, len(first))), np.empty((2, len(first)))
     for row, (limit, side) in enumerate(zip(model.limits, (-1.0, 1.0), strict=True)):
-        knee = model.mean + KNEE * (limit - model.mean)
+        knee = model.mean + KNEE_SHARE * (limit - model.mean)
         outside = side * (first - knee) > 0.0
         knees[row] = np.where(outside, first, knee)
         limits[row] = np.where(outside, side * np.maximum(side * limit, side * first + HEADROOM), limit)
