@@ -20,7 +20,7 @@ from examples.driver_simulator import simulate_drive
 from laboratory.fair_measure import halves
 from laboratory.identification_drives import moved, offset_of
 from tests.kit import simulated as plants
-from xosc_lateral.drivers.drives.cuts import PAPER_RULES, all_runs
+from xosc_lateral.drivers.drives.drive import PAPER_RULES, all_runs
 from xosc_lateral.drivers.evaluation.sizes import SIGNIFICANCE_LEVEL, Sizes, differences, sizes_of_runs
 from xosc_lateral.drivers.fitting.fitting import fit_profile
 from xosc_lateral.files.drives import drives_of_table, read_drives

@@ -42,8 +42,8 @@ def halves(runs: Sequence[Run], seed: int) -> tuple[list[Run], list[Run]]:
     units = sorted({run.drive for run in runs})
     if len(units) < LEAST_UNITS:
         raise NotEnoughDataError(
-            f"{len(units)} vehicles (or blocks of {BLOCK_SECONDS:g} s) are left after cutting; {LEAST_UNITS} are needed "
-            "to fit on one half and score on the other"
+            f"{len(units)} vehicles (or blocks of {BLOCK_SECONDS:g} s) are left after cutting; {LEAST_UNITS} are "
+            "needed to fit on one half and score on the other"
         )
     chosen = set(np.random.default_rng(seed).permutation(units)[: len(units) // 2].tolist())
     return [run for run in runs if run.drive in chosen], [run for run in runs if run.drive not in chosen]

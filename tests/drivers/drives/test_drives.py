@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.drivers.drives.cuts import LANE_CHANGE_MARGIN, all_runs, cut_runs, whole_run
-from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.drives.drive import LANE_CHANGE_MARGIN, Drive, all_runs, cut_runs, whole_run
 from xosc_lateral.drivers.drives.resampling import STEP, average, resample
 
 

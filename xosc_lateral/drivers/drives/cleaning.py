@@ -12,8 +12,7 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.limits import DRIVE_SPAN, TIME
 from xosc_lateral.base.rows import true_slices
-from xosc_lateral.drivers.drives.cuts import MAX_GAP
-from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.drives.drive import MAX_GAP, Drive
 from xosc_lateral.drivers.drives.markings import both_markings
 
 MAX_STEP = 0.25
@@ -63,17 +62,10 @@ def clean_drive(
     """Rows of one drive, from whatever source, sorted by time, without repeated times and rows without a place in the
     lane; None when nothing is left.
 
-    Raises `FormatError` if a column can't be in the unit meant, or the rows are too far apart.
-
-    Parameters
-    ----------
-    columns : mapping of str to array, shape (n,)
-        `time` [s], and `offset` and `lane_width` or `distance_left` and `distance_right` [m]; `speed` [m/s] if known;
-        `RUN` where an import has cut the drive; all others are context. NaN: missing, or "there is none".
-    levels : frozenset of str
-        Columns that hold levels.
-    path : Path
-        What messages call the source.
+    `columns`, shape (n,): `time` [s], and `offset` and `lane_width` or `distance_left` and `distance_right` [m];
+    `speed` [m/s] if known; `RUN` where an import has cut the drive; all others are context, of which `levels` hold
+    levels. NaN: missing, or "there is none". Raises `FormatError` if a column can't be in the unit meant, or the rows
+    are too far apart; `path` is what messages call the source.
     """
     columns = _in_order(columns, name, path)
     if RUN not in columns:

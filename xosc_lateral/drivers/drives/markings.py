@@ -25,8 +25,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.numbers import MAD_TO_SD
-from xosc_lateral.drivers.drives.cuts import MAX_GAP, lane_steps
-from xosc_lateral.drivers.drives.drive import MarkingShares
+from xosc_lateral.drivers.drives.drive import MAX_GAP, MarkingShares, lane_steps
 from xosc_lateral.drivers.drives.resampling import STEP
 
 DEGREES = 4.0

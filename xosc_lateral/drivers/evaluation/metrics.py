@@ -122,12 +122,17 @@ def wasserstein(a: FloatArray, b: FloatArray) -> float:
     return float(np.abs(below_a - below_b) @ steps)
 
 
+def wasserstein_columns(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Of each column, shape (k,), of rows of shape (n, k) and (m, k)."""
+    return np.array([wasserstein(a[:, k], b[:, k]) for k in range(a.shape[1])])
+
+
 def column_distances(real: FloatArray, other: FloatArray) -> list[float]:
     """Wasserstein distance of each column, in standard deviations of the real one. [sd] Shapes (n, k) and (m, k)."""
     spread = real.std(axis=0)
     # a column that never varies has no scale of its own; any difference then counts in its own unit
     spread = np.where(spread > 0.0, spread, 1.0)
-    return [wasserstein(real[:, k], other[:, k]) / float(spread[k]) for k in range(real.shape[1])]
+    return (wasserstein_columns(real, other) / spread).tolist()  # type: ignore[no-any-return]
 
 
 def metric_distances(real: FloatArray, other: FloatArray) -> Distances:

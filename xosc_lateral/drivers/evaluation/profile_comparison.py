@@ -17,7 +17,7 @@ from xosc_lateral.drivers.evaluation.metrics import (
     cut_snippets,
     free_runs,
     snippet_metrics,
-    wasserstein,
+    wasserstein_columns,
 )
 from xosc_lateral.drivers.evaluation.scores import SNIPPET
 from xosc_lateral.drivers.evaluation.sizes import (
@@ -50,23 +50,14 @@ class ComparedProfile:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Compared:
-    """Profiles and how they differ.
-
-    Parameters
-    ----------
-    profiles : tuple of ComparedProfile
-    metrics : array, shape (k, k, 10)
-        Wasserstein distance per metric, in standard deviations over all profiles' snippets. On the diagonal: of a
-        profile from itself, as much driving as it was fitted on from as much other driving, half of its drivers at
-        most, where the mean over the metrics is the 95 % quantile of random choices.
-    scale : array, shape (10,)
-        Those standard deviations. [m]
-    seed : int
-    """
+    """Profiles and how they differ."""
 
     profiles: tuple[ComparedProfile, ...]
+    # Wasserstein distance per metric, shape (k, k, 10), in standard deviations over all profiles' snippets. On the
+    # diagonal: of a profile from itself, as much driving as it was fitted on from as much other driving, half of its
+    # drivers at most, where the mean over the metrics is the 95 % quantile of random choices.
     metrics: FloatArray
-    scale: FloatArray
+    scale: FloatArray  # Those standard deviations, shape (10,). [m]
     seed: int
 
     @property
@@ -88,10 +79,13 @@ class Compared:
     @property
     def differences(self) -> dict[tuple[str, str], list[Difference]]:
         """What each pair differs by, of the drives that both were fitted on, else of drives sampled from both."""
-        return {
-            (first.profile.name, second.profile.name): _between(first, second)
-            for first, second in combinations(self.profiles, 2)
-        }
+        pairs = {}
+        for first, second in combinations(self.profiles, 2):
+            both = first.sampled, second.sampled
+            if first.measured is not None and second.measured is not None:
+                both = first.measured, second.measured
+            pairs[first.profile.name, second.profile.name] = differences(*both)
+        return pairs
 
     @property
     def groups(self) -> tuple[tuple[str, ...], ...]:
@@ -102,12 +96,6 @@ class Compared:
         labels = fcluster(linkage(1.0 - apart, "complete"), 1.0 - SIGNIFICANCE_LEVEL, "distance")
         names = self.names
         return tuple(tuple(names[k] for k in np.flatnonzero(labels == label)) for label in dict.fromkeys(labels))
-
-
-def _between(first: ComparedProfile, second: ComparedProfile) -> list[Difference]:
-    if first.measured is not None and second.measured is not None:
-        return differences(first.measured, second.measured)
-    return differences(first.sampled, second.sampled)
 
 
 def compare(profiles: Sequence[DriverProfile], seed: int) -> Compared:
@@ -137,7 +125,7 @@ def _distances(profiles: Sequence[ComparedProfile], seed: int) -> tuple[FloatArr
         fitted = round(_fitted_drives(profiles[row].profile)[1] / RUN_SECONDS)
         distances[row, row] = _from_itself(drivers[row], fitted, scale, np.random.default_rng([seed, row]))
         for column in range(row):
-            distances[row, column] = distances[column, row] = _per_metric(pooled[row], pooled[column]) / scale
+            distances[row, column] = distances[column, row] = wasserstein_columns(pooled[row], pooled[column]) / scale
     return distances, scale
 
 
@@ -156,10 +144,8 @@ def _from_itself(drivers: Sequence[FloatArray], fitted: int, scale: FloatArray, 
     for _ in range(HALVINGS):
         order = rng.permutation(len(drivers)).tolist()
         half, rest = order[:count], order[-count:]
-        distances.append(_per_metric(*(np.concatenate([drivers[k] for k in part]) for part in (half, rest))) / scale)
+        distances.append(
+            wasserstein_columns(*(np.concatenate([drivers[k] for k in part]) for part in (half, rest))) / scale
+        )
     means = [float(gaps.mean()) for gaps in distances]
     return distances[int(np.argsort(means)[round(HALVING_COUNT_AND_SHARE * (HALVINGS - 1))])]
-
-
-def _per_metric(first: FloatArray, other: FloatArray) -> FloatArray:
-    return np.array([wasserstein(first[:, k], other[:, k]) for k in range(first.shape[1])])

@@ -217,11 +217,12 @@ def _beside(
 def _with_proper_scores(scores: ConditionScores, profile: DriverProfile, cut: Snippets, seed: int) -> ConditionScores:
     """Energy and variogram score of several sampled snippets, beside other drivers' snippets with the same start."""
     chosen = np.unique(np.linspace(0, len(cut) - 1, min(len(cut), SCORED_SNIPPETS)).astype(np.int64))
-    some = cut.take(chosen)
-    members = [snippets.sample_snippets(profile, some, seed + 10 + k, with_sensor=True) for k in range(ENSEMBLE_SIZE)]
-    rng, starts = np.random.default_rng(seed), (some.offset[:, 0], some.group, cut.offset[:, 0], cut.group)
+    driven, every = cut.offset[chosen], cut.segments
+    segments = [every[row] for row in chosen]
+    members = [snippets.sample_recorded(profile, segments, driven[:, 0], seed + 10 + k) for k in range(ENSEMBLE_SIZE)]
+    rng, starts = np.random.default_rng(seed), (driven[:, 0], cut.group[chosen], cut.offset[:, 0], cut.group)
     drivers = measures.windows_with_the_same_start(*starts, rng, count=ENSEMBLE_SIZE)
-    sampled = proper_scores(some.offset, np.stack(members, axis=1))
-    real = proper_scores(some.offset, cut.offset[drivers])
+    sampled = proper_scores(driven, np.stack(members, axis=1))
+    real = proper_scores(driven, cut.offset[drivers])
     added = {name: Beside(sampled[name], real[name], SCORE_UNITS[name]) for name in sampled}
     return replace(scores, families={**scores.families, **added})

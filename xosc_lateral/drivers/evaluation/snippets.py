@@ -47,18 +47,6 @@ class Snippets:
     def __len__(self) -> int:
         return len(self.items)
 
-    def take(self, rows: NDArray[np.int64]) -> Snippets:
-        """Some of them. `rows` of shape (k,). [-]"""
-        chosen = rows.tolist()
-        return Snippets(
-            self.seconds,
-            tuple(self.items[row] for row in chosen),
-            self.offset[rows],
-            self.lane_width[rows],
-            self.group[rows],
-            tuple(self.place[row] for row in chosen),
-        )
-
     @property
     def segments(self) -> list[Segment]:
         """Each with the context around it."""

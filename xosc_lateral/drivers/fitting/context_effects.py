@@ -25,7 +25,7 @@ from xosc_lateral.base.numbers import all_significant
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.fitting.regression import autoregressive_least_squares, random_effects_least_squares
-from xosc_lateral.drivers.model.core.autoregressive.coarse import split_bands
+from xosc_lateral.drivers.model.core.autoregressive.parameters import split_bands
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Levels, Linear, Piecewise, Proximity
 from xosc_lateral.drivers.model.profile import SIDES, SIGNIFICANT_ERRORS, Basis, Beside
 

@@ -12,8 +12,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.numbers import significant
 from xosc_lateral.base.version import __version__
-from xosc_lateral.drivers.drives.cuts import PAPER_RULES, CutRules, all_runs
-from xosc_lateral.drivers.drives.drive import Drive, Run
+from xosc_lateral.drivers.drives.drive import PAPER_RULES, CutRules, Drive, Run, all_runs
 from xosc_lateral.drivers.drives.resampling import STEP, resample
 from xosc_lateral.drivers.evaluation.sizes import sizes_of_runs
 from xosc_lateral.drivers.fitting.bands import KEEPING_BAND, in_bands, split_by_band

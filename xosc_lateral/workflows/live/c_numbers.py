@@ -16,9 +16,14 @@ from xosc_lateral.base.limits import DISTANCES, LIVE_PAUSE, LIVE_RANGES, TIME, c
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.model import effects as kinds
-from xosc_lateral.drivers.model.core.autoregressive.coarse import COARSE_EVERY, TICKS, phases
 from xosc_lateral.drivers.model.core.autoregressive.model import HEADROOM, KNEE_SHARE, AutoregressiveModel
-from xosc_lateral.drivers.model.core.autoregressive.parameters import CANDIDATES, SLOW_CORRELATION_TIME
+from xosc_lateral.drivers.model.core.autoregressive.parameters import (
+    CANDIDATES,
+    COARSE_EVERY,
+    SLOW_CORRELATION_TIME,
+    TICKS,
+    phases,
+)
 from xosc_lateral.drivers.model.core.two_level.model import TwoLevelModel
 from xosc_lateral.drivers.model.effects.base import LOG_LIMIT
 from xosc_lateral.drivers.model.effects.response import split_shift

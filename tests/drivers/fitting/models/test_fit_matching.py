@@ -26,7 +26,7 @@ from xosc_lateral.drivers.fitting.models.autoregressive_fit import (
     matched,
     simulate,
 )
-from xosc_lateral.drivers.model.core.autoregressive.coarse import GRID, Autoregression
+from xosc_lateral.drivers.model.core.autoregressive.parameters import GRID, Autoregression
 
 NOTHING, SLOPES = np.zeros(7), np.ones(2)
 

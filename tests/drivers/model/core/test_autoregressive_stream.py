@@ -9,8 +9,8 @@ import pytest
 from msgspec.structs import replace
 
 from tests.kit.core_models import POPULATION, STEADY
-from xosc_lateral.drivers.model.core.autoregressive.coarse import Autoregression
 from xosc_lateral.drivers.model.core.autoregressive.model import HEADROOM, KNEE_SHARE, AutoregressiveState, _bends
+from xosc_lateral.drivers.model.core.autoregressive.parameters import Autoregression
 from xosc_lateral.drivers.model.core.base import Start
 from xosc_lateral.drivers.model.records import plain, read_as
 

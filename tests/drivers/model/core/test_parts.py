@@ -8,9 +8,8 @@ from msgspec.structs import replace
 from scipy.signal import lfilter
 
 from tests.kit.core_models import POPULATION, STEADY
-from xosc_lateral.drivers.model.core.autoregressive.coarse import COARSE_EVERY, TICKS, interpolate
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
-from xosc_lateral.drivers.model.core.autoregressive.parameters import DriverState
+from xosc_lateral.drivers.model.core.autoregressive.parameters import COARSE_EVERY, TICKS, DriverState, interpolate
 from xosc_lateral.drivers.model.core.autoregressive.parts import (
     COARSE,
     FINE,

@@ -21,7 +21,7 @@ from msgspec.structs import replace
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.drives.filters import Detrend, periodograms
 from xosc_lateral.drivers.drives.resampling import STEP
-from xosc_lateral.drivers.model.core.autoregressive.coarse import (
+from xosc_lateral.drivers.model.core.autoregressive.parameters import (
     COARSE_EVERY,
     FREQUENCIES,
     GRID,

@@ -40,16 +40,17 @@ from xosc_lateral.drivers.fitting.models.autoregressive_coarse import (
     scaled_spectrum,
     window_of,
 )
-from xosc_lateral.drivers.model.core.autoregressive.coarse import (
+from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
+from xosc_lateral.drivers.model.core.autoregressive.parameters import (
     BORDER,
     COARSE_EVERY,
     FREQUENCIES,
     Autoregression,
+    Volatility,
+    averaged_covariance,
     largest_root,
     split_bands,
 )
-from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
-from xosc_lateral.drivers.model.core.autoregressive.parameters import Volatility, averaged_covariance
 from xosc_lateral.drivers.model.core.base import Start
 
 DIGITS = 5

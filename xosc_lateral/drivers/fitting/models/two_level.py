@@ -16,8 +16,14 @@ from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.drives.filters import periodograms
 from xosc_lateral.drivers.model.core.base import KERNEL_TAPS, N_KNOTS, NOISE_VARIANCE, ShapedNoise
-from xosc_lateral.drivers.model.core.two_level.markov import N_BINS, MarkovChain, bin_of
-from xosc_lateral.drivers.model.core.two_level.model import PAPER_SETTINGS, TwoLevelModel, TwoLevelSettings
+from xosc_lateral.drivers.model.core.two_level.model import (
+    N_BINS,
+    PAPER_SETTINGS,
+    MarkovChain,
+    TwoLevelModel,
+    TwoLevelSettings,
+    bin_of,
+)
 from xosc_lateral.drivers.model.linear_filters import convolve
 
 

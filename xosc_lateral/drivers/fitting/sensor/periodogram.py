@@ -167,16 +167,8 @@ def rounding_density(
     ``q^2 / (2 pi^2) sum_k exp(-2 pi^2 k^2 D(tau) / q^2) / k^2``. Noise that is new in every row adds twice its variance
     to D between different rows: beside enough of it the error is new in every row, too.
 
-    Parameters
-    ----------
-    step : float
-        q. [m]
-    driver, variance : callable, float
-        Density of what is rounded, at frequencies [m2/Hz], and what it is scaled to: the variance less the noise [m2].
-    rate : float
-        Rows per second. [Hz]
-    noise : float
-        Variance of white noise before rounding. [m2]
+    `step`: q [m]; `driver`, `variance`: density of what is rounded, at frequencies [m2/Hz], and what it is scaled to,
+    the variance less the noise [m2]; `rate`: rows per second [Hz]; `noise`: variance of white noise before that [m2].
 
     References
     ----------

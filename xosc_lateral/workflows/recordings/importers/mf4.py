@@ -33,7 +33,7 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.limits import CLOCK_ROWS, TIME
 from xosc_lateral.base.segment import CONTEXT_UNITS
-from xosc_lateral.drivers.drives.cuts import LANE_JUMP_SHARE, MAX_GAP
+from xosc_lateral.drivers.drives.drive import LANE_JUMP_SHARE, MAX_GAP
 from xosc_lateral.drivers.drives.resampling import average, resample
 from xosc_lateral.files.columns import refuse_marker
 from xosc_lateral.files.drives import file_labels, from_middle

@@ -25,8 +25,9 @@ import msgspec
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.model.core.autoregressive.coarse import COARSE_EVERY, TICKS
 from xosc_lateral.drivers.model.core.autoregressive.parameters import (
+    COARSE_EVERY,
+    TICKS,
     AutoregressiveParameters,
     DriverState,
     draw_drivers,

@@ -8,11 +8,13 @@ import msgspec
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
-from xosc_lateral.drivers.model.core.autoregressive.coarse import COARSE_EVERY, TICKS, interpolate
 from xosc_lateral.drivers.model.core.autoregressive.parameters import (
+    COARSE_EVERY,
     SLOW_CORRELATION_TIME,
+    TICKS,
     AutoregressiveParameters,
     DriverState,
+    interpolate,
 )
 from xosc_lateral.drivers.model.linear_filters import convolve, recur
 from xosc_lateral.drivers.model.seeds import AutoregressiveSeed, generator
