@@ -9,6 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.drivers.evaluation import sizes
 from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, MovementSummary, figures_of, highway_drives
 from xosc_lateral.drivers.evaluation.metrics import (
     DRIVER_COUNT,
@@ -20,14 +21,6 @@ from xosc_lateral.drivers.evaluation.metrics import (
     wasserstein_columns,
 )
 from xosc_lateral.drivers.evaluation.scores import SNIPPET
-from xosc_lateral.drivers.evaluation.sizes import (
-    SIGNIFICANCE_LEVEL,
-    Difference,
-    Sizes,
-    differences,
-    sizes_of_samples,
-    surest,
-)
 from xosc_lateral.drivers.evaluation.spectra import Spectrum, spectrum
 from xosc_lateral.drivers.model.profile import DriverProfile
 
@@ -43,8 +36,8 @@ class ComparedProfile:
     runs: FloatArray  # Shape (drivers, n). [m]
     summary: MovementSummary
     keeping: LaneKeeping
-    measured: Sizes | None  # Of the drives that it was fitted on, where it knows them.
-    sampled: Sizes  # Of its own drives, as sure as if it had been fitted on such.
+    measured: sizes.Sizes | None  # Of the drives that it was fitted on, where it knows them.
+    sampled: sizes.Sizes  # Of its own drives, as sure as if it had been fitted on such.
     spectrum: Spectrum
 
 
@@ -77,14 +70,14 @@ class Compared:
         return np.sqrt(0.5 * (itself[:, None] ** 2 + itself[None, :] ** 2))
 
     @property
-    def differences(self) -> dict[tuple[str, str], list[Difference]]:
+    def differences(self) -> dict[tuple[str, str], list[sizes.Difference]]:
         """What each pair differs by, of the drives that both were fitted on, else of drives sampled from both."""
         pairs = {}
         for first, second in combinations(self.profiles, 2):
             both = first.sampled, second.sampled
             if first.measured is not None and second.measured is not None:
                 both = first.measured, second.measured
-            pairs[first.profile.name, second.profile.name] = differences(*both)
+            pairs[first.profile.name, second.profile.name] = sizes.differences(*both)
         return pairs
 
     @property
@@ -92,8 +85,8 @@ class Compared:
         """Profiles that are alike, each with each (complete linkage): they differ no more than two fits of a driver."""
         from scipy.cluster.hierarchy import fcluster, linkage
 
-        apart = np.array([surest(parts) for parts in self.differences.values()])
-        labels = fcluster(linkage(1.0 - apart, "complete"), 1.0 - SIGNIFICANCE_LEVEL, "distance")
+        apart = np.array([sizes.surest(parts) for parts in self.differences.values()])
+        labels = fcluster(linkage(1.0 - apart, "complete"), 1.0 - sizes.SIGNIFICANCE_LEVEL, "distance")
         names = self.names
         return tuple(tuple(names[k] for k in np.flatnonzero(labels == label)) for label in dict.fromkeys(labels))
 
@@ -104,8 +97,8 @@ def compare(profiles: Sequence[DriverProfile], seed: int) -> Compared:
     for number, profile in enumerate(profiles):
         runs, drives, step = free_runs(profile, seed + number), highway_drives(profile, seed), profile.model.step
         known = profile.provenance.fit
-        measured = None if "derived_from" in known else Sizes.from_dict(known.get("sizes", {}))
-        sampled = sizes_of_samples(drives, step, *_fitted_drives(profile))
+        measured = None if "derived_from" in known else sizes.Sizes.from_dict(known.get("sizes", {}))
+        sampled = sizes.sizes_of_samples(drives, step, *_fitted_drives(profile))
         figures = figures_of(profile, seed, drives)
         compared.append(ComparedProfile(profile, runs, *figures, measured, sampled, spectrum(list(runs), step)))
     return Compared(tuple(compared), *_distances(compared, seed), seed)

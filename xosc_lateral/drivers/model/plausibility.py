@@ -48,13 +48,9 @@ def check_offsets(
         return
     first = int(far[0])
     when = "" if time is None else f" at {time[first]:g} s"
-    limit = OFFSET_LANES.refusal(_lanes(offset, lane_width, first))
+    width = np.broadcast_to(np.asarray(lane_width, dtype=np.float64), offset.shape)[first]
+    limit = OFFSET_LANES.refusal(float(abs(offset[first]) / max(width, MINIMUM_LANE_WIDTH)))
     raise DriverProfileError(f"{subject}: an offset of {offset[first]:.4g} m{when}; {limit}")
-
-
-def _lanes(offset: FloatArray, lane_width: FloatArray | float, row: int) -> float:
-    width = np.broadcast_to(np.asarray(lane_width, dtype=np.float64), offset.shape)[row]
-    return float(abs(offset[row]) / max(width, MINIMUM_LANE_WIDTH))
 
 
 def check_context(context: Mapping[str, float], subject: str) -> None:

@@ -8,7 +8,13 @@ from msgspec.structs import replace
 from scipy import signal, stats
 
 from xosc_lateral.base.shipped import shipped_folder
-from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
+from xosc_lateral.drivers.model.core.autoregressive.model import (
+    COARSE,
+    FINE,
+    AutoregressiveModel,
+    Factors,
+    begin_factors,
+)
 from xosc_lateral.drivers.model.core.autoregressive.parameters import (
     BORDER,
     COARSE_EVERY,
@@ -21,7 +27,6 @@ from xosc_lateral.drivers.model.core.autoregressive.parameters import (
     phases,
     split_bands,
 )
-from xosc_lateral.drivers.model.core.autoregressive.parts import COARSE, FINE, Factors, begin_factors
 from xosc_lateral.drivers.model.core.base import Start
 from xosc_lateral.files.profiles import read_profile
 
