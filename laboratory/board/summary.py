@@ -15,9 +15,8 @@ from laboratory.board.result import Board, ModelScore, Row
 from laboratory.board.sampled_half import SampledHalf
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.resampling import STEP
-from xosc_lateral.drivers.evaluation.measures import LAGS, autocorrelation_of, resolved_bands
 from xosc_lateral.drivers.evaluation.realism import variance_parts
-from xosc_lateral.drivers.evaluation.snippets import BLOCK_SECONDS, FEW_DRIVES
+from xosc_lateral.drivers.evaluation.snippets import BLOCK_SECONDS, FEW_DRIVES, LAGS, autocorrelation_of, resolved_bands
 
 FloatArray = NDArray[np.float64]
 Parts = Sequence[tuple[Half, Mapping[str, SampledHalf]]]

@@ -257,20 +257,16 @@ class DriveProcess:
         if self._core is None:
             self._core = self._model.stream(child(self._seed, DriveSeed.CORE), None)
             self.state.core = self._core.state
-        return Movement(self._core.mean, *self._take_core(self._core, n, rate))
-
-    def _take_core(self, core: CoreStream, n: int, rate: FloatArray | None) -> tuple[FloatArray, FloatArray]:
-        """Next rows of the core movement."""
-        state = self.state
+        core, state = self._core, self.state
         if rate is not None or not (self._core_ahead or len(state.coarse)):
-            return core.take(n, rate)
+            return Movement(core.mean, *core.take(n, rate))
         missing = n - len(state.coarse)
         if missing > 0:
             coarse, fine = core.take(max(missing, self._core_ahead))
             state.coarse, state.fine = np.concatenate([state.coarse, coarse]), np.concatenate([state.fine, fine])
         taken = state.coarse[:n], state.fine[:n]
         state.coarse, state.fine = state.coarse[n:], state.fine[n:]
-        return taken
+        return Movement(core.mean, *taken)
 
     def restore(self, values: Any, where: str) -> None:
         """Go on from a state as plain JSON values.

@@ -122,6 +122,6 @@ def fit(
 
 def fit_warnings(profile: DriverProfile, sensor_noise: float | None = None) -> list[str]:
     """What to know about a fitted profile, and the error of its sensor as far as it was given [m], in lines."""
-    from xosc_lateral.drivers.fitting import warnings
+    from xosc_lateral.drivers.fitting import fitting
 
-    return warnings.fit_warnings(profile, sensor_noise, given_profile(PRIOR))
+    return fitting.fit_warnings(profile, sensor_noise, given_profile(PRIOR))
