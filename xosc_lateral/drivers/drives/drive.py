@@ -135,12 +135,6 @@ def _freeze(series: Drive | Run, name: str) -> None:
 
 
 # ---- what is cut out of a drive ----
-MIN_SPEED = 40.0 / 3.6
-"""Slower driving is cut out (arXiv:2405.17080, section III). [m/s]"""
-
-LANE_CHANGE_MARGIN = 4.0
-"""Cut on each side of the moment in which the marking is crossed: a lane change takes 4-6 s, half of it before. [s]"""
-
 LANE_JUMP_SHARE = 0.5
 """A change of the relative offset between two rows that means another lane. [-]"""
 
@@ -161,8 +155,9 @@ MIN_RUN = 10.0
 class CutRules:
     """What is cut out of a drive; the defaults are the paper's where it gives one."""
 
-    min_speed: float = MIN_SPEED  # [m/s]
-    lane_change_margin: float = LANE_CHANGE_MARGIN  # Cut on each side of a lane change. [s]
+    min_speed: float = 40.0 / 3.6  # Slower driving is cut out (arXiv:2405.17080, section III). [m/s]
+    # Cut on each side of the moment in which the marking is crossed: a lane change takes 4-6 s, half of it before. [s]
+    lane_change_margin: float = 4.0
     max_gap: float = MAX_GAP  # Longest gap that is bridged. [s]
     min_run: float = MIN_RUN  # Shortest run that is kept. [s]
     step: float = STEP  # Of the runs. [s]

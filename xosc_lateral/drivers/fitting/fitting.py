@@ -84,22 +84,24 @@ def fit_profile(
         Gives the prior, of a model of ours, where the drives state a band that ends below `KEEPING_BAND`.
     """
     slow, fast = split_by_band(drives)
-    runs = all_runs(slow, rules)
-    if model_named(model).model.kind == ModelKind.TWO_LEVEL:  # the paper takes offsets as they were measured
-        if neighbours:
-            raise DriverProfileError(f"a {ModelKind.TWO_LEVEL} profile is fitted without what neighbours do")
-        if fast or prior is not None:
-            raise DriverProfileError(f"a {ModelKind.TWO_LEVEL} profile is fitted to one recording alone")
-        return in_bands(fit_runs(runs, name=name, model=model, provenance=provenance), runs)
-    is_partial = not fast and any((drive.valid_below or np.inf) < KEEPING_BAND for drive in slow)
-    if stand_in is not None and is_partial:
-        prior = stand_in()
-    cleaned, sensor = driver_runs(runs, slow, sensor_noise=sensor_noise)
-    known = provenance or Provenance()
-    known = replace(known, fit={**known.fit, **_marking_notes(slow)})
-    profile = fit_population(cleaned, name=name, model=model, provenance=known, sensor=sensor, neighbours=neighbours)
-    fast_runs = driver_runs(all_runs(fast, rules), fast)[0] if fast else ()
-    return in_bands(profile, cleaned, fast_runs, prior)
+    runs, fast_runs = all_runs(slow, rules), list[Run]()
+    is_paper = model_named(model).model.kind == ModelKind.TWO_LEVEL  # which takes offsets as they were measured
+    if is_paper and neighbours:
+        raise DriverProfileError(f"a {ModelKind.TWO_LEVEL} profile is fitted without what neighbours do")
+    if is_paper and (fast or prior is not None):
+        raise DriverProfileError(f"a {ModelKind.TWO_LEVEL} profile is fitted to one recording alone")
+    if not is_paper:
+        if stand_in is not None and not fast and any((drive.valid_below or np.inf) < KEEPING_BAND for drive in slow):
+            prior = stand_in()
+        runs, sensor = driver_runs(runs, slow, sensor_noise=sensor_noise)
+        known = provenance or Provenance()
+        known = replace(known, fit={**known.fit, **_marking_notes(slow)})
+        profile = fit_population(runs, name=name, model=model, provenance=known, sensor=sensor, neighbours=neighbours)
+        if fast:
+            fast_runs, _ = driver_runs(all_runs(fast, rules), fast)
+    else:
+        profile = fit_runs(runs, name=name, model=model, provenance=provenance)
+    return in_bands(profile, runs, fast_runs, prior)
 
 
 def _marking_notes(drives: Sequence[Drive]) -> Mapping[str, float]:
@@ -178,6 +180,7 @@ def driver_runs(
         variance = float(np.concatenate([run.offset for run in runs]).var())
         return list(runs), SensorModel(0.0, driver_variance=significant(variance, 7), driver_share=(1.0, 1.0))
     rows, durations, rate = rows_of(runs, drives)
+    half_widths = half_widths_of(runs, drives)
     separated = separate(
         [run.offset for run in runs],
         STEP,
@@ -185,7 +188,7 @@ def driver_runs(
         durations=durations,
         rate=rate,
         sensor_noise=sensor_noise,
-        half_widths=half_widths_of(runs, drives),
+        half_widths=half_widths,
         one_camera=all(drive.mended is not None for drive in drives),
         highest=highest,
     )

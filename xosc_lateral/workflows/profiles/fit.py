@@ -97,13 +97,13 @@ def fit(
         raise DriverProfileError(f"model {model}: only the two-level model has a corrected fit")
     tables = given_drives(drives, columns).valid_below(valid_below)
     by_default = isinstance(prior, str) and prior == PRIOR
-    known = Provenance(
-        source=source or ", ".join(tables.inputs),
-        licence=licence,
-        inputs=dict(tables.inputs),
-        fit=dict(summary_of(tables.drives)),
-    )
     with naming(tables):
+        known = Provenance(
+            source=source or ", ".join(tables.inputs),
+            licence=licence,
+            inputs=dict(tables.inputs),
+            fit=dict(summary_of(tables.drives)),
+        )
         profile = fit_profile(
             tables.drives,
             name=name or (tables.files[0].name.split(".")[0] if tables.files else "profile"),

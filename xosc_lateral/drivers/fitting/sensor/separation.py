@@ -18,7 +18,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.numbers import NORMAL_95, all_significant, significant
-from xosc_lateral.drivers.drives.filters import scale_frequencies
+from xosc_lateral.drivers.drives.filters import mirrored, scale_frequencies
 from xosc_lateral.drivers.fitting.sensor.likelihood import Colour, Known, Measured, Solution, density, solve
 from xosc_lateral.drivers.fitting.sensor.periodogram import (
     COARSE_STEP_RATIO,
@@ -68,14 +68,11 @@ class Separation:
         n = len(offset)
         if n < 2:
             return offset
-        mean = float(offset.mean())
-        about = offset - mean
-        extended = np.concatenate([2.0 * about[0] - about[:0:-1], about, 2.0 * about[-1] - about[-2::-1]])
-        frequency: FloatArray = np.asarray(np.fft.rfftfreq(len(extended), step), dtype=np.float64)
-        driver = density(self.knots, frequency)
+        frequency: FloatArray = np.asarray(np.fft.rfftfreq(3 * n - 2, step), dtype=np.float64)
+        driver, mean = density(self.knots, frequency), float(offset.mean())
         share = driver / (driver + self.sensor.density(frequency) + self.beside(frequency))
         share[0] = 1.0
-        filtered = scale_frequencies(extended, np.sqrt(share))
+        filtered = scale_frequencies(mirrored(offset - mean, n - 1), np.sqrt(share))
         return np.asarray(mean + filtered[n - 1 : 2 * n - 1])
 
 

@@ -132,12 +132,7 @@ def take_at_rate(state: ClockState, source: Callable[[int], FloatArray], n: int,
         raise ValueError(f"rate: expected {n} finite values > 0")
     # Added up one by one from where the last call ended, so that pieces give the same sums as the whole.
     times = np.cumsum(np.concatenate([[state.time], steps]))
-    state.time = float(times[-1])
-    return _read(state, source, times[:-1])
-
-
-def _read(state: ClockState, source: Callable[[int], FloatArray], times: FloatArray) -> FloatArray:
-    """Values at times of the source, and a state that holds what later times need. Shape (n, drivers)."""
+    state.time, times = float(times[-1]), times[:-1]
     held = source(0) if state.held is None else state.held
     if not len(times):
         return held[:0]
