@@ -31,11 +31,8 @@ OWN_ROWS = 0.3
 """Share of a column's values in rows without a place that speaks of a bus of its own: all, less those that coincide;
 where a camera loses the lane for that long, other columns are bridged over 0.5 s, and no more. [-]"""
 
-CONTRADICTION_DISTANCE = 0.05
-"""Two rows of one time further apart than this contradict each other [m] ..."""
-
-MAX_CONTRADICTIONS = 0.01
-"""... and more than this share of them means several drives in one. [-]"""
+CONTRADICTION_DISTANCE, MAX_CONTRADICTIONS = 0.05, 0.01
+"""Rows of one time further apart contradict each other [m]; a larger share of them means several drives in one [-]."""
 
 RUN = "following_run"
 """Column of tables that an import has cut: number of the road-following stretch. What it has cut is not cut again."""

@@ -173,11 +173,8 @@ ORDER = 0.5  # Of the variogram score: the power that its authors found most sen
 def energy_score(real: FloatArray, ensemble: FloatArray) -> FloatArray:
     """Energy score of each window, shape (n,): a proper score, lowest on average for the truth. [m]
 
-    `real`, shape (n, m): what was driven; `ensemble`, shape (n, k, m), k >= 2: sampled for each. [m]
-
-    References
-    ----------
-    .. [1] T. Gneiting, A. E. Raftery, "Strictly Proper Scoring Rules, Prediction, and Estimation", JASA 102, 2007, 4.3.
+    `real`, shape (n, m): what was driven; `ensemble`, shape (n, k, m), k >= 2: sampled for each. [m] T. Gneiting, A. E.
+    Raftery, "Strictly Proper Scoring Rules, Prediction, and Estimation", JASA 102, 2007, section 4.3.
     """
     import scoringrules
 
@@ -188,10 +185,8 @@ def energy_score(real: FloatArray, ensemble: FloatArray) -> FloatArray:
 def variogram_score(real: FloatArray, ensemble: FloatArray) -> FloatArray:
     """Variogram score of each window, as `energy_score`: sees how values depend on one another. [m]
 
-    References
-    ----------
-    .. [1] M. Scheuerer, T. M. Hamill, "Variogram-Based Proper Scoring Rules for Probabilistic Forecasts of Multivariate
-       Quantities", Monthly Weather Review 143, 2015: order 0.5.
+    M. Scheuerer, T. M. Hamill, "Variogram-Based Proper Scoring Rules for Probabilistic Forecasts of Multivariate
+    Quantities", Monthly Weather Review 143, 2015: order 0.5.
     """
     import scoringrules
 

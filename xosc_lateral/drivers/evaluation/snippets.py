@@ -109,17 +109,6 @@ def sample_recorded(
     ]
 
 
-def sample_parts(profile: DriverProfile, snippets: Snippets, seed: int) -> tuple[FloatArray, FloatArray]:
-    """Coarse and fine part of sampled snippets, without effects, in lane widths; shape (n, m) each. [-]"""
-    root = np.random.SeedSequence(seed)
-    relative = snippets.offset / snippets.lane_width
-    coarse, fine = np.empty_like(relative), np.empty_like(relative)
-    for k, start in enumerate(relative[:, 0].tolist()):
-        stream = profile.model.stream(child(root, k), Start(rel_offset=start))
-        coarse[k], fine[k] = stream.take(relative.shape[1])
-    return coarse, fine
-
-
 def sample_runs(profile: DriverProfile, runs: Sequence[Run], seed: int, *, same_start: bool = True) -> list[FloatArray]:
     """For each run one of the same length and context, shape (n_i,) each. [m]
 
@@ -196,7 +185,11 @@ def evaluate_parts(
     coarse_real, fine_real = (
         np.array([split[id(one.run)][part][one.rows] for one in snippets.items]) for part in range(2)
     )
-    coarse, fine = sample_parts(profile, snippets, seed)
+    root, relative = np.random.SeedSequence(seed), snippets.offset / snippets.lane_width
+    coarse, fine = np.empty_like(relative), np.empty_like(relative)
+    for k, start in enumerate(relative[:, 0].tolist()):  # without effects
+        stream = profile.model.stream(child(root, k), Start(rel_offset=start))
+        coarse[k], fine[k] = stream.take(relative.shape[1])
     shifted = np.roll(fine_real, round(FINE_SHIFT / profile.model.step), axis=1)
     width = snippets.lane_width
     combinations = (

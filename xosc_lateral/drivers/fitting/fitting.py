@@ -68,20 +68,11 @@ def fit_profile(
     `DriverProfileError` when neighbours are asked for (True) of the two-level model, which is the paper's to the
     letter, or drives of different bands are given to it.
 
-    Parameters
-    ----------
-    provenance : Provenance, optional
-        What is known about the drives; hours, counts and fit settings are filled in.
-    sensor_noise : float, optional
-        Standard deviation of the sensor's error on the rows, rounding included, where it is known. [m]
-    neighbours : bool, optional
-        Whether a population's profile holds how its drivers keep away from vehicles beside them. None: where they are
-        known.
-    prior : DriverProfile, optional
-        Where its movement comes from above the band that the drives show (`Drive.valid_below`), if no other drives show
-        it: without, there is none above.
-    stand_in : callable, optional
-        Gives the prior, of a model of ours, where the drives state a band that ends below `KEEPING_BAND`.
+    `provenance`: what is known about the drives; hours, counts and fit settings are filled in. `sensor_noise`: standard
+    deviation of the sensor's error on the rows, rounding included, where it is known [m]. `neighbours`: whether a
+    population's profile holds how its drivers keep away from vehicles beside them, None: where they are known. `prior`:
+    where its movement comes from above the band that the drives show (`Drive.valid_below`), if no other drives show it;
+    `stand_in` gives it, for a model of ours, where the drives state a band that ends below `KEEPING_BAND`.
     """
     slow, fast = split_by_band(drives)
     runs, fast_runs = all_runs(slow, rules), list[Run]()

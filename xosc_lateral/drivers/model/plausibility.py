@@ -28,11 +28,8 @@ if TYPE_CHECKING:
 MINIMUM_LANE_WIDTH = 2.5
 """Where a lane is narrower than this (it opens or closes), an offset is held against a lane of this width. [m]"""
 
-TRIAL_STEPS = 150
-"""Model steps that a profile is tried with: half a minute. [-]"""
-
-TRIAL_SPEED = 30.0
-"""Speed of the trial. [m/s]"""
+TRIAL_STEPS, TRIAL_SPEED = 150, 30.0
+"""Model steps that a profile is tried with, half a minute [-], and the speed [m/s]."""
 
 
 def check_offsets(

@@ -93,20 +93,12 @@ def separate(
     Raises `NotEnoughDataError` if no run lasts 12.8 s; `DriverProfileError` if the error that is known is more than all
     that was measured.
 
-    Parameters
-    ----------
-    runs, step
-        Offsets [m] at an even step [s].
-    rows, durations
-        The offsets of the same runs as recorded: variances are counted, and rounding is detected, in these [m]; and how
-        long each row stands for, where rows are not even in time [s].
-    rate
-        Rows per second; without, as many as there are in the time of the runs. [Hz]
-    sensor_noise
-        Standard deviation of the sensor's error on the rows, rounding included, where it is known. [m]
-    half_widths, one_camera
-        Half the lane width in the same runs, where a camera measured it: a second view of its errors [m]; and whether
-        that is known to be the camera that measured the offset: else what the width shows is taken where plausible.
+    Of offsets [m] at an even step [s], up to a `highest` frequency [Hz]. `rows`: the same runs as recorded, in which
+    variances are counted and rounding is detected [m]; `durations`: how long each row stands for, where rows are not
+    even in time [s]; `rate`: rows per second, without as many as there are in the time of the runs [Hz].
+    `sensor_noise`: standard deviation of the sensor's error on the rows, rounding included, where it is known [m].
+    `half_widths`: half the lane width in the runs, where a camera measured it, a second view of its errors [m];
+    `one_camera`: that is known to have measured the offset, else what the width shows is taken where plausible.
     """
     measured = list(rows) if rows is not None else list(runs)
     variance = _variance(measured, durations)

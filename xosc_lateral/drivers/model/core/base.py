@@ -154,11 +154,8 @@ def take_at_rate(state: ClockState, source: Callable[[int], FloatArray], n: int,
 # ---- fine movement: uniform white noise shaped by a kernel, phi = R * k (arXiv:2405.17080, section III) ----
 # The amplitude spectrum of the measured fine part, relative to that of the noise, is approximated by a piecewise linear
 # damping function over frequency; its inverse transform is the kernel.
-N_KNOTS = 11
-"""Knots of the damping function, evenly from 0 to half the sampling rate. [-]"""
-
-KERNEL_TAPS = 51
-"""Taps of the kernel (odd): 10 s at 5 Hz, one snippet. [-]"""
+N_KNOTS, KERNEL_TAPS = 11, 51
+"""Knots of the damping function, and taps of the kernel (odd): 10 s at 5 Hz, one snippet. [-]"""
 
 
 class ShapedNoise(Record, frozen=True, eq=False, dict=True):

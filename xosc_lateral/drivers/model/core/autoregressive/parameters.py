@@ -34,11 +34,9 @@ BORDER = 0.4
 HALF_LENGTH = 4.0
 """Of the measuring low-pass. [s]"""
 
-MEASURING_WINDOW = 6.0
-"""Kaiser shape of the measuring low-pass: 63 dB, so that noise five decades below the slow movement stays apart. [-]"""
-
-BUILDING_WINDOW = 7.0
-"""Kaiser shape of the building low-pass: images of slow movement are 75 dB down. [-]"""
+MEASURING_WINDOW, BUILDING_WINDOW = 6.0, 7.0
+"""Kaiser shapes of the low-passes: 63 dB to measure by, so that noise five decades below the slow movement stays apart,
+75 dB to build by, for images of slow movement. [-]"""
 
 COARSE_EVERY = 5
 """Steps of the 5 Hz grid per step of the coarse movement: 1 Hz holds all below 0.5 Hz. [-]"""
@@ -71,13 +69,9 @@ def phases() -> FloatArray:
     Sample p after coarse value j is the sum over k of ``phases[k, p] * coarse[j - TICKS + k]``.
     """
     kernel = building_low_pass()
-    half = len(kernel) // 2
-    table = np.zeros((2 * TICKS + 2, COARSE_EVERY))
-    for k in range(2 * TICKS + 2):
-        for p in range(COARSE_EVERY):
-            at = half + p - COARSE_EVERY * (k - TICKS)
-            if 0 <= at < len(kernel):
-                table[k, p] = kernel[at]
+    late = COARSE_EVERY * (np.arange(2 * TICKS + 2)[:, None] - TICKS)
+    at = len(kernel) // 2 + np.arange(COARSE_EVERY) - late
+    table = np.where((at >= 0) & (at < len(kernel)), kernel[np.clip(at, 0, len(kernel) - 1)], 0.0)
     return frozen_array(table / table.sum(axis=0))  # a level stays a level in every phase
 
 
