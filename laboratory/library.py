@@ -14,6 +14,7 @@ those of the others; for `rural` a fit to the first file on the other ones. What
 
 from __future__ import annotations
 
+import dataclasses
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -44,7 +45,6 @@ from xosc_lateral.files.drives import drives_of_table, read_drives
 from xosc_lateral.files.source import parsed_hash
 from xosc_lateral.workflows.recordings.importers.dlr_ht import HIGHEST_FREQUENCY, import_dlr_ht
 from xosc_lateral.workflows.recordings.importers.openacc import import_openacc
-from xosc_lateral.workflows.recordings.importers.table import write_imported
 
 FloatArray = NDArray[np.float64]
 
@@ -104,7 +104,7 @@ def build_library(
     kind = dict(zip(imported.table["drive"], imported.table["vehicle_class"], strict=True))
     with tempfile.TemporaryDirectory() as folder:
         table = Path(folder) / "dlr-ht.parquet"
-        write_imported(imported, table)
+        dataclasses.replace(imported, sources=(source,)).write(table)
         drives = read_drives(table)
     runs = all_runs(drives)
     rural, fast = _rural(gnss, model)

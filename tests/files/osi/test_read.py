@@ -17,7 +17,7 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main
 from xosc_lateral.files.osi.write import write_osi
 from xosc_lateral.workflows.recordings.importers import import_drives
-from xosc_lateral.workflows.recordings.osi.trace import NANOSECONDS, PLACES
+from xosc_lateral.workflows.recordings.osi_trace import NANOSECONDS, PLACES
 from xosc_lateral.world.scenario.enums import VehicleCategory
 
 osi_utilities = pytest.importorskip("osi_utilities")

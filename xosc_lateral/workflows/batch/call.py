@@ -6,9 +6,8 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
@@ -22,32 +21,42 @@ from xosc_lateral.workflows.batch.guard import JobLimits
 from xosc_lateral.workflows.batch.jobs import Batch, plan_batch
 from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, read_manifest
 from xosc_lateral.workflows.batch.progress import Display, Summary, follow
-from xosc_lateral.workflows.batch.request import frame_requests
+from xosc_lateral.workflows.batch.request import read_request_table
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
-from xosc_lateral.workflows.options import spelled_out
+from xosc_lateral.workflows.options import declare_options, flag, process_count, spelled_out
 from xosc_lateral.workflows.result import PathLike, Result
 
 if TYPE_CHECKING:
     ScenariosLike = PathLike | pd.DataFrame | Sequence[PathLike]
 
 
+BATCH = "Batches"
+"""Heading of their options on the command line."""
+
+
 @spelled_out(ConvertSettings)
+@declare_options
 def convert_many(
     scenarios: ScenariosLike,
-    output: PathLike,
-    *,
-    variants: int = 1,
-    report: PathLike | None = None,
-    workers: int = 1,
-    cluster: str | None = None,
-    job_timeout: float = JOB_TIMEOUT.value,
-    job_memory: float = JOB_MEMORY.value,
-    keep_old: bool = False,
+    output: PathLike, *,
+    variants: Annotated[int, flag(help="Number of outputs, each with different offsets.", min=1)] = 1,
+    report: Annotated[PathLike | None, flag(kind=str | None, metavar="PAGE.html",
+        help="Page that shows what was added; for a batch, a folder of pages.")] = None,
+    workers: Annotated[int, flag("--jobs", read=process_count, help="Number of processes; -1: one per core.",
+        rich_help_panel=BATCH)] = 1,
+    job_timeout: Annotated[float, flag(help="Time limit per scenario [s].", min=1, max=86_400,
+        rich_help_panel=BATCH)] = JOB_TIMEOUT.value,
+    job_memory: Annotated[float, flag(help="Memory limit per scenario [MB].", min=100, max=1e6,
+        rich_help_panel=BATCH)] = JOB_MEMORY.value,
+    cluster: Annotated[str | None, flag(metavar="ADDRESS", help="Address of a dask scheduler.",
+        rich_help_panel=BATCH)] = None,
+    keep_old: Annotated[bool, flag("--keep-old", help="Leave outputs of older inputs or versions alone.",
+        rich_help_panel=BATCH)] = False,
     force: bool = False,
     show: Literal["auto", "quiet", "json", "nothing"] = "nothing",
     on_outcome: Callable[[Mapping[str, Any]], None] | None = None,
     **options: Unpack[ConvertKeywords],
-) -> BatchResult:
+) -> BatchResult:  # fmt: skip
     """Convert many scenarios into a folder; what is up to date there already is left alone.
 
     Parameters
@@ -57,14 +66,8 @@ def convert_many(
         if wanted `variants`, `profile:ENTITY`, `parameter:NAME` and names of options; or several of them.
     output : str or Path
         Folder; it mirrors the inputs, and holds `manifest.parquet` at the end.
-    variants : int
-        Outputs per scenario, each with offsets of its own.
     report : str or Path, optional
         Folder for a page per output, and an ``index.html`` that lists what needs attention first.
-    workers : int
-        Processes; -1: one per core.
-    cluster : str, optional
-        Address of a dask.distributed scheduler to work on.
     job_timeout, job_memory : float
         What one scenario may take; one that takes more fails. [s], [MB]
     keep_old : bool
@@ -89,19 +92,28 @@ def convert_many(
     elif isinstance(scenarios, Sequence):
         inputs = list(scenarios)
     else:
-        inputs = list(frame_requests(scenarios, settings, variants=variants))
+        inputs = list(read_request_table(scenarios, settings, variants=variants))
     batch = plan_batch(inputs, output_folder(output), settings, variants=variants, report=report)
     if not len(batch):
         raise FormatError(f"no scenario to convert{_left_out(batch)}", path=", ".join(map(str, inputs[:3])) or output)
     _refuse_unknown_names(batch)
     # A folder in an output's place is that output's failure alone.
     claim((job.output for job in batch.jobs if not job.output.is_dir()), force=force)
-    limits = JobLimits(job_timeout, job_memory)
     outcomes = outcomes_of(
-        batch, workers=workers, cluster=cluster, keep_old=keep_old, limits=limits, notify=_notifier(show)
+        batch,
+        workers=workers,
+        cluster=cluster,
+        keep_old=keep_old,
+        limits=JobLimits(job_timeout, job_memory),
+        notify=None if show == "nothing" else lambda line: print(f"xosc-lateral: {line}", file=sys.stderr, flush=True),
     )
+
+    def report_row(outcome: JobOutcome) -> None:
+        if on_outcome is not None:
+            on_outcome(_row(outcome.state, outcome.seconds, outcome.row))
+
     try:
-        summary = follow(outcomes, len(batch), Display(show), report=on_outcome and partial(_report_row, on_outcome))
+        summary = follow(outcomes, len(batch), Display(show), report=report_row)
     except Interrupted as signal:
         signal.finished = sum(job.output.is_file() for job in batch.jobs)
         raise
@@ -126,16 +138,8 @@ def _refuse_unknown_names(batch: Batch) -> None:
             raise FormatError(f"--{option} {name!r}: no scenario has such an entity", path=batch.base)
 
 
-def _report_row(report: Callable[[Mapping[str, Any]], None], outcome: JobOutcome) -> None:
-    report(_row(outcome.state, outcome.seconds, outcome.row))
-
-
 def _row(state: JobState, seconds: float, row: ManifestRow) -> dict[str, Any]:
     return {"state": state.value, "seconds": round(seconds, 4), **row.to_dict()}
-
-
-def _notifier(show: str) -> Callable[[str], None] | None:
-    return None if show == "nothing" else lambda line: print(f"xosc-lateral: {line}", file=sys.stderr, flush=True)
 
 
 class BatchResult(Result):

@@ -63,7 +63,11 @@ def lane_changes(
     rate = _lateral_speed(x, first, last, step)
     near = np.abs(offset) < settings.open_offset
     switches = np.flatnonzero((vehicle[1:] == vehicle[:-1]) & (lane[1:] != lane[:-1]))
-    for k in np.concatenate([switches, _open_ends(offset, rate, vehicle, settings)]):
+    new = np.flatnonzero(vehicle[1:] != vehicle[:-1])
+    ends = np.concatenate([[0], new, new + 1, [len(vehicle) - 1]]).astype(np.int64)
+    fast = np.abs(rate[ends])  # tracks may be cut off amid a lane change
+    is_open = (np.abs(offset[ends]) > settings.open_offset) & (fast > settings.calm_rate) | (fast > settings.open_rate)
+    for k in np.concatenate([switches, ends[is_open]]):
         lowest, highest = max(first[k], k - reach), min(last[k], k + reach)
         towards = np.sign(rate[k]) or 1.0
         before = np.flatnonzero(near[lowest : k + 1] & (towards * rate[lowest : k + 1] < settings.calm_rate))
@@ -72,14 +76,6 @@ def lane_changes(
         end = k + after[0] if len(after) else highest
         changing[max(first[k], begin - margin) : min(last[k], end + margin) + 1] = True
     return changing
-
-
-def _open_ends(offset: FloatArray, rate: FloatArray, vehicle: IntArray, settings: CutSettings) -> IntArray:
-    """First and last rows of tracks that are cut off amid a lane change."""
-    new = np.flatnonzero(vehicle[1:] != vehicle[:-1])
-    ends = np.concatenate([[0], new, new + 1, [len(vehicle) - 1]]).astype(np.int64)
-    far, fast = np.abs(offset[ends]) > settings.open_offset, np.abs(rate[ends]) > settings.open_rate
-    return np.asarray(ends[(far & (np.abs(rate[ends]) > settings.calm_rate)) | fast])
 
 
 def long_gaps(made_up: BoolArray, vehicle: IntArray, step: float, max_gap: float) -> BoolArray:
@@ -153,8 +149,7 @@ def _kept_runs(state: NDArray[np.str_], lane: IntArray, vehicle: IntArray, time:
     """Number of each row's stretch of equal fate, in one lane and without a gap that `fit` would not bridge."""
     kept = state == KEPT_ROWS
     other = (kept[1:] != kept[:-1]) | (vehicle[1:] != vehicle[:-1]) | (lane[1:] != lane[:-1])
-    new = other | (np.diff(time) > MAX_GAP + 1e-9)
-    return _runs(new)
+    return _runs(other | (np.diff(time) > MAX_GAP + 1e-9))
 
 
 def _lateral_speed(x: FloatArray, first: IntArray, last: IntArray, step: float) -> FloatArray:
@@ -199,9 +194,9 @@ def require_headings(heading: FloatArray, way: FloatArray, speed: FloatArray, pa
     }
     shares = {name: _share(np.cos(other - way)[moving] < HEADING_AGREEMENT) for name, other in meant.items()}
     likely = min(shares, key=lambda name: shares[name])
-    meant_by_us = "radians counter-clockwise from x are meant"
-    cause = f"; it may be {likely}" if shares[likely] <= MAX_AGAINST else f"; {meant_by_us}"
-    what = f"contradicts the way through x and y in {100 * wrong:.0f} % of the moving rows{cause}"
+    is_known = shares[likely] <= MAX_AGAINST
+    cause = f"it may be {likely}" if is_known else "radians counter-clockwise from x are meant"
+    what = f"contradicts the way through x and y in {100 * wrong:.0f} % of the moving rows; {cause}"
     raise FormatError(what, path=path, element="column 'heading'")
 
 

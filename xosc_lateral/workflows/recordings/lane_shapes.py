@@ -45,26 +45,9 @@ class LaneShape(ABC):
 
 
 def place_in_shapes(tracks: Tracks, shapes: Sequence[LaneShape], left: IntArray) -> PlacedTracks:
-    """Every row in the lane that it drives along; `left`: on the left of each lane, driven the same way, or -1."""
-    piece, along, offset, width, curvature, agreement = find_lanes(shapes, tracks.x, tracks.y, tracks.heading)
-    index, count = lanes_beside(left)
-    inside = piece >= 0
-    road = {
-        "curvature": curvature,
-        "lane_index": np.where(inside, index[piece], np.nan),
-        "lane_count": np.where(inside, count[piece], np.nan),
-    }
-    return PlacedTracks(tracks, piece, along, offset, width, agreement, road)
-
-
-def find_lanes(
-    shapes: Sequence[LaneShape], x: FloatArray, y: FloatArray, heading: FloatArray
-) -> tuple[IntArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Lane that every row drives along, amid which it is (-1: none), way in it, offset, width and curvature.
-
-    Last, the cosine of heading and lane, of lanes driven another way too; NaN where the row lies in none.
-    """
-    n = len(x)
+    """Every row in the lane that it drives along, amid which it is; `left`: on the left of each lane, driven the same
+    way, or -1. The agreement is that with lanes driven another way, too."""
+    n, x, y = len(tracks.x), tracks.x, tracks.y
     piece = np.full(n, -1)
     along, offset, width, curvature, agreement = (np.full(n, np.nan) for _ in range(5))
     nearest = np.full(n, np.inf)
@@ -74,13 +57,15 @@ def find_lanes(
             continue
         way, aside, wide, ahead, bend = shape.place(x[near], y[near])
         inside = (np.abs(aside) <= 0.5 * wide) & np.isfinite(way)
-        along_lane = np.cos(heading[near] - ahead)
+        along_lane = np.cos(tracks.heading[near] - ahead)
         agreement[near[inside]] = np.fmax(agreement[near[inside]], along_lane[inside])
         better = inside & (along_lane > LANE_AGREEMENT) & (np.abs(aside) < nearest[near])
         rows = near[better]
         piece[rows], nearest[rows] = number, np.abs(aside[better])
         along[rows], offset[rows], width[rows], curvature[rows] = way[better], aside[better], wide[better], bend[better]
-    return piece, np.nan_to_num(along), offset, width, curvature, agreement
+    index, count = (np.where(piece >= 0, lanes[piece], np.nan) for lanes in lanes_beside(left))
+    road = {"curvature": curvature, "lane_index": index, "lane_count": count}
+    return PlacedTracks(tracks, piece, np.nan_to_num(along), offset, width, agreement, road)
 
 
 def lanes_beside(left: IntArray) -> tuple[IntArray, IntArray]:
@@ -89,12 +74,10 @@ def lanes_beside(left: IntArray) -> tuple[IntArray, IntArray]:
     right[left[left >= 0]] = np.flatnonzero(left >= 0)
     counts = []
     for beside in (right, left):
-        steps = np.zeros(len(left), dtype=np.int64)
-        for start in range(len(left)):
-            here = start
-            while beside[here] >= 0 and steps[start] < len(left):
-                here = int(beside[here])
-                steps[start] += 1
+        steps, here = np.zeros(len(left), dtype=np.int64), beside
+        while (here >= 0).any() and steps.max() < len(left):
+            steps += here >= 0
+            here = np.where(here >= 0, beside[here], -1)
         counts.append(steps)
     return counts[0], counts[0] + counts[1] + 1
 
@@ -106,12 +89,11 @@ def lane_graph(shapes: Sequence[LaneShape], left: IntArray, following: Sequence[
         for lane, other in ((number, int(left[number])), (int(left[number]), number)):
             shape = shapes[lane]
             way = np.linspace(0.0, shape.length, int(np.ceil(shape.length / FACING_STEP)) + 1)
-            facing_way = shapes[other].place(*(np.interp(way, shape.start, shape.centre[:, axis]) for axis in (0, 1)))[
-                0
-            ]
-            known = np.isfinite(facing_way)
+            x, y = (np.interp(way, shape.start, shape.centre[:, axis]) for axis in (0, 1))
+            other_way = shapes[other].place(x, y)[0]
+            known = np.isfinite(other_way)
             if known.sum() > 1:
-                facing[lane, other] = way[known], np.maximum.accumulate(facing_way[known])
+                facing[lane, other] = way[known], np.maximum.accumulate(other_way[known])
     return LaneGraph(np.array([shape.length for shape in shapes]), left, following, facing)
 
 
@@ -161,10 +143,9 @@ class Strip(LaneShape):
         """Way along, distance to the left, number of the piece, and how far past its ends; shape as the arguments."""
         points = np.stack([x, y], axis=1)
         nearest = np.asarray(self._tree.query(points)[1], dtype=np.intp)
-        feet = [self._on(points, np.clip(nearest + side, 0, len(self.size) - 1)) for side in (-1, 0)]
-        first = feet[0][4] <= feet[1][4]
-        way, aside, beyond = (np.where(first, feet[0][n], feet[1][n]) for n in (0, 1, 3))
-        k = np.where(first, feet[0][2], feet[1][2])
+        before, after = (self._on(points, np.clip(nearest + side, 0, len(self.size) - 1)) for side in (-1, 0))
+        is_before = before[4] <= after[4]
+        way, aside, k, beyond = (np.where(is_before, *both) for both in zip(before[:4], after[:4], strict=True))
         return way, aside, k, beyond
 
     def _on(self, points: FloatArray, k: NDArray[np.intp]) -> tuple[Any, ...]:
@@ -181,25 +162,23 @@ class Strip(LaneShape):
 
 def middle(left: FloatArray, right: FloatArray) -> FloatArray:
     """A line between two others that are driven the same way, shape (n, 3). [m]"""
-    ways = [np.concatenate([[0.0], np.cumsum(_sizes(line))]) for line in (left, right)]
-    share = np.union1d(*(way / way[-1] for way in ways))
+    shares = [way / way[-1] for way in map(_way, (left, right))]
+    every = np.union1d(*shares)
     ends = [
-        np.stack([np.interp(share, way / way[-1], line[:, axis]) for axis in (0, 1, 2)], axis=1)
-        for way, line in zip(ways, (left, right), strict=True)
+        np.stack([np.interp(every, share, line[:, axis]) for axis in (0, 1, 2)], axis=1)
+        for share, line in zip(shares, (left, right), strict=True)
     ]
     return np.asarray(0.5 * (ends[0] + ends[1]))
 
 
-def _sizes(line: FloatArray) -> FloatArray:
-    return np.asarray(np.hypot(*np.diff(line[:, :2], axis=0).T))
+def _way(line: FloatArray) -> FloatArray:
+    return np.asarray(np.r_[0.0, np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))])
 
 
 def _dense(line: FloatArray) -> FloatArray:
     """Without points that are there twice, and none farther from the next than `STEP`."""
-    size = _sizes(line)
-    line = line[np.r_[True, size > 1e-9]]
-    size = _sizes(line)
-    way = np.concatenate([[0.0], np.cumsum(size)])
+    line = line[np.r_[True, np.hypot(*np.diff(line[:, :2], axis=0).T) > 1e-9]]
+    size, way = np.hypot(*np.diff(line[:, :2], axis=0).T), _way(line)
     count = np.maximum(np.ceil(size / STEP).astype(np.int64), 1)
     piece = np.repeat(np.arange(len(size)), count)
     within = np.concatenate([np.arange(n) / n for n in count]) if len(count) else np.zeros(0)

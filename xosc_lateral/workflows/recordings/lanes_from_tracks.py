@@ -36,7 +36,8 @@ CORRELATION = 0.9  # correlation of a driver's offset after 1 s, as assumed by t
 ROUNDS = 4  # of reweighting; the line moves by under 1 mm after three
 HUBER = 2.0  # residuals beyond this many standard deviations count less: undetected lane changes
 BEND_PENALTY = 0.1  # [-]
-MIN_PASSAGES = 10  # per 100 m of road, below which the lane ends
+COUNT_WINDOW = 100.0  # of road, in which passages are counted [m]
+MIN_PASSAGES = 10  # per window, below which the lane ends
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,35 +86,24 @@ def fit_lane_centre(
     basis = _basis(s, knots)
     size = basis.shape[1]
     design = np.hstack([basis, basis * taller[:, None], taller[:, None]])
-    follows = np.r_[False, passage[1:] == passage[:-1]]
-    coefficients, covariance = _robust_least_squares(
-        _whiten(design, follows), _whiten(d, follows), _penalty(size), passage
-    )
-    centre, tilt = coefficients[:size], coefficients[size : 2 * size]
-    lane = LaneCentreLine(
-        start, end, knots, centre, tilt, mean_height, covariance[:size, :size], len(np.unique(passage))
-    )
-    return _sure_part(lane)
-
-
-def _sure_part(lane: LaneCentreLine) -> LaneCentreLine:
-    """The lane's longest part in which the centre is known to `MAX_ERROR`."""
-    s = np.arange(lane.start, lane.end, 10.0)
-    first, last = _longest_run(lane.standard_error(s) <= MAX_ERROR)
-    if last <= first:
-        raise NotEnoughDataError(f"no lane centre is known anywhere to within {MAX_ERROR:g} m (standard error)")
-    return replace(lane, start=float(s[first]), end=float(s[last - 1]))
-
-
-def _penalty(size: int) -> FloatArray:
-    """Penalty on the coefficients: centre (weakly) smooth, tilt small, tilt's mean free."""
-    # The penalty on bends carries the line over places where nobody was measured.
+    # The penalty on bends carries the line over places where nobody was measured; the tilt is small, its mean free.
     bend = BEND_PENALTY * np.diff(np.eye(size), n=2, axis=0)
     penalty = np.zeros((2 * size + 1, 2 * size + 1))
     penalty[:size, :size] = bend.T @ bend
     penalty[size : 2 * size, size : 2 * size] = TILT_PENALTY * np.eye(size)
     penalty[-1, -1] = 1e-6  # where all vehicles are equally tall it is anything: then 0
-    return penalty
+    follows = np.r_[False, passage[1:] == passage[:-1]]
+    rows, values = _whiten(design, follows), _whiten(d, follows)
+    coefficients, covariance = _robust_least_squares(rows, values, penalty, passage)
+    tilt, passages = coefficients[size : 2 * size], len(np.unique(passage))
+    of_centre = coefficients[:size], tilt, mean_height, covariance[:size, :size]
+    lane = LaneCentreLine(start, end, knots, *of_centre, passages)
+    # the longest part in which the centre is known well enough
+    s = np.arange(lane.start, lane.end, 10.0)
+    first, last = _longest_run(lane.standard_error(s) <= MAX_ERROR)
+    if last <= first:
+        raise NotEnoughDataError(f"no lane centre is known anywhere to within {MAX_ERROR:g} m (standard error)")
+    return replace(lane, start=float(s[first]), end=float(s[last - 1]))
 
 
 def _robust_least_squares(
@@ -148,19 +138,18 @@ def _whiten(values: FloatArray, follows: NDArray[np.bool_]) -> FloatArray:
     return np.asarray(innovation, dtype=np.float64)
 
 
-def _covered(s: FloatArray, passage: IntArray, window: float = 100.0) -> tuple[float, float]:
+def _covered(s: FloatArray, passage: IntArray) -> tuple[float, float]:
     """Longest range of s in which every window has enough passages."""
-    number = np.floor(s / window).astype(np.int64)
+    number = np.floor(s / COUNT_WINDOW).astype(np.int64)
     pairs = np.unique(np.column_stack([number, passage]), axis=0)
     if len(pairs) == 0:
         raise NotEnoughDataError("no vehicle keeps to this lane")
     count = np.bincount(pairs[:, 0] - pairs[0, 0])
     first, last = _longest_run(count >= MIN_PASSAGES)
     if last <= first:
-        raise NotEnoughDataError(
-            f"at most {count.max()} drives share {window:.0f} m of a lane; {MIN_PASSAGES} are needed"
-        )
-    return float((pairs[0, 0] + first + 0.5) * window), float((pairs[0, 0] + last - 0.5) * window)
+        what = f"at most {count.max()} drives share {COUNT_WINDOW:.0f} m of a lane"
+        raise NotEnoughDataError(f"{what}; {MIN_PASSAGES} are needed")
+    return float((pairs[0, 0] + first + 0.5) * COUNT_WINDOW), float((pairs[0, 0] + last - 0.5) * COUNT_WINDOW)
 
 
 def _longest_run(good: NDArray[np.bool_]) -> tuple[int, int]:

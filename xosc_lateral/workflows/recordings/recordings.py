@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.texts import composed
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping
@@ -96,7 +94,7 @@ def _tracks(source: Path, road: Path | None, columns: TableMapping) -> RecordedT
 
 def _osi(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
     from xosc_lateral.workflows.recordings.importers.osi import lanes_of
-    from xosc_lateral.workflows.recordings.osi.read import read_osi
+    from xosc_lateral.workflows.recordings.osi_trace import read_osi
 
     recorded = read_osi(source)
     made = recorded.opendrive
@@ -132,7 +130,7 @@ def name_of(source: Path) -> str:
 
 
 def _on_road(tracks: Tracks, source: Path, road: Path | None, made: bytes | None = None) -> RecordedTraffic:
-    """`own`: OpenDRIVE of the recording's own lanes, for where no road is given."""
+    """`made`: OpenDRIVE of the recording's own lanes, for where no road is given."""
     if road is not None:
         network, data, road_name = read_opendrive(road), road.read_bytes(), road.name
     elif made is not None:
@@ -143,9 +141,24 @@ def _on_road(tracks: Tracks, source: Path, road: Path | None, made: bytes | None
     heading = tracks.heading - network.header_offset.heading
     every = slice(None, None, max(1, len(x) // GATE_ROWS))
     require_along_lanes(network, x[every], y[every], heading[every], tracks.speed[every], source)
-    vehicles, notes = [], []
-    for name, rows in zip(tracks.names, _rows_of_vehicles(tracks.vehicle, tracks.time), strict=True):
-        first = rows[0]
+    vehicles, notes = _vehicles(replace(tracks, x=x, y=y, heading=heading))
+    sources = (source,) if road is None else (source, road)
+    return RecordedTraffic(name_of(source), vehicles, network, data, road_name, sources, notes)
+
+
+def _vehicles(tracks: Tracks) -> tuple[tuple[Track, ...], tuple[str, ...]]:
+    """Each vehicle, its rows `STEP` apart or as recorded, the first and the last always; and whose size is none."""
+    vehicles, notes = list[Track](), list[str]()
+    parts = np.split(np.arange(len(tracks.x)), np.flatnonzero(np.diff(tracks.vehicle)) + 1)
+    for name, part in zip(tracks.names, parts, strict=True):
+        number = np.floor((tracks.time[part] - tracks.time[part[0]]) / STEP + 1e-6)
+        rows = part[np.r_[True, np.diff(number[:-1]) > 0, True][: len(part)]]
+        first, time, x, y, heading = (
+            rows[0],
+            *(each[rows] for each in (tracks.time, tracks.x, tracks.y, tracks.heading)),
+        )
+        if np.isnan(heading).all():
+            heading = np.arctan2(np.gradient(y), np.gradient(x)) if len(rows) > 1 else np.zeros(1)
         kind, length = str(tracks.kind[first]), float(tracks.length[first])
         usual = USUAL_LENGTH.get(kind, 4.6), USUAL_WIDTH.get(kind, 1.8)
         width = usual[1] if tracks.width is None else float(tracks.width[first])
@@ -153,12 +166,11 @@ def _on_road(tracks: Tracks, source: Path, road: Path | None, made: bytes | None
             taken = f"{usual[0]:g} m x {usual[1]:g} m are taken"
             notes.append(f"{name}: no vehicle has {length:g} m x {width:g} m, {taken}")
             length, width = usual
+        height = USUAL_HEIGHT.get(kind, 1.5) if tracks.height is None else float(tracks.height[first])
         middle = REAR_AXLE * length if tracks.rear is None else float(tracks.rear[first])
         ahead = 0.0 if tracks.is_reference or tracks.rear is not None else middle
-        box = length, width, USUAL_HEIGHT.get(kind, 1.5), ahead, middle
-        vehicles.append(Track(name, kind, *box, tracks.time[rows], x[rows], y[rows], heading[rows]))
-    sources = (source,) if road is None else (source, road)
-    return RecordedTraffic(name_of(source), tuple(vehicles), network, data, road_name, sources, tuple(notes))
+        vehicles.append(Track(name, kind, length, width, height, ahead, middle, time, x, y, heading))
+    return tuple(vehicles), tuple(notes)
 
 
 def driven_lanes(shapes: Sequence[LaneShape], graph: LaneGraph) -> list[DrivenLane]:
@@ -169,39 +181,26 @@ def driven_lanes(shapes: Sequence[LaneShape], graph: LaneGraph) -> list[DrivenLa
     ]
 
 
-def _rows_of_vehicles(vehicle: NDArray[Any], time: FloatArray) -> Iterator[NDArray[np.intp]]:
-    """Rows of each vehicle, by which they are sorted, `STEP` apart or as recorded; always the first and the last."""
-    for rows in np.split(np.arange(len(vehicle)), np.flatnonzero(vehicle[1:] != vehicle[:-1]) + 1):
-        number = np.floor((time[rows] - time[rows[0]]) / STEP + 1e-6)
-        yield rows[np.r_[True, np.diff(number[:-1]) > 0, True][: len(rows)]]
-
-
 # ---- recordings whose road is made -----------------------------------------------------------------------------------
-def _made(road: WrittenRoad, tracks: Sequence[Track], source: Path, *notes: str) -> RecordedTraffic:
-    data = road.to_xml().encode()
+def _made(road: WrittenRoad, tracks: Tracks, source: Path, *notes: str) -> RecordedTraffic:
+    data, (vehicles, odd) = road.to_xml().encode(), _vehicles(tracks)
     network = parse_opendrive(data, road.name)
-    return RecordedTraffic(road.name, tuple(tracks), network, data, f"{road.name}.xodr", (source,), notes)
+    return RecordedTraffic(road.name, vehicles, network, data, f"{road.name}.xodr", (source,), (*notes, *odd))
 
 
 def _dlr(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
     table = dlr_ht.read_tracks(source)
     made = dlr_road(dlr_ht.find_lanes(table))
-    kinds = dlr_ht.vehicle_classes(table)
-    x = table["center_easting"].to_numpy() - made.origin[0]
-    y = table["center_northing"].to_numpy() - made.origin[1]
-    time = table["time"].to_numpy()
-    usual = np.array([USUAL_WIDTH.get(str(kind), 1.8) for kind in kinds])
-    width = table[dlr_ht.WIDTH].to_numpy() if dlr_ht.WIDTH in table else usual
-    length, height = table["dimension_length"].to_numpy(), table["dimension_height"].to_numpy()
-    names = table["id"].astype(str).to_numpy(dtype=str)
-    short = _short(names)
-    tracks = []
-    for rows in _rows_of_vehicles(table["vehicle"].to_numpy(), time):
-        first = rows[0]
-        heading = np.arctan2(np.gradient(y[rows]), np.gradient(x[rows])) if len(rows) > 1 else np.zeros(1)
-        box = float(length[first]), float(width[first]), float(height[first])
-        name, kind, ahead = short[names[first]], str(kinds[first]), REAR_AXLE * box[0]
-        tracks.append(Track(name, kind, *box, ahead, ahead, time[rows], x[rows], y[rows], heading))
+    kinds, vehicle = dlr_ht.vehicle_classes(table), table["vehicle"].to_numpy()
+    x, y, time = (table[name].to_numpy() for name in ("center_easting", "center_northing", "time"))
+    length, height, speed = (
+        table[name].to_numpy() for name in ("dimension_length", "dimension_height", "velocity_magnitude")
+    )
+    width = table[dlr_ht.WIDTH].to_numpy() if dlr_ht.WIDTH in table else None
+    short = _short(table["id"].astype(str).to_numpy(dtype=str))
+    names = tuple(short[str(name)] for name in table["id"][np.r_[True, np.diff(vehicle) != 0]])
+    place = x - made.origin[0], y - made.origin[1], np.full(len(x), np.nan)  # headings are not recorded
+    tracks = Tracks(names, vehicle, time, dlr_ht.STEP, *place, speed, length, kinds, width, height=height)
     note = "the road is that of the traffic: lane centres are those of its vehicles, nobody measured markings"
     return _made(made, tracks, source, note)
 
@@ -216,22 +215,20 @@ def _levelx(source: Path, road: Path | None, columns: TableMapping) -> RecordedT
     if "latLaneCenterOffset" in table.columns:
         kinds = meta.set_index("trackId").reindex(table["trackId"])["class"].astype(str).to_numpy()
         named = table.assign(time=table["frame"] / rate, heading=np.radians(table["heading"]), vehicle_class=kinds)
-        return _on_road(tracks_of(named, files[0], saved=columns), files[0], road)
+        return _on_road(tracks_of(named, files[0], (), columns), files[0], road)
     levelx.require(table, levelx.HIGHD_COLUMNS, files[0])
     lower, upper = (np.sort(levelx.markings(about, side, files[0])) for side in ("lower", "upper"))
-    middle = 0.5 * (upper[-1] + lower[0])
     table = table.sort_values(["id", "frame"], ignore_index=True)
     meta = meta.set_index("id").loc[table["id"]]
-    kinds, is_ahead = meta["class"].astype(str).str.lower().to_numpy(), meta["drivingDirection"].to_numpy() == 2
+    kind = meta["class"].astype(str).str.lower().to_numpy(dtype=str)
+    is_ahead = meta["drivingDirection"].to_numpy() == 2
+    vehicle, ids = table["id"].factorize()
     time, length, width = table["frame"].to_numpy(dtype=np.float64) / rate, table["width"], table["height"]
     x, y = (table["x"] + 0.5 * length).to_numpy(), -(table["y"] + 0.5 * width).to_numpy()  # y points down there
-    tracks = []
-    for rows in _rows_of_vehicles(table["id"].to_numpy(), time):
-        first = rows[0]
-        name, kind, ahead = str(table["id"][first]), str(kinds[first]), REAR_AXLE * float(length[first])
-        box = float(length[first]), float(width[first]), USUAL_HEIGHT.get(kind, 1.5), ahead, ahead
-        heading = np.full(len(rows), 0.0 if is_ahead[first] else np.pi)
-        tracks.append(Track(name, kind, *box, time[rows], x[rows], y[rows], heading))
+    place, speed = (x, y, np.where(is_ahead, 0.0, np.pi)), np.abs(table["xVelocity"].to_numpy())
+    when = tuple(map(str, ids)), vehicle, time, 1.0 / rate
+    tracks = Tracks(*when, *place, speed, length.to_numpy(), kind, width.to_numpy())
+    middle = 0.5 * (upper[-1] + lower[0])
     sides = ((middle - float(upper[-1]), np.diff(upper)[::-1]), (float(lower[0]) - middle, np.diff(lower)))
     left, right = (
         [WrittenLane.even("median", inner), *(WrittenLane.even("driving", float(width)) for width in widths)]

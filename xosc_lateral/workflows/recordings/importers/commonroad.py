@@ -18,11 +18,10 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
-from xosc_lateral.files.drives import file_labels
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.files.xml import read_xml, root_tag
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
-from xosc_lateral.workflows.recordings.importers.table import Imported, guarded, import_each, paths_of
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, import_each, importer, paths_of
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks, ground_speed, travel_heading
 from xosc_lateral.workflows.recordings.importers.tracks import import_placed, require_lanes
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
@@ -31,22 +30,18 @@ from xosc_lateral.workflows.recordings.lane_shapes import LaneShape, curvature_a
 LICENCE = "that of the CommonRoad scenario and of the recording that it was made from"
 
 
-@guarded
-def import_commonroad(
-    sources: Path | Sequence[Path], settings: CutSettings = DEFAULT_CUTS, *, keep_cut: bool = False
-) -> Imported:
-    """Read one or several scenarios. Raises `FormatError`, `NotEnoughDataError`."""
-    files = paths_of(sources)
-    labels = dict(zip(files, file_labels(files), strict=True))
+@importer
+def import_commonroad(sources: Path | Sequence[Path], settings: CutSettings = DEFAULT_CUTS) -> ImportedDrives:
+    """CommonRoad scenarios (extra `commonroad`): recorded obstacles between the bounds of their lanelets."""
 
-    def read(path: Path) -> Imported:
-        tracks, shapes, graph, version = read_obstacles(path, labels[path])
+    def read(path: Path, label: str) -> ImportedDrives:
+        tracks, shapes, graph, version = read_obstacles(path, label)
         placed = place_in_shapes(tracks, shapes, graph.left)
         require_lanes(placed, "its lanelets", path)
         about = {"format": "commonroad", "version": version, "licence": LICENCE}
-        return import_placed(placed, graph, settings, keep_cut=True, sources=[path], **about)
+        return import_placed(placed, graph, settings, sources=[path], **about)
 
-    return import_each(files, read, keep_cut=keep_cut)
+    return import_each(paths_of(sources), read)
 
 
 def read_obstacles(path: Path, label: str) -> tuple[Tracks, list[_Lanelet], LaneGraph, str]:

@@ -23,8 +23,9 @@ from __future__ import annotations
 import io
 import re
 import zipfile
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,7 @@ from xosc_lateral.base.lazy import pd
 from xosc_lateral.drivers.drives.cleaning import RESOLUTION, RUN, VALID_BELOW
 from xosc_lateral.drivers.drives.filters import filtered, low_pass_between
 from xosc_lateral.files.source import open_source
+from xosc_lateral.workflows.options import flag
 from xosc_lateral.workflows.recordings.cuts import (
     DEFAULT_CUTS,
     CutSettings,
@@ -43,7 +45,7 @@ from xosc_lateral.workflows.recordings.cuts import (
     name_states,
     number_runs,
 )
-from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer
 from xosc_lateral.workflows.recordings.lane_graph import find_neighbours
 from xosc_lateral.workflows.recordings.lanes_from_tracks import LaneCentreLine, fit_lane_centre
 from xosc_lateral.world.road.reference_line import ReferenceLine, fit_reference_line
@@ -69,25 +71,54 @@ LICENCE = (
 )
 
 
-@guarded
-def import_dlr_ht(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cut: bool = False) -> Imported:
-    """Read the trajectory CSV, the data set's zip or the wheel of `tasi` that holds it."""
+@importer
+def import_dlr_ht(
+    source: Path,
+    settings: CutSettings = DEFAULT_CUTS,
+    *,
+    max_gap: Annotated[
+        float, flag(help="Longest gap between two cameras that is kept [s].", min=0, max=60)
+    ] = DEFAULT_CUTS.max_gap,
+) -> ImportedDrives:
+    """DLR Highway Traffic: the wheel of tasi 0.15.4, the data set's zip, or its trajectory CSV."""
+    settings = replace(settings, max_gap=max_gap) if settings is DEFAULT_CUTS else settings
     tracks = read_tracks(source)
-    road = find_lanes(tracks, settings)
-    way = np.where(road.forward, 1.0, -1.0)
+    road, kind = find_lanes(tracks, settings), vehicle_classes(tracks)
+    vehicle, time, length = (tracks[name].to_numpy() for name in ("vehicle", "time", "dimension_length"))
     s = np.where(road.forward, road.s, road.reference.length - road.s)
-    table = _drive_table(tracks, road, s)
-    table["curvature"] = road.reference.curvature(road.s) * way
+    is_truck, where = kind == "truck", np.round(time / STEP).astype(np.int64) * 2 + road.forward
+    on_left, on_right = road.lane < LANES - 1, road.lane > 0
+    near = find_neighbours(where, road.lane, s, length, is_truck, lane_on_left=on_left, lane_on_right=on_right)
+    columns = {
+        "drive": "ht-" + tracks["id"].astype(str),
+        "time": np.round(time, 3),
+        "offset": road.offset,
+        "lane_width": road.width,
+        "speed": tracks["velocity_magnitude"].to_numpy(),
+        "acceleration": tracks["acceleration_signed"].to_numpy(),
+        "lane_index": road.lane,
+        "lane_count": LANES,
+        **near,
+        "vehicle_class": kind,
+        "is_truck": is_truck.astype(np.float64),
+        "curvature": road.reference.curvature(road.s) * np.where(road.forward, 1.0, -1.0),
+    }
+    table = pd.DataFrame(columns)
     # 0.1 mm, 0.1 per km: below any measurement, above what linear algebra does differently from machine to machine.
     table = table.round({"curvature": 7, **dict.fromkeys(table.columns.drop(["curvature", "drive", "time"]), 4)})
     table[VALID_BELOW], table[RESOLUTION] = HIGHEST_FREQUENCY, POSITION_RESOLUTION
     reasons = {"no lane": road.lane < 0, "lane change": road.changing, "gap": road.gap}
-    vehicle, time = tracks["vehicle"].to_numpy(), tracks["time"].to_numpy()
     table["state"] = name_states(reasons, road.lane, vehicle, time, STEP, settings)
     table[RUN] = number_runs(table["state"].to_numpy(), road.lane, vehicle, time)
-    described = [_describe(name, k, lane) for name, both in road.lanes.items() for k, lane in enumerate(both)]
-    about = {"format": "dlr-ht", "version": _version(source), "licence": LICENCE, "lanes": described}
-    return finished(table, keep_cut=keep_cut, sources=[source], settings=asdict(settings), step=STEP, **about)
+    lanes = []
+    for carriageway, both in road.lanes.items():
+        for index, lane in enumerate(both):
+            error = lane.standard_error(np.arange(lane.start, lane.end, 10.0))
+            known = {"median": round(float(np.median(error)), 4), "max": round(float(error.max()), 4)}
+            size = {"length_m": round(lane.end - lane.start, 1), "stretches": lane.passages}
+            lanes.append({"carriageway": carriageway, "lane_index": index, **size, "centre_standard_error_m": known})
+    about = {"format": "dlr-ht", "version": _version(source), "licence": LICENCE, "lanes": lanes}
+    return imported(table, sources=[source], settings=asdict(settings), step=STEP, **about)
 
 
 def read_tracks(source: Path) -> pd.DataFrame:
@@ -202,7 +233,10 @@ def _place_in_lanes(
     centre, lanes = np.repeat(levels[:, None], len(s), axis=1), list[LaneCentreLine]()
     bend, width = np.full(len(d), levels.mean()), float(np.diff(levels).mean())
     for remaining in (3, 2, 1, 0):
-        lane = _nearest_lane(d, centre, width)
+        away = np.abs(d - centre)
+        away = np.where(np.isfinite(away), away, np.inf)
+        # Between two lanes the midpoint decides; towards the outside half a width does.
+        lane = np.where(away.min(axis=0) <= width * 0.55, away.argmin(axis=0), -1)
         offset = np.where(lane >= 0, d - centre[np.clip(lane, 0, None), np.arange(len(d))], np.nan)
         changing = lane_changes(d - bend, offset, lane, vehicle, STEP, settings)
         if not remaining:
@@ -218,8 +252,7 @@ def _place_in_lanes(
         bend = np.mean([line.at(np.clip(s, line.start, line.end), height) for line in lanes], axis=0)
         # median distance of neighbouring centres, where both are known
         known = np.arange(max(line.start for line in lanes), min(line.end for line in lanes), 10.0)
-        apart = np.diff([line.at(known, np.full(len(known), line.height)) for line in lanes], axis=0)
-        width = float(np.median(apart))
+        width = float(np.median(np.diff([line.at(known, np.full(len(known), line.height)) for line in lanes], axis=0)))
     return lanes, lane, offset, width, changing
 
 
@@ -234,15 +267,6 @@ def _levels(d: FloatArray) -> FloatArray:
     return levels
 
 
-def _nearest_lane(d: FloatArray, centre: FloatArray, width: float) -> IntArray:
-    """Index from the right; -1 where the vehicle is more than half a lane width from every centre."""
-    away = np.abs(d - centre)
-    away = np.where(np.isfinite(away), away, np.inf)
-    nearest = away.argmin(axis=0)
-    # Between two lanes the midpoint decides; towards the outside half a width does.
-    return np.where(away.min(axis=0) <= width * 0.55, nearest, -1)
-
-
 def _each(passage: IntArray, every: int) -> BoolArray:
     """True for every n-th row of each passage, from its first."""
     start = np.flatnonzero(np.r_[True, passage[1:] != passage[:-1]])
@@ -250,49 +274,10 @@ def _each(passage: IntArray, every: int) -> BoolArray:
     return np.asarray(position % every == 0)
 
 
-def _drive_table(tracks: pd.DataFrame, road: Carriageways, s: FloatArray) -> pd.DataFrame:
-    kind = vehicle_classes(tracks)
-    near = find_neighbours(
-        np.round(tracks["time"].to_numpy() / STEP).astype(np.int64) * 2 + road.forward,
-        road.lane,
-        s,
-        tracks["dimension_length"].to_numpy(),
-        kind == "truck",
-        lane_on_left=road.lane < LANES - 1,
-        lane_on_right=road.lane > 0,
-    )
-    return pd.DataFrame(
-        {
-            "drive": "ht-" + tracks["id"].astype(str),
-            "time": np.round(tracks["time"].to_numpy(), 3),
-            "offset": road.offset,
-            "lane_width": road.width,
-            "speed": tracks["velocity_magnitude"].to_numpy(),
-            "acceleration": tracks["acceleration_signed"].to_numpy(),
-            "lane_index": road.lane,
-            "lane_count": LANES,
-            **near,
-            "vehicle_class": kind,
-            "is_truck": (kind == "truck").astype(np.float64),
-        }
-    )
-
-
 def vehicle_classes(tracks: pd.DataFrame) -> NDArray[np.str_]:
     """The provider's likeliest class of each vehicle."""
     scores = tracks[[f"classifications_{name}" for name in CLASSES]].to_numpy()
     return np.asarray(np.array(CLASSES)[scores.argmax(axis=1)])
-
-
-def _describe(carriageway: str, index: int, lane: LaneCentreLine) -> dict[str, object]:
-    error = lane.standard_error(np.arange(lane.start, lane.end, 10.0))
-    return {
-        "carriageway": carriageway,
-        "lane_index": index,
-        "length_m": round(lane.end - lane.start, 1),
-        "stretches": lane.passages,
-        "centre_standard_error_m": {"median": round(float(np.median(error)), 4), "max": round(float(error.max()), 4)},
-    }
 
 
 def _version(source: Path) -> str:

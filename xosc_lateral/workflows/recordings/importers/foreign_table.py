@@ -16,7 +16,7 @@ from xosc_lateral.files.columns import comma_numbers
 from xosc_lateral.files.drives import drives_of_table, file_labels, labels_apart, translated
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping, factor, spelled
 from xosc_lateral.files.tables import read_table, text_encoding
-from xosc_lateral.workflows.recordings.importers.table import paths_of
+from xosc_lateral.workflows.recordings.importers import paths_of
 
 HEADERS = {
     "time": r"time|timestamp|t|zeit|zeitstempel|sec|seconds",
@@ -102,12 +102,12 @@ def propose_mapping(files: Sequence[Path]) -> str:
         bare, _ = _parts_of(header)
         placed = _place_named(bare)
         known = {} if set(bare.split("_")) & SATELLITE else HEADERS
-        usual = (name for name, words in known.items() if name not in headers and _fits(words, bare))
-        name = placed if placed is not None and placed not in headers else next(usual, None)
+        spellings = bare, bare.partition("_")[2] or "-"  # whole, and without a word before it
+        usual = (name for name, words in known.items() if any(re.fullmatch(words, text) for text in spellings))
+        name = next((name for name in (placed, *usual) if name is not None and name not in headers), None)
         if name is not None:
             headers[name] = header
-    sides = {"distance_left", "distance_right"} <= headers.keys()
-    needed = ("time",) if sides else ("time", "offset", "lane_width")
+    needed = ("time",) if SIDES.keys() <= headers.keys() else ("time", "offset", "lane_width")
     codes = sorted({text_encoding(path) for path in files} - {"utf-8"})
     lines = [
         f"# Proposed from {', '.join(path.name for path in files)}: read every line, correct it, save it, and give it",
@@ -153,15 +153,9 @@ def _place_named(bare: str) -> str | None:
     if len(words - known) > 1:
         return "offset" if COMPOUND.search(bare) and not sides else None
     if sides:
-        return (
-            sides[0] if words & MARKING and (words & PLACE or words & {"c0"} or words & {"marking", "line"}) else None
-        )
+        return sides[0] if words & MARKING and words & (PLACE | {"c0", "marking", "line"}) else None
     means_offset = COMPOUND.search(bare) or (words & PLACE and (words & LATERAL or words & MIDDLE))
     return "offset" if means_offset else None
-
-
-def _fits(words: str, bare: str) -> bool:
-    return re.fullmatch(words, bare) is not None or re.fullmatch(words, bare.partition("_")[2] or "-") is not None
 
 
 def _line(name: str, header: str, column: pd.Series) -> str:

@@ -30,7 +30,7 @@ from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.tables import read_table
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings, Rows, cut_table, require_lane_direction
-from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer
 from xosc_lateral.workflows.recordings.lane_graph import NEIGHBOUR_DISTANCE, find_neighbours
 
 LICENCE = (
@@ -47,29 +47,26 @@ TRUCKS = ("truck", "bus")
 VEHICLES = ("car", "van", "truck", "bus", "motorcycle", "trailer")
 
 
-@guarded
-def import_levelx(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cut: bool = False) -> Imported:
-    """Read one recording (its ``XX_tracks.csv``) or a folder of them, of highD or exiD, told by their columns."""
-    tracks_files = sorted(source.glob("*_tracks.csv")) if source.is_dir() else [source]
-    if not tracks_files:
+@importer
+def import_levelx(source: Path, settings: CutSettings = DEFAULT_CUTS) -> ImportedDrives:
+    """Recordings of highD or exiD: a folder, or one XX_tracks.csv with its two meta files beside it."""
+    files = sorted(source.glob("*_tracks.csv")) if source.is_dir() else [source]
+    if not files:
         raise FormatError("no XX_tracks.csv in this folder", path=source)
-    parts, layouts, steps = zip(*(_read_recording(path, settings) for path in tracks_files), strict=True)
-    if len(set(layouts)) > 1 or len(set(steps)) > 1:
+    parts, layouts, steps = [], set[str](), set[float]()
+    for path in files:
+        tracks, meta, recording = read_recording_files(path)
+        steps.add(step := 1.0 / frame_rate(recording, path))
+        is_exid = "latLaneCenterOffset" in tracks.columns
+        layouts.add("exiD" if is_exid else "highD")
+        if is_exid:
+            parts.append(_from_exid(tracks, meta, step, path, settings))
+        else:
+            parts.append(_from_highd(tracks, meta, recording, step, path, settings))
+    if len(layouts) > 1 or len(steps) > 1:
         raise FormatError("recordings of different layouts or frame rates: import them one by one", path=source)
-    table, about = pd.concat(parts, ignore_index=True), {"format": f"levelx {layouts[0]}", "licence": LICENCE}
-    return finished(table, keep_cut=keep_cut, sources=tracks_files, settings=asdict(settings), step=steps[0], **about)
-
-
-def _read_recording(path: Path, settings: CutSettings) -> tuple[pd.DataFrame, str, float]:
-    tracks, meta, recording = read_recording_files(path)
-    step = 1.0 / frame_rate(recording, path)
-    if "latLaneCenterOffset" in tracks.columns:
-        return _from_exid(tracks, meta, step, path, settings), "exiD", step
-    return _from_highd(tracks, meta, recording, step, path, settings), "highD", step
-
-
-def _number(path: Path) -> str:
-    return path.name.split("_")[0]
+    about = {"format": f"levelx {layouts.pop()}", "licence": LICENCE, "settings": asdict(settings)}
+    return imported(pd.concat(parts, ignore_index=True), sources=files, step=steps.pop(), **about)
 
 
 def read_recording_files(path: Path) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
@@ -83,7 +80,8 @@ def read_recording_files(path: Path) -> tuple[pd.DataFrame, pd.DataFrame, pd.Dat
         tables.append(read_table(file))
         if tables[-1].empty:
             raise NotEnoughDataError(f"{file}: has no rows")
-    return tables[0], tables[1], tables[2]
+    tracks, meta, recording = tables
+    return tracks, meta, recording
 
 
 def markings(recording: pd.DataFrame, side: str, path: Path) -> FloatArray:
@@ -136,20 +134,12 @@ def _from_highd(
         offset[mine] = left[mine] - 0.5 * (marks[inside] + marks[inside + 1])
         width[mine], count[mine] = np.diff(marks)[inside], len(marks) - 1
     lane_number = lane.astype(np.int64)
-    vehicle, frame = tracks["id"].to_numpy(), tracks["frame"].to_numpy()
-    kind = meta["class"].astype(str).str.lower().to_numpy()
+    frame, kind = tracks["frame"].to_numpy(), meta["class"].astype(str).str.lower().to_numpy()
     is_truck = np.isin(kind, TRUCKS)
-    near = find_neighbours(
-        frame * 2 + rightwards,
-        lane_number,
-        x,
-        tracks["width"].to_numpy(),
-        is_truck,
-        lane_on_left=lane_number < count - 1,
-        lane_on_right=lane_number > 0,
-    )
+    where, length, on_left = frame * 2 + rightwards, tracks["width"].to_numpy(), lane_number < count - 1
+    near = find_neighbours(where, lane_number, x, length, is_truck, lane_on_left=on_left, lane_on_right=lane_number > 0)
     columns = {
-        "drive": f"highd-{_number(path)}-" + tracks["id"].astype(str),
+        "drive": f"highd-{path.name.split('_')[0]}-" + tracks["id"].astype(str),
         "time": np.round(frame * step, 4),
         "offset": offset,
         "lane_width": width,
@@ -159,7 +149,7 @@ def _from_highd(
         "lane_count": count.astype(np.int64),
         **near,
     }
-    rows, reasons = Rows(vehicle, frame * step, lane_number, step), {"no lane": lane_number < 0}
+    rows, reasons = Rows(tracks["id"].to_numpy(), frame * step, lane_number, step), {"no lane": lane_number < 0}
     return cut_table(columns, rows, settings, sideways=left, reasons=reasons, kind=kind, is_truck=is_truck)
 
 
@@ -182,7 +172,7 @@ def _from_exid(
     offset = offset * _left_sign(lateral, tracks, vehicle, step, path)
     is_truck = np.isin(kind, TRUCKS)
     columns = {
-        "drive": f"exid-{_number(path)}-" + tracks["trackId"].astype(str),
+        "drive": f"exid-{path.name.split('_')[0]}-" + tracks["trackId"].astype(str),
         "time": np.round(frame * step, 4),
         "offset": offset,
         "lane_width": width,

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,8 +40,9 @@ from xosc_lateral.files.drives import file_labels, from_middle
 from xosc_lateral.files.mapping import ColumnSource, MappingLike, as_mapping, factor, is_measured, parse_map, spelled
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import LONGEST_MESSAGE, foreign_errors
+from xosc_lateral.workflows.options import MAPPING, flag
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
-from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded, paths_of
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer, paths_of
 
 POSITIONS = (("offset", "lane_width"), ("distance_left", "distance_right"))
 LICENCE = "your own recording"
@@ -93,18 +94,19 @@ class Channel:
         return values
 
 
-@guarded
+@importer
 def import_mf4(
     sources: Path | Sequence[Path],
-    channels: Sequence[str] = (),
-    *,
-    step: float = 0.04,
-    mapping: MappingLike | None = None,
-) -> Imported:
-    """Read mapped channels of bus logs at an even step, over the time that all position channels of a log cover.
+    channels: Annotated[Sequence[str], flag("--map", kind=list[str] | None, metavar="NAME=CHANNEL[:UNIT]",
+        help="Channel of a column, e.g. speed=v_veh:km/h; default unit: the file's.")] = (), *,
+    mapping: Annotated[MappingLike | None, MAPPING] = None,
+    step: Annotated[float, flag(help="Time step of the table, to which channels are interpolated [s].", min=0.001,
+        max=1)] = 0.04,
+) -> ImportedDrives:  # fmt: skip
+    """ASAM MDF bus logs (extra `mdf`). They need a channel map, since signal names differ from car to car.
 
-    Each log is a drive called after its file. `channels`: words ``NAME=CHANNEL[:UNIT]``; `mapping`: more of them,
-    saved. `step`: of the table [s]. Messages that stay away for longer than `fit` bridges leave a gap.
+    Mapped channels are read at an even step, over the time that all position channels of a log cover. Each log is a
+    drive called after its file. Messages that stay away for longer than `fit` bridges leave a gap.
     """
     files, saved = paths_of(sources), as_mapping(mapping)
     wanted = {**saved.columns, **parse_map(channels)}
@@ -120,16 +122,14 @@ def import_mf4(
             notes += channel.notes
         tables.append(from_middle(_table(signals, file, label, step), saved, file))
     for table in tables:
-        known = {name: table[name].notna().mean() for name in wanted if name in table}
-        notes += [
-            f"{table['drive'].iloc[0]}: {name} is known in {100 * share:.0f} % of the time"
-            for name, share in known.items()
-            if share < 1.0 and name not in POSITIONS[0] + POSITIONS[1]
-        ]
+        for name in wanted:
+            share = table[name].notna().mean() if name in table else 1.0
+            if share < 1.0 and name not in POSITIONS[0] + POSITIONS[1]:
+                notes.append(f"{table['drive'].iloc[0]}: {name} is known in {100 * share:.0f} % of the time")
     every_unit = {name: " | ".join(sorted(words)) for name, words in units.items()}
     settings = {"step": step, "channels": list(channels), "units": every_unit}
     about = {"format": "mf4", "licence": LICENCE, "settings": settings, "notes": tuple(dict.fromkeys(notes))}
-    return finished(pd.concat(tables, ignore_index=True), keep_cut=False, sources=files, step=step, **about)
+    return imported(pd.concat(tables, ignore_index=True), sources=files, step=step, **about)
 
 
 def channels_wanted(source: Path) -> str:
@@ -145,7 +145,7 @@ def channels_wanted(source: Path) -> str:
 
 
 def _names(log: Any) -> list[str]:
-    # Every group's time base is a channel as well; names such as CAN1.Speed repeat others with their bus.
+    """Of channels, without the time bases of groups; names such as CAN1.Speed repeat others with their bus."""
     masters = {log.groups[group].channels[index].name for group, index in log.masters_db.items()}
     return sorted(set(log.channels_db) - masters)
 
@@ -193,7 +193,7 @@ def _read_channel(
     notes = _of_one_name(signals, [group for group, _ in places], name, named, wrong)
     signal = max(signals, key=lambda signal: len(signal.samples))
     samples, stamps = signal.samples, np.asarray(signal.timestamps, dtype=np.float64)
-    kind, stated, is_quantity = samples.dtype.kind, str(signal.unit or ""), _is_quantity(name, "")
+    kind, stated, is_quantity = samples.dtype.kind, str(signal.unit or ""), _is_quantity(name)
     if kind in "SU":
         if is_quantity:
             raise wrong(" holds words, not numbers")
@@ -256,7 +256,7 @@ def _alike(log: Any, wanted: str) -> str:
     return f"; like it are {', '.join(close[:8])}" if close else f"; the log has {len(names)} others, none alike"
 
 
-def _is_quantity(name: str, unit: str) -> bool:
+def _is_quantity(name: str, unit: str = "") -> bool:
     """Whether a column holds a physical quantity: by the standard table, or by its unit."""
     known = (*POSITIONS[0], *POSITIONS[1], "time")
     return name in known or CONTEXT_UNITS.get(name, "-") != "-" or is_measured(spelled(unit.lstrip("-")) or "")

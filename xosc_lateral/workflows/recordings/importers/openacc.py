@@ -23,6 +23,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -33,8 +34,9 @@ from xosc_lateral.base.rows import true_slices
 from xosc_lateral.drivers.drives.cleaning import RESOLUTION, RUN, VALID_BELOW
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import unpacked_text
+from xosc_lateral.workflows.options import flag
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
-from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded, paths_of
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer, paths_of
 
 LICENCE = (
     "OpenACC, AstaZero campaign: (c) European Union, Joint Research Centre, CC BY 4.0 (doi:10.1016/j.trc.2021.103047). "
@@ -46,6 +48,7 @@ POSITION_RESOLUTION = 1e-3  # noise of the positions [m]
 GRID_STEP = 1.0  # points of the centre line are so far apart [m]
 SMOOTHING, ROUNDS = 12.0, 5  # Gaussian by which the centre line follows the mean path [m], and how often
 RETURN_DISTANCE = 5.0  # a lap is over where a car is as near to where it began [m] ...
+PLACING_STEPS = 4  # of the search for the point of a line abreast: each leaves less than a tenth of the last [-]
 MINIMUM_LAP = 500.0  # ... and has come so far since [m]
 MINIMUM_SPEED = 5.0  # slower rows (standing start, end of a test) say nothing about the lane's centre [m/s]
 LANE_SHARE = 0.5  # of the lane's width: rows further from its centre are elsewhere [-]
@@ -57,11 +60,13 @@ the campaigns it does for minutes, the engine's too; measured ones here repeat f
 HEADER_LINES = 50  # lines before the header, at most: the campaign's files have five [-]
 
 
-@guarded
+@importer
 def import_openacc(
-    source: Path | Sequence[Path], *, lane_width: float = LANE_WIDTH, keep_cut: bool = False
-) -> Imported:
-    """A drive for each car of AstaZero's files (.csv, .csv.gz). `lane_width`: of the road, not measured. [m]"""
+    source: Path | Sequence[Path],
+    *,
+    lane_width: Annotated[float, flag(help="Of the road, which the files don't give. [m]", min=2, max=6)] = LANE_WIDTH,
+) -> ImportedDrives:
+    """OpenACC's platoons on the closed loop of AstaZero: lane centre from all passes of all files."""
     paths = paths_of(source)
     cars = [car for path in paths for car in _cars(path)]
     if not cars:
@@ -73,10 +78,9 @@ def import_openacc(
             frames += _placed(same, _centre_line(same), lane_width)
     table = pd.concat(frames, ignore_index=True)
     note = "lane centre: mean path of all passes; lane width assumed; steering by hand assumed throughout"
-    return finished(
-        table, keep_cut=keep_cut, sources=paths, format="openacc", version="AstaZero 2019", licence=LICENCE,
-        settings={"lane_width": lane_width}, step=float(np.median(np.diff(cars[0].time))), notes=(note,),
-    )  # fmt: skip
+    about = {"format": "openacc", "version": "AstaZero 2019", "licence": LICENCE, "notes": (note,)}
+    step = float(np.median(np.diff(cars[0].time)))
+    return imported(table, sources=paths, settings={"lane_width": lane_width}, step=step, **about)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +95,11 @@ class _Car:
     lead: FloatArray
 
     @property
+    def moves(self) -> BoolArray:
+        """Rows that say something about the lane, shape (n,)."""
+        return np.asarray(self.speed > MINIMUM_SPEED)
+
+    @property
     def turn(self) -> float:
         """1 for a loop driven counter-clockwise, else -1."""
         area = float(np.sum(self.x[:-1] * np.diff(self.y) - self.y[:-1] * np.diff(self.x)))
@@ -98,7 +107,13 @@ class _Car:
 
 
 def _cars(path: Path) -> list[_Car]:
-    frame, first = _read(path)
+    with open_source(path) as opened:
+        lines = unpacked_text(opened).read().decode("utf-8", "replace").splitlines(keepends=True)
+    heads = [k for k, line in enumerate(lines[:HEADER_LINES]) if line.split(",")[0].strip().lower() == "time"]
+    if not heads:
+        raise FormatError("no header that begins with Time; is this a file of OpenACC?", path=path, line=1)
+    frame = pd.read_csv(io.StringIO("".join(lines[heads[0] :])), low_memory=False)
+    frame, first = frame.rename(columns=lambda name: str(name).strip()), heads[0] + 1
     numbers = sorted(int(name[1:]) for name in frame.columns if re.fullmatch(r"E\d+", name))
     needed = ["Time", *(f"{name}{k}" for k in numbers for name in ("E", "N", "Speed"))]
     missing = [name for name in needed if name not in frame]
@@ -118,25 +133,13 @@ def _cars(path: Path) -> list[_Car]:
     return cars
 
 
-def _read(path: Path) -> tuple[pd.DataFrame, int]:
-    """The table below whatever stands above its header, and the header's line."""
-    with open_source(path) as opened:
-        lines = unpacked_text(opened).read().decode("utf-8", "replace").splitlines(keepends=True)
-    heads = [k for k, line in enumerate(lines[:HEADER_LINES]) if line.split(",")[0].strip().lower() == "time"]
-    if not heads:
-        raise FormatError("no header that begins with Time; is this a file of OpenACC?", path=path, line=1)
-    frame = pd.read_csv(io.StringIO("".join(lines[heads[0] :])), low_memory=False)
-    return frame.rename(columns=lambda name: str(name).strip()), heads[0] + 1
-
-
 def _numbers(column: pd.Series, path: Path, first: int) -> FloatArray:
     numbers = pd.to_numeric(column, errors="coerce").to_numpy(dtype=np.float64)
     wrong = np.isnan(numbers) & column.notna().to_numpy()
     if wrong.any():
         row = int(np.argmax(wrong))
-        raise FormatError(
-            f"no number: {column.iloc[row]!r}", path=path, line=first + 1 + row, element=f"column {column.name!r}"
-        )
+        what, element = f"no number: {column.iloc[row]!r}", f"column {column.name!r}"
+        raise FormatError(what, path=path, line=first + 1 + row, element=element)
     return numbers
 
 
@@ -163,65 +166,54 @@ class _Loop:
         """Index along the points with its fraction, and distance to the left [m], as between two normals."""
         from scipy.spatial import cKDTree
 
-        points, normals = self.points, self.normals()
-        where = np.stack([x, y], axis=1)
-        near = cKDTree(points).query(where)[1]
-        along = np.stack([normals[:, 1], -normals[:, 0]], axis=1)
-        index: FloatArray = np.asarray(near, dtype=np.float64)
+        normals, where = self.normals(), np.stack([x, y], axis=1)
+        columns = self.points, normals, np.stack([normals[:, 1], -normals[:, 0]], axis=1)
+        index: FloatArray = np.asarray(cKDTree(self.points).query(where)[1], dtype=np.float64)
         for _ in range(PLACING_STEPS):
-            centre, _, tangent = self._at(index, points, normals, along)
+            centre, _, tangent = _between_points(index, columns)
             index = index + np.einsum("ij,ij->i", where - centre, tangent) / GRID_STEP
-        centre, normal, _ = self._at(index, points, normals, along)
-        return np.asarray(index % len(points)), np.einsum("ij,ij->i", where - centre, normal)
-
-    @staticmethod
-    def _at(index: FloatArray, *columns: FloatArray) -> list[FloatArray]:
-        """Periodic cubic interpolation (Catmull-Rom) of columns, shape (n, 2) each."""
-        low = np.floor(index).astype(np.int64)
-        share = (index - low)[:, None]
-        values = []
-        for column in columns:
-            a, b, c, d = (column[(low + k) % len(column)] for k in (-1, 0, 1, 2))
-            cubic = c - a + share * (2 * a - 5 * b + 4 * c - d + share * (3 * (b - c) + d - a))
-            values.append(b + 0.5 * share * cubic)
-        return values
+        centre, normal, _ = _between_points(index, columns)
+        return np.asarray(index % len(self.points)), np.einsum("ij,ij->i", where - centre, normal)
 
 
-PLACING_STEPS = 4  # of the search for the point of a line abreast: each leaves less than a tenth of the last [-]
+def _between_points(index: FloatArray, columns: Sequence[FloatArray]) -> list[FloatArray]:
+    """Periodic cubic interpolation (Catmull-Rom) of columns, shape (n, 2) each."""
+    low = np.floor(index).astype(np.int64)
+    share = (index - low)[:, None]
+    values = []
+    for column in columns:
+        a, b, c, d = (column[(low + k) % len(column)] for k in (-1, 0, 1, 2))
+        cubic = c - a + share * (2 * a - 5 * b + 4 * c - d + share * (3 * (b - c) + d - a))
+        values.append(b + 0.5 * share * cubic)
+    return values
 
 
 def _centre_line(cars: Sequence[_Car]) -> _Loop:
     loop = _even(_smooth(_first_lap(cars)))
-    x, y = (np.concatenate([getattr(car, name)[_moves(car)] for car in cars]) for name in ("x", "y"))
+    x, y = (np.concatenate([getattr(car, name)[car.moves] for car in cars]) for name in ("x", "y"))
     for _ in range(ROUNDS):
         index, offset = loop.place(x, y)
         near = np.abs(offset) < LANE_SHARE * LANE_WIDTH
-        at, n = np.round(index[near]).astype(np.int64) % len(loop.points), len(loop.points)
-        sums, counts = (
-            np.bincount(at, each, minlength=n).astype(np.float64) for each in (offset[near], np.ones(len(at)))
-        )
+        n = len(loop.points)
+        at = np.round(index[near]).astype(np.int64) % n
+        sums, counts = (np.bincount(at, each, n).astype(np.float64) for each in (offset[near], np.ones(len(at))))
         shift = _smooth(sums) / np.maximum(_smooth(counts), 1e-9)
         loop = _even(loop.points + shift[:, None] * loop.normals())
     return loop
 
 
-def _moves(car: _Car) -> BoolArray:
-    return np.asarray(car.speed > MINIMUM_SPEED)
-
-
 def _first_lap(cars: Sequence[_Car]) -> FloatArray:
     """The first closed lap of the car that goes furthest, shape (n, 2), points `GRID_STEP` apart, its ends met. [m]"""
     car = max(cars, key=lambda car: float(np.hypot(np.diff(car.x), np.diff(car.y)).sum()))
-    moves = _moves(car)
-    path = np.stack([car.x[moves], car.y[moves]], axis=1)
+    path = np.stack([car.x, car.y], axis=1)[car.moves]
     way = _way(path)
     for begin in range(0, len(path), max(1, len(path) // 100)):  # the very first metres may lie beside the loop
         back = np.hypot(*(path - path[begin]).T)
         returned = np.flatnonzero((way - way[begin] > MINIMUM_LAP) & (back < RETURN_DISTANCE))
         if len(returned):
             end = returned[0] + int(np.argmin(back[returned[0] : returned[0] + 50]))
-            closed, even = _closed(path[begin:end])
-            return np.stack([np.interp(even, _way(closed), closed[:, k]) for k in range(2)], axis=1)
+            closed, at, even = _closed(path[begin:end])
+            return np.stack([np.interp(even, at, closed[:, k]) for k in range(2)], axis=1)
     raise NotEnoughDataError(f"{car.name} drives {way[-1]:.0f} m and never comes back to where it was: no closed loop")
 
 
@@ -229,19 +221,19 @@ def _way(path: FloatArray) -> FloatArray:
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
 
 
-def _closed(path: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """A line with its beginning at its end, and ways along it at even steps of about `GRID_STEP`."""
+def _closed(path: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """A line with its beginning at its end, ways along it, and others at even steps of about `GRID_STEP`."""
     closed = np.concatenate([path, path[:1]])
-    length = _way(closed)[-1]
-    return closed, np.linspace(0.0, length, round(length / GRID_STEP) + 1)[:-1]
+    way = _way(closed)
+    return closed, way, np.linspace(0.0, way[-1], round(way[-1] / GRID_STEP) + 1)[:-1]
 
 
 def _even(points: FloatArray) -> _Loop:
     """With points at even steps again: arc lengths by cubics, so that corners don't get between points."""
     from scipy.interpolate import CubicSpline
 
-    closed, even = _closed(points)
-    return _Loop(np.asarray(CubicSpline(_way(closed), closed, bc_type="periodic")(even)))
+    closed, way, even = _closed(points)
+    return _Loop(np.asarray(CubicSpline(way, closed, bc_type="periodic")(even)))
 
 
 def _smooth(values: FloatArray) -> FloatArray:

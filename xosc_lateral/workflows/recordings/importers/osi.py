@@ -13,61 +13,65 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.drives import file_labels
 from xosc_lateral.files.opendrive import parse_opendrive, read_opendrive
 from xosc_lateral.files.osi import osi
+from xosc_lateral.workflows.options import flag
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, MOVING_SPEED, CutSettings
-from xosc_lateral.workflows.recordings.importers.table import Imported, guarded, import_each, paths_of
-from xosc_lateral.workflows.recordings.importers.tracks import (
-    PlacedTracks,
-    import_placed,
-    place_on_road,
-    require_lanes,
-)
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, import_each, importer, paths_of
+from xosc_lateral.workflows.recordings.importers.tracks import import_placed, place_on_road, require_lanes
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
 from xosc_lateral.workflows.recordings.lane_shapes import Strip, lane_graph, middle, place_in_shapes
-from xosc_lateral.workflows.recordings.osi.read import Recorded, read_osi
+from xosc_lateral.workflows.recordings.osi_trace import Recorded, read_osi
 
 LICENCE = "that of the trace"
 HOST = "host"  # stands for the trace's own host vehicle
 
 
-@guarded
+@importer
 def import_osi(
     sources: Path | Sequence[Path],
     settings: CutSettings = DEFAULT_CUTS,
     *,
-    host: str | None = None,
-    road: Path | str | None = None,
-    channel: str | None = None,
-    keep_cut: bool = False,
-) -> Imported:
-    """Read one or several traces of ground truth or sensor views.
-
-    `host`: keep this vehicle alone: its identifier or name in the trace; "host": the trace's host vehicle. `road`:
-    OpenDRIVE file to take lanes from. `channel`: topic of an MCAP file with several.
-    """
+    host: Annotated[str | None, flag("--host", metavar="ID",
+        help="Keep this vehicle alone: its id or name; host: the host vehicle.")] = None,
+    road: Annotated[Path | str | None, flag("--road", kind=Path | None, metavar="FILE.xodr",
+        help="Take lanes from here, not from the trace.")] = None,
+    channel: Annotated[str | None, flag("--channel", metavar="TOPIC", help="Of an MCAP file.")] = None,
+) -> ImportedDrives:  # fmt: skip
+    """ASAM OSI traces of ground truth or sensor views (extra `osi`): vehicles between the boundaries of their lanes."""
     files = paths_of(sources)
-    labels = dict(zip(files, file_labels(files), strict=True))
 
-    def read(path: Path) -> Imported:
+    def read(path: Path, label: str) -> ImportedDrives:
         recorded = read_osi(path, channel)
         only = None if host is None else _named(recorded, host, path)
         if len(files) > 1:
-            names = tuple(f"{labels[path]}:{name}" for name in recorded.tracks.names)
+            names = tuple(f"{label}:{name}" for name in recorded.tracks.names)
             recorded = replace(recorded, tracks=replace(recorded.tracks, names=names))
-            only = None if only is None else {f"{labels[path]}:{name}" for name in only}
-        placed, graph, read_from = _placed(recorded, path, None if road is None else Path(road))
-        about = {"format": "osi", "sources": read_from, "licence": LICENCE, "notes": recorded.notes}
-        return import_placed(placed, graph, settings, keep_cut=True, only=only, **about)
+            only = None if only is None else {f"{label}:{name}" for name in only}
+        network, where = None, "the road in it"
+        if road is not None:
+            network, where = read_opendrive(road), Path(road).name
+        elif recorded.opendrive is not None:
+            network = parse_opendrive(recorded.opendrive, path.stem)
+        if network is not None:
+            placed, graph = place_on_road(recorded.tracks, network)
+        elif (lanes := lanes_of(recorded)) is not None:
+            (strips, graph), where = lanes, "the trace"
+            placed = place_in_shapes(recorded.tracks, strips, graph.left)
+        else:
+            raise FormatError("has no lanes with boundaries: give the road with --road FILE.xodr", path=path)
+        require_lanes(placed, where, path)
+        sources = [path] if road is None else [path, Path(road)]
+        about = {"format": "osi", "sources": sources, "licence": LICENCE, "notes": recorded.notes}
+        return import_placed(placed, graph, settings, only=only, **about)
 
-    return import_each(sources, read, keep_cut=keep_cut)
+    return import_each(files, read)
 
 
 def _named(recorded: Recorded, host: str, path: Path) -> set[str]:
@@ -80,26 +84,8 @@ def _named(recorded: Recorded, host: str, path: Path) -> set[str]:
     wanted = {number: name for name, number in recorded.numbers.items()}.get(wanted, wanted)
     names = {name for name in recorded.tracks.names if name.split("#")[0] == wanted}  # NAME#2 after a leap
     if not names:
-        there = ", ".join(recorded.tracks.names[:20])
-        raise FormatError(f"no vehicle {host!r}; there are {there}", path=path)
+        raise FormatError(f"no vehicle {host!r}; there are {', '.join(recorded.tracks.names[:20])}", path=path)
     return names
-
-
-def _placed(recorded: Recorded, path: Path, road: Path | None) -> tuple[PlacedTracks, LaneGraph, list[Path]]:
-    tracks, files, network = recorded.tracks, [path], None
-    if road is not None:
-        network, files, where = read_opendrive(road), [path, road], road.name
-    elif recorded.opendrive is not None:
-        network, where = parse_opendrive(recorded.opendrive, path.stem), "the road in it"
-    if network is not None:
-        placed, graph = place_on_road(tracks, network)
-    elif (lanes := lanes_of(recorded)) is not None:
-        (strips, graph), where = lanes, "the trace"
-        placed = place_in_shapes(tracks, strips, graph.left)
-    else:
-        raise FormatError("has no lanes with boundaries: give the road with --road FILE.xodr", path=path)
-    require_lanes(placed, where, path)
-    return placed, graph, files
 
 
 SHOWING_ROWS = 20_000  # so many rows of a trace show which way its lanes are driven [-]
@@ -144,18 +130,15 @@ def lanes_of(recorded: Recorded) -> tuple[list[Strip], LaneGraph] | None:
 
 def _physical(recorded: Recorded) -> dict[int, _Lane]:
     kinds = osi("osi3.osi_lane_pb2").Lane.Classification
-    things = recorded.things["lane"]
+    things, edges = recorded.things["lane"], recorded.things["lane_boundary"]
     # writers of proto3 leave out what is false: a lane that says nothing is driven backwards; where none says anything,
     # vehicles show it
     known = any(lane.classification.HasField("centerline_is_driving_direction") for lane in things.values())
     lanes = {}
     for number, lane in things.items():
         about = lane.classification
-        if about.type not in (kinds.TYPE_DRIVING, kinds.TYPE_INTERSECTION):
-            continue
-        edges = recorded.things["lane_boundary"]
         left, right = (_edge(edges, ids) for ids in (about.left_lane_boundary_id, about.right_lane_boundary_id))
-        if left is None or right is None:
+        if about.type not in (kinds.TYPE_DRIVING, kinds.TYPE_INTERSECTION) or left is None or right is None:
             continue
         centre = np.array([(p.x, p.y, p.z) for p in about.centerline], dtype=np.float64).reshape(-1, 3)
         if len(centre) > 1:
@@ -164,22 +147,22 @@ def _physical(recorded: Recorded) -> dict[int, _Lane]:
             right = _aligned(right, left)
             centre = middle(left, right)
         is_ahead = about.centerline_is_driving_direction if known else None
-        pairs = [(pair.successor_lane_id.value, pair.antecessor_lane_id.value) for pair in about.lane_pairing]
         beside = [n.value for n in about.left_adjacent_lane_id], [n.value for n in about.right_adjacent_lane_id]
-        following = list(dict.fromkeys(pair[0] for pair in pairs)), list(dict.fromkeys(pair[1] for pair in pairs))
-        lanes[number] = _Lane(left, right, centre, is_ahead, beside, following)
+        following = list(dict.fromkeys(pair.successor_lane_id.value for pair in about.lane_pairing))
+        before = list(dict.fromkeys(pair.antecessor_lane_id.value for pair in about.lane_pairing))
+        lanes[number] = _Lane(left, right, centre, is_ahead, beside, (following, before))
     return lanes
 
 
 def _logical(recorded: Recorded) -> dict[int, _Lane]:
-    kinds = osi("osi3.osi_logicallane_pb2").LogicalLane
+    kinds, edges = osi("osi3.osi_logicallane_pb2").LogicalLane, recorded.things["logical_lane_boundary"]
     words = ("NORMAL", "EXIT", "ENTRY", "ONRAMP", "OFFRAMP", "CONNECTINGRAMP", "UNKNOWN")
     driven = {kinds.Type.Value(f"TYPE_{word}") for word in words}
     directions = {kinds.MOVE_DIRECTION_INCREASING_S: True, kinds.MOVE_DIRECTION_DECREASING_S: False}
     lanes = {}
     for number, lane in recorded.things["logical_lane"].items():
-        edges, ends = recorded.things["logical_lane_boundary"], (lane.start_s, lane.end_s)
-        left, right = (_edge(edges, ids, *ends) for ids in (lane.left_boundary_id, lane.right_boundary_id))
+        sides = lane.left_boundary_id, lane.right_boundary_id
+        left, right = (_edge(edges, ids, lane.start_s, lane.end_s) for ids in sides)
         if lane.type in driven and left is not None and right is not None:
             beside = _numbers(lane.left_adjacent_lane), _numbers(lane.right_adjacent_lane)
             onward = _numbers(lane.successor_lane), _numbers(lane.predecessor_lane)
@@ -218,32 +201,15 @@ def _driven_ahead(lanes: Mapping[int, _Lane], recorded: Recorded) -> dict[int, b
 
 
 def _edge(edges: Mapping[int, Any], ids: Any, start: float = 0.0, end: float = 0.0) -> FloatArray | None:
-    """The boundaries of these identifiers as one line, within start and end of s where they say s. [m]"""
-    return _chained([_points(edges[i.value].boundary_line, start, end) for i in ids if i.value in edges])
-
-
-def _points(points: Any, start: float = 0.0, end: float = 0.0) -> FloatArray:
-    """Of a boundary, shape (n, 3); within start and end of s, where the boundary says s. [m]"""
-    line = np.array([(p.position.x, p.position.y, p.position.z) for p in points], dtype=np.float64).reshape(-1, 3)
-    if end <= start or len(line) < 2:
-        return line
-    s = np.array([p.s_position for p in points])
-    if s[-1] < s[0]:
-        line, s = line[::-1], s[::-1]
-    if not np.any(np.diff(s) > 0.0) or (start <= s[0] and s[-1] <= end):
-        return line
-    at = np.concatenate([[max(start, s[0])], s[(s > start) & (s < end)], [min(end, s[-1])]])
-    return np.stack([np.interp(at, s, line[:, axis]) for axis in (0, 1, 2)], axis=1) if at[-1] > at[0] else line[:0]
-
-
-def _chained(lines: Sequence[FloatArray]) -> FloatArray | None:
-    """Stretches put end to end, each as it fits to the one before; None: no line."""
-    lines = [
+    """The boundaries of these identifiers as one line, within start and end of s where they say s, put end to end, each
+    as it fits to those before; None: no line. [m]"""
+    lines = [_points(edges[i.value].boundary_line, start, end) for i in ids if i.value in edges]
+    rest = [
         line for line in lines if len(line) > 1 and np.isfinite(line).all() and np.ptp(line[:, :2], axis=0).max() > 0.0
     ]
-    if not lines:
+    if not rest:
         return None
-    chain, rest = lines[0], list(lines[1:])
+    chain = rest.pop(0)
     while rest:
         tries = [
             (float(np.linalg.norm(end - start)), k, flipped, ahead)
@@ -256,6 +222,20 @@ def _chained(lines: Sequence[FloatArray]) -> FloatArray | None:
         line = line[::-1] if flipped else line
         chain = np.concatenate([chain, line] if ahead else [line, chain])
     return chain
+
+
+def _points(points: Any, start: float, end: float) -> FloatArray:
+    """Of a boundary, shape (n, 3); within start and end of s, where the boundary says s. [m]"""
+    line = np.array([(p.position.x, p.position.y, p.position.z) for p in points], dtype=np.float64).reshape(-1, 3)
+    if end <= start or len(line) < 2:
+        return line
+    s = np.array([p.s_position for p in points])
+    if s[-1] < s[0]:
+        line, s = line[::-1], s[::-1]
+    if not np.any(np.diff(s) > 0.0) or (start <= s[0] and s[-1] <= end):
+        return line
+    at = np.concatenate([[max(start, s[0])], s[(s > start) & (s < end)], [min(end, s[-1])]])
+    return np.stack([np.interp(at, s, line[:, axis]) for axis in (0, 1, 2)], axis=1) if at[-1] > at[0] else line[:0]
 
 
 def _aligned(line: FloatArray, along: FloatArray) -> FloatArray:

@@ -41,7 +41,6 @@ STATE_COLUMNS = frozenset(COLUMNS) - {"z", "offset_t"}
 USUAL_LENGTH = {"truck": 16.5, "bus": 12.0, "trailer": 12.0, "motorcycle": 2.2, "motorbike": 2.2}
 """Where no length is given; 4.6 m for the rest (EU new cars, 2023: mean 4.4 m). [m]"""
 
-
 BEHIND_MIDDLE = {"centre": 0.0, "front": -0.5, "rear": 0.5, "rear axle": 0.3}
 """How far a point that recordings refer to lies behind a vehicle's middle, as a share of its length. [-]"""
 
@@ -61,10 +60,9 @@ class Tracks:
     length: FloatArray
     kind: NDArray[np.str_]
     width: FloatArray | None = None
-    is_reference: bool = False
-    """Positions are those of the reference point, as in a table of states that `play` writes, not of the middle."""
-    rear: FloatArray | None = None
-    """How far x and y lie behind the vehicle's middle; None: they are the middle. [m]"""
+    is_reference: bool = False  # positions are those of the reference point, as `play` writes them, not of the middle
+    rear: FloatArray | None = None  # how far x and y lie behind the vehicle's middle; None: they are the middle [m]
+    height: FloatArray | None = None
 
 
 MAX_SPEED_RATIO = 1.39  # a speed off by more is in another unit: root of the nearest, knots, 1.94 times as many [-]
@@ -94,21 +92,16 @@ def rate(values: FloatArray, vehicle: IntArray, time: FloatArray, step: float, w
 def read_tracks(path: Path, columns: Sequence[str] = (), mapping: MappingLike | None = None) -> Tracks:
     """Read a table of tracks. `columns`: ``NAME=COLUMN[:UNIT]`` for other headers and units than usual."""
     saved = as_mapping(mapping)
-    is_log = is_esmini_log(path)
+    with open_source(path) as source:
+        is_log = unpacked_text(source).read(len(LOG_BEGINNING)) == LOG_BEGINNING
     table = read_esmini_log(path) if is_log else read_table(path, saved)
     return tracks_of(table, path, columns, saved, is_log=is_log)
 
 
 def tracks_of(
-    table: pd.DataFrame,
-    path: Path,
-    columns: Sequence[str] = (),
-    saved: TableMapping | None = None,
-    *,
-    is_log: bool = False,
+    table: pd.DataFrame, path: Path, columns: Sequence[str], saved: TableMapping, *, is_log: bool = False
 ) -> Tracks:
     """Tracks of a table that is read; see `read_tracks`. `is_log`: it is one of esmini, whose units are known."""
-    saved = TableMapping() if saved is None else saved
     is_played = set(map(str, table.columns)) >= STATE_COLUMNS
     if is_played:  # a table of states, as `play` and `live` write it
         table = table.rename(columns={"name": "vehicle", "h": "heading"})
@@ -137,21 +130,10 @@ def tracks_of(
         kinds = rows["vehicle_class"].astype(str).str.lower().to_numpy(dtype=str)
     length = stated("length", np.array([USUAL_LENGTH.get(kind, 4.6) for kind in kinds]))
     ahead = BEHIND_MIDDLE[saved.reference] * length
-    return Tracks(
-        tuple(map(str, names)),
-        vehicle,
-        time - float(time.min()),
-        step,
-        x + ahead * np.cos(heading),
-        y + ahead * np.sin(heading),
-        heading,
-        speed,
-        length,
-        kinds,
-        rows["width"].to_numpy(dtype=np.float64) if "width" in rows else None,
-        is_reference=is_played,
-        rear=stated("rear", np.zeros(len(rows))) if "rear" in rows else None,
-    )
+    when, place = (time - float(time.min()), step), (x + ahead * np.cos(heading), y + ahead * np.sin(heading), heading)
+    width = rows["width"].to_numpy(dtype=np.float64) if "width" in rows else None
+    rear = stated("rear", np.zeros(len(rows))) if "rear" in rows else None
+    return Tracks(tuple(map(str, names)), vehicle, *when, *place, speed, length, kinds, width, is_played, rear)
 
 
 def _require_speed(speed: FloatArray, driven: FloatArray, path: Path) -> None:
@@ -178,10 +160,9 @@ def _columns(table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequen
         source = mapping.get(name) or (None if usual is None else ColumnSource(usual))
         if source is None or source.column not in table.columns:
             if name in mapping or name in ("vehicle", "time", "x", "y"):
-                there = f"there are {listed(table.columns)} (translate with --map {name}=COLUMN)"
-                raise FormatError(
-                    f"no column {repr(name) if source is None else source.column}; {there}", path=path, line=1
-                )
+                what = f"no column {repr(name) if source is None else source.column}"
+                what = f"{what}; there are {listed(table.columns)} (translate with --map {name}=COLUMN)"
+                raise FormatError(what, path=path, line=1)
             continue
         column = table[source.column]
         if name == "vehicle":
@@ -198,7 +179,8 @@ def _columns(table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequen
     return made.dropna(subset=["vehicle", "time", "x", "y"])
 
 
-LOG_BEGINNING = b"esmini "  # begins the lines before the table, which name the player's version
+# ---- logs of esmini --------------------------------------------------------------------------------------------------
+LOG_BEGINNING = b"esmini "  # of the lines before the table, which name the player's version
 TABLE_HEAD = "Index [-]"
 MOST_LINES = 50  # before the table's head; a player writes seven
 
@@ -217,12 +199,6 @@ _LOGGED = {
 _NAME = re.compile(r"\s*#(\d+)\s+(\w+)")
 
 
-def is_esmini_log(path: Path) -> bool:
-    """Whether a file begins like one."""
-    with open_source(path) as source:
-        return unpacked_text(source).read(len(LOG_BEGINNING)) == LOG_BEGINNING
-
-
 def read_esmini_log(path: Path) -> pd.DataFrame:
     """Columns of `_LOGGED` and `time`, one vehicle below the other: a line has a group of columns for each."""
     with open_source(path) as source, foreign_errors(path, "can't be read as a log of esmini"):
@@ -235,7 +211,7 @@ def read_esmini_log(path: Path) -> pd.DataFrame:
         width = max((line.count(b",") + 1 for line in lines.splitlines()), default=len(names))
         table = pd.read_csv(BytesIO(lines), header=None, names=range(width), skipinitialspace=True, index_col=False)
     matches = [_NAME.match(name) for name in names]
-    group = {match[2]: column for column, match in enumerate(matches) if match and match[1] == "1"}
+    group = {match[2]: column for column, match in enumerate(matches) if match is not None and match[1] == "1"}
     if not group:
         raise FormatError("no vehicle in the table's head", path=path)
     if missing := sorted(set(_LOGGED.values()) - group.keys()):

@@ -9,15 +9,17 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.mapping import MappingLike
 from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.workflows.options import MAPPING, flag
 from xosc_lateral.workflows.recordings.cuts import (
     DEFAULT_CUTS,
     MOVING_SPEED,
@@ -26,39 +28,36 @@ from xosc_lateral.workflows.recordings.cuts import (
     cut_table,
     require_lane_direction,
 )
-from xosc_lateral.workflows.recordings.importers.table import Imported, finished, guarded
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks, rate, read_tracks
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph, neighbour_columns
 from xosc_lateral.world.road.lanes import DRIVING, beside
 from xosc_lateral.world.road.network import RoadNetwork
 
 LICENCE = "your own recording"
-LANE_VALUES = ("lane_width", "agreement", "scale")  # what is found of a lane, and is no column of its road
 INTO_NEXT = 1e-3  # step beyond a section's end that brings one into the next [m]
 Piece = tuple[int, int, int]  # road, lane section, lane
 
 
-@guarded
+@importer
 def import_tracks(
-    source: Path,
-    *,
-    road: Path | str,
-    columns: Sequence[str] = (),
-    mapping: MappingLike | None = None,
+    source: Path, *,
+    road: Annotated[Path | str, flag("--road", kind=Path, metavar="FILE.xodr", help="Road on which the tracks lie.")],
+    columns: Annotated[Sequence[str], flag("--map", kind=list[str] | None, metavar="NAME=COLUMN[:UNIT]",
+        help="vehicle, time, x, y, heading, speed, length, vehicle_class, e.g. heading=psi:deg.")] = (),
+    mapping: Annotated[MappingLike | None, MAPPING] = None,
     settings: CutSettings = DEFAULT_CUTS,
-    keep_cut: bool = False,
-) -> Imported:
-    """Read tracks on a known road, an OpenDRIVE file.
+) -> ImportedDrives:  # fmt: skip
+    """A table of tracks (x, y and heading of any recording) on a known road: lanes, offsets, neighbours.
 
     `source`: table of one row per vehicle and instant, or a log of esmini (``--csv_logger``); x and y are the vehicle's
-    middle, or lie `rear` behind it, in the road's coordinates. `columns`: ``NAME=COLUMN[:UNIT]``; `mapping`: more,
-    saved.
+    middle, or lie `rear` behind it, in the road's coordinates.
     """
     network = read_opendrive(road)
     placed, graph = place_on_road(read_tracks(source, columns, mapping), network)
     require_lanes(placed, Path(road).name, source)
     sources = [source, Path(road)]
-    return import_placed(placed, graph, settings, keep_cut=keep_cut, format="tracks", sources=sources, licence=LICENCE)
+    return import_placed(placed, graph, settings, format="tracks", sources=sources, licence=LICENCE)
 
 
 def place_on_road(tracks: Tracks, network: RoadNetwork) -> tuple[PlacedTracks, LaneGraph]:
@@ -80,23 +79,19 @@ def place_on_road(tracks: Tracks, network: RoadNetwork) -> tuple[PlacedTracks, L
         along[inside[mine]] = s[mine] - section.start if forward else section.end - s[mine]
     there = np.flatnonzero(piece >= 0)
     where = place.road[there], place.lane[there], place.s[there]
-    lane_index, lane_count = network.lane_index(*where)
-    bend = network.curvature(where[0], where[2])
-    crossfall, grade = network.lean(*where)
-    values = {
-        "agreement": np.cos(heading[there] - network.lane_to_world(*where).heading),
-        "scale": 1.0 - bend * network.lane_centre_t(*where),
-        "lane_width": network.lane_width(*where),
-        "curvature": network.lane_curvature(*where),
-        "lane_index": lane_index,
-        "lane_count": lane_count,
-        "crossfall": crossfall,
-        "grade": grade,
-    }
-    columns = {name: np.full(len(piece), np.nan) for name in values}
-    for name, known in values.items():
-        columns[name][there] = known
-    offset, (width, agreement, scale) = np.where(piece >= 0, place.offset, np.nan), map(columns.pop, LANE_VALUES)
+
+    def known(values: NDArray[Any]) -> FloatArray:
+        column = np.full(len(piece), np.nan)
+        column[there] = values
+        return column
+
+    names = ("curvature", "lane_index", "lane_count", "crossfall", "grade")
+    values: list[NDArray[Any]]
+    values = [network.lane_curvature(*where), *network.lane_index(*where), *network.lean(*where)]
+    columns = dict(zip(names, map(known, values), strict=True))
+    offset, width = np.where(piece >= 0, place.offset, np.nan), known(network.lane_width(*where))
+    agreement = known(np.cos(heading[there] - network.lane_to_world(*where).heading))
+    scale = known(1.0 - network.curvature(where[0], where[2]) * network.lane_centre_t(*where))
     return PlacedTracks(tracks, piece, along, offset, width, agreement, columns, np.nan_to_num(scale, nan=1.0)), graph
 
 
@@ -110,27 +105,19 @@ def lane_graph(network: RoadNetwork) -> tuple[dict[Piece, int], LaneGraph]:
                 if lane.type in DRIVING:
                     pieces[index, k, lane.id] = len(pieces)
                     length.append(section.end - section.start)
-    left = np.full(len(pieces), -1)
-    following = []
+    left, following = np.full(len(pieces), -1), list[list[int]]()
     for (index, k, name), number in pieces.items():
         forward = network.travel_direction(index, name) > 0
         other = beside(name, 1 if forward else -1)
         if network.travel_direction(index, other) == network.travel_direction(index, name):
             left[number] = pieces.get((index, k, other), -1)
-        following.append(_following(network, pieces, index, k, name, forward))
+        section = network.roads[index].sections[k]
+        end = section.end - INTO_NEXT if forward else section.start + INTO_NEXT
+        step = network.advance(index, name, end, 2 * INTO_NEXT)
+        next_piece = step.road, network.roads[step.road].section_number(step.s), step.lane
+        ahead = pieces.get(next_piece, number) if step.remaining <= 0.0 else number
+        following.append([] if ahead == number else [ahead])
     return pieces, LaneGraph(np.array(length), left, following)
-
-
-def _following(
-    network: RoadNetwork, pieces: dict[Piece, int], index: int, k: int, name: int, forward: bool
-) -> list[int]:
-    section = network.roads[index].sections[k]
-    end = section.end - INTO_NEXT if forward else section.start + INTO_NEXT
-    step = network.advance(index, name, end, 2 * INTO_NEXT)
-    if step.remaining > 0.0:
-        return []
-    ahead = pieces.get((step.road, network.roads[step.road].section_number(step.s), step.lane))
-    return [] if ahead is None or ahead == pieces[index, k, name] else [ahead]
 
 
 TRUCKS = ("truck", "bus", "trailer", "semitrailer", "lorry", "van_trailer", "truck_trailer")
@@ -162,12 +149,12 @@ def require_lanes(placed: PlacedTracks, where: str, path: Path) -> None:
 
 def import_placed(
     placed: PlacedTracks, graph: LaneGraph, settings: CutSettings, *, only: Collection[str] | None = None, **about: Any
-) -> Imported:
-    """Neighbours, cuts and record, see `table.finished`; of the vehicles in `only` alone, if it is given."""
+) -> ImportedDrives:
+    """Neighbours, cuts and record, see `imported`; of the vehicles in `only` alone, if it is given."""
     table = _drive_table(placed, graph, settings)
     if only is not None:
         table = table[table["drive"].isin(only)].reset_index(drop=True)
-    return finished(table, settings=asdict(settings), step=placed.tracks.step, **about)
+    return imported(table, settings=asdict(settings), step=placed.tracks.step, **about)
 
 
 def _drive_table(placed: PlacedTracks, graph: LaneGraph, settings: CutSettings) -> pd.DataFrame:

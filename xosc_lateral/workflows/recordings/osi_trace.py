@@ -1,24 +1,171 @@
-"""What vehicles did and where lanes are, from the ground truth of an OSI trace."""
+"""OSI traces: their ground truth message by message, and from it what vehicles did and where lanes are."""
 
 from __future__ import annotations
 
 from array import array
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
+from itertools import groupby, takewhile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
-from xosc_lateral.files.osi import osi
+from xosc_lateral.files.osi import SUFFIXES, osi
+from xosc_lateral.files.source import check_regular, open_source
+from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH, Tracks, ground_speed, travel_heading
-from xosc_lateral.workflows.recordings.osi.trace import Trace
 from xosc_lateral.world.motion.nominal import axes
 
+TRUTHS = ("GROUND_TRUTH", "SENSOR_VIEW")  # messages of the true world; a sensor view has it as its global ground truth
+NANOSECONDS = 1_000_000_000
+PLACES = {
+    "position": ("x", "y", "z"),
+    "velocity": ("vel_x", "vel_y", "vel_z"),
+    "acceleration": ("acc_x", "acc_y", "acc_z"),
+    "orientation": ("roll", "pitch", "yaw"),
+    "dimension": ("length", "width", "height"),
+}
+"""Part of OSI's `BaseMoving` -> columns of omega-prime's Parquet."""
+
+ROW_COLUMNS = ("total_nanos", "idx", "type", "role", "subtype", *(name for names in PLACES.values() for name in names))
+
+
+class Trace:
+    """An open trace; use it as a context, and iterate over its ground truths.
+
+    `channel`: topic of an MCAP file; without it the one that holds ground truth, else a sensor view. `notes`: channels
+    that are not read. `opendrive`: the road, where the file has it and was read.
+    """
+
+    def __init__(self, path: Path, channel: str | None = None) -> None:
+        suffix = path.suffix.lower()
+        if suffix not in (*SUFFIXES, ".parquet"):
+            what = f"an OSI trace ends in {', '.join(SUFFIXES)}, one of omega-prime in .parquet too"
+            raise FormatError(what, path=path)
+        check_regular(path)
+        if path.stat().st_size == 0:
+            raise FormatError("is empty", path=path)
+        if channel is not None and suffix != ".mcap":
+            raise FormatError(f"has no channels, so no channel {channel!r}", path=path)
+        self.path = path
+        self.notes: list[str] = []
+        self.opendrive: bytes | None = None
+        self._reader: Any = None
+        if suffix != ".parquet":
+            self._reader = self._of_mcap(channel) if suffix == ".mcap" else self._of_messages()
+
+    def __enter__(self) -> Trace:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self._reader is not None:
+            self._reader.close()
+
+    def __iter__(self) -> Iterator[Any]:
+        if self._reader is None:
+            yield from self._of_rows()
+            return
+        number = 0
+        while (result := self._reader.read_message()) is not None:
+            number += 1
+            if result.message is None:
+                why = " ".join(str(result.error_message).split())
+                raise FormatError(f"damaged: {why}", path=self.path, element=f"message {number}")
+            is_view = type(result.message).__name__ == "SensorView"
+            yield result.message.global_ground_truth if is_view else result.message
+
+    def _of_mcap(self, channel: str | None) -> Any:
+        utilities = osi("osi_utilities")
+        reader = utilities.MultiTraceReader()
+        if not reader.open(self.path):
+            raise FormatError("not an MCAP file, or one that was not closed", path=self.path)
+        names = {kind: name for name, kind in utilities.MessageType.__members__.items()}
+        topics = {known.topic: names[known.message_type] for known in reader.list_channel_specifications()}
+        others = [topic for topic in reader.get_available_topics() if topic not in topics]
+        listed = ", ".join([f"{topic} ({kind})" for topic, kind in topics.items()] + others) or "none"
+        truths = [topic for wanted in TRUTHS for topic, kind in topics.items() if kind == wanted]
+        chosen = next((topic for topic in truths if channel in (None, topic)), None)
+        if chosen is None:
+            reader.close()
+            what = "ground truth or a sensor view" + ("" if channel is None else f" named {channel!r}")
+            raise FormatError(f"no channel with {what}; there are: {listed}", path=self.path)
+        if len(topics) + len(others) > 1:
+            self.notes.append(f"{self.path.name}: read channel {chosen} of {listed}")
+        reader.set_topics([chosen])
+        return reader
+
+    def _of_messages(self) -> Any:
+        utilities = osi("osi_utilities")
+        kinds = utilities.MessageType
+        named = utilities.infer_message_type_from_filename(self.path.name)
+        if named not in (kinds.UNKNOWN, kinds.GROUND_TRUTH, kinds.SENSOR_VIEW):
+            raise FormatError(f"its name says {named.name}: neither ground truth nor a sensor view", path=self.path)
+        if named is not kinds.UNKNOWN:
+            return self._opened(named)
+        # nothing in the file says what its messages are: a sensor view is one that shows moving objects
+        reader = self._opened(kinds.SENSOR_VIEW)
+        first = reader.read_message()
+        reader.close()
+        is_view = first.message is not None and first.message.global_ground_truth.moving_object
+        return self._opened(kinds.SENSOR_VIEW if is_view else kinds.GROUND_TRUTH)
+
+    def _opened(self, kind: Any) -> Any:
+        reader = osi("osi_utilities").SingleTraceReader()
+        reader.set_message_type(kind)
+        if not reader.open(self.path):
+            raise FormatError("not an OSI trace", path=self.path)
+        return reader
+
+    def _of_rows(self) -> Iterator[Any]:
+        """Ground truths of omega-prime's Parquet, whose lanes or road are in its metadata."""
+        import pyarrow.parquet as pq
+
+        path, ground_truth = self.path, osi("osi3.osi_groundtruth_pb2").GroundTruth
+        with open_source(path) as source, foreign_errors(path, "can't be read as Parquet"):
+            file = pq.ParquetFile(source.file)
+            missing = [name for name in ROW_COLUMNS if name not in file.schema_arrow.names]
+            if missing:
+                raise FormatError(f"no column {missing[0]!r}: not a recording of omega-prime", path=path)
+            about = file.schema_arrow.metadata or {}
+            rows = file.read(list(ROW_COLUMNS)).sort_by([("total_nanos", "ascending"), ("idx", "ascending")])
+        self.opendrive = about.get(b"xodr")
+        with foreign_errors(path, "can't be read as a recording of omega-prime"):
+            lanes = ground_truth()
+            if b"osi" in about:
+                osi("google.protobuf.json_format").Parse(about[b"osi"], lanes, ignore_unknown_fields=True)
+            host = int(about.get(b"host_vehicle_idx", b"-1"))
+        every = (row for batch in rows.to_batches(max_chunksize=10_000) for row in batch.to_pylist())
+        for number, (nanoseconds, present) in enumerate(groupby(every, key=lambda row: row["total_nanos"]), 1):
+            message = ground_truth()
+            if number == 1:
+                message.CopyFrom(lanes)
+                message.ClearField("moving_object")
+            with foreign_errors(path, f"message {number}"):
+                message.timestamp.seconds, message.timestamp.nanos = divmod(nanoseconds, NANOSECONDS)
+                if host >= 0:
+                    message.host_vehicle_id.value = host
+                for row in present:
+                    _fill(message.moving_object.add(), row)
+            yield message
+
+
+def _fill(thing: Any, row: dict[str, Any]) -> None:
+    thing.id.value, thing.type = row["idx"], row["type"]
+    for part, names in PLACES.items():
+        vector = getattr(thing.base, part)
+        fields = names if part in ("orientation", "dimension") else ("x", "y", "z")
+        for name, column in zip(fields, names, strict=True):
+            setattr(vector, name, row[column])
+    for name, column in (("type", "subtype"), ("role", "role")):
+        if row[column] >= 0:
+            setattr(thing.vehicle_classification, name, row[column])
+
+
+# ---- what vehicles did, and where lanes are --------------------------------------------------------------------------
 KINDS = {
     **dict.fromkeys(("SMALL_CAR", "COMPACT_CAR", "CAR", "MEDIUM_CAR", "LUXURY_CAR"), "car"),
     **{"DELIVERY_VAN": "van", "VAN": "van", "HEAVY_TRUCK": "truck", "SEMITRACTOR": "truck", "MOTORBIKE": "motorcycle"},
@@ -84,12 +231,9 @@ class _Collected:
                 latest = self.latest.get((name, number_of))
                 if latest == thing:
                     continue
-                copy = type(thing)()
-                copy.CopyFrom(thing)  # a part would keep the whole message
-                self.latest[name, number_of] = copy
+                self.latest[name, number_of] = deepcopy(thing)  # a part would keep the whole message
                 if latest is None:
-                    known[number_of] = type(thing)()
-                    known[number_of].CopyFrom(thing)
+                    known[number_of] = deepcopy(thing)
                 else:
                     extend_thing(known[number_of], thing)
 
@@ -139,33 +283,20 @@ class _Collected:
         if not same.any():
             raise NotEnoughDataError(f"{self.path}: no vehicle in two of {self.messages} messages")
         step = float(np.median(np.diff(rows[:, 1])[same]))
-        vehicle, names = self._split(rows, same, step, notes)
-        tracks = self._tracks(rows, vehicle, names, step)
-        hosts = tuple(self.names.get(host, str(host)) for host in self.hosts)
-        if len(hosts) > 1:
-            notes.append(f"several host vehicles: {', '.join(hosts)}")
-        numbers = {name: str(number) for number, name in self.names.items()}
-        return Recorded(tracks, self.things, hosts, numbers, notes)
-
-    def _split(
-        self, rows: FloatArray, same: NDArray[np.bool_], step: float, notes: list[str]
-    ) -> tuple[IntArray, list[str]]:
-        """Track of every row: an identifier that leaps is another vehicle from there on."""
+        # an identifier that leaps is another vehicle from there on
         moved, passed = np.hypot(*np.diff(rows[:, 2:4], axis=0).T), np.diff(rows[:, 1])
         recent = np.fmax(rows[1:, 5], rows[:-1, 5])
         leaps = same & np.isfinite(recent) & (moved > 2.0 * recent * passed + LEAP_DISTANCE)
-        vehicle = np.concatenate([[0], np.cumsum(~same | leaps)]).astype(np.int64)
-        first = np.flatnonzero(np.r_[True, ~same | leaps])
-        names, count = list[str](), Counter[int]()
-        for row in first.tolist():
-            number = int(rows[row, 0])
+        new = np.r_[True, ~same | leaps]
+        vehicle, names, count = np.cumsum(new).astype(np.int64) - 1, list[str](), Counter[int]()
+        for number in rows[new, 0].astype(np.int64).tolist():
             count[number] += 1
             names.append(self.names[number] + (f"#{count[number]}" if count[number] > 1 else ""))
         if leaps.any():
             notes.append(f"{int(leaps.sum())} leaps of a vehicle: another one from there on (NAME#2 ...)")
-        return vehicle, names
-
-    def _tracks(self, rows: FloatArray, vehicle: IntArray, names: list[str], step: float) -> Tracks:
+        hosts = tuple(self.names.get(host, str(host)) for host in self.hosts)
+        if len(hosts) > 1:
+            notes.append(f"several host vehicles: {', '.join(hosts)}")
         _, time, x, y, yaw, speed, length, pitch, roll, *rear = rows.T
         kinds = np.array([self.kinds[int(number)] for number in rows[:, 0]])
         usual = np.array([USUAL_LENGTH.get(kind, 4.6) for kind in kinds])
@@ -174,7 +305,9 @@ class _Collected:
         arm = sum(part[:, None] * axis for part, axis in zip(rear, axes(heading, pitch, roll), strict=True))
         length, behind = np.where(np.isfinite(length), length, usual), -rear[0] if rear[0].any() else None
         when, place = (time - float(time.min()), step), (x + arm[:, 0], y + arm[:, 1], heading)
-        return Tracks(tuple(names), vehicle, *when, *place, speed, length, kinds, rear=behind)
+        tracks = Tracks(tuple(names), vehicle, *when, *place, speed, length, kinds, rear=behind)
+        numbers = {name: str(number) for number, name in self.names.items()}
+        return Recorded(tracks, self.things, hosts, numbers, notes)
 
 
 BEYOND_END = 1e-3  # points farther than this past the end of a line go on with it [m]
@@ -219,10 +352,5 @@ def _beyond(before: Any, end: Any, points: list[Any], place: Callable[[Any], Any
     """Of points from the far end inwards, those past a line's end."""
     dx, dy = end.x - before.x, end.y - before.y
     size = max((dx * dx + dy * dy) ** 0.5, 1e-9)
-    beyond = []
-    for point in points:
-        at = place(point)
-        if ((at.x - end.x) * dx + (at.y - end.y) * dy) / size <= BEYOND_END:
-            break
-        beyond.append(point)
-    return beyond
+    ways = (((place(point).x - end.x) * dx + (place(point).y - end.y) * dy) / size for point in points)
+    return [point for point, _ in takewhile(lambda pair: pair[1] > BEYOND_END, zip(points, ways, strict=True))]

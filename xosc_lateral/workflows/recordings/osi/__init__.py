@@ -1,1 +1,0 @@
-"""Reads ASAM OSI traces."""
