@@ -18,15 +18,7 @@ from xosc_lateral.drivers.loop.timeline import coarse_mean
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Cycle, Product, Regimes, Step, TimeSmooth
 from xosc_lateral.files.pages.chart import BLUE, DASHED, MUTED, ORANGE, VERMILLION, Panel
 from xosc_lateral.files.pages.figure import Figure
-from xosc_lateral.workflows.profiles.loop_curves import (
-    MovingStatistic,
-    curve_of,
-    hidden_mean,
-    longest_parts,
-    moving_mean,
-    moving_spread,
-    regime_probability,
-)
+from xosc_lateral.workflows.profiles import loop_curves
 from xosc_lateral.workflows.profiles.loop_words import SPREAD, column_label, product_label
 
 # Measured drives, the profile before and the profile after, in every figure of the loop.
@@ -145,7 +137,7 @@ def _draw_passage(panel: Panel, passage: Passage, column: str) -> None:
 
 
 def _draw_curve(panel: Panel, result: LoopResult, effect: ColumnEffect) -> None:
-    on_mean, curve = effect.acts is Acts.LOCATION, curve_of(result, effect)
+    on_mean, curve = effect.acts is Acts.LOCATION, loop_curves.curve_of(result, effect)
 
     def shown(strength: FloatArray) -> FloatArray:
         return strength if on_mean else np.exp(strength)
@@ -167,7 +159,7 @@ def _draw_curve(panel: Panel, result: LoopResult, effect: ColumnEffect) -> None:
 def traces_figure(result: LoopResult) -> Figure:
     """The longest uninterrupted stretches of a few drives: measured, profile before, profile after, on one scale."""
     timeline, scored = result.coarse.timeline, result.scored
-    parts = longest_parts(result)
+    parts = loop_curves.longest_parts(result)
     figure = Figure(len(parts), 3, height=54.0, share_x="all", share_y="all")
     offsets = (timeline.offset, scored.runs_before[0], scored.runs_after[0])
     for number, rows in enumerate(parts):
@@ -241,17 +233,17 @@ def _time(result: LoopResult, finding: Finding) -> Figure:
     if isinstance(effect, TimeSmooth) and not effect.location:
         _draw_spread(panel, result, effect, finding.size_m)
         return figure
-    moving = moving_mean(result, MEAN_S)
+    moving = loop_curves.moving_mean(result, MEAN_S)
     _draw_statistic(panel, moving)
     word = "step" if isinstance(effect, Step) else "smooth change"
-    fitted = hidden_mean(result) + moving.measured.mean()
+    fitted = loop_curves.hidden_mean(result) + moving.measured.mean()
     panel.line(moving.time, fitted, ORANGE, width=2.0, label=f"fitted {word}")
     panel.y.label = f"mean over {MEAN_S / 60:.0f} min, positive to the left [m]"
     return figure
 
 
 def _draw_spread(panel: Panel, result: LoopResult, effect: TimeSmooth, factor: float) -> None:
-    moving = moving_spread(result, SPREAD_S)
+    moving = loop_curves.moving_spread(result, SPREAD_S)
     curve = effect.path(effect.spread, moving.time)
     waves = [effect.path(tuple(row), moving.time) for row in np.eye(len(effect.spread))]
     error = np.sqrt(sum(np.square(wave * own) for wave, own in zip(waves, effect.spread_errors, strict=True)))
@@ -263,7 +255,7 @@ def _draw_spread(panel: Panel, result: LoopResult, effect: TimeSmooth, factor: f
     panel.y.holds, panel.y.label = (0.0,), f"spread over {SPREAD_S / 60:.0f} min [m]"
 
 
-def _draw_statistic(panel: Panel, moving: MovingStatistic) -> None:
+def _draw_statistic(panel: Panel, moving: loop_curves.MovingStatistic) -> None:
     for values, color, dashes, label in (
         (moving.measured, DRIVES, "", "measured"),
         (moving.before, BEFORE, "", "profile before, all runs"),
@@ -277,9 +269,9 @@ def _regimes(result: LoopResult, finding: Finding) -> Figure:
     """Local spread over time where the regime of large spread is likely, and how often which spread occurs."""
     figure = Figure(1, 2, height=165.0, legend=True)
     over_time, quantiles = figure.panels
-    moving = moving_spread(result, REGIME_S)
+    moving = loop_curves.moving_spread(result, REGIME_S)
     top = 1.05 * float(moving.measured.max())
-    loud = np.where(regime_probability(result) > 0.5, top, np.nan)
+    loud = np.where(loop_curves.regime_probability(result) > 0.5, top, np.nan)
     over_time.band(moving.time, 0.0, loud, ORANGE, opacity=0.3, label="large spread more likely than not")
     over_time.line(moving.time, _gapped(moving, moving.measured), DRIVES, width=0.8, label="measured")
     over_time.y.limits, over_time.y.label = (0.0, top), f"spread within {REGIME_S:.0f} s [m]"
@@ -304,7 +296,7 @@ def _draw_quantiles(panel: Panel, result: LoopResult) -> None:
     panel.x.label = "share of the time with less spread [%]"
 
 
-def _gapped(moving: MovingStatistic, values: FloatArray) -> FloatArray:
+def _gapped(moving: loop_curves.MovingStatistic, values: FloatArray) -> FloatArray:
     """NaN at the first second after a gap, so that no line is drawn across it."""
     return np.where(np.diff(moving.time, prepend=moving.time[:1]) > GAP_S, np.nan, values)
 

@@ -19,6 +19,7 @@ import numpy as np
 from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.drivers.loop import refinement
 from xosc_lateral.drivers.loop.autocorrelation import Problem
 from xosc_lateral.drivers.loop.candidates import shapes_of
 from xosc_lateral.drivers.loop.column_search import SearchedTerm, grows
@@ -28,15 +29,6 @@ from xosc_lateral.drivers.loop.low_frequencies import penalised
 from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage, Term, fit_model
 from xosc_lateral.drivers.loop.omnibus import DELAYS, check_remainder, smooth_covariance, tents, weights_of
 from xosc_lateral.drivers.loop.passage import Passage, passage_of, typical_passage
-from xosc_lateral.drivers.loop.refinement import (
-    FINE_RESPONSES,
-    LAG_STEPS,
-    lags_about,
-    means_by_second,
-    other_centres,
-    other_scales,
-    running_sums,
-)
 from xosc_lateral.drivers.loop.terms.column import driving_range, of_kind
 from xosc_lateral.drivers.loop.timeline import Coarse, coarse_mean
 from xosc_lateral.drivers.model.effects import Acts, Angular, ColumnEffect, Effect, Product, Proximity
@@ -144,7 +136,7 @@ def _shapes(coarse: Coarse, effect: ColumnEffect) -> list[ColumnEffect]:
     """Other shapes of the only column, or scales and centres of a product, with one coefficient and the same timing."""
     timing = {"lag_s": effect.lag_s, "response_s": effect.response_s}
     if isinstance(effect, Product):
-        others = (*other_scales(effect, NEAR_SCALES), *other_centres(effect, coarse))
+        others = (*refinement.other_scales(effect, NEAR_SCALES), *refinement.other_centres(effect, coarse))
         return [structs.replace(other, response_range=()) for other in others]
     if len(effect.columns) > 1 or len(effect.coefficients) > 1:
         return []
@@ -167,10 +159,13 @@ def _shapes(coarse: Coarse, effect: ColumnEffect) -> list[ColumnEffect]:
 def _timed(fitted: Fitted, effect: ColumnEffect) -> list[FloatArray]:
     """Responses at 1 Hz per time constant, shape (n, lags, k)."""
     coarse = fitted.coarse
-    late = [round(float(lag) / coarse.timeline.step) for lag in lags_about(effect.lag_s, NEAR_S, LAG_STEPS[-1])]
+    late = [
+        round(float(lag) / coarse.timeline.step)
+        for lag in refinement.lags_about(effect.lag_s, NEAR_S, refinement.LAG_STEPS[-1])
+    ]
     quantity = coarse.fine_response(structs.replace(effect, lag_s=0.0, response_s=0.0, response_range=()))
-    sums = (running_sums(coarse, quantity, response_s) for response_s in FINE_RESPONSES)
-    return [np.stack([means_by_second(one, shift) for shift in late], axis=1) for one in sums]
+    sums = (refinement.running_sums(coarse, quantity, response_s) for response_s in refinement.FINE_RESPONSES)
+    return [np.stack([refinement.means_by_second(one, shift) for shift in late], axis=1) for one in sums]
 
 
 def _profile(rows: FloatArray, left: FloatArray, contrast: FloatArray) -> tuple[float, float, float]:

@@ -25,16 +25,7 @@ from xosc_lateral.base.lazy import njit
 from xosc_lateral.drivers.loop.dictionary import Search, beside
 from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage, Term
 from xosc_lateral.drivers.loop.significance import HEAVY_TAIL_SHARE, LoopSeed, in_another_order, upper_tail
-from xosc_lateral.drivers.loop.terms.spread import (
-    SLOW_S,
-    fine_squares,
-    known_log_scale,
-    log_sizes,
-    quick_squares,
-    slow_squares,
-    what_a_column_may_do,
-    what_columns_do,
-)
+from xosc_lateral.drivers.loop.terms import spread
 from xosc_lateral.drivers.loop.timeline import Coarse, on_fine_grid
 from xosc_lateral.drivers.model.effects import Acts, Effect, Regimes
 from xosc_lateral.drivers.model.seeds import generator
@@ -142,9 +133,9 @@ class RegimesTerm(Term):
         if not coarse.lasts or any(isinstance(term, cls) for term in fitted.terms):
             return None
         # what a column does to the size in another shape than the one that was found is no regime
-        columns = what_columns_do(search, fitted), what_a_column_may_do(search, fitted)[0]
-        known = np.concatenate([known_log_scale(fitted), *columns], axis=1)
-        squares, rng = quick_squares(fitted).standardised, generator(search.seed, LoopSeed.REGIMES)
+        columns = spread.what_columns_do(search, fitted), spread.what_a_column_may_do(search, fitted)[0]
+        known = np.concatenate([spread.known_log_scale(fitted), *columns], axis=1)
+        squares, rng = spread.quick_squares(fitted).standardised, generator(search.seed, LoopSeed.REGIMES)
         p_value = probability_of_persistence(squares, coarse.valid, known, rng)
         return Outcome(cls(fit_regimes(fitted.innovations, coarse.valid)), (), p_value)
 
@@ -152,11 +143,11 @@ class RegimesTerm(Term):
         """Regimes are found in the innovations; what they do to the movement itself may be more."""
         on = self.fit.on[:, None]
         # the fit holds the regimes' scale already; squares of its innovations say what is left of them
-        fine = float(log_sizes(fine_squares(fitted), on)[0][0])
-        moved = float(log_sizes(slow_squares(fitted), on)[0][0])
+        fine = float(spread.log_sizes(spread.fine_squares(fitted), on)[0][0])
+        moved = float(spread.log_sizes(spread.slow_squares(fitted), on)[0][0])
         factor = self.fit.factor * max(1.0, float(np.exp(moved)))
         loud = float(np.sum(self.fit.on[fitted.coarse.valid]))
-        error = factor / np.sqrt(2.0 * max(loud / SLOW_S, 1.0))
+        error = factor / np.sqrt(2.0 * max(loud / spread.SLOW_S, 1.0))
         lengths = {"on_s": self.fit.on_s, "off_s": self.fit.off_s}
         return (Regimes(factor=factor, factor_error=error, fine_factor=float(np.exp(fine)), **lengths),)
 
