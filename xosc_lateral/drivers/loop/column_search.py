@@ -207,7 +207,8 @@ class ColumnSearch:
         slow, and against slow noise a quicker look-alike stands out better than the effect itself.
         """
         term: SearchedTerm = self.kind.of(scored.dictionary.timed(scored.best))
-        after = self._fit_with(term)
+        coarse, terms = self.fitted.coarse, self.fitted.terms
+        after = fit_model(coarse, (*terms, term))
         best: Refined | None = None
         for _ in range(ROUNDS):
             problem = self.kind.reweighted(self.fitted, after)
@@ -215,7 +216,7 @@ class ColumnSearch:
             if here is None:
                 break
             refined, other = self._refined(here)
-            other_after = self._fit_with(other)
+            other_after = fit_model(coarse, (*terms, other))
             if best and 2.0 * other_after.log_likelihood - refined.price <= 2.0 * after.log_likelihood - best.price:
                 break
             same = other.columns == term.columns
@@ -223,9 +224,6 @@ class ColumnSearch:
             if same or problem is None:
                 break
         return term, after
-
-    def _fit_with(self, term: SearchedTerm) -> Fitted:
-        return fit_model(self.fitted.coarse, (*self.fitted.terms, term))
 
     def _refined(self, scored: _Scored) -> tuple[Refined, SearchedTerm]:
         """Refine the best sets of columns; the best of them, which knows what others explain as much."""

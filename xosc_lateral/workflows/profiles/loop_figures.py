@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
 
 import numpy as np
 
@@ -28,8 +27,9 @@ SPECTRUM_ROWS, CYCLE_ROWS = 512, 4096
 SURROUNDINGS_HZ = 0.07  # To either side of a cycle's line. [Hz]
 TWO_ERRORS = 2.0  # Half width of bands, in standard errors: chance leaves them 1 time in 20. [-]
 FLAT_AXIS = 10.0  # A residual's axis reaches at least so far to both sides, lest noise look large. [mm]
-NEGLIGIBLE = 1e-2  # Share of a column's range that is written as 0. [-]
+ZERO_SHARE = 1e-2  # Share of a column's range that is written as 0. [-]
 PANELS = 4  # Residual panels side by side.
+WHOLE_NUMBERED = frozenset(["lane_index", "lane_count"])  # No reader takes the mean of a quantile group for a lane.
 # Averaging times of the paths of the mean, of the spread, and of the spread with regimes. [s]
 MEAN_S, SPREAD_S, REGIME_S = 120.0, 240.0, 20.0
 GAP_S = 5.0  # Longer gaps in a drive interrupt a line. [s]
@@ -47,24 +47,18 @@ def _three(result: LoopResult) -> tuple[tuple[Mapping[str, FloatArray], str, str
 
 # ---- columns ----
 def residual_figure(result: LoopResult, what: str) -> Figure:
-    """Measured minus expected by every column's fifths, before and after; `what` is "mean" or "spread"."""
-    names = _shown(result, what)
+    """Measured minus expected by fifths of every column, those of findings first; `what` is "mean" or "spread"."""
+    names = [name for name in result.scored.statistics.labels if f"{what} by {name}" in result.scored.real]
+    acting = {column for finding in result.findings for column in finding.columns}
+    names = sorted(
+        (name for name in names if not name.startswith("effect: ")),
+        key=lambda name: not any(column == name or f"({column})" in name for column in acting),
+    )
     figure = Figure(-(-len(names) // PANELS), PANELS, height=66.0, share_y="all", legend=True)
     for number, (panel, name) in enumerate(zip(figure.panels, names, strict=False)):
         _draw_residual(panel, result, f"{what} by {name}", name)
         panel.y.label = "residual [mm]" if number % PANELS == 0 else ""
     return figure
-
-
-def _shown(result: LoopResult, what: str) -> list[str]:
-    """Columns with a panel, those of the findings first."""
-    names = [
-        name
-        for name in result.scored.statistics.labels
-        if f"{what} by {name}" in result.scored.real and not name.startswith("effect: ")
-    ]
-    acting = {column for finding in result.findings for column in finding.columns}
-    return sorted(names, key=lambda name: not any(column == name or f"({column})" in name for column in acting))
 
 
 def _draw_residual(panel: Panel, result: LoopResult, group: str, name: str) -> None:
@@ -79,7 +73,7 @@ def _draw_residual(panel: Panel, result: LoopResult, group: str, name: str) -> N
         panel.line(place, residual, color, label=label)
         panel.dots(place, residual, color)
     # what a smoothed switch decays to is as good as 0
-    shown = np.where(np.abs(middles) < NEGLIGIBLE * np.nanmax(np.abs(middles)), 0.0, middles)
+    shown = np.where(np.abs(middles) < ZERO_SHARE * np.nanmax(np.abs(middles)), 0.0, middles)
     if name in WHOLE_NUMBERED:
         shown = np.round(shown)
     last = len(middles) - 1
@@ -88,10 +82,6 @@ def _draw_residual(panel: Panel, result: LoopResult, group: str, name: str) -> N
     ]
     panel.x.limits, panel.y.holds = (-0.3, last + 0.3), (-FLAT_AXIS, FLAT_AXIS)
     panel.title = column_label(name, hint=False)
-
-
-WHOLE_NUMBERED = frozenset(["lane_index", "lane_count"])
-"""Columns whose quantile groups have means that no reader can take for a lane."""
 
 
 def _short(value: float) -> str:
@@ -231,7 +221,16 @@ def _time(result: LoopResult, finding: Finding) -> Figure:
     figure = Figure(height=165.0, legend=True)
     (panel,) = figure.panels
     if isinstance(effect, TimeSmooth) and not effect.location:
-        _draw_spread(panel, result, effect, finding.size_m)
+        moving = loop_curves.moving_spread(result, SPREAD_S)
+        curve = effect.path(effect.spread, moving.time)
+        waves = [effect.path(tuple(row), moving.time) for row in np.eye(len(effect.spread))]
+        error = np.sqrt(sum(np.square(wave * own) for wave, own in zip(waves, effect.spread_errors, strict=True)))
+        fitted = float(np.mean(np.log(moving.measured) - curve)) + curve
+        low, high = (np.exp(fitted + sign * TWO_ERRORS * error) for sign in (-1.0, 1.0))
+        panel.band(moving.time, low, high, ORANGE, opacity=0.25)
+        _draw_statistic(panel, moving)
+        panel.line(moving.time, np.exp(fitted), ORANGE, label=f"fitted: factor {finding.size_m:.2f}")
+        panel.y.holds, panel.y.label = (0.0,), f"spread over {SPREAD_S / 60:.0f} min [m]"
         return figure
     moving = loop_curves.moving_mean(result, MEAN_S)
     _draw_statistic(panel, moving)
@@ -240,19 +239,6 @@ def _time(result: LoopResult, finding: Finding) -> Figure:
     panel.line(moving.time, fitted, ORANGE, width=2.0, label=f"fitted {word}")
     panel.y.label = f"mean over {MEAN_S / 60:.0f} min, positive to the left [m]"
     return figure
-
-
-def _draw_spread(panel: Panel, result: LoopResult, effect: TimeSmooth, factor: float) -> None:
-    moving = loop_curves.moving_spread(result, SPREAD_S)
-    curve = effect.path(effect.spread, moving.time)
-    waves = [effect.path(tuple(row), moving.time) for row in np.eye(len(effect.spread))]
-    error = np.sqrt(sum(np.square(wave * own) for wave, own in zip(waves, effect.spread_errors, strict=True)))
-    middle = float(np.mean(np.log(moving.measured) - curve)) + curve
-    low, high = (np.exp(middle + sign * TWO_ERRORS * error) for sign in (-1.0, 1.0))
-    panel.band(moving.time, low, high, ORANGE, opacity=0.25)
-    _draw_statistic(panel, moving)
-    panel.line(moving.time, np.exp(middle), ORANGE, label=f"fitted: factor {factor:.2f}")
-    panel.y.holds, panel.y.label = (0.0,), f"spread over {SPREAD_S / 60:.0f} min [m]"
 
 
 def _draw_statistic(panel: Panel, moving: loop_curves.MovingStatistic) -> None:
@@ -302,20 +288,18 @@ def _gapped(moving: loop_curves.MovingStatistic, values: FloatArray) -> FloatArr
 
 
 # By kind of effect, or of finding: what draws it, and the caption.
-DRAWINGS: Mapping[str, tuple[Callable[[LoopResult, Finding], Figure], str]] = MappingProxyType(
-    {
-        Cycle.kind: (
-            _cycle,
-            "Power spectral density about the fitted oscillation, a peak that the profile before does not have.",
-        ),
-        TimeSmooth.kind: (_time, "What changes with time, over the drive; orange: the fitted curve."),
-        Regimes.kind: (
-            _regimes,
-            "Left: local spread over the drive; shaded: the regime of large spread is more likely than not. Right: its "
-            "distribution on held-out blocks.",
-        ),
-        Step.kind: (_time, "Mean position over the drive; orange: the fitted step."),
-        "memory": (spectrum_figure, "Power spectral density of the movement, measured and of both profiles."),
-        "population": (_population, "Distribution of the local spread of the movement on held-out blocks."),
-    }
-)
+DRAWINGS: Mapping[str, tuple[Callable[[LoopResult, Finding], Figure], str]] = {
+    Cycle.kind: (
+        _cycle,
+        "Power spectral density about the fitted oscillation, a peak that the profile before does not have.",
+    ),
+    TimeSmooth.kind: (_time, "What changes with time, over the drive; orange: the fitted curve."),
+    Regimes.kind: (
+        _regimes,
+        "Left: local spread over the drive; shaded: the regime of large spread is more likely than not. Right: its "
+        "distribution on held-out blocks.",
+    ),
+    Step.kind: (_time, "Mean position over the drive; orange: the fitted step."),
+    "memory": (spectrum_figure, "Power spectral density of the movement, measured and of both profiles."),
+    "population": (_population, "Distribution of the local spread of the movement on held-out blocks."),
+}

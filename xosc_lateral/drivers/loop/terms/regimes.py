@@ -26,6 +26,7 @@ from xosc_lateral.drivers.loop.dictionary import Search, beside
 from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage, Term
 from xosc_lateral.drivers.loop.significance import HEAVY_TAIL_SHARE, LoopSeed, in_another_order, upper_tail
 from xosc_lateral.drivers.loop.terms import spread
+from xosc_lateral.drivers.loop.terms.column import columns_on_size
 from xosc_lateral.drivers.loop.timeline import Coarse, on_fine_grid
 from xosc_lateral.drivers.model.effects import Acts, Effect, Regimes
 from xosc_lateral.drivers.model.seeds import generator
@@ -133,7 +134,7 @@ class RegimesTerm(Term):
         if not coarse.lasts or any(isinstance(term, cls) for term in fitted.terms):
             return None
         # what a column does to the size in another shape than the one that was found is no regime
-        columns = spread.what_columns_do(search, fitted), spread.what_a_column_may_do(search, fitted)[0]
+        columns = search.cross_basis(columns_on_size(fitted)), spread.what_a_column_may_do(search, fitted)[0]
         known = np.concatenate([spread.known_log_scale(fitted), *columns], axis=1)
         squares, rng = spread.quick_squares(fitted).standardised, generator(search.seed, LoopSeed.REGIMES)
         p_value = probability_of_persistence(squares, coarse.valid, known, rng)

@@ -25,7 +25,7 @@ from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage,
 from xosc_lateral.drivers.loop.refinement import Alternatives
 from xosc_lateral.drivers.loop.significance import LoopSeed
 from xosc_lateral.drivers.loop.terms import spread
-from xosc_lateral.drivers.loop.terms.column import ColumnTerm
+from xosc_lateral.drivers.loop.terms.column import ColumnTerm, columns_on_size
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
 from xosc_lateral.drivers.loop.timeline import COARSE, Coarse
 from xosc_lateral.drivers.model.effects import Acts, Effect, Step, TimeSmooth
@@ -208,7 +208,7 @@ class TimeSpreadTerm(Term):
         if not fitted.coarse.lasts or any(isinstance(term, cls) for term in fitted.terms):
             return None
         # what a column does to the size of any part of the movement is not time's doing, slow as the column may be
-        known = spread.what_columns_do(search, fitted)
+        known = search.cross_basis(columns_on_size(fitted))
         may_act, p_column = spread.what_a_column_may_do(search, fitted)
         columns = low.half_cosines_of(fitted.coarse, max(low.SPREAD_ORDERS))
 
