@@ -38,10 +38,12 @@ MIN_SUPPORT_S = 45.0
 LEFT_OVER = 0.05  # A candidate of which less than this share is left beside what is known is not tested. [-]
 # Directions of a column's cross-basis with less than this share of the largest variance are left in. [-]
 CROSS_BASIS = 0.01
-ROBUST = 200  # Entries whose scores are set beside the squares of their own rows: those that may be the best.
-RESPONSES = 12  # Of one column's entries, the best so many stand for all that it may do; more of them span hardly more.
-CHUNK = 48  # Candidates that are whitened at once: few enough to stay in a processor's cache.
-TINY = 1e-30  # Keeps single precision from dividing by zero.
+ROBUST_ENTRIES = 200  # Entries whose scores are set beside the squares of their own rows: those that may be the best.
+RESPONSE_ENTRIES = (
+    12  # Of one column's entries, the best so many stand for all that it may do; more of them span hardly more.
+)
+CHUNK_CANDIDATES = 48  # Candidates that are whitened at once: few enough to stay in a processor's cache.
+LEAST_POWER = 1e-30  # Keeps single precision from dividing by zero.
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,8 +108,8 @@ def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:
     blocks: list[SingleArray] = [np.zeros((0, len(seconds)), dtype=np.float32)]
     single = np.array([len(candidate.columns) == 1 for candidate in quantities.candidates], dtype=np.bool_)
     for members, grid in ((np.flatnonzero(single), TIMINGS), (np.flatnonzero(~single), PRODUCT_TIMINGS)):
-        for first in range(0, len(members), CHUNK):
-            chunk = members[first : first + CHUNK]
+        for first in range(0, len(members), CHUNK_CANDIDATES):
+            chunk = members[first : first + CHUNK_CANDIDATES]
             for response_s, lags in grid.items():
                 response = quantities.responses(chunk, response_s)
                 for lag in lags:
@@ -116,10 +118,10 @@ def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:
                     rows = compact.rows(moved)
                     squares = np.square(rows)
                     power = squares.sum(axis=0)
-                    support = power**2 / np.maximum(np.square(squares).sum(axis=0), TINY)
-                    varies = power > 1e-9 * np.maximum(np.square(moved).sum(axis=0), TINY)  # within drives
+                    support = power**2 / np.maximum(np.square(squares).sum(axis=0), LEAST_POWER)
+                    varies = power > 1e-9 * np.maximum(np.square(moved).sum(axis=0), LEAST_POWER)  # within drives
                     kept = np.flatnonzero(varies & (support >= MIN_SUPPORT_S))
-                    unit = rows[:, kept] / np.sqrt(np.maximum(power[kept], TINY))
+                    unit = rows[:, kept] / np.sqrt(np.maximum(power[kept], LEAST_POWER))
                     blocks.append(unit.T.astype(np.float32, copy=False))
                     entries += [(quantities.candidates[chunk[i]], float(lag), response_s) for i in kept]
     timings = np.array([entry[1:] for entry in entries]).reshape(-1, 2)
@@ -179,17 +181,17 @@ def _beside_loud_stretches(
     scores: FloatArray, dictionary: Dictionary, left: FloatArray, basis: SingleArray
 ) -> FloatArray:
     """Scores of the best entries by the squares of their own rows [2]_: the null loses where they are large."""
-    order = np.argsort(-scores)[:ROBUST]
+    order = np.argsort(-scores)[:ROBUST_ENTRIES]
     order = order[np.isfinite(scores[order])]
     rows = dictionary.rows[order].astype(np.float64)
     rows -= (rows @ basis) @ basis.T
     columns = [frozenset(dictionary.candidates[index].effect.columns) for index in order]
     rest = np.empty_like(rows)
     for read in set(columns):  # what some response to the same columns explains is not loudness
-        alike = [k for k, others in enumerate(columns) if others <= read or read <= others][:RESPONSES]
+        alike = [k for k, others in enumerate(columns) if others <= read or read <= others][:RESPONSE_ENTRIES]
         span = orthonormal(rows[alike].T)
         rest[[others == read for others in columns]] = beside(span, left)
-    power = np.maximum(np.square(rows).sum(axis=1), TINY)
+    power = np.maximum(np.square(rows).sum(axis=1), LEAST_POWER)
     weights = np.square(rows) / power[:, None]
     scatter = (weights * np.square(rest)).sum(axis=1)
     # of few rows it is a rough estimate: what counts is what is sure of it, two standard errors less
@@ -228,7 +230,7 @@ def beside_parts(
         span = orthonormal(np.concatenate([known, *(spans(column) for column in pair)], axis=1), CROSS_BASIS)
         rows = beside(span, dictionary.rows[entries].astype(np.float64).T)
         power = np.square(rows).sum(axis=0)
-        gains = np.square(beside(span, left) @ rows) / np.maximum(power, TINY) - dictionary.costs[entries]
+        gains = np.square(beside(span, left) @ rows) / np.maximum(power, LEAST_POWER) - dictionary.costs[entries]
         scores[entries] = np.where(power > LEFT_OVER, np.minimum(scores[entries], gains), -np.inf)
     return scores
 

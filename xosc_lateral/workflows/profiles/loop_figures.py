@@ -21,7 +21,7 @@ from xosc_lateral.workflows.profiles import loop_curves
 from xosc_lateral.workflows.profiles.loop_words import SPREAD, column_label, product_label
 
 # Measured drives, the profile before and the profile after, in every figure of the loop.
-DRIVES, BEFORE, AFTER = BLUE, MUTED, VERMILLION
+DRIVES_COLOR, BEFORE_COLOR, AFTER_COLOR = BLUE, MUTED, VERMILLION
 # Samples per segment of a spectrum: 102 s; of that about a cycle, at most: 14 min, or a line would be smeared.
 SPECTRUM_ROWS, CYCLE_ROWS = 512, 4096
 SURROUNDINGS_HZ = 0.07  # To either side of a cycle's line. [Hz]
@@ -39,9 +39,9 @@ def _three(result: LoopResult) -> tuple[tuple[Mapping[str, FloatArray], str, str
     """Statistics by group of cells, colour and name: measured, and of both profiles."""
     scored = result.scored
     return (
-        (scored.real, DRIVES, "measured"),
-        (scored.before, BEFORE, "profile before"),
-        (scored.after, AFTER, "profile after"),
+        (scored.real, DRIVES_COLOR, "measured"),
+        (scored.before, BEFORE_COLOR, "profile before"),
+        (scored.after, AFTER_COLOR, "profile after"),
     )
 
 
@@ -68,7 +68,7 @@ def _draw_residual(panel: Panel, result: LoopResult, group: str, name: str) -> N
     floor = 1000.0 * TWO_ERRORS * result.lack_of_fit.floors[group]
     panel.band(place, -floor, floor, MUTED, opacity=0.2, label="sampling error")
     panel.level(color=MUTED)
-    for values, color, label in ((scored.before, BEFORE, "before"), (scored.after, AFTER, "after")):
+    for values, color, label in ((scored.before, BEFORE_COLOR, "before"), (scored.after, AFTER_COLOR, "after")):
         residual = 1000.0 * (scored.real[group] - values[group])
         panel.line(place, residual, color, label=label)
         panel.dots(place, residual, color)
@@ -119,9 +119,9 @@ def _draw_passage(panel: Panel, passage: Passage, column: str) -> None:
     about = TWO_ERRORS * passage.error
     there = coarse_mean(np.nan_to_num((passage.column - np.nan_to_num(passage.usual)) / (passage.high or 1.0)))
     scale = passage.largest_shift[0] / max(float(np.abs(there).max()), 1e-300)
-    panel.line(passage.time, scale * there, BEFORE, label=f"{column} (scaled)")
-    panel.band(passage.time, passage.path - about, passage.path + about, AFTER, opacity=0.2)
-    panel.line(passage.time, passage.path, AFTER)
+    panel.line(passage.time, scale * there, BEFORE_COLOR, label=f"{column} (scaled)")
+    panel.band(passage.time, passage.path - about, passage.path + about, AFTER_COLOR, opacity=0.2)
+    panel.line(passage.time, passage.path, AFTER_COLOR)
     panel.title = "Path in a typical passage"
     panel.x.label, panel.y.label = "time from its beginning [s]", "shift, positive to the left [m]"
 
@@ -134,12 +134,12 @@ def _draw_curve(panel: Panel, result: LoopResult, effect: ColumnEffect) -> None:
 
     about, errors = TWO_ERRORS * curve.error, TWO_ERRORS * curve.measured_error
     low, high = shown(curve.strength - about), shown(curve.strength + about)
-    panel.band(curve.over, low, high, AFTER, opacity=0.2, label="two standard errors")
-    panel.line(curve.over, shown(curve.strength), AFTER, label="fitted effect")
+    panel.band(curve.over, low, high, AFTER_COLOR, opacity=0.2, label="two standard errors")
+    panel.line(curve.over, shown(curve.strength), AFTER_COLOR, label="fitted effect")
     for place, value, error in zip(curve.seen, curve.measured, errors, strict=True):
-        panel.line((place, place), shown(np.array([value - error, value + error])), DRIVES, width=1.0)
+        panel.line((place, place), shown(np.array([value - error, value + error])), DRIVES_COLOR, width=1.0)
     if len(curve.seen):
-        panel.dots(curve.seen, shown(curve.measured), DRIVES, label="measured")
+        panel.dots(curve.seen, shown(curve.measured), DRIVES_COLOR, label="measured")
     panel.title = "The effect"
     panel.x.label = product_label(effect) if isinstance(effect, Product) else column_label(effect.columns[0])
     panel.y.label = "shift, positive to the left [m]" if on_mean else "factor [-]"
@@ -178,17 +178,17 @@ def draw_spectra(panel: Panel, result: LoopResult, segment: int, *, within_block
     together = timeline.valid & np.r_[True, seams[1:] == seams[:-1]]
     segment = min(segment, max(part.stop - part.start for part in true_slices(together)))  # runs may all be shorter
     for runs, color, label, dashes in (
-        (timeline.offset[None], DRIVES, "measured (band: two standard errors)", ""),
-        (result.scored.runs_before, BEFORE, "profile before", ""),
-        (result.scored.runs_after, AFTER, "profile after", DASHED),
+        (timeline.offset[None], DRIVES_COLOR, "measured (band: two standard errors)", ""),
+        (result.scored.runs_before, BEFORE_COLOR, "profile before", ""),
+        (result.scored.runs_after, AFTER_COLOR, "profile after", DASHED),
     ):
         frequency, density, number = gapped_spectrum(runs, timeline.valid, seams, timeline.step, segment)
-        if color == DRIVES:
+        if color == DRIVES_COLOR:
             # the mean of so many independent periodograms, which overlap by half
             about = TWO_ERRORS / np.sqrt(max(0.75 * number, 1.0))
             inner = slice(1, None)  # frequency 0 has no place on a logarithmic axis
             low, high = density[inner] * np.exp(-about), density[inner] * np.exp(about)
-            panel.band(frequency[inner], low, high, DRIVES, opacity=0.2)
+            panel.band(frequency[inner], low, high, DRIVES_COLOR, opacity=0.2)
         panel.line(frequency[1:], density[1:], color, dashes=dashes, label=label)
     panel.y.log = True
     panel.x.label, panel.y.label = "frequency [Hz]", "power density [m²/Hz]"
@@ -243,9 +243,9 @@ def _time(result: LoopResult, finding: Finding) -> Figure:
 
 def _draw_statistic(panel: Panel, moving: loop_curves.MovingStatistic) -> None:
     for values, color, dashes, label in (
-        (moving.measured, DRIVES, "", "measured"),
-        (moving.before, BEFORE, "", "profile before, all runs"),
-        (moving.after, AFTER, DASHED, "profile after, all runs"),
+        (moving.measured, DRIVES_COLOR, "", "measured"),
+        (moving.before, BEFORE_COLOR, "", "profile before, all runs"),
+        (moving.after, AFTER_COLOR, DASHED, "profile after, all runs"),
     ):
         panel.line(moving.time, _gapped(moving, values), color, width=1.2, dashes=dashes, label=label)
     panel.x.label = "time [s]"
@@ -259,7 +259,7 @@ def _regimes(result: LoopResult, finding: Finding) -> Figure:
     top = 1.05 * float(moving.measured.max())
     loud = np.where(loop_curves.regime_probability(result) > 0.5, top, np.nan)
     over_time.band(moving.time, 0.0, loud, ORANGE, opacity=0.3, label="large spread more likely than not")
-    over_time.line(moving.time, _gapped(moving, moving.measured), DRIVES, width=0.8, label="measured")
+    over_time.line(moving.time, _gapped(moving, moving.measured), DRIVES_COLOR, width=0.8, label="measured")
     over_time.y.limits, over_time.y.label = (0.0, top), f"spread within {REGIME_S:.0f} s [m]"
     over_time.x.label = "time [s]"
     _draw_quantiles(quantiles, result)

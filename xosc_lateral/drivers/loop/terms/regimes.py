@@ -108,7 +108,7 @@ MEMORIES_S = (6.0, 15.0, 40.0)  # Lengths of regimes that are tested. [s]
 # and no regime. [s]
 CLUSTER_S = 15
 SHORTEST_S = 12  # Lags are compared from here on. [s]
-DRAWS = 2000  # Orders of the blocks that are the null.
+BLOCK_ORDERS = 2000  # Orders of the blocks that are the null.
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,8 +183,8 @@ def probability_of_persistence(
         products = np.fft.irfft(np.abs(np.fft.rfft(series, size)) ** 2, size)[lags]
         return float((weights @ products / scales).max())
 
-    inside, drawn, null = np.flatnonzero(valid), np.zeros(len(squares)), np.zeros(DRAWS)
-    for draw in range(DRAWS):
+    inside, drawn, null = np.flatnonzero(valid), np.zeros(len(squares)), np.zeros(BLOCK_ORDERS)
+    for draw in range(BLOCK_ORDERS):
         drawn[inside] = in_another_order(np.roll(squares[inside], rng.integers(CLUSTER_S)), CLUSTER_S, rng)
         null[draw] = score(drawn)
     return upper_tail(score(squares), null, tail_share=HEAVY_TAIL_SHARE, least_excess=0.0)

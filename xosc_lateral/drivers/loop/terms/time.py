@@ -36,7 +36,9 @@ STEP_PARAMETERS = 2  # Of a step: its height and its moment.
 SETTLING_S = (150.0, 300.0, 600.0, 1200.0)
 AS_LIKELY = float(np.log(20.0))  # A form so much less likely than the best, or less so, is not ruled out. [nat]
 CHANGE_WITH_TIME = "change of the mean with time"
-SURER = 0.01  # Where it is surer than the best column by this factor, what that column may do is left to time. [-]
+TIME_ADVANTAGE = (
+    0.01  # Where it is surer than the best column by this factor, what that column may do is left to time. [-]
+)
 
 
 class _MeanByTime(Term):
@@ -224,7 +226,7 @@ class TimeSpreadTerm(Term):
             return (min(1.0, min(tested)[0] * len(tested)), min(tested)[1]) if tested else None
 
         best = best_beside(known)
-        if best is not None and best[0] > SURER * p_column:
+        if best is not None and best[0] > TIME_ADVANTAGE * p_column:
             best = best_beside(np.concatenate([known, may_act], axis=1))
         if best is None:
             return None
