@@ -222,12 +222,9 @@ FEEDBACK_SHARE, DOUBTFUL_SHARE, NEGLIGIBLE_SHARE = 0.05, 0.02, 0.003
 # it. Warnings with hysteresis have 0.8, a lateral speed 0.4 to 0.7, causes below 0.06. [-]
 FUNCTION_COHERENCE = 0.4
 # Quantiles of the movement between which that mean is taken: finer at the ends, where warnings fire. [-]
-MOVEMENT_QUANTILES = np.concatenate(
-    [np.array([0.005, 0.01, 0.02]), np.linspace(0.04, 0.96, 24), np.array([0.98, 0.99, 0.995])]
-)
-HALVES_BLOCK_S = (
-    150.0  # Stretches of so long are dealt to two halves; the mean of either half is taken from the other. [s]
-)
+MOVEMENT_QUANTILES = np.r_[0.005, 0.01, 0.02, np.linspace(0.04, 0.96, 24), 0.98, 0.99, 0.995]
+# Stretches of so long are dealt to two halves; the mean of either half is taken from the other. [s]
+HALVES_BLOCK_S = 150.0
 # Past samples of the column, and of the movement, in the test of time's direction: 2 s and 1 s.
 OWN_PAST, MOVED_PAST = 10, 5
 # Over the number of segments: what unrelated columns' coherence stays below, the largest of 4 parts and 6 movements

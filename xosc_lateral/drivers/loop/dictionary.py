@@ -39,9 +39,8 @@ LEFT_OVER = 0.05  # A candidate of which less than this share is left beside wha
 # Directions of a column's cross-basis with less than this share of the largest variance are left in. [-]
 CROSS_BASIS = 0.01
 ROBUST_ENTRIES = 200  # Entries whose scores are set beside the squares of their own rows: those that may be the best.
-RESPONSE_ENTRIES = (
-    12  # Of one column's entries, the best so many stand for all that it may do; more of them span hardly more.
-)
+# Of one column's entries, the best so many stand for all that it may do; more of them span hardly more.
+RESPONSE_ENTRIES = 12
 CHUNK_CANDIDATES = 48  # Candidates that are whitened at once: few enough to stay in a processor's cache.
 LEAST_POWER = 1e-30  # Keeps single precision from dividing by zero.
 

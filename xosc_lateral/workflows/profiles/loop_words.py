@@ -187,7 +187,8 @@ def feedback_words(item: Feedback) -> str:
         return f"it is {by} the car's own movement"
     if item.function >= FUNCTION_COHERENCE:
         return f"it is a function of the present {item.of} (squared coherence {item.function:.2f}), as a warning is"
-    shared = f"above {FEEDBACK_BAND_HZ[0]:g}{GAP}Hz, where drivers hardly respond, its squared coherence with the {item.of} is"
+    above = f"above {FEEDBACK_BAND_HZ[0]:g}{GAP}Hz, where drivers hardly respond"
+    shared = f"{above}, its squared coherence with the {item.of} is"
     share = f"the movement predicts {100 * item.predicted_share:.1f}{GAP}% of its changes"
     verdict = "it may follow from the car's own movement" if item.doubtful else "it follows from the car's own movement"
     declare = f"; if it cannot, declare what it is: `--role {item.column}=road`" if item.doubtful else ""

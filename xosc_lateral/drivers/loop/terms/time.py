@@ -36,9 +36,8 @@ STEP_PARAMETERS = 2  # Of a step: its height and its moment.
 SETTLING_S = (150.0, 300.0, 600.0, 1200.0)
 AS_LIKELY = float(np.log(20.0))  # A form so much less likely than the best, or less so, is not ruled out. [nat]
 CHANGE_WITH_TIME = "change of the mean with time"
-TIME_ADVANTAGE = (
-    0.01  # Where it is surer than the best column by this factor, what that column may do is left to time. [-]
-)
+# Where it is surer than the best column by this factor, what that column may do is left to time. [-]
+TIME_ADVANTAGE = 0.01
 
 
 class _MeanByTime(Term):
