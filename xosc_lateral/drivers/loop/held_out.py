@@ -32,7 +32,7 @@ from xosc_lateral.drivers.loop.identify import Nested, Progress, folds_of, hold_
 from xosc_lateral.drivers.loop.model import Fitted, fit_model
 from xosc_lateral.drivers.loop.selection import Selection
 from xosc_lateral.drivers.loop.significance import LoopSeed
-from xosc_lateral.drivers.loop.terms.cycle import CycleTerm
+from xosc_lateral.drivers.loop.terms.hidden import CycleTerm
 from xosc_lateral.drivers.loop.timeline import Coarse, Timeline, coarse_middle
 from xosc_lateral.drivers.model.core.base import ModelKind
 from xosc_lateral.drivers.model.effects import Acts, Effect

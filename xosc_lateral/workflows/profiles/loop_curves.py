@@ -17,7 +17,7 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.drivers.loop.close import LoopResult
 from xosc_lateral.drivers.loop.identify import hold_out_blocks
 from xosc_lateral.drivers.loop.terms.between import is_between
-from xosc_lateral.drivers.loop.terms.regimes import RegimesTerm
+from xosc_lateral.drivers.loop.terms.hidden import RegimesTerm
 from xosc_lateral.drivers.loop.timeline import LOCAL_S, Timeline, coarse_mean, coarse_middle, local_mean
 from xosc_lateral.drivers.model.effects import Acts, Angular, ColumnEffect, Product
 
