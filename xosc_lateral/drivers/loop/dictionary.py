@@ -22,7 +22,6 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.drivers.loop.autocorrelation import Whitener
 from xosc_lateral.drivers.loop.candidates import Candidate, Family, candidates_of
 from xosc_lateral.drivers.loop.columns import Column
-from xosc_lateral.drivers.loop.significance import NULL_DRAWS, draw_null
 from xosc_lateral.drivers.loop.timeline import Coarse, Timeline, coarse_mean, coarse_middle, start_anew
 from xosc_lateral.drivers.model.effects import ColumnEffect
 
@@ -35,6 +34,7 @@ TIMINGS: Mapping[float, tuple[int, ...]] = {1.0: (-3, -2, -1, 0, 1, 2), 4.0: (-4
 PRODUCT_TIMINGS: Mapping[float, tuple[int, ...]] = {2.0: (-2, -1, 0, 1)}
 # A quantity that rests on fewer seconds than this is not tested: anything may have happened just then. [s]
 MIN_SUPPORT_S = 45.0
+LIKELIHOOD_MARGIN = 12.0  # Sets of columns that score lower than the best by more than this are not looked at. [-]
 LEFT_OVER = 0.05  # A candidate of which less than this share is left beside what is known is not tested. [-]
 # Directions of a column's cross-basis with less than this share of the largest variance are left in. [-]
 CROSS_BASIS = 0.01
@@ -140,22 +140,16 @@ def respond_by_second(values: Reals, response_s: float, drive: IndexArray) -> Fl
 
 def score_entries(
     dictionary: Dictionary,
-    residual: FloatArray,
+    left: FloatArray,
     known: FloatArray,
     barred: BoolArray,
-    drive: IndexArray,
-    rng: np.random.Generator,
+    null: FloatArray,
     *,
-    draws: int = NULL_DRAWS,
-    of_mean: bool = True,
+    of_mean: bool,
 ) -> tuple[FloatArray, FloatArray]:
-    """Squared score of every entry less its cost, -inf if barred, and the largest of each of the null's residuals;
+    """Squared score of every entry less its cost, -inf if barred, and the largest of each of the `null`'s residuals;
     beside `known`, orthonormal columns. Loudness where entries act is evidence of a spread, not of a mean."""
-    left = beside(known, residual)
-    left = left / max(float(np.sqrt(np.mean(left**2))), 1e-300)
-    if len(dictionary) == 0 or barred.all():
-        return np.full(len(dictionary), -np.inf), np.zeros(0)
-    rotated = np.concatenate([left[:, None], draw_null(left, drive, rng, draws)], axis=1)
+    rotated = np.concatenate([left[:, None], null], axis=1)
     rotated = beside(known, rotated).astype(np.float32)
     basis = known.astype(np.float32)
     squared = np.empty((len(dictionary), rotated.shape[1]), dtype=np.float32)
@@ -204,16 +198,9 @@ def _beside_loud_stretches(
 
 
 def beside_parts(
-    scores: FloatArray,
-    dictionary: Dictionary,
-    residual: FloatArray,
-    known: FloatArray,
-    spans: Callable[[str], FloatArray],
-    within: float,
+    scores: FloatArray, dictionary: Dictionary, left: FloatArray, known: FloatArray, spans: Callable[[str], FloatArray]
 ) -> FloatArray:
     """Scores of products, where less, beside all that either column does alone (`spans`); no vector's components."""
-    left = beside(known, residual)
-    left = left / max(float(np.sqrt(np.mean(left**2))), 1e-300)
     members: dict[tuple[str, ...], list[int]] = {}
     for index in np.flatnonzero(np.isfinite(scores)):
         candidate = dictionary.candidates[index]
@@ -222,7 +209,7 @@ def beside_parts(
     scores, open_pairs = scores.copy(), set(members)
     while open_pairs:
         pair = max(open_pairs, key=lambda columns: float(scores[members[columns]].max()))
-        if float(scores[members[pair]].max()) < float(scores.max()) - within:
+        if float(scores[members[pair]].max()) < float(scores.max()) - LIKELIHOOD_MARGIN:
             break
         open_pairs.remove(pair)
         entries = members[pair]
@@ -242,6 +229,11 @@ def orthonormal(columns: FloatArray, share: float = 1e-6) -> FloatArray:
     powers, directions = np.linalg.eigh(columns.T @ columns)
     kept = powers > share * max(float(powers[-1]), 1e-300)
     return np.asarray(columns @ (directions[:, kept] / np.sqrt(powers[kept])))
+
+
+def of_unit_variance(rows: FloatArray) -> FloatArray:
+    """Rows about zero, shape (n,), over their root mean square. [-]"""
+    return np.asarray(rows / max(float(np.sqrt(np.mean(rows**2))), 1e-300))
 
 
 def beside(basis: FloatArray, rows: FloatArray) -> FloatArray:

@@ -23,7 +23,14 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray, IntArray
 from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.drivers.loop.autocorrelation import Whitener, positions_in_run
 from xosc_lateral.drivers.loop.candidates import Family
-from xosc_lateral.drivers.loop.dictionary import CROSS_BASIS, MIN_SUPPORT_S, Quantities, beside, orthonormal
+from xosc_lateral.drivers.loop.dictionary import (
+    CROSS_BASIS,
+    MIN_SUPPORT_S,
+    Quantities,
+    beside,
+    of_unit_variance,
+    orthonormal,
+)
 from xosc_lateral.drivers.loop.model import Fitted
 from xosc_lateral.drivers.loop.significance import NULL_DRAWS, LoopSeed, as_one_degree, draw_null, upper_tail
 from xosc_lateral.drivers.loop.timeline import Coarse
@@ -121,7 +128,7 @@ def _beside_loud_rows(basis: FloatArray, rows: FloatArray) -> float:
     """Squares that an orthonormal basis explains, or less, beside the squares of the rows it rests on [2]_."""
     scores = basis.T @ rows
     left = rows - basis @ scores
-    weighed = basis * (left / max(float(np.sqrt(np.mean(left**2))), 1e-300))[:, None]
+    weighed = basis * of_unit_variance(left)[:, None]
     return min(float(scores @ scores), float(scores @ np.linalg.pinv(weighed.T @ weighed) @ scores))
 
 
