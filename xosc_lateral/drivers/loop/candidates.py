@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.loop.columns import Column, Role, Values
 from xosc_lateral.drivers.model import effects
-from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Factor, Form, Product
+from xosc_lateral.drivers.model.effects import EFFECTS, Acts, ColumnEffect, Factor, Form, Product, known_effects
 
 LIMITS = (0.1, 0.25, 0.5, 0.75, 0.9)  # Quantiles at which limits are tried first; refined later. [-]
 FINE_LIMITS = tuple(np.linspace(0.05, 0.95, 37).tolist())  # The quantiles at which they are refined. [-]
@@ -216,5 +216,5 @@ def _varies(values: FloatArray) -> bool:
 
 def offered_effects(column: str, values: NDArray[np.float64]) -> list[ColumnEffect]:
     """What installed plug-ins propose for a column with these values, shape (n,), without coefficients."""
-    kinds = [kind for kind in effects.known_effects() if kind not in effects.EFFECTS and issubclass(kind, ColumnEffect)]
+    kinds = [kind for kind in known_effects() if kind not in EFFECTS and issubclass(kind, ColumnEffect)]
     return [effect for kind in kinds for effect in kind.proposals(column, values)]
