@@ -310,12 +310,8 @@ class Part(StrEnum):
 
 
 PROFILE = flag("--profile", "-p", kind=str, metavar="NAME|PATH", help="Driver profile.")
-MAPPING = flag(
-    "--mapping",
-    kind=Path | None,
-    metavar="FILE.toml",
-    help="Saved mapping of columns (import table --propose FILE...).",
-)
+MAPPING = flag("--mapping", kind=Path | None, metavar="FILE.toml",
+    help="Saved mapping of columns (import table --propose FILE...).")  # fmt: skip
 
 # fmt: off
 SHARED: Mapping[str, Option] = {
