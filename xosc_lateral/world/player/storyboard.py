@@ -184,15 +184,12 @@ class EventElement(StoryboardElement):
 
     def make_room(self) -> bool:
         """By the priority among the events of the maneuver."""
-        if self.priority not in (Priority.SKIP, Priority.OVERRIDE):
-            return True
         siblings = () if self.parent is None else self.parent.children
         running = [event for event in siblings if event is not self and event.is_running]
         if self.priority is Priority.SKIP:
             return not running
-        if self.priority is Priority.OVERRIDE:
-            for event in running:
-                event.end()
+        for event in running if self.priority is Priority.OVERRIDE else ():
+            event.end()
         return True
 
 
