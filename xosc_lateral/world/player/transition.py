@@ -24,15 +24,11 @@ _PEAK_SLOPE = {DynamicsShape.LINEAR: 1.0, DynamicsShape.CUBIC: 1.5, DynamicsShap
 
 @dataclass(slots=True)
 class Transition:
-    """A transition under way.
-
-    `dimension`: what the parameter is: seconds (`time`, `rate`) or metres (`distance`); `parameter_range`: its range (a
-    step has none), or peak slope for `rate` (its sign does not matter).
-    """
+    """A transition under way."""
 
     shape: DynamicsShape
-    dimension: DynamicsDimension
-    parameter_range: InitVar[float]
+    dimension: DynamicsDimension  # of the parameter: seconds (`time`, `rate`) or metres (`distance`)
+    parameter_range: InitVar[float]  # a step has none; for `rate` the peak slope, whose sign does not matter
     start: float = 0.0
     target: float = 0.0
     parameter: float = 0.0
