@@ -22,18 +22,9 @@ def printable(text: str) -> str:
 
 
 class FormatError(XoscLateralError, ValueError):
-    """A file can't be understood.
+    """A file can't be understood: what is wrong, with the value and, if known, what to do; and where.
 
-    Parameters
-    ----------
-    what : str
-        What is wrong, with the value and, if known, what to do.
-    path : str or path-like, optional
-        The file.
-    line : int, optional
-        Line in the file, from 1.
-    element : str, optional
-        The XML element or table column, as in ``Event 'brake'``.
+    `line`: from 1; `element`: the XML element or table column, as in ``Event 'brake'``.
     """
 
     def __init__(self, what: str, *, path: object = None, line: int | None = None, element: str | None = None) -> None:

@@ -179,14 +179,9 @@ def stored(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def columns(n: int, parts: Iterable[Sequence[NDArray[Any]]]) -> list[NDArray[Any]]:
-    """Columns that last, shape (n,) each, from blocks of their rows in order; read-only where all values are the same.
+    """Columns that last, shape (n,) each with n at least 1; read-only where all values are the same.
 
-    Parameters
-    ----------
-    n : int
-        Rows in all, 1 or more.
-    parts : iterable of sequence of array
-        The same columns each time, shape (rows of the block,) each.
+    `parts`: blocks of their rows in order, the same columns each time, shape (rows of the block,) each.
     """
     made: list[NDArray[Any]] = []
     begin = 0
@@ -225,12 +220,7 @@ def rows_where(n: int, holds: Callable[[slice], NDArray[np.bool_]], begin: int =
 
 
 def true_slices(mask: NDArray[np.bool_]) -> list[slice]:
-    """The longest slices in which a mask is True throughout, in order.
-
-    Parameters
-    ----------
-    mask : array of bool, shape (n,)
-    """
+    """The longest slices in which a mask, shape (n,), is True throughout, in order."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
     return [slice(first, stop) for first, stop in edges.reshape(-1, 2).tolist()]
 

@@ -6,7 +6,7 @@ import hashlib
 import re
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from lxml import etree
 from msgspec import Struct
@@ -90,9 +90,14 @@ def read_xml(path: Path) -> tuple[etree._Element, bytes]:
     return document.root, document.data
 
 
-def document_of(data: bytes, path: Path) -> XmlDocument:
+def document_of(data: bytes, path: object) -> XmlDocument:
     """From bytes, as if they were that file's."""
     return XmlDocument(parse_xml(data, path), data, hashlib.sha256(data).hexdigest())
+
+
+def line_of(xml: etree._Element) -> int | None:
+    """Line in the file, from 1; None for an element that was made, not read."""
+    return cast("int | None", xml.sourceline)  # the stubs have an ellipsis there
 
 
 def root_tag(path: Path) -> str:

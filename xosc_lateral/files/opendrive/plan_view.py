@@ -168,17 +168,11 @@ def finish_elements(records: Iterable[Sequence[Record]]) -> list[tuple[Reference
     """Elements of all roads, cubics run through by arc length (computed for all of them at once)."""
     roads = [[element for _, _, element in road] for road in records]
     cubics = [element for road in roads for element in road if isinstance(element, CubicRecord)]
-    done = iter(_finish_cubics(cubics))
-    return [tuple(next(done) if isinstance(e, CubicRecord) else e for e in road) for road in roads]
-
-
-def _finish_cubics(cubics: Sequence[CubicRecord]) -> list[ParamCubic]:
-    if not cubics:
-        return []
-    length = np.array([c.length for c in cubics])
-    u, v = np.array([c.u for c in cubics]), np.array([c.v for c in cubics])
-    pieces = parameter_pieces(u, v, np.array([c.p_end for c in cubics]), length)
-    return [_world(cubic, parameter.tolist()) for cubic, parameter in zip(cubics, pieces, strict=True)]
+    pieces = iter(())
+    if cubics:
+        u, v, p_end, length = (np.array([getattr(c, name) for c in cubics]) for name in ("u", "v", "p_end", "length"))
+        pieces = iter(parameter_pieces(u, v, p_end, length).tolist())
+    return [tuple(_world(e, next(pieces)) if isinstance(e, CubicRecord) else e for e in road) for road in roads]
 
 
 def _world(cubic: CubicRecord, parameter: list[list[float]]) -> ParamCubic:

@@ -133,15 +133,9 @@ def roads_xml(
 
 
 def _geometry(plan: etree._Element, piece: FloatArray) -> None:
-    s, x, y, heading, length = piece[:5]
+    digits = {"s": 6, "x": 6, "y": 6, "hdg": 9, "length": 6}
     item = sub(
-        plan,
-        "geometry",
-        s=decimal(s, 6),
-        x=decimal(x, 6),
-        y=decimal(y, 6),
-        hdg=decimal(heading, 9),
-        length=decimal(length, 6),
+        plan, "geometry", **{name: decimal(value, digits[name]) for name, value in zip(digits, piece, strict=False)}
     )
     if len(piece) == 5:
         sub(item, "line")
@@ -153,8 +147,7 @@ def _geometry(plan: etree._Element, piece: FloatArray) -> None:
 
 def _lane(side: etree._Element, number: int, lane: WrittenLane, outer: str) -> None:
     item = sub(side, "lane", id=str(number), type=lane.kind, level="false")
-    links = {"predecessor": lane.predecessor, "successor": lane.successor}
-    for tag, linked in links.items():
+    for tag, linked in (("predecessor", lane.predecessor), ("successor", lane.successor)):
         if linked is not None:
             sub(item[0] if len(item) else sub(item, "link"), tag, id=str(linked))
     for s, *cubic in lane.width:

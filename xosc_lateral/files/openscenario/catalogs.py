@@ -15,6 +15,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from glob import escape
 from pathlib import Path
@@ -33,19 +34,13 @@ _WINDOWS_DRIVE = re.compile(r"[A-Za-z]:[\\/]")
 
 
 def allowed_roots(scenario: Path, extra: Iterable[Path] = ()) -> tuple[Path, ...]:
-    """Folders that files named by this scenario may lie in, real paths.
-
-    Raises `FormatError`: One of the further folders isn't one.
-    """
+    """Real paths of folders that files named by this scenario may lie in; `FormatError` if an extra one isn't one."""
     extra = list(extra)
     require_folders(extra)
     folder = Path(os.path.realpath(scenario)).parent
     beside = Path(os.path.realpath(Path(scenario).absolute().parent))
-    return tuple(
-        dict.fromkeys(
-            [_highest_folder(folder), _highest_folder(beside), *(Path(os.path.realpath(path)) for path in extra)]
-        )
-    )
+    allowed = [_highest_folder(folder), _highest_folder(beside), *(Path(os.path.realpath(path)) for path in extra)]
+    return tuple(dict.fromkeys(allowed))
 
 
 def require_folders(folders: Iterable[Path]) -> None:
@@ -74,10 +69,7 @@ class Boundary:
     roots: tuple[Path, ...]  # real paths of the folders that they have to stay in
 
     def path(self, reference: str, place: Place) -> Path:
-        """Path of a file or folder, wherever it is.
-
-        Raises `FormatError`: The reference is empty or no path at all.
-        """
+        """Path of a file or folder, wherever it is; `FormatError` for a reference that is empty or no path at all."""
         text = reference.strip()
         if not text or "\0" in text:
             raise place.error("empty file reference")
@@ -95,10 +87,7 @@ class Boundary:
         )
 
     def inside(self, reference: str, place: Place) -> Path:
-        """Path of a file or folder that has to lie inside.
-
-        Raises `FormatError`: It leads outside, is empty, or no path at all.
-        """
+        """Path of a file or folder; `FormatError` for a reference that leads outside, is empty, or no path at all."""
         path = self.path(reference, place)
         windows = bool(_WINDOWS_DRIVE.match(reference.strip())) and os.name != "nt"
         if windows or not self.holds(path):
@@ -128,7 +117,7 @@ class Catalogs:
         `MissingFileError` without the catalog.
         """
         catalog, name = reference.text("catalogName"), reference.text("entryName")
-        path = self._file(catalog, reference)
+        path = self._files.get(catalog) or self._files.setdefault(catalog, self._search(catalog, reference))
         document = read_document(path)
         if self.used.setdefault(path, document.sha256) != document.sha256:
             reference.fail(f"catalog {path} changed while the scenario was being read")
@@ -139,11 +128,6 @@ class Catalogs:
             names = ", ".join(sorted(str(xml.get("name")) for xml in entries)[:8])
             reference.fail(f"catalog '{catalog}' has no entry '{name}' (it has {names})")
         return element.within(entry_scope(element, reference))
-
-    def _file(self, catalog: str, reference: XmlElement) -> Path:
-        if catalog not in self._files:
-            self._files[catalog] = self._search(catalog, reference)
-        return self._files[catalog]
 
     def _search(self, catalog: str, reference: XmlElement) -> Path:
         """By file name in every location, as the reference player does; then by the name inside; then near by."""
@@ -179,8 +163,10 @@ class Catalogs:
         """A file whose catalog bears that name, whatever its own is."""
         for folder in dict.fromkeys(folders):
             for path in sorted(folder.glob("*.xosc"))[:MAX_FILES_SCANNED]:
-                if self.boundary.holds(path) and _calls_itself(path, catalog):
-                    return path
+                with suppress(FormatError):
+                    inside = read_xml(path)[0].iterfind("{*}Catalog") if self.boundary.holds(path) else ()
+                    if any(xml.get("name") == catalog for xml in inside):
+                        return path
         return None
 
 
@@ -189,11 +175,3 @@ def _near_by(boundary: Boundary, name: str) -> Path | None:
     patterns = (f"{levels}{escape(name)}" for levels in ("", "*/", "*/*/", "*/*/*/"))
     files = [path for pattern in patterns for path in boundary.folder.glob(pattern) if path.is_file()]
     return files[0] if len(files) == 1 and boundary.holds(files[0]) else None
-
-
-def _calls_itself(path: Path, name: str) -> bool:
-    try:
-        root, _ = read_xml(path)
-    except FormatError:
-        return False
-    return any(xml.get("name") == name for xml in root.iterfind("{*}Catalog"))

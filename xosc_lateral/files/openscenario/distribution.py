@@ -40,6 +40,7 @@ class LogicalScenario:
     place: Place  # of the distribution
     _scenario: XmlElement = field(repr=False)
     discarded: int = 0  # parameter sets left out so far because they violate the scenario's constraint groups
+    _begin: float = field(init=False, repr=False, default=0.0)
     _declared: dict[str, str] = field(init=False, repr=False)
     _constrained: list[XmlElement] = field(init=False, repr=False)
 
@@ -57,25 +58,16 @@ class LogicalScenario:
 
         Raises `FormatError`: A parameter that the scenario does not declare, or constraints that nothing satisfies.
         """
-        self.discarded, begin = 0, time.monotonic()
+        self.discarded, self._begin = 0, time.monotonic()
         limit = PARAMETER_SETS if isinstance(self.distribution, Stochastic) else COMBINATIONS
         if self.count > limit.value:
             raise self.place.error(limit.refusal(self.count))
         if isinstance(self.distribution, Deterministic):
-            for values in self.distribution:
-                if self._accepts(values):
-                    yield values
-                self._check_time(begin)
+            yield from filter(self._accepts, self.distribution)
             return
         rng = np.random.default_rng(seed if self.distribution.seed is None else self.distribution.seed)
         for _ in range(self.distribution.number_of_test_runs):
             yield self._draw(self.distribution, rng)
-            self._check_time(begin)
-
-    def _check_time(self, begin: float) -> None:
-        took = time.monotonic() - begin
-        if took > DISTRIBUTION_TIME.value:
-            raise self.place.error(f"{DISTRIBUTION_TIME.refusal(took)}; constraints or limits leave out nearly all")
 
     @property
     def count(self) -> int:
@@ -95,6 +87,9 @@ class LogicalScenario:
         raise self.place.error(f"{MAX_REDRAWS} draws in a row violate the constraints of {self.scenario_file}")
 
     def _accepts(self, values: ParameterSet) -> bool:
+        took = time.monotonic() - self._begin
+        if took > DISTRIBUTION_TIME.value:
+            raise self.place.error(f"{DISTRIBUTION_TIME.refusal(took)}; constraints or limits leave out nearly all")
         for name in values:
             if name not in self._declared:
                 raise self.place.error(f"parameter '{name}' is not declared in {self.scenario_file}")
@@ -135,20 +130,17 @@ def _deterministic(owner: XmlElement) -> Deterministic:
     parts: list[ValueSets | SteppedRange] = []
     for item in owner.children():
         if item.tag == "DeterministicMultiParameterDistribution":
-            parts.append(_value_sets(item.required("ValueSetDistribution")))
+            holder = item.required("ValueSetDistribution")
+            sets = [
+                {_name_of(a, "parameterRef"): a.text("value") for a in value_set.children("ParameterAssignment")}
+                for value_set in holder.children("ParameterValueSet")
+            ]
+            parts.append(ValueSets(tuple(sets), holder.place()))
         elif item.tag == "DeterministicSingleParameterDistribution":
             parts.append(_single(item))
         else:
             item.fail("is not a deterministic distribution")
     return Deterministic(tuple(parts))
-
-
-def _value_sets(owner: XmlElement) -> ValueSets:
-    sets = tuple(
-        {_name_of(a, "parameterRef"): a.text("value") for a in item.children("ParameterAssignment")}
-        for item in owner.children("ParameterValueSet")
-    )
-    return ValueSets(sets, owner.place())
 
 
 def _name_of(element: XmlElement, attribute: str) -> str:

@@ -10,6 +10,7 @@ from typing import NoReturn, TypeVar, cast
 
 from lxml import etree
 
+from xosc_lateral.files.xml import line_of
 from xosc_lateral.world.scenario.enums import SYNONYMS
 from xosc_lateral.world.scenario.parameters import ExpressionError, Scope
 from xosc_lateral.world.scenario.place import Place
@@ -211,11 +212,6 @@ def parent_of(xml: etree._Element) -> etree._Element:
     parent = xml.getparent()
     assert parent is not None
     return parent
-
-
-def line_of(xml: etree._Element) -> int | None:
-    """Line in the file, from 1; None for an element that was made, not read."""
-    return cast("int | None", xml.sourceline)  # the stubs have an ellipsis there
 
 
 def node_of(xml: etree._Element) -> tuple[int, ...]:

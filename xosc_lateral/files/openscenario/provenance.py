@@ -16,7 +16,7 @@ from lxml import etree
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.atomic import replace_atomically
-from xosc_lateral.files.openscenario.element import line_of
+from xosc_lateral.files.xml import line_of
 
 MARK = "xosc-lateral provenance: "
 HEADER_MARK = "[xosc-lateral: "
@@ -31,7 +31,9 @@ def mark(root: etree._Element, provenance: Mapping[str, Any], summary: str) -> N
     """Write the provenance as a comment before the file header, and in short into its description."""
     header = root.find("{*}FileHeader")
     text = json.dumps(provenance, sort_keys=True, ensure_ascii=False, default=str)
-    comment = etree.Comment(f" {MARK}{_comment_safe(text)} ")
+    for _ in range(2):  # no ``--`` may stand in a comment, nor may it end in a dash
+        text = text.replace("--", "-\\u002d")
+    comment = etree.Comment(f" {MARK}{text} ")
     comment.tail = root.text  # the white space before the first child
     root.insert(0 if header is None else root.index(header), comment)
     if header is not None:
@@ -133,8 +135,3 @@ def refuse_converted(root: etree._Element, path: object) -> None:
     header = root.find("{*}FileHeader")
     line = None if header is None else line_of(header)
     raise FormatError(f"was converted by xosc-lateral already{hint}", path=path, line=line, element="FileHeader")
-
-
-def _comment_safe(text: str) -> str:
-    """JSON in which no ``--`` stands, which would end the comment, and which does not end in a dash."""
-    return text.replace("--", "-\\u002d").replace("--", "-\\u002d")
