@@ -126,8 +126,8 @@ def test_a_folder_that_is_up_to_date_need_not_be_written(tmp_path: Path, monkeyp
 STOPPED_RUN = """
 import sys
 from tests.kit.fake_converter import convert
-from xosc_lateral.workflows.batch import convert_job
-convert_job.convert_job = convert
+from xosc_lateral.workflows.batch import batch
+batch.convert_job = convert
 from xosc_lateral.cli import main
 main(None)
 """

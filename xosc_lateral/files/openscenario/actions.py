@@ -9,33 +9,12 @@ from xosc_lateral.files.openscenario.conditions import read_trigger
 from xosc_lateral.files.openscenario.context import Context, Reader, declared, read_struct
 from xosc_lateral.files.openscenario.declarations import local_scope
 from xosc_lateral.files.openscenario.element import XmlElement
-from xosc_lateral.files.openscenario.entities import (
-    read_bounding_box,
-    read_controller,
-    read_environment,
-    read_performance,
-)
+from xosc_lateral.files.openscenario.entities import READERS as ENTITY_READERS
 from xosc_lateral.files.openscenario.positions import READERS as POSITION_READERS
 from xosc_lateral.files.openscenario.positions import read_position
+from xosc_lateral.world.scenario import global_actions
 from xosc_lateral.world.scenario import private_actions as private
-from xosc_lateral.world.scenario.entity import BoundingBox, Controller, Performance
 from xosc_lateral.world.scenario.enums import DynamicsShape
-from xosc_lateral.world.scenario.global_actions import (
-    AddEntityAction,
-    DeleteEntityAction,
-    Environment,
-    EnvironmentAction,
-    ModifyOperation,
-    ParameterModifyAction,
-    ParameterSetAction,
-    SetMonitorAction,
-    TrafficAction,
-    TrafficSignalControllerAction,
-    TrafficSignalStateAction,
-    UserDefinedAction,
-    VariableModifyAction,
-    VariableSetAction,
-)
 from xosc_lateral.world.scenario.parameters import ExpressionError
 from xosc_lateral.world.scenario.place import Unsupported
 from xosc_lateral.world.scenario.private_actions import TransitionDynamics
@@ -93,11 +72,12 @@ def _contents(owner: XmlElement) -> list[XmlElement]:
     return elements
 
 
-def _entity(e: XmlElement, context: Context) -> AddEntityAction | DeleteEntityAction:
+def _entity(e: XmlElement, context: Context) -> Struct:
     if (add := e.child("AddEntityAction")) is not None:
-        return AddEntityAction(context.entity(e), read_position(add.required("Position"), context), place=e.place())
+        position = read_position(add.required("Position"), context)
+        return global_actions.AddEntityAction(context.entity(e), position, place=e.place())
     e.required("DeleteEntityAction")
-    return DeleteEntityAction(context.entity(e), place=e.place())
+    return global_actions.DeleteEntityAction(context.entity(e), place=e.place())
 
 
 def _setting(sets: type[Struct], modifies: type[Struct]) -> Reader:
@@ -107,28 +87,30 @@ def _setting(sets: type[Struct], modifies: type[Struct]) -> Reader:
         if (change := e.child("SetAction")) is not None:
             return read_struct(sets, e, context, value=change.text("value"))
         rule = e.required("ModifyAction").required("Rule").required("AddValue", "MultiplyByValue")
-        return read_struct(modifies, e, context, operation=ModifyOperation(rule.tag), value=rule.number("value"))
+        operation = global_actions.ModifyOperation(rule.tag)
+        return read_struct(modifies, e, context, operation=operation, value=rule.number("value"))
 
     return read
 
 
-def _traffic(e: XmlElement, _: Context) -> TrafficAction:
+def _traffic(e: XmlElement, _: Context) -> global_actions.TrafficAction:
     content = e.child()
-    return TrafficAction(content.tag if content else e.tag, place=e.place())
+    return global_actions.TrafficAction(content.tag if content else e.tag, place=e.place())
 
 
-def _user_defined(e: XmlElement, _: Context) -> UserDefinedAction:
+def _user_defined(e: XmlElement, _: Context) -> global_actions.UserDefinedAction:
     command = e.child("CustomCommandAction")
     if command is None:
-        return UserDefinedAction("", "", place=e.place())
-    return UserDefinedAction(command.text("type", ""), (command.xml.text or "").strip(), place=e.place())
+        return global_actions.UserDefinedAction("", "", place=e.place())
+    return global_actions.UserDefinedAction(command.text("type", ""), (command.xml.text or "").strip(), place=e.place())
 
 
 GLOBAL_ACTIONS: dict[str, Reader] = {
-    **declared(EnvironmentAction, SetMonitorAction, TrafficSignalStateAction, TrafficSignalControllerAction),
+    **declared(global_actions.EnvironmentAction, global_actions.SetMonitorAction),
+    **declared(global_actions.TrafficSignalStateAction, global_actions.TrafficSignalControllerAction),
     "EntityAction": _entity,
-    "ParameterAction": _setting(ParameterSetAction, ParameterModifyAction),
-    "VariableAction": _setting(VariableSetAction, VariableModifyAction),
+    "ParameterAction": _setting(global_actions.ParameterSetAction, global_actions.ParameterModifyAction),
+    "VariableAction": _setting(global_actions.VariableSetAction, global_actions.VariableModifyAction),
     "TrafficAction": _traffic,
     "UserDefinedAction": _user_defined,
 }
@@ -237,13 +219,10 @@ def _read_event(element: XmlElement, context: Context) -> Event:
 
 READERS: dict[object, Reader] = {
     **POSITION_READERS,
-    BoundingBox: read_bounding_box,
-    Controller: read_controller,
-    Environment: read_environment,
+    **ENTITY_READERS,
     Event: _read_event,
     Init: _read_init,
     ManeuverGroup: _read_group,
-    Performance: read_performance,
     Story: _read_story,
     TransitionDynamics: read_transition,
     Trigger: read_trigger,

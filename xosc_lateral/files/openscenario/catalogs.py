@@ -1,20 +1,17 @@
 """Files that a scenario names: which may be read, and catalogs, an entry by name in the scope of its own parameters.
 
-A scenario comes from somewhere else; what it names is read by us. So a reference (road, catalog, scenario of a
-distribution) has to stay inside the folders that the user gave: the scenario's own folder, those up to three levels
-above it (field layouts are ``xosc/``, ``xodr/`` and ``xosc/Catalogs`` side by side, sometimes deeper), and folders
-allowed explicitly. The file system's root is never among them, and its direct children only for a scenario one level
-below. Symbolic links are followed before the check. Absolute paths are fine inside these folders, and refused outside.
-
-A scenario that we wrote into another folder names its road and catalogs where they are; reading it there takes the
-explicit permission as well. What it states about its inputs could be forged: it opens nothing.
+A scenario comes from somewhere else; what it names (road, catalog, scenario of a distribution) is read by us. So it has
+to lie in the scenario's own folder, up to three levels above it (field layouts are ``xosc/``, ``xodr/`` and
+``xosc/Catalogs`` side by side, sometimes deeper), or in folders allowed explicitly, symbolic links followed. The file
+system's root is never among them, and its direct children only for a scenario one level below. This holds for what we
+wrote as well: what it states about its inputs could be forged, and opens nothing.
 """
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from glob import escape
@@ -147,31 +144,19 @@ class Catalogs:
                 folders.append(folder)
             else:
                 refused = refused or self.boundary.refusal(written, place)
-        inside = self._by_name_inside(folders, catalog)
-        if inside is not None:
-            return inside
-        near = _near_by(self.boundary, f"{catalog}.xosc")
-        if near is not None:
-            self.remarks.append(Unsupported("CatalogReference", reference.place(), f"catalog taken from {near}"))
-            return near
-        if refused is not None:
-            raise refused
-        searched = ", ".join(str(folder) for folder in dict.fromkeys(folders)) or "no folder is named"
-        raise reference.place().error(f"catalog '{catalog}' not found ({searched})", MissingFileError)
-
-    def _by_name_inside(self, folders: Sequence[Path], catalog: str) -> Path | None:
-        """A file whose catalog bears that name, whatever its own is."""
-        for folder in dict.fromkeys(folders):
+        for folder in dict.fromkeys(folders):  # a file whose catalog bears that name, whatever its own is
             for path in sorted(folder.glob("*.xosc"))[:MAX_FILES_SCANNED]:
                 with suppress(FormatError):
                     inside = read_xml(path)[0].iterfind("{*}Catalog") if self.boundary.holds(path) else ()
                     if any(xml.get("name") == catalog for xml in inside):
                         return path
-        return None
-
-
-def _near_by(boundary: Boundary, name: str) -> Path | None:
-    """The only file of that name at most three levels below the scenario: some field files name stale folders."""
-    patterns = (f"{levels}{escape(name)}" for levels in ("", "*/", "*/*/", "*/*/*/"))
-    files = [path for pattern in patterns for path in boundary.folder.glob(pattern) if path.is_file()]
-    return files[0] if len(files) == 1 and boundary.holds(files[0]) else None
+        # Some field files name stale folders: then the only file of that name at most three levels below the scenario.
+        patterns = (f"{levels}{escape(catalog)}.xosc" for levels in ("", "*/", "*/*/", "*/*/*/"))
+        near = [path for pattern in patterns for path in self.boundary.folder.glob(pattern) if path.is_file()]
+        if len(near) == 1 and self.boundary.holds(near[0]):
+            self.remarks.append(Unsupported("CatalogReference", reference.place(), f"catalog taken from {near[0]}"))
+            return near[0]
+        if refused is not None:
+            raise refused
+        searched = ", ".join(str(folder) for folder in dict.fromkeys(folders)) or "no folder is named"
+        raise reference.place().error(f"catalog '{catalog}' not found ({searched})", MissingFileError)

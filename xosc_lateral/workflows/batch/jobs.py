@@ -1,4 +1,4 @@
-"""A batch as a list of jobs: every output with its place in the tree, its settings and a fingerprint of them."""
+"""A batch as a list of jobs, every output with its place in the tree and its settings; and what makes one of them."""
 
 from __future__ import annotations
 
@@ -9,17 +9,21 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
 from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.base.limits import BATCH_JOBS, VARIANTS
 from xosc_lateral.base.version import BEHAVIOUR, __version__
 from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.files.atomic import make_own_folder, write_atomically
 from xosc_lateral.files.openscenario.catalogs import require_folders
 from xosc_lateral.files.output_paths import real_path
 from xosc_lateral.files.profiles import find_profile, profile_hash
 from xosc_lateral.files.source import file_hash
 from xosc_lateral.workflows.batch.manifest import ManifestRow, printable
 from xosc_lateral.workflows.batch.request import DocumentKind, Request, concrete, document_kind, find_requests
-from xosc_lateral.workflows.conversion.convert import numbered
+from xosc_lateral.workflows.conversion.conversion import Conversion
+from xosc_lateral.workflows.conversion.convert import convert_scenario, numbered
 from xosc_lateral.workflows.conversion.plan import hidden_by_libraries
 from xosc_lateral.workflows.conversion.settings import AUTO, AUTO_PROFILE, ConvertSettings
 
@@ -248,3 +252,69 @@ def _hash_or(path: Path, otherwise: str) -> str:
 
 MISSING = "missing"
 """In place of the hash of a file that can't be read: its conversion says why, and the others go on."""
+
+
+def convert_job(job: Job) -> ManifestRow:
+    """Convert and describe.
+
+    Raises `XoscLateralError`: when the input is at fault; `OSError`: when the output can't be written.
+    """
+    _refuse_changes(job)
+    for path in filter(None, (job.output, job.page)):
+        make_own_folder(path.parent, depth=job.name.count("/"))
+    conversion = convert_scenario(job.source, job.output, job.settings, variant_index=job.variant)
+    _refuse_changes(job)
+    if job.page is not None:
+        from xosc_lateral.workflows.conversion.page import conversion_page
+        from xosc_lateral.workflows.playing.figures import thumbnail
+
+        write_atomically(job.page.with_suffix(".svg"), thumbnail(conversion.movement))  # stands for it in the index
+        write_atomically(job.page, conversion_page(conversion))
+    return describe(job, conversion)
+
+
+def _refuse_changes(job: Job) -> None:
+    """The row states the profiles and the context table that the run was planned with."""
+    if fingerprint(job.settings, job.variant) != job.fingerprint:
+        raise FormatError("profile or context table changed during the run; run it again", path=job.source)
+
+
+def describe(job: Job, conversion: Conversion) -> ManifestRow:
+    """A conversion as a row: numbers and hashes, nothing that keeps its arrays alive."""
+    enriched, provenance = conversion.movement, conversion.provenance
+    before, after = (None if gap is None else _rounded(gap) for gap in conversion.smallest_gap)
+    inputs = {
+        Path(os.path.relpath(os.path.normpath(job.source.parent / name), job.base)).as_posix(): sha256
+        for name, sha256 in sorted(provenance.inputs.items())
+    }
+    road = next((name for name in inputs if name.lower().endswith(".xodr")), "")
+    offsets = [segment.offset for entity in enriched.entities for segment in entity.segments]
+    return replace(
+        job.row(),
+        scenario_sha256=provenance.inputs.get(job.source.name, ""),
+        output_sha256=conversion.sha256,
+        road=road,
+        road_sha256=inputs.get(road, ""),
+        inputs=inputs,
+        profiles={entity: name for entity, (name, _) in sorted(provenance.profiles.items())},
+        profile_sha256=dict(sorted(provenance.profiles.values())),
+        entities=len(enriched.entities),
+        enriched=tuple(entity.name for entity in enriched.entities if entity.is_enriched),
+        why_not={entity.name: entity.why for entity in enriched.entities if not entity.is_enriched},
+        segment_seconds=_rounded(sum(entity.segment_seconds for entity in enriched.entities)),
+        offset_spread=_rounded(np.std(np.concatenate(offsets))) if offsets else 0.0,
+        gap_before=before,
+        gap_after=after,
+        warnings=conversion.warnings,
+        version=provenance.version,
+        mode=provenance.mode,
+        modes=dict(provenance.modes),
+        ego=provenance.ego,
+        content_sha256=provenance.content_sha256,
+        cut_off=enriched.motion.cut_off is not None,
+    )
+
+
+def _rounded(value: float | np.floating) -> float:
+    """To a micrometre or microsecond: what a manifest is read for, and no noise of another machine's last bit."""
+    return round(float(value), 6)
