@@ -131,14 +131,16 @@ def _speed_profile(e: XmlElement, context: Context) -> private.SpeedProfileActio
 
 def _lane_offset(e: XmlElement, context: Context) -> private.LaneOffsetAction:
     dynamics = e.required("LaneOffsetActionDynamics")
-    shape = dynamics.choice("dynamicsShape", DynamicsShape, DynamicsShape.STEP)
+    shape = dynamics.value("dynamicsShape", DynamicsShape, DynamicsShape.STEP)
     most = dynamics.optional_number("maxLateralAcc", finite=False)
     action = read_struct(private.LaneOffsetAction, e, context, shape=shape, max_lateral_acc=most)
     return replace(action, target=replace(action.target, value=-action.target.value)) if context.left_handed else action
 
 
 def _override(e: XmlElement, _: Context) -> private.OverrideControllerValueAction:
-    overrides = tuple((item.tag, item.boolean("active", False), item.optional_number("value")) for item in e.children())
+    overrides = tuple(
+        (item.tag, item.value("active", bool, False), item.optional_number("value")) for item in e.children()
+    )
     return private.OverrideControllerValueAction(overrides, place=e.place())
 
 
@@ -150,7 +152,7 @@ def _animation(e: XmlElement, context: Context) -> private.AnimationAction:
 
 def read_transition(e: XmlElement, context: Context) -> TransitionDynamics:
     """How a value goes to its target; a step needs no value."""
-    is_step = e.choice("dynamicsShape", DynamicsShape, DynamicsShape.STEP) is DynamicsShape.STEP
+    is_step = e.value("dynamicsShape", DynamicsShape, DynamicsShape.STEP) is DynamicsShape.STEP
     preset = {"value": 0.0} if is_step and e.optional_number("value", finite=False) is None else {}
     return read_struct(TransitionDynamics, e, context, **preset)
 

@@ -43,7 +43,7 @@ def _collision(e: XmlElement, context: Context) -> conditions.CollisionCondition
         e.fail("contains neither EntityRef nor ByType")
     return conditions.CollisionCondition(
         None if reference is None else context.entity(reference),
-        None if by_type is None else by_type.choice("type", EntityCategory),
+        None if by_type is None else by_type.value("type", EntityCategory),
         place=e.place(),
     )
 

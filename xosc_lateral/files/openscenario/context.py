@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from enum import StrEnum
 from functools import cache, partial, reduce
 from operator import or_
 from types import NoneType, UnionType
@@ -170,13 +169,7 @@ def _value(e: XmlElement, name: str, kind: type[Any], xml: Xml, context: Context
         return parameter_name(e.raw(name) or e.text(name))
     if xml.is_road:
         return e.text(name).removesuffix(ZERO_DECIMALS)
-    if issubclass(kind, StrEnum):
-        return e.optional_choice(name, kind)
-    if kind is bool:
-        return e.optional_boolean(name)
-    if kind is int:
-        return e.optional_integer(name)
-    return e.optional_number(name, finite=xml.finite) if kind is float else e.optional_text(name)
+    return e.optional(name, kind, finite=xml.finite)
 
 
 def _below(e: XmlElement | None, above: list[str]) -> XmlElement | None:

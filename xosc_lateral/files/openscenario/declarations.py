@@ -72,7 +72,7 @@ def read_declarations(
     for declaration in root.listed("ParameterDeclarations", "ParameterDeclaration"):
         item = declaration.within(scope)
         name, value = parameter_name(item.raw("name") or ""), value_of(item)
-        kind = item.choice("parameterType", ParameterType, ParameterType.STRING)
+        kind = item.value("parameterType", ParameterType, ParameterType.STRING)
         parameters[name] = Parameter(name, kind, value, item.place())
         broken = broken_constraint(item, value)
         if broken and name in overrides:
@@ -95,7 +95,7 @@ def read_variables(root: XmlElement) -> dict[str, Parameter]:
     variables = {}
     for declaration in root.listed("VariableDeclarations", "VariableDeclaration"):
         name, value = parameter_name(declaration.text("name")), declaration.text("value", "")
-        kind = declaration.choice("variableType", ParameterType, ParameterType.STRING)
+        kind = declaration.value("variableType", ParameterType, ParameterType.STRING)
         variables[name] = Parameter(name, kind, value, declaration.place())
     return variables
 
@@ -104,7 +104,7 @@ def broken_constraint(declaration: XmlElement, value: str) -> str | None:
     """Words for the constraints that a value violates; None if it satisfies one of the groups, or there is none."""
     groups = []
     for group in declaration.children("ConstraintGroup"):
-        constraints = [(item.choice("rule", Rule), item.text("value")) for item in group.children("ValueConstraint")]
+        constraints = [(item.value("rule", Rule), item.text("value")) for item in group.children("ValueConstraint")]
         if all(satisfies(value, rule, limit) for rule, limit in constraints):
             return None
         groups.append(" and ".join(f"{rule} {limit}" for rule, limit in constraints))

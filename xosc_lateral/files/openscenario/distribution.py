@@ -180,7 +180,7 @@ def _decimal(element: XmlElement, name: str) -> Decimal:
 
 
 def _stochastic(owner: XmlElement, context: Context) -> Stochastic:
-    runs = owner.integer("numberOfTestRuns")
+    runs = owner.value("numberOfTestRuns", int)
     if runs < 0:
         owner.fail(f"numberOfTestRuns of {runs} is negative")
     draws = []

@@ -48,7 +48,7 @@ def _time_of_day(element: XmlElement, context: Context) -> TimeOfDay | None:
     if moment is None:
         context.remark(element, f"dateTime='{element.text('dateTime')}' is not a date and time")
         return None
-    return TimeOfDay(moment, element.boolean("animation", False))
+    return TimeOfDay(moment, element.value("animation", bool, False))
 
 
 def _weather(element: XmlElement, context: Context) -> Weather:
@@ -96,7 +96,7 @@ def _read_selections(owner: XmlElement, entities: list[Entity], context: Context
                 name = member.text("entityRef")
                 members.extend(selections[name] if name in selections else (context.entity(member),))
             elif member.tag == "ByType":
-                wanted = member.choice("objectType", EntityCategory)
+                wanted = member.value("objectType", EntityCategory)
                 members.extend(entity.name for entity in entities if entity.category is wanted)
         name = selection.text("name")
         if name in context.entities or name in selections:
@@ -127,7 +127,7 @@ def _read_object(item: XmlElement, context: Context, name: str | None = None) ->
     trailer, inner = _read_trailer(content, name, context)
     vehicle_category = VehicleCategory.CAR if category is EntityCategory.VEHICLE else None
     try:
-        vehicle_category = vehicle_category and content.choice("vehicleCategory", VehicleCategory, vehicle_category)
+        vehicle_category = vehicle_category and content.value("vehicleCategory", VehicleCategory, vehicle_category)
     except FormatError as error:
         context.remark(content, f"{error.what}: taken as a car")
     entity = read_struct(

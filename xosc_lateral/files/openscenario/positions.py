@@ -47,7 +47,7 @@ def _shape(owner: XmlElement, context: Context) -> Shape:
 
 
 def _relative_lane(e: XmlElement, context: Context) -> places.RelativeLanePosition:
-    ds, lanes = e.optional_number("ds"), e.optional_integer("dLane")
+    ds, lanes = e.optional_number("ds"), e.optional("dLane", int)
     if ds is None and e.optional_number("dsLane") is None:
         ds = _number_or_zero(e, "ds", context)
     if lanes is None:

@@ -16,6 +16,7 @@ from lxml import etree
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.atomic import replace_atomically
+from xosc_lateral.files.source import hash_of
 from xosc_lateral.files.xml import line_of
 
 MARK = "xosc-lateral provenance: "
@@ -66,8 +67,8 @@ def facts_in(data: bytes) -> Mapping[str, Any] | None:
 
 
 def content_hash(data: bytes) -> str:
-    """SHA-256 of a file of ours without its provenance, in hexadecimal."""
-    return hashlib.sha256(without_provenance(data)).hexdigest()
+    """`hash_of` a file of ours without its provenance."""
+    return hash_of(without_provenance(data))
 
 
 def without_provenance(data: bytes) -> bytes:

@@ -170,8 +170,8 @@ def read_header(root: XmlElement) -> FileHeader:
         root.fail("FileHeader is missing")
     # tools have written "1+" for what came after 1.1
     minor_text = header.text("revMinor", "0").strip()
-    minor = int(minor_text[:-1]) if re.fullmatch(r"\d{1,3}\+", minor_text) else header.integer("revMinor", 0)
-    major = header.integer("revMajor", 1)
+    minor = int(minor_text[:-1]) if re.fullmatch(r"\d{1,3}\+", minor_text) else header.value("revMinor", int, 0)
+    major = header.value("revMajor", int, 1)
     if major != 1:
         header.fail(f"OpenSCENARIO {major}.{minor} is not read; versions 1.0 to 1.3 are, later 1.x as 1.3")
     return FileHeader(major, minor, header.text("author", ""), header.text("description", ""), header.text("date", ""))

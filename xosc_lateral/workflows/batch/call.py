@@ -6,7 +6,7 @@ import os
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Unpack
@@ -142,15 +142,13 @@ def _row(state: JobState, seconds: float, row: ManifestRow) -> dict[str, Any]:
     return {"state": state.value, "seconds": round(seconds, 4), **row.to_dict()}
 
 
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
 class BatchResult(Result):
     """What became of a batch; of single outputs, `to_frame` and `to_dict` read it from the manifest."""
 
-    __slots__ = ("_batch", "_summary", "report")
-
-    def __init__(self, batch: Batch, summary: Summary, report: Path | None) -> None:
-        self._batch, self._summary = batch, summary
-        self.report = report
-        """Index of the pages, if there are any."""
+    _batch: Batch
+    _summary: Summary
+    report: Path | None  # index of the pages, if there are any
 
     @property
     def folder(self) -> Path:

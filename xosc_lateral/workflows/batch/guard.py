@@ -1,8 +1,7 @@
 """One job within limits of time and memory: what exceeds them ends as an error of that job.
 
-A thread beside the job watches both and raises an exception inside it; a job that does not even come to that (stuck in
-a library's code) takes its worker process with it, and the batch counts that as its row. Memory is limited by the
-system as well (`RLIMIT_AS`), so that one call that asks for too much fails at once.
+A thread beside the job raises it inside; a job stuck in a library's code takes its worker process with it, which is its
+row. The system limits memory as well (`RLIMIT_AS`), so that one call that asks for too much fails at once.
 """
 
 from __future__ import annotations

@@ -46,11 +46,10 @@ class Job:
 
     def row(self, error: str = "") -> ManifestRow:
         """Its row as far as it is known before the conversion; no hash of a scenario that can't be read."""
-        scenario_sha256 = _hash_or(self.source, "")
         return ManifestRow(
             output=self.name,
             scenario=self.scenario,
-            scenario_sha256=scenario_sha256,
+            scenario_sha256=_hash_or(self.source, ""),
             variant=self.variant + 1,
             seed=self.settings.seed,
             profile=self.settings.profile if isinstance(self.settings.profile, str) else self.settings.profile.name,
@@ -90,13 +89,11 @@ def plan_batch(
 ) -> Batch:
     """Plan a batch; nothing is converted or written yet.
 
-    - `inputs`: files, folders, globs, tables (see `find_requests`), or requests with settings of their own
+    - `inputs`: files, folders, globs, tables (see `find_requests`), or requests with `settings` of their own
     - `folder`: output tree. It mirrors the inputs below their common folder: ``db/a/x.xosc`` of the input ``db``
-      becomes ``folder/a/x.xosc``, its variants ``folder/a/x_01.xosc`` and so on, the scenarios that a parameter value
-      distribution stands for ``folder/a/x_p00000.xosc`` and so on. A row of a table with settings of its own becomes
-      ``folder/a/x_PROFILE_HASH.xosc``: its profile, and a hash of what else it says
-    - `settings`: for every input that has none of its own
-    - `variants`: outputs per scenario
+      becomes ``folder/a/x.xosc``, of its `variants` the first ``x_01.xosc``, the first scenario of a parameter value
+      distribution ``x_p00000.xosc``, a row of a table with settings of its own ``x_PROFILE_HASH.xosc``: its profile,
+      and a hash of what else it says
     - `report`: folder for a report page per output, in a tree like that of the outputs
 
     Raises `FormatError`: an input or allowed folder that isn't there, two inputs with the same output, an output on top
@@ -111,7 +108,7 @@ def plan_batch(
     listed = ([it] if isinstance(it, Request) else find_requests(it, settings, variants, root) for it in inputs)
     requests = [_absolute(request) for part in listed for request in part]
     base = _common_folder(requests)
-    fingerprints = _Fingerprints()
+    fingerprints = Fingerprints()
     jobs: dict[str, Job] = {}
     left_out: list[tuple[Path, DocumentKind]] = []
     asked: dict[Path, set[tuple[str, int, str]]] = {}
@@ -168,7 +165,7 @@ def _common_folder(requests: Sequence[Request]) -> Path:
         raise FormatError(f"inputs have no folder in common: {', '.join(sorted(bases)[:3])}") from error
 
 
-def _jobs(request: Request, kind: DocumentKind, base: Path, root: Path, fingerprints: _Fingerprints) -> Iterator[Job]:
+def _jobs(request: Request, kind: DocumentKind, base: Path, root: Path, fingerprints: Fingerprints) -> Iterator[Job]:
     relative = request.scenario.relative_to(base)
     stem = request.name.removesuffix(relative.suffix) or f"{relative.stem}{request.label}"
     for source, suffix, settings, error in concrete(request, kind):
@@ -201,19 +198,18 @@ def _refuse_overwriting(jobs: Iterable[Job]) -> None:
             raise FormatError("is an input: choose another output folder", path=job.output)
 
 
-def fingerprint(settings: ConvertSettings, variant: int) -> str:
-    """SHA-256 over everything but the input files that decides on an output's bytes, as it is now."""
-    return _Fingerprints().of(settings, variant)
-
-
 @dataclass(slots=True)
-class _Fingerprints:
-    """Hashes of settings; files that they name count by their bytes, not by their place."""
+class Fingerprints:
+    """SHA-256 over everything but the input files that decides on an output's bytes, as it is now.
+
+    Files that settings name count by their bytes, not by their place.
+    """
 
     _profiles: dict[tuple[str, tuple[Path, ...]], str] = field(default_factory=dict)
     _last: tuple[ConvertSettings, dict[str, str]] | None = None
 
     def of(self, settings: ConvertSettings, variant: int) -> str:
+        """Of settings and a variant, from 0."""
         if self._last is None or self._last[0] is not settings:  # variants come one after another
             self._last = settings, self._texts(settings)
         texts = self._last[1] | {"variant": str(variant)}
@@ -255,10 +251,7 @@ MISSING = "missing"
 
 
 def convert_job(job: Job) -> ManifestRow:
-    """Convert and describe.
-
-    Raises `XoscLateralError`: when the input is at fault; `OSError`: when the output can't be written.
-    """
+    """Convert and describe; `XoscLateralError`: the input is at fault, `OSError`: the output can't be written."""
     _refuse_changes(job)
     for path in filter(None, (job.output, job.page)):
         make_own_folder(path.parent, depth=job.name.count("/"))
@@ -275,7 +268,7 @@ def convert_job(job: Job) -> ManifestRow:
 
 def _refuse_changes(job: Job) -> None:
     """The row states the profiles and the context table that the run was planned with."""
-    if fingerprint(job.settings, job.variant) != job.fingerprint:
+    if Fingerprints().of(job.settings, job.variant) != job.fingerprint:
         raise FormatError("profile or context table changed during the run; run it again", path=job.source)
 
 

@@ -37,9 +37,8 @@ class FolderInUseError(XoscLateralError):
 def folder_lock(path: Path) -> Iterator[Sequence[str]]:
     """Hold a lock file while the block runs; gives ids: that of this run, then those of killed runs before it.
 
-    The operating system's lock counts, not the file: it goes with the process, however that ends, so a file that a
-    killed run has left is no obstacle. What the file says (process and host) is for the message, and the ids for what
-    killed runs have left half-written.
+    The operating system's lock counts, which goes with the process; what the file says (process and host) is for the
+    message, and the ids for what killed runs have left half-written.
 
     Raises `FolderInUseError`: when another process holds it; `FormatError`: it is a link or somebody else's; `OSError`:
     when the folder can't be written.

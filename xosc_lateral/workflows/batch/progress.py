@@ -19,16 +19,12 @@ LINES_EVERY = 30.0
 
 
 class Display(StrEnum):
-    """How a batch is followed.
+    """How a batch is followed; failures are a line each unless it is by nothing."""
 
-    `AUTO`: a bar on a terminal, a line now and then elsewhere; `JSON`: an object a line for every output, at the start
-    and at the end; `NOTHING`: for callers that look at the outcomes themselves. Failures are a line each but there.
-    """
-
-    AUTO = "auto"
+    AUTO = "auto"  # a bar on a terminal, a line now and then elsewhere
     QUIET = "quiet"
-    JSON = "json"
-    NOTHING = "nothing"
+    JSON = "json"  # an object a line for every output, at the start and at the end
+    NOTHING = "nothing"  # for callers that look at the outcomes themselves
 
 
 @dataclass(slots=True)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.texts import composed
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping
-from xosc_lateral.files.opendrive import parse_opendrive, read_opendrive
+from xosc_lateral.files.opendrive.reader import parse_opendrive, read_opendrive
 from xosc_lateral.files.opendrive.write import SHOULDER, WIDTH_PIECE, WrittenLane, WrittenRoad, curved_plan
 from xosc_lateral.files.sumo import read_sumo_net
 from xosc_lateral.files.tables import foreign_errors
