@@ -43,10 +43,7 @@ CHUNK = 64 << 20
 
 
 def status_bytes(column: int) -> int:
-    """Memory of this process, of the columns of /proc/self/statm (0: all, 1: resident, 2: of files). [byte]
-
-    0 where the system does not say.
-    """
+    """Memory by a column of /proc/self/statm (0: all, 1: resident, 2: of files); 0: the system does not say. [byte]"""
     if not sys.platform.startswith("linux"):
         return 0
     return int(Path("/proc/self/statm").read_bytes().split()[column]) * mmap.PAGESIZE

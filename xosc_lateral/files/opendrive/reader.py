@@ -27,10 +27,7 @@ MAXIMUM_ROAD_LENGTH = 1e6
 
 
 def read_opendrive(path: str | PathLike[str]) -> RoadNetwork:
-    """Read one ``.xodr``; the network's `notes` name what was repaired, ignored or degenerate.
-
-    Raises `FormatError` if it is no OpenDRIVE, or can't be understood: file, line, element and value.
-    """
+    """Read one ``.xodr``; the network's `notes` name what was repaired; `FormatError` for what can't be understood."""
     return _network(read_document(Path(path)), fspath(path))
 
 

@@ -7,11 +7,11 @@ from msgspec.structs import replace
 
 from xosc_lateral.files.openscenario.conditions import read_trigger
 from xosc_lateral.files.openscenario.context import Context, Reader, declared, read_struct
-from xosc_lateral.files.openscenario.declarations import local_scope
 from xosc_lateral.files.openscenario.element import XmlElement
 from xosc_lateral.files.openscenario.entities import READERS as ENTITY_READERS
 from xosc_lateral.files.openscenario.positions import READERS as POSITION_READERS
 from xosc_lateral.files.openscenario.positions import read_position
+from xosc_lateral.files.openscenario.references import local_scope
 from xosc_lateral.world.scenario import global_actions
 from xosc_lateral.world.scenario import private_actions as private
 from xosc_lateral.world.scenario.enums import DynamicsShape
@@ -44,10 +44,7 @@ GROUPING = {
 
 
 def read_actions(owner: XmlElement, name: str, context: Context) -> list[Action]:
-    """Actions in a PrivateAction, GlobalAction or UserDefinedAction element: one, or more in lenient files.
-
-    In version 1.0 a ControllerAction holds both an assignment and an override; the assignment comes first.
-    """
+    """Actions in a PrivateAction, GlobalAction or UserDefinedAction element: one, or more in lenient files."""
     private = owner.tag == "PrivateAction"
     readers = PRIVATE_ACTIONS if private else GLOBAL_ACTIONS
     try:

@@ -12,9 +12,8 @@ from typing import Annotated, Any, TypeVar, Union, get_args, get_origin, get_typ
 from msgspec import NODEFAULT, UNSET, Struct, structs
 
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.openscenario.catalogs import Catalogs
-from xosc_lateral.files.openscenario.declarations import local_scope, parameter_name
 from xosc_lateral.files.openscenario.element import XmlElement
+from xosc_lateral.files.openscenario.references import Catalogs, local_scope, parameter_name
 from xosc_lateral.world.scenario.place import Place, Unsupported, Xml
 from xosc_lateral.world.scenario.position import Position, Shape
 
@@ -62,10 +61,7 @@ class Context:
         self.remarks.append(Unsupported(element.tag, element.place(), reason))
 
     def inline_or_entry(self, owner: XmlElement, tag: str) -> XmlElement:
-        """In the scope of its own parameters; in a catalog, what the reference assigns comes before what is declared.
-
-        `owner` holds an element of that tag or a reference to one.
-        """
+        """The element of that tag that `owner` holds or refers to, in the scope of its own and assigned parameters."""
         inline = owner.child(tag)
         if inline is not None:
             return inline.within(local_scope(inline))

@@ -15,11 +15,18 @@ import numpy as np
 from msgspec import Struct
 
 from xosc_lateral.base.limits import COMBINATIONS, DECIMAL_EXPONENT, DISTRIBUTION_TIME, PARAMETER_SETS
-from xosc_lateral.files.openscenario.catalogs import Boundary, Catalogs, allowed_roots
 from xosc_lateral.files.openscenario.context import Context, read_struct
-from xosc_lateral.files.openscenario.declarations import broken_constraint, declared_values, parameter_name, value_of
 from xosc_lateral.files.openscenario.element import XmlElement
 from xosc_lateral.files.openscenario.read import open_scenario, read_header
+from xosc_lateral.files.openscenario.references import (
+    Boundary,
+    Catalogs,
+    allowed_roots,
+    broken_constraint,
+    declared_values,
+    parameter_name,
+    value_of,
+)
 from xosc_lateral.files.xml import read_xml
 from xosc_lateral.world.scenario import distribution as spread
 from xosc_lateral.world.scenario.distribution import Deterministic, ParameterSet, SteppedRange, Stochastic, ValueSets

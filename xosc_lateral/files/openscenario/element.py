@@ -30,10 +30,7 @@ def means_true(text: str) -> bool:
 
 
 class XmlElement:
-    """An element of the scenario or of a catalog, in the scope that its attributes are read in.
-
-    Optional attributes: `default` comes back where the attribute is missing or empty. Required ones raise.
-    """
+    """An element of the scenario or of a catalog, in the scope that its attributes are read in."""
 
     __slots__ = ("path", "scope", "xml")
 

@@ -8,8 +8,8 @@ from msgspec.structs import replace
 
 from xosc_lateral.base.errors import FormatError, MissingFileError
 from xosc_lateral.files.openscenario.context import Context, Reader, read_struct
-from xosc_lateral.files.openscenario.declarations import local_scope
 from xosc_lateral.files.openscenario.element import XmlElement
+from xosc_lateral.files.openscenario.references import local_scope
 from xosc_lateral.world.scenario.entity import USUAL_BOX, BoundingBox, Controller, Entity, Performance
 from xosc_lateral.world.scenario.enums import EntityCategory, VehicleCategory
 from xosc_lateral.world.scenario.global_actions import Environment, TimeOfDay, Weather

@@ -11,11 +11,16 @@ from msgspec import Struct
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.openscenario.actions import READERS
-from xosc_lateral.files.openscenario.catalogs import Boundary, Catalogs, allowed_roots
 from xosc_lateral.files.openscenario.context import Context, read_struct
-from xosc_lateral.files.openscenario.declarations import read_declarations, read_variables
 from xosc_lateral.files.openscenario.element import XmlElement, local_name, means_true
 from xosc_lateral.files.openscenario.entities import read_entities
+from xosc_lateral.files.openscenario.references import (
+    Boundary,
+    Catalogs,
+    allowed_roots,
+    read_declarations,
+    read_variables,
+)
 from xosc_lateral.files.xml import document_of, read_document
 from xosc_lateral.world.scenario.parameters import Scope
 from xosc_lateral.world.scenario.place import Place, Unsupported
@@ -62,10 +67,7 @@ LEFT_HANDED = "written for CARLA: its left-handed coordinates are mirrored, its 
 
 
 class RoadSearch(Struct, frozen=True):
-    """Where a road may lie besides where the scenario says: what the user names is allowed.
-
-    Raises `FormatError`: No such file, no such folder.
-    """
+    """Where a road may lie besides where the scenario says; `FormatError` where there is no such file or folder."""
 
     file: Path | None = None  # the road, whatever the scenario says
     folders: tuple[Path, ...] = ()  # looked through for a file of the road's name
@@ -190,10 +192,7 @@ def _catalog_locations(root: XmlElement) -> dict[str, tuple[str, Place]]:
 def _road_file(
     logic: XmlElement, written: str, boundary: Boundary, remarks: list[Unsupported], roads: RoadSearch
 ) -> Path:
-    """The road where the scenario says, or else, like the reference player, a file of that name near the scenario.
-
-    Scenarios for CARLA name a town, without a suffix.
-    """
+    """The road where the scenario says, or else, like the reference player, a file of that name near the scenario."""
     place, name = logic.place(), PureWindowsPath(written.strip()).name
     try:
         road = boundary.inside(written, place)

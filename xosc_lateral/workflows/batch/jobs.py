@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from xosc_lateral.base.limits import BATCH_JOBS, VARIANTS
 from xosc_lateral.base.version import BEHAVIOUR, __version__
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.atomic import make_own_folder, write_atomically
-from xosc_lateral.files.openscenario.catalogs import require_folders
+from xosc_lateral.files.openscenario.references import require_folders
 from xosc_lateral.files.output_paths import real_path
 from xosc_lateral.files.profiles import find_profile, profile_hash
 from xosc_lateral.files.source import file_hash
@@ -134,7 +134,10 @@ def plan_batch(
                 raise FormatError(what, path=job.output)
             if len(jobs) > BATCH_JOBS.value:
                 raise FormatError(BATCH_JOBS.refusal(len(jobs)), path=request.scenario)
-    _refuse_overwriting(jobs.values())
+    sources, folders = set(map(os.path.realpath, {job.source for job in jobs.values()})), dict[Path, str]()
+    for job in jobs.values():
+        if real_path(job.output, folders) in sources:
+            raise FormatError("is an input: choose another output folder", path=job.output)
     planned = [jobs[name] for name in sorted(jobs)]
     if report is not None:
         pages = _normal(Path(report))
@@ -187,15 +190,6 @@ def _jobs(request: Request, kind: DocumentKind, base: Path, root: Path, fingerpr
                 fingerprint=fingerprints.of(settings, variant),
                 error=error,
             )
-
-
-def _refuse_overwriting(jobs: Iterable[Job]) -> None:
-    jobs = list(jobs)
-    sources = set(map(os.path.realpath, {job.source for job in jobs}))
-    folders: dict[Path, str] = {}
-    for job in jobs:
-        if real_path(job.output, folders) in sources:
-            raise FormatError("is an input: choose another output folder", path=job.output)
 
 
 @dataclass(slots=True)
@@ -263,7 +257,7 @@ def convert_job(job: Job) -> ManifestRow:
 
         write_atomically(job.page.with_suffix(".svg"), thumbnail(conversion.movement))  # stands for it in the index
         write_atomically(job.page, conversion_page(conversion))
-    return describe(job, conversion)
+    return _described(job, conversion)
 
 
 def _refuse_changes(job: Job) -> None:
@@ -272,7 +266,7 @@ def _refuse_changes(job: Job) -> None:
         raise FormatError("profile or context table changed during the run; run it again", path=job.source)
 
 
-def describe(job: Job, conversion: Conversion) -> ManifestRow:
+def _described(job: Job, conversion: Conversion) -> ManifestRow:
     """A conversion as a row: numbers and hashes, nothing that keeps its arrays alive."""
     enriched, provenance = conversion.movement, conversion.provenance
     before, after = (None if gap is None else _rounded(gap) for gap in conversion.smallest_gap)

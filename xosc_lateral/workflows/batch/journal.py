@@ -169,10 +169,7 @@ class Journal:
         return self._timings.get(output, Timing())
 
     def add(self, row: ManifestRow, timing: Timing) -> None:
-        """Append a row. From the return on it survives the death of this process.
-
-        Raises `OSError`: when the disk is full; rows added before are still there.
-        """
+        """Append a row, which survives the death of this process; `OSError` on a full disk, earlier rows stay."""
         self._changed = True
         line = json.dumps({"row": row.to_dict(), **timing._asdict()}).encode() + b"\n"
         self._file.seek(self._end)
@@ -188,10 +185,7 @@ class Journal:
         del self._begin[output]
 
     def finish(self) -> None:
-        """Write manifest and timings, sorted by output, if they change; then the journal goes.
-
-        A kill in between leaves a journal that says the same as the manifest.
-        """
+        """Write manifest and timings, sorted by output, if they change; then the journal goes, which says the same."""
         if self._changed:
             outputs, now = sorted(self._begin), time.time_ns()
             write_timings(((output, _known(self._timings[output], now)) for output in outputs), self._folder / TIMINGS)

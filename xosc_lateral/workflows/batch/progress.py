@@ -126,10 +126,7 @@ def follow(
     stream: TextIO | None = None,
     report: Callable[[JobOutcome], object] | None = None,
 ) -> Summary:
-    """Run a batch to its end and show how it goes, on standard error unless on a `stream`.
-
-    `outcomes`: from `convert_many`; `total`: how many there will be; `report`: gets each.
-    """
+    """Run a batch of `total` outcomes to its end; show how it goes, on standard error or a `stream`; report each."""
     stream = stream or sys.stderr
     summary = Summary(total)
     start = time.monotonic()

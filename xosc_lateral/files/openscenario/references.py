@@ -1,4 +1,4 @@
-"""Files that a scenario names: which may be read, and catalogs, an entry by name in the scope of its own parameters.
+"""What a scenario refers to by name: files, and which may be read; entries of catalogs; parameters, in their scopes.
 
 A scenario comes from somewhere else; what it names (road, catalog, scenario of a distribution) is read by us. So it has
 to lie in the scenario's own folder, up to three levels above it (field layouts are ``xosc/``, ``xodr/`` and
@@ -18,11 +18,12 @@ from glob import escape
 from pathlib import Path
 
 from xosc_lateral.base.errors import FormatError, MissingFileError
-from xosc_lateral.files.openscenario.declarations import entry_scope
 from xosc_lateral.files.openscenario.element import XmlElement
 from xosc_lateral.files.xml import read_document, read_xml
-from xosc_lateral.world.scenario.parameters import Scope
+from xosc_lateral.world.scenario.enums import ParameterType, Rule
+from xosc_lateral.world.scenario.parameters import ExpressionError, Scope, satisfies
 from xosc_lateral.world.scenario.place import Place, Unsupported
+from xosc_lateral.world.scenario.scenario import Parameter
 
 LEVELS_UP = 3
 """How many folders above the scenario's own may still hold what it names."""
@@ -48,14 +49,12 @@ def require_folders(folders: Iterable[Path]) -> None:
 
 
 def _highest_folder(folder: Path) -> Path:
-    root = folder
     for level in range(1, LEVELS_UP + 1):
-        parent = root.parent
         # parts of "/tmp": ("/", "tmp"). One level up may reach such a folder, two may not; "/" is never reached.
-        if len(parent.parts) < 1 + level:
+        if len(folder.parent.parts) < 1 + level:
             break
-        root = parent
-    return root
+        folder = folder.parent
+    return folder
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,3 +159,105 @@ class Catalogs:
             raise refused
         searched = ", ".join(str(folder) for folder in dict.fromkeys(folders)) or "no folder is named"
         raise reference.place().error(f"catalog '{catalog}' not found ({searched})", MissingFileError)
+
+
+# ---- declarations of parameters and variables, assignments, and the constraints on values ----
+NAMES = frozenset({"parameterRef", "variableRef", "parameterName"})
+"""Attributes that name a parameter instead of standing for its value."""
+
+
+def parameter_name(text: str) -> str:
+    """Name without the ``$`` that references in field files carry."""
+    return text[1:] if text.startswith("$") else text
+
+
+def declared_values(owner: XmlElement) -> dict[str, str]:
+    """Names and values as written; of declarations with the same name the last counts, as in the reference player."""
+    values = {}
+    for declaration in owner.listed("ParameterDeclarations", "ParameterDeclaration"):
+        name = parameter_name(declaration.raw("name") or "")
+        if not name:
+            declaration.fail("attribute 'name' is missing")
+        values[name] = declaration.raw("value") or ""
+    return values
+
+
+def local_scope(owner: XmlElement) -> Scope:
+    """Scope inside an element that may declare parameters (Story, Maneuver, inline Vehicle, Route, Trajectory ...)."""
+    values = declared_values(owner)
+    return Scope(values, owner.scope) if values else owner.scope
+
+
+def entry_scope(entry: XmlElement, reference: XmlElement) -> Scope:
+    """Scope inside a catalog entry: its declarations, overridden by what the reference assigns.
+
+    Assigned values are read in the scope of the reference. Names that the entry does not declare are looked up there,
+    too: field catalogs use the scenario's parameters.
+    """
+    assigned = {
+        parameter_name(assignment.raw("parameterRef") or ""): final(assignment.text("value"))
+        for assignment in reference.listed("ParameterAssignments", "ParameterAssignment")
+    }
+    return Scope({**declared_values(entry), **assigned}, reference.scope)
+
+
+def final(value: str) -> str:
+    """A value in which a leading ``$`` is text: nobody fills it in again."""
+    return f"\\{value}" if value.startswith("$") else value
+
+
+def read_declarations(
+    root: XmlElement, overrides: Mapping[str, str], remarks: list[Unsupported]
+) -> tuple[Scope, dict[str, Parameter]]:
+    """Global scope and parameters, with overrides in place.
+
+    Raises `FormatError`: An override of a parameter that is not declared or that violates its constraints, or a value
+    that can't be evaluated. A declared value that violates the constraints beside it is only remarked: it plays.
+    """
+    values = declared_values(root)
+    unknown = sorted(set(overrides) - set(values))
+    if unknown:
+        known = ", ".join(sorted(values)[:10]) or "none"
+        root.fail(f"parameter '{unknown[0]}' is not declared (declared: {known})")
+    scope = Scope({**values, **overrides})
+    parameters = {}
+    for declaration in root.listed("ParameterDeclarations", "ParameterDeclaration"):
+        item = declaration.within(scope)
+        name, value = parameter_name(item.raw("name") or ""), value_of(item)
+        kind = item.value("parameterType", ParameterType, ParameterType.STRING)
+        parameters[name] = Parameter(name, kind, value, item.place())
+        broken = broken_constraint(item, value)
+        if broken and name in overrides:
+            item.fail(f"value '{value}' violates {broken}")
+        if broken:
+            remarks.append(Unsupported("ConstraintGroup", item.place(), f"'{value}' violates {broken}"))
+    return scope, parameters
+
+
+def value_of(declaration: XmlElement) -> str:
+    """Value of the parameter that an element declares, in its scope."""
+    try:
+        return declaration.scope.value(parameter_name(declaration.raw("name") or ""))
+    except ExpressionError as error:
+        declaration.fail(f"value: {error}")
+
+
+def read_variables(root: XmlElement) -> dict[str, Parameter]:
+    """Variable declarations (1.2)."""
+    variables = {}
+    for declaration in root.listed("VariableDeclarations", "VariableDeclaration"):
+        name, value = parameter_name(declaration.text("name")), declaration.text("value", "")
+        kind = declaration.value("variableType", ParameterType, ParameterType.STRING)
+        variables[name] = Parameter(name, kind, value, declaration.place())
+    return variables
+
+
+def broken_constraint(declaration: XmlElement, value: str) -> str | None:
+    """Words for the constraints that a value violates; None if it satisfies one of the groups, or there is none."""
+    groups = []
+    for group in declaration.children("ConstraintGroup"):
+        constraints = [(item.value("rule", Rule), item.text("value")) for item in group.children("ValueConstraint")]
+        if all(satisfies(value, rule, limit) for rule, limit in constraints):
+            return None
+        groups.append(" and ".join(f"{rule} {limit}" for rule, limit in constraints))
+    return " or ".join(groups) or None
