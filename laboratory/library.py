@@ -14,6 +14,7 @@ those of the others; for `rural` a fit to the first file on the other ones. What
 
 from __future__ import annotations
 
+import dataclasses
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -43,7 +44,6 @@ from xosc_lateral.drivers.model.profile import DriverProfile, Metadata, Provenan
 from xosc_lateral.drivers.model.sensor import SensorModel
 from xosc_lateral.files.drives import drives_of_table, read_drives
 from xosc_lateral.files.source import parsed_hash
-from xosc_lateral.workflows.recordings.importers import ImportedDrives
 from xosc_lateral.workflows.recordings.importers.dlr_ht import HIGHEST_FREQUENCY, import_dlr_ht
 from xosc_lateral.workflows.recordings.importers.openacc import import_openacc
 
@@ -105,7 +105,7 @@ def build_library(
     kind = dict(zip(imported.table["drive"], imported.table["vehicle_class"], strict=True))
     with tempfile.TemporaryDirectory() as folder:
         table = Path(folder) / "dlr-ht.parquet"
-        ImportedDrives(imported, (source,)).write(table)
+        dataclasses.replace(imported, sources=(source,)).write(table)
         drives = read_drives(table)
     runs = all_runs(drives)
     rural, fast = _rural(gnss, model)

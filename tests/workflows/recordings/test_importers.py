@@ -19,7 +19,7 @@ from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.cli import main
 from xosc_lateral.files.output_tables import METADATA_KEY
 from xosc_lateral.workflows.recordings.cuts import CutSettings, lane_changes, long_gaps, name_states, number_runs
-from xosc_lateral.workflows.recordings.importers import Imported
+from xosc_lateral.workflows.recordings.importers import ImportedDrives
 from xosc_lateral.workflows.recordings.importers.dlr_ht import import_dlr_ht, read_tracks
 from xosc_lateral.workflows.recordings.importers.levelx import import_levelx
 from xosc_lateral.workflows.recordings.lane_graph import NEIGHBOUR_DISTANCE, find_neighbours
@@ -241,8 +241,8 @@ def dlr_csv(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, pd.DataFram
 
 
 @pytest.fixture(scope="module")
-def dlr_full(dlr_csv: tuple[Path, pd.DataFrame]) -> Imported:
-    """Imported once, with the rows that would be cut."""
+def dlr_full(dlr_csv: tuple[Path, pd.DataFrame]) -> ImportedDrives:
+    """ImportedDrives once, with the rows that would be cut."""
     return import_dlr_ht(dlr_csv[0], keep_cut=True)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -129,14 +130,13 @@ def test_a_unit_of_something_else_is_refused_with_what_to_write(bus):
 @pytest.mark.filterwarnings("default")
 def test_indices_flags_and_words_keep_their_values(bus, tmp_path):
     from xosc_lateral.files.drives import read_drives
-    from xosc_lateral.workflows.recordings.importers import ImportedDrives
 
     imported = import_mf4(bus, [*BUS, "lane_index=LaneIdx", "wiper=Rain_Flg", "surface=RoadState"])
     table = imported.table
     assert set(table["lane_index"]) == {0.0, 1.0} and set(table["wiper"]) == {0.0, 1.0}
     assert set(table["surface"]) == {"DRY", "WET"}
     assert table.loc[table["lane_index"] == 1, "time"].min() == pytest.approx(29.76, abs=0.021), "half a sample before"
-    ImportedDrives(imported, (bus,)).write(tmp_path / "t.parquet")
+    replace(imported, sources=(bus,)).write(tmp_path / "t.parquet")
     (drive,) = read_drives(tmp_path / "t.parquet")
     assert {"lane_index", "wiper", "surface=DRY", "surface=WET"} <= drive.levels
     assert drive.context["surface=WET"][drive.time > 40].min() == 1.0

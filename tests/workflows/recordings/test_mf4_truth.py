@@ -11,7 +11,7 @@ from tests.kit.recordings import WIDTH, write_mf4
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.drivers.drives.cuts import cut_runs
 from xosc_lateral.files.drives import drives_of_table
-from xosc_lateral.workflows.recordings.importers import Imported
+from xosc_lateral.workflows.recordings.importers import ImportedDrives
 from xosc_lateral.workflows.recordings.importers.mf4 import import_mf4
 
 pytest.importorskip("asammdf", reason="extra `mdf` is not installed")
@@ -102,7 +102,7 @@ def test_channels_of_one_name_are_named_and_refused_where_they_differ(tmp_path) 
     time = np.arange(0.0, 30.0, 0.04)
     base = {"Lat": (time, 0.1 * np.sin(time), "m"), "Width": (time, WIDTH + 0.0 * time, "m")}
 
-    def read(other: np.ndarray, words: str = "V:m/s") -> Imported:
+    def read(other: np.ndarray, words: str = "V:m/s") -> ImportedDrives:
         speed = 20.0 + 0.1 * time
         signals = base | {"V": (time, speed, "m/s"), "V#2": (time[::2], other[::2], "m/s")}
         return import_mf4(write_mf4(tmp_path / "a.mf4", signals), [*OFFSET[:2], f"speed={words}"])

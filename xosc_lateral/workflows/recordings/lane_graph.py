@@ -32,13 +32,26 @@ class LaneGraph:
         n = len(self.length)
         part, rank = np.full(n, -1), np.zeros(n, dtype=np.int64)
         lines = [(np.zeros(1), np.zeros(1))] * n
-        steps = self._steps()
+        # from each piece to those about it: piece, lanes to the left, +1 ahead or -1 behind
+        steps: list[list[tuple[int, int, int]]] = [[] for _ in self.length]
+        for piece, left in enumerate(self.left.tolist()):
+            if left >= 0:
+                steps[piece].append((left, 1, 0))
+                steps[left].append((piece, -1, 0))
+        for piece, after in enumerate(self.following):
+            for other in after:
+                steps[piece].append((other, 0, 1))
+                steps[other].append((piece, 0, -1))
+
+        def straight(piece: int, start: float) -> tuple[FloatArray, FloatArray]:
+            return np.array([0.0, self.length[piece]]), np.array([start, start + self.length[piece]])
+
         taken: dict[tuple[int, int], list[tuple[float, float]]] = {}
         count = 0
         for first in range(n):
             if part[first] >= 0:
                 continue
-            waiting = deque([(first, self._straight(first, 0.0), 0)])
+            waiting = deque([(first, straight(first, 0.0), 0)])
             while waiting:
                 piece, line, level = waiting.popleft()
                 (at, end), here = (float(line[1][k]) for k in (0, -1)), taken.setdefault((count, level), [])
@@ -49,14 +62,11 @@ class LaneGraph:
                 for other, side, where in steps[piece]:
                     start = {0: at, 1: end, -1: at - float(self.length[other])}[where]
                     faced = self.facing.get((other, piece)) if where == 0 else None
-                    other_line = self._straight(other, start) if faced is None else (faced[0], follow(faced[1], line))
+                    other_line = straight(other, start) if faced is None else (faced[0], follow(faced[1], line))
                     put = waiting.appendleft if where == 0 else waiting.append  # what lies beside, before what follows
                     put((other, other_line, level + side))
             count += 1
         return part, lines, rank
-
-    def _straight(self, piece: int, start: float) -> tuple[FloatArray, FloatArray]:
-        return np.array([0.0, self.length[piece]]), np.array([start, start + self.length[piece]])
 
     def stations(self, piece: IntArray, along: FloatArray) -> tuple[IntArray, FloatArray, IntArray, FloatArray]:
         """Part, station [m], rank of places `along` pieces [m], and metres along a piece per metre of station."""
@@ -69,19 +79,6 @@ class LaneGraph:
             ends = follow(here - SLOPE_LENGTH, lines[number]), follow(here + SLOPE_LENGTH, lines[number])
             scale[mine] = 2.0 * SLOPE_LENGTH / np.maximum(ends[1] - ends[0], SLOPE_LENGTH)
         return part[piece], station, rank[piece], scale
-
-    def _steps(self) -> list[list[tuple[int, int, int]]]:
-        """From each piece to the pieces about it: (piece, lanes to the left, +1 ahead or -1 behind)."""
-        steps: list[list[tuple[int, int, int]]] = [[] for _ in self.length]
-        for piece, left in enumerate(self.left):
-            if left >= 0:
-                steps[piece].append((int(left), 1, 0))
-                steps[int(left)].append((piece, -1, 0))
-        for piece, after in enumerate(self.following):
-            for other in after:
-                steps[piece].append((other, 0, 1))
-                steps[other].append((piece, 0, -1))
-        return steps
 
 
 SLOPE_LENGTH = 10.0  # to each side: over which metres of a lane are compared with those of its neighbour [m]
@@ -174,16 +171,13 @@ def find_neighbours(
             best, truck = np.where(closer, gap, best), np.where(closer, is_truck[other], truck)
         return np.where(there & known | np.isfinite(best), best, np.nan), truck
 
-    nearest_by_side = {
-        "lead": nearest(group, known, ahead_only=True),
-        "left": nearest(np.where(known, group + 1, -2), lane_on_left),
-        "right": nearest(np.where(known & (lane > 0), group - 1, -2), lane_on_right),
-    }
+    lead, lead_is_truck = nearest(group, known, ahead_only=True)
+    left, left_is_truck = nearest(np.where(known, group + 1, -2), lane_on_left)
+    right, right_is_truck = nearest(np.where(known & (lane > 0), group - 1, -2), lane_on_right)
     return {
-        f"{other}_{what}": values
-        for other, both in nearest_by_side.items()
-        for what, values in zip(("distance", "is_truck"), both, strict=True)
-    }
+        "lead_distance": lead, "lead_is_truck": lead_is_truck, "left_distance": left, "left_is_truck": left_is_truck,
+        "right_distance": right, "right_is_truck": right_is_truck,
+    }  # fmt: skip
 
 
 STAMP_DISTANCE = 0.25  # stamps farther apart than this are of two instants ... [steps]
@@ -216,7 +210,7 @@ def _clock(time: FloatArray, vehicle: IntArray, step: float) -> tuple[float, flo
         rows = time <= begin + span
         number = np.round((time[rows] - start) / step)
         if np.ptp(number) > 0.0:
-            step, start = (float(one) for one in np.polyfit(number, time[rows], 1))
+            step, start = np.polyfit(number, time[rows], 1).tolist()
         if rows.all():
             return step, start
         span *= 2.0
@@ -241,14 +235,14 @@ class Pool:
         return np.where(between, along[self.row] + self.share * (along[after] - along[self.row]), on)
 
 
-def pool_of(time: FloatArray, vehicle: IntArray, step: float, longest: float = MAX_GAP) -> Pool:
-    """See `Pool`; instants missing for at most `longest` [s] are filled."""
+def pool_of(time: FloatArray, vehicle: IntArray, step: float) -> Pool:
+    """See `Pool`; instants missing for at most `MAX_GAP` are filled."""
     instant, when = instants(time, vehicle, step)
     new = np.r_[True, (np.diff(vehicle) != 0) | (np.diff(instant) != 0)]
     row = np.flatnonzero(new)
     missing = np.r_[np.diff(instant[row]) - 1, 0]
     passed = np.r_[np.diff(time[row]), 0.0]
-    missing = np.where(np.r_[np.diff(vehicle[row]) == 0, False] & (passed <= longest + 1e-9), missing, 0)
+    missing = np.where(np.r_[np.diff(vehicle[row]) == 0, False] & (passed <= MAX_GAP + 1e-9), missing, 0)
     missing = np.maximum(missing, 0)
     last, following = np.repeat(row, missing), np.repeat(np.r_[row[1:], row[-1]], missing)  # about what is filled
     after = np.arange(len(last)) - np.repeat(np.cumsum(missing) - missing, missing) + 1

@@ -98,18 +98,7 @@ def reconstruct_recording(traffic: RecordedTraffic, settings: ReconstructSetting
     met = encounters(plans, network)
     is_relative = settings.relative and not settings.exact
     relative = {plan.name: relative_triggers(plan, plans, network) for plan in plans if is_relative}
-    major, minor = map(int, settings.version.split("."))
-    scenario = reconstructed_scenario(
-        plans,
-        network,
-        road_file=traffic.road_name,
-        duration=end - begin,
-        version=(major, minor),
-        host=entity,
-        description=f"{traffic.name}: reconstructed from {traffic.sources[0].name}, {begin:g} to {end:g} s",
-        relative=relative,
-        exact=settings.exact,
-    )
+    scenario = reconstructed_scenario(traffic, recording, plans, relative, settings, entity)
     return Reconstruction(traffic, recording, plans, scenario, met, relative, *_drivers(plans, settings), entity)
 
 
@@ -166,7 +155,7 @@ def chosen(
         centre = by_name[settings.around]
         middle = 0.5 * (max(centre.time[0], begin) + min(centre.time[-1], end))
         begin, end = max(begin, middle - 0.5 * settings.window), min(end, middle + 0.5 * settings.window)
-        tracks = [track for track in tracks if _comes_near(track, centre, begin, end)]
+        tracks = [track for track in tracks if centre.distance(track, begin, end) <= SURROUNDING_DISTANCE]
     if settings.vehicles is not None:
         tracks = [track for track in tracks if track.name in settings.vehicles]
     begin, end = max(begin, first), min(end, last)
@@ -177,16 +166,6 @@ def chosen(
         what = f"{end - begin:g} s are more than {LONGEST_WINDOW:g} s: take a part with --from and --to"
         raise FormatError(what, path=source)
     return tracks, begin, end
-
-
-def _comes_near(track: Track, centre: Track, begin: float, end: float) -> bool:
-    first, last = max(begin, centre.time[0]), min(end, centre.time[-1])
-    time = track.time[(track.time >= first) & (track.time <= last)]
-    away = [
-        np.interp(time, track.time, getattr(track, axis)) - np.interp(time, centre.time, getattr(centre, axis))
-        for axis in "xy"
-    ]
-    return bool((np.hypot(*away) <= SURROUNDING_DISTANCE).any())  # nobody where they are not there at once
 
 
 WINDOW, STEP = 10.0, 0.2  # of movement that is summed up, as the evaluation's snippets; of rows, as in profiles [s]

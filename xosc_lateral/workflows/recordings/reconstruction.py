@@ -218,12 +218,11 @@ def encounter_rows(met: Sequence[Encounter]) -> list[dict[str, Any]]:
         row: dict[str, Any] = {"kind": encounter.kind, "entity": encounter.vehicle, "time": round(encounter.time, 3)}
         row["side"] = encounter.side
         for word, other in (("ahead", encounter.ahead), ("behind", encounter.behind)):
-            time = np.inf if other is None else other.time_to_collision
-            row |= {
-                word: None if other is None else other.name,
-                f"gap_{word}": None if other is None else round(float(other.gap), 2),
-                f"time_to_collision_{word}": round(float(time), 2) if np.isfinite(time) else None,
-            }
+            row |= dict.fromkeys((word, f"gap_{word}", f"time_to_collision_{word}"))
+            if other is not None:
+                time = other.time_to_collision
+                row |= {word: other.name, f"gap_{word}": round(float(other.gap), 2)}
+                row[f"time_to_collision_{word}"] = round(float(time), 2) if np.isfinite(time) else None
         rows.append(row)
     return rows
 
@@ -251,7 +250,7 @@ def not_expressed(plans: Sequence[VehiclePlan], left_out: Sequence[str]) -> list
 
 def as_text(facts: dict[str, Any]) -> str:
     """For a person, at the command line."""
-    numbers, files = facts["summary"], facts["outputs"]
+    numbers = facts["summary"]
     profiles = [row["profile"] for row in facts["vehicles"] if row["profile"]]
     counted = ", ".join(f"{profiles.count(name)} {name}" for name in sorted(set(profiles)))
     lines = [
@@ -261,7 +260,7 @@ def as_text(facts: dict[str, Any]) -> str:
         f"  across: {numbers['across_rms']:.2f} m rms, of which in lane {numbers['across_in_lane_rms']:.2f} m, "
         f"in maneuvers {numbers['across_in_maneuvers_rms']:.2f} m",
         f"  drivers: {counted or 'none'}",
-        f"  not expressed: {len(facts['not_expressed'])} lines in the report" if facts["not_expressed"] else "",
-        *(f"  {path}" for path in files),
     ]
-    return "\n".join(line for line in lines if line)
+    if facts["not_expressed"]:
+        lines.append(f"  not expressed: {len(facts['not_expressed'])} lines in the report")
+    return "\n".join([*lines, *(f"  {path}" for path in facts["outputs"])])

@@ -94,6 +94,16 @@ class Track:
     y: FloatArray
     heading: FloatArray
 
+    def distance(self, other: Track, begin: float, end: float) -> float:
+        """The least to another track between two moments [s]; infinite where they are not there at once. [m]"""
+        first, last = max(begin, self.time[0]), min(end, self.time[-1])
+        time = other.time[(other.time >= first) & (other.time <= last)]
+        x, y = (
+            np.interp(time, other.time, there) - np.interp(time, self.time, here)
+            for there, here in ((other.x, self.x), (other.y, self.y))
+        )
+        return float(np.hypot(x, y).min(initial=np.inf))
+
 
 def place_tracks(tracks: Sequence[Track], network: RoadNetwork, start: float, end: float) -> Recording:
     """Each vehicle's longest passage in driving lanes within a window of time. Raises `NotEnoughDataError`."""
@@ -117,19 +127,20 @@ def _place(track: Track, rows: NDArray[np.intp], network: RoadNetwork, left_out:
     velocity = np.stack([_slope(time, x), _slope(time, y)])
     heading = _steady_heading(time, x, y, velocity, track.heading[rows], network)
     x, y = x - track.ahead * np.cos(heading), y - track.ahead * np.sin(heading)
-    place_on_road = network.world_to_lane(x, y, heading=heading)
-    on_lane = (place_on_road.distance <= MARKING_TOLERANCE) & (place_on_road.lane != 0)
+    nearest = network.world_to_lane(x, y, heading=heading)
+    on_lane = (nearest.distance <= MARKING_TOLERANCE) & (nearest.lane != 0)
     if not on_lane.any():
         left_out.append(f"{track.name}: on no driving lane")
         return None
-    lane_heading = np.zeros(len(x))
-    there = np.flatnonzero(on_lane)
-    place = place_on_road.road[there], place_on_road.lane[there], place_on_road.s[there]
-    lane_heading[there] = network.lane_to_world(*place).heading
-    width = np.full(len(x), np.nan)
-    width[there] = network.lane_width(*place)
+    lane_heading, width, there = np.zeros(len(x)), np.full(len(x), np.nan), np.flatnonzero(on_lane)
+    place = nearest.road[there], nearest.lane[there], nearest.s[there]
+    lane_heading[there], width[there] = network.lane_to_world(*place).heading, network.lane_width(*place)
     way = np.where(np.cos(heading - lane_heading) < 0.0, -1, 1)
-    elsewhere = on_lane & (_across(velocity, lane_heading) | _backwards(x, y, heading))
+    turn = np.arctan2(velocity[1], velocity[0]) - lane_heading
+    is_across = (np.abs(np.sin(turn)) > np.abs(np.cos(turn))) & (np.hypot(*velocity) >= MOVING_SPEED)
+    driven = np.cumsum(np.r_[0.0, np.diff(x) * np.cos(heading[1:]) + np.diff(y) * np.sin(heading[1:])])
+    is_back = driven < np.maximum.accumulate(driven) - BACKWARDS_DISTANCE
+    elsewhere = on_lane & (is_across | is_back)
     passages = _passages(time, x, y, np.flatnonzero(on_lane & ~elsewhere))
     reasons = {"off the lanes": int((~on_lane).sum()), "across a lane or backwards": int(elsewhere.sum())}
     if not passages:
@@ -142,12 +153,10 @@ def _place(track: Track, rows: NDArray[np.intp], network: RoadNetwork, left_out:
         reasons["beyond them, a gap or a leap"] = lost - sum(reasons.values())
         counts = ", ".join(f"{rows} {why}" for why, rows in reasons.items() if rows > 0)
         left_out.append(f"{track.name}: {lost} of {len(time)} rows: {counts}")
-    size = track.length, track.width, track.height, track.middle
-    road, lane = (each.astype(np.int64)[best] for each in (place_on_road.road, place_on_road.lane))
-    where = road, lane, place_on_road.s[best], (way * place_on_road.offset)[best]
-    return RecordedVehicle(
-        track.name, track.kind, *size, time[best], x[best], y[best], *where, width[best], way[best].astype(np.int64)
-    )
+    vehicle = track.name, track.kind, track.length, track.width, track.height, track.middle
+    road, lane, way = (each.astype(np.int64)[best] for each in (nearest.road, nearest.lane, way))
+    where = road, lane, nearest.s[best], way * nearest.offset[best], width[best], way
+    return RecordedVehicle(*vehicle, time[best], x[best], y[best], *where)
 
 
 def _slope(time: FloatArray, values: FloatArray) -> FloatArray:
@@ -169,12 +178,7 @@ def _slope(time: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def _steady_heading(
-    time: FloatArray,
-    x: FloatArray,
-    y: FloatArray,
-    velocity: FloatArray,
-    heading: FloatArray,
-    network: RoadNetwork,
+    time: FloatArray, x: FloatArray, y: FloatArray, velocity: FloatArray, heading: FloatArray, network: RoadNetwork
 ) -> FloatArray:
     """Headings averaged over `HEADING_WINDOW` of way: those of a vehicle that stands are from when it last moved.
 
@@ -194,17 +198,6 @@ def _steady_heading(
     edges, turned = np.r_[0.0, way], np.r_[0.0, turns]
     mean = np.interp(middle + half, edges, turned) - np.interp(middle - half, edges, turned)
     return np.asarray(np.angle(mean))
-
-
-def _across(velocity: FloatArray, lane_heading: FloatArray) -> NDArray[np.bool_]:
-    turn = np.arctan2(velocity[1], velocity[0]) - lane_heading
-    return np.asarray((np.abs(np.sin(turn)) > np.abs(np.cos(turn))) & (np.hypot(*velocity) >= MOVING_SPEED))
-
-
-def _backwards(x: FloatArray, y: FloatArray, heading: FloatArray) -> NDArray[np.bool_]:
-    steps = np.diff(x) * np.cos(heading[1:]) + np.diff(y) * np.sin(heading[1:])
-    driven = np.cumsum(np.r_[0.0, steps])
-    return np.asarray(driven < np.maximum.accumulate(driven) - BACKWARDS_DISTANCE)
 
 
 def _passages(time: FloatArray, x: FloatArray, y: FloatArray, rows: NDArray[np.intp]) -> list[NDArray[np.intp]]:

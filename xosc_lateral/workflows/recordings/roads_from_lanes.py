@@ -100,9 +100,8 @@ def _links(
         if road in done or not onward[road]:
             continue
         incoming, linked = {road}, set[int]()
-        while (
-            more := set().union(*(onward[before] for before in incoming))
-        ) != linked:  # all that meet at the same place
+        # all that meet at the same place
+        while (more := set().union(*(onward[before] for before in incoming))) != linked:
             linked = more
             incoming = set().union(*(back[before] for before in linked))
         done |= incoming
@@ -125,30 +124,28 @@ def _links(
 
 def _road(road_number: int, lanes: Sequence[DrivenLane], name: str) -> WrittenRoad:
     """Lanes from left to right along the straightest of their left lines that is about as long as the longest."""
-    longest = max(_length(lane.left) for lane in lanes)
-    line = smooth_line(min((one.left for one in lanes if _length(one.left) > WHOLE_LENGTH * longest), key=_turning))
+    lengths = [float(np.hypot(*np.diff(lane.left[:, :2], axis=0).T).sum()) for lane in lanes]
+    whole = [lane.left for lane, size in zip(lanes, lengths, strict=True) if size > WHOLE_LENGTH * max(lengths)]
+    line = smooth_line(min(whole, key=_turning))
     s = np.linspace(0.0, line.length, max(2, int(np.ceil(line.length / SAMPLE_LENGTH)) + 1))
     samples = line.place(s, 0)
     sides = [(_aside(lane.left, line, s, samples), _aside(lane.right, line, s, samples)) for lane in lanes]
     borders = [np.full(len(s), np.nan)]
     for left, _ in sides:  # that of the leftmost lane which is there
         borders[0] = np.where(np.isnan(borders[0]), left, borders[0])
-    for number, (_, right) in enumerate(sides):
-        beyond = sides[number + 1][0] if number + 1 < len(sides) else np.full(len(s), np.nan)
+    for (_, right), (beyond, _) in pairwise([*sides, (np.full(len(s), np.nan),) * 2]):
         shared = np.where(np.isnan(beyond), right, 0.5 * (right + beyond))
         borders.append(np.where(np.isnan(right), borders[-1], shared))
-    written = [
-        WrittenLane("driving", _straight_pieces(s, np.maximum(one - other, 0.0))) for one, other in pairwise(borders)
-    ]
+    widths = [np.maximum(left - right, 0.0) for left, right in pairwise(borders)]
+    written = [WrittenLane("driving", _straight_pieces(s, width)) for width in widths]
     offset = _straight_pieces(s, np.nan_to_num(borders[0]))
     plan = curved_plan(line, piece=PIECE_LENGTH)
     chord = samples[-1] - samples[0]
     away = np.abs(chord[0] * (samples - samples[0])[:, 1] - chord[1] * (samples - samples[0])[:, 0]) / np.hypot(*chord)
     if away.max() < WIDTH_TOLERANCE:
         plan = np.array([[0.0, *samples[0], np.arctan2(chord[1], chord[0]), line.length]])
-    has_offset = np.abs(offset[:, 1:]).max() > WIDTH_TOLERANCE
-    kept = offset if has_offset else None
-    return WrittenRoad(name, plan, [], written, number=road_number + 1, kind="unknown", offset=kept)
+    known = offset if np.abs(offset[:, 1:]).max() > WIDTH_TOLERANCE else None
+    return WrittenRoad(name, plan, [], written, number=road_number + 1, kind="unknown", offset=known)
 
 
 def _mirrored(road: WrittenRoad) -> WrittenRoad:
@@ -175,20 +172,13 @@ def smooth_line(points: FloatArray) -> ReferenceLine:
     points = points[np.r_[True, np.hypot(*np.diff(points, axis=0).T) > 1e-6]]
     chord = np.r_[0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T))]
     fine = np.linspace(0.0, chord[-1], max(3, int(np.ceil(chord[-1] / SAMPLE_LENGTH)) + 1))
-    curve = Akima1DInterpolator(chord, points)(fine) if len(points) > 2 else np.stack(
-        [np.interp(fine, chord, points[:, axis]) for axis in (0, 1)], axis=1
-    )  # fmt: skip
+    if len(points) > 2:
+        curve = Akima1DInterpolator(chord, points)(fine)
+    else:
+        curve = np.stack([np.interp(fine, chord, points[:, axis]) for axis in (0, 1)], axis=1)
     s = np.r_[0.0, np.cumsum(np.hypot(*np.diff(curve, axis=0).T))]
     places = CubicSpline(s, curve)
-    return ReferenceLine(
-        length=float(s[-1]),
-        place=lambda at, order: np.asarray(places(at, order)),
-        curvature=lambda at: np.zeros(np.shape(at)),
-    )
-
-
-def _length(points: FloatArray) -> float:
-    return float(np.hypot(*np.diff(points[:, :2], axis=0).T).sum())
+    return ReferenceLine(float(s[-1]), lambda at, order: np.asarray(places(at, order)), lambda at: 0.0 * at)
 
 
 def _turning(points: FloatArray) -> float:

@@ -14,12 +14,15 @@ from xosc_lateral.files.output_paths import template_mark
 from xosc_lateral.workflows.recordings.encounters import RelativeTrigger, Triggers
 from xosc_lateral.workflows.recordings.lateral import Transition, peak_acceleration
 from xosc_lateral.workflows.recordings.plan import VehiclePlan
+from xosc_lateral.workflows.recordings.recorded import Recording
+from xosc_lateral.workflows.recordings.recordings import RecordedTraffic
+from xosc_lateral.workflows.recordings.settings import ReconstructSettings
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.enums import Priority
 
 DATE = "2024-01-01T00:00:00"  # the format asks for a date: the same recording gives the same bytes
-MODELS = {"car": "car", "van": "van", "truck": "truck", "bus": "bus", "trailer": "trailer"}
-MODELS |= {"motorcycle": "motorbike", "motorbike": "motorbike", "bicycle": "bicycle"}
+MODELS = {name: name for name in ("car", "van", "truck", "bus", "trailer", "motorbike", "bicycle")}
+MODELS["motorcycle"] = "motorbike"
 """Recorded class -> vehicle category, the same in all versions; others are cars."""
 
 LIMITS = {"maxSpeed": "80", "maxAcceleration": "12", "maxDeceleration": "12"}
@@ -34,22 +37,19 @@ VERTICES = 0.2  # between the vertices of a recorded path [s]
 
 
 def reconstructed_scenario(
+    traffic: RecordedTraffic,
+    recording: Recording,
     plans: Sequence[VehiclePlan],
-    network: RoadNetwork,
-    *,
-    road_file: str,
-    duration: float,
-    version: Version,
+    relative: Mapping[str, Triggers],
+    settings: ReconstructSettings,
     host: str | None,
-    description: str,
-    relative: Mapping[str, Triggers] | None = None,
-    exact: bool = False,
 ) -> str:
-    """The document, the same bytes each time; it ends after `duration` [s].
-
-    `host`: entity under test. `relative`: entity -> what of it begins by a distance instead of the clock. `exact`:
-    recorded paths as trajectories, instead of maneuvers.
-    """
+    """The document, the same bytes each time; `relative`: entity -> what of it begins by a distance instead of the
+    clock; `host`: entity under test."""
+    major, minor = map(int, settings.version.split("."))
+    network, road_file, version = traffic.network, traffic.road_name, (major, minor)
+    part = f"{recording.start:g} to {recording.end:g} s"
+    description = f"{traffic.name}: reconstructed from {traffic.sources[0].name}, {part}"
     entities, actions = etree.Element("Entities"), etree.Element("Actions")
     story = build.story("Recorded")
     act = sub(story, "Act", name="Traffic")
@@ -60,10 +60,10 @@ def reconstructed_scenario(
         if plan.appears is None:
             vehicle.add_init(actions)
         event = vehicle.drive()
-        if exact:
+        if settings.exact:
             vehicle.follow_recorded_path(event)
         else:
-            vehicle.maneuver_as_planned(event, *(relative or {}).get(plan.name, ({}, {})))
+            vehicle.maneuver_as_planned(event, *relative.get(plan.name, ({}, {})))
         vehicle.leave()
     build.time_trigger(act, "StartTrigger", 0.0, version)
 
@@ -80,7 +80,7 @@ def reconstructed_scenario(
     storyboard = sub(root, "Storyboard")
     sub(storyboard, "Init").append(actions)
     storyboard.append(story)
-    build.time_trigger(storyboard, "StopTrigger", duration, version)
+    build.time_trigger(storyboard, "StopTrigger", recording.end - recording.start, version)
     etree.indent(root, "  ")
     text = f"<?xml version='1.0' encoding='UTF-8'?>\n{etree.tostring(root, encoding='unicode')}\n"
     return text + template_mark(text)
@@ -260,12 +260,8 @@ class _Vehicle:
         else:
             action = sub(lateral, "LaneOffsetAction", continuous="false")
             limit = peak_acceleration(transition.shape, transition.change, transition.duration)
-            sub(
-                action,
-                "LaneOffsetActionDynamics",
-                dynamicsShape=transition.shape.value,
-                maxLateralAcc=decimal(limit, 9),
-            )
+            dynamics = {"dynamicsShape": transition.shape.value, "maxLateralAcc": decimal(limit, 9)}
+            sub(action, "LaneOffsetActionDynamics", **dynamics)
             wanted = self._value(f"{name}_offset", offset_t, 4)
             sub(action, "LaneOffsetTarget/AbsoluteTargetLaneOffset", value=wanted)
         if relative is not None:

@@ -21,7 +21,7 @@ def _version(text: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class ReconstructSettings:
-    """What is reconstructed, and how: keywords of `reconstruct`, and options of the command line.
+    """What is reconstructed, and how: keywords of `reconstruct`, and the options of the command line.
 
     `format`: "dlr-ht", "levelx", "osi", "commonroad", "fcd" or "tracks"; by default told from the file. `road`: of
     recordings that come without their lanes. `begin`, `end`: part of the recording. [s] `vehicles`: these alone.

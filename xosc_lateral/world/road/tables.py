@@ -89,8 +89,6 @@ class NetworkTables(LaneTables):
         self._superelevation = Cubics([road.surface.superelevation for road in roads])
         self._is_shaped = np.array([bool(r.surface.crossfall or r.surface.shape) for r in roads])
         self._heights = HeightTable(self._lanes)
-        self._level = bool(self._superelevation.is_zero and not self._is_shaped.any())
-        self._flat = bool(self._elevation.is_zero and self._level)
 
     # ---- poses -------------------------------------------------------------------------------------------------------
     def lane_to_world(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, offset: ArrayLike = 0.0) -> Poses:
@@ -173,10 +171,11 @@ class NetworkTables(LaneTables):
     ) -> _Lie:
         """What `Surface.at` answers, by elevation and slope; without `angles` height, shrinking and lead alone."""
         nothing = np.zeros(len(s))
-        if self._flat:
+        is_level = self._superelevation.is_zero and not self._is_shaped.any()
+        if is_level and self._elevation.is_zero:
             return nothing, nothing, nothing, None, None, None
         height, grade = rising
-        if self._level:
+        if is_level:
             return height, -np.arctan(grade) if angles else nothing, nothing, None, None, None
         angle, twist = self._superelevation.at(road, s)
         shrink, rise = np.cos(angle), np.sin(angle)

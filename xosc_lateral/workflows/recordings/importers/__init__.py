@@ -1,8 +1,8 @@
 """Other people's recordings into the standard drive table: one reader per format.
 
-An importer turns a path into an `Imported`: the table with a column `state` (`cuts.KEPT_ROWS`, or why a row is cut),
-and a record of where it came from, what was cut out and how sure the lane centres are. `importer` takes the cut rows
-out, and sees to it that a damaged source ends in one line. `ImportedDrives.write` puts both into one file.
+An importer turns a path into a table with a column `state` (`cuts.KEPT_ROWS`, or why a row is cut), and a record where
+it came from, what was cut out and how sure the lane centres are. `importer` takes the cut rows out, and sees to it that
+a damaged source ends in one line. `ImportedDrives.write` puts both into one file.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths
 
-Importer: TypeAlias = "Callable[..., Imported | pd.DataFrame]"
-"""A source's path, and options by name, into a drive table, or into an `Imported` with a record of its own."""
+Importer: TypeAlias = "Callable[..., ImportedDrives | pd.DataFrame]"
+"""A source's path, and options by name, into a drive table, or into an `ImportedDrives` with a record of its own."""
 
 IMPORTERS = {
     "dlr-ht": ".dlr_ht:import_dlr_ht",
@@ -90,54 +90,9 @@ def import_drives(
     if not sources:
         raise ValueError("no source to import")
     made = find_importer(format)(sources[0] if len(sources) == 1 else sources, **options)
-    return ImportedDrives(as_imported(made, format, sources, options), sources)
+    return as_imported(made, format, sources, options)
 
 
-class ImportedDrives(Result):
-    """A drive table and where it came from."""
-
-    __slots__ = ("_imported", "sources")
-
-    def __init__(self, imported: Imported, sources: tuple[Path, ...]) -> None:
-        self._imported = imported
-        self.sources = sources
-
-    def headline(self) -> str:
-        """One line."""
-        known = self._imported.provenance
-        return f"{known.source}: {known.vehicles} vehicles, {known.hours:g} h"
-
-    def __str__(self) -> str:
-        record = self._imported.provenance
-        rows = ", ".join(f"{count} {state}" for state, count in record.rows.items())
-        head = f"{record.source}: {record.vehicles} vehicles, {record.hours:g} h kept (rows: {rows})"
-        lanes = ["  " + ", ".join(f"{name} {value}" for name, value in lane.items()) for lane in record.lanes]
-        notes = [f"  note: {note}" for note in record.notes]
-        return "\n".join([head, *lanes, *notes, f"licence: {record.licence}"])
-
-    def to_frame(self) -> pd.DataFrame:
-        """The drive table: what `fit` and the other calls take."""
-        return self._imported.table
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values, as ``--json`` prints them: the provenance."""
-        return asdict(self._imported.provenance)
-
-    def write(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write the table: ``.parquet``, ``.csv`` or ``.csv.gz``, with its provenance, whole or not at all."""
-        output = output_file(path, f"{file_label(self.sources[0])}.parquet", output_suffixes())
-        claim([output], [source for source in self.sources if source.is_file()], force=force)
-        table = self.to_frame()
-        write_table(
-            output,
-            self.to_dict(),
-            frame=lambda: table,
-            text=lambda: harmless_frame(table).to_csv(index=False, lineterminator="\n"),
-        )
-        return output
-
-
-# ---- what importers make ---------------------------------------------------------------------------------------------
 @dataclass(frozen=True, kw_only=True)
 class ImportRecord:
     """Where a table came from and what was done to it. Lengths in m, times in s."""
@@ -156,15 +111,46 @@ class ImportRecord:
     package_version: str = field(default=__version__)
 
 
-@dataclass(frozen=True, eq=False)
-class Imported:
-    """A drive table and its provenance."""
+@dataclass(frozen=True, eq=False, repr=False)
+class ImportedDrives(Result):
+    """A drive table and where it came from."""
 
     table: pd.DataFrame
     provenance: ImportRecord
+    sources: tuple[Path, ...] = ()
+
+    def headline(self) -> str:
+        """One line."""
+        known = self.provenance
+        return f"{known.source}: {known.vehicles} vehicles, {known.hours:g} h"
+
+    def __str__(self) -> str:
+        record = self.provenance
+        rows = ", ".join(f"{count} {state}" for state, count in record.rows.items())
+        head = f"{record.source}: {record.vehicles} vehicles, {record.hours:g} h kept (rows: {rows})"
+        lanes = ["  " + ", ".join(f"{name} {value}" for name, value in lane.items()) for lane in record.lanes]
+        notes = [f"  note: {note}" for note in record.notes]
+        return "\n".join([head, *lanes, *notes, f"licence: {record.licence}"])
+
+    def to_frame(self) -> pd.DataFrame:
+        """The drive table: what `fit` and the other calls take."""
+        return self.table
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them: the provenance."""
+        return asdict(self.provenance)
+
+    def write(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the table: ``.parquet``, ``.csv`` or ``.csv.gz``, with its provenance, whole or not at all."""
+        output = output_file(path, f"{file_label(self.sources[0])}.parquet", output_suffixes())
+        claim([output], [source for source in self.sources if source.is_file()], force=force)
+        text = lambda: harmless_frame(self.table).to_csv(index=False, lineterminator="\n")  # noqa: E731
+        write_table(output, self.to_dict(), frame=lambda: self.table, text=text)
+        return output
 
 
-def imported(table: pd.DataFrame, *, sources: Sequence[Path], step: float, **about: Any) -> Imported:
+# ---- what importers make ---------------------------------------------------------------------------------------------
+def imported(table: pd.DataFrame, *, sources: Sequence[Path], step: float, **about: Any) -> ImportedDrives:
     """A table with a column `state` and rows `step` seconds apart, and its record; `about`: what can't be counted."""
     record = ImportRecord(
         source=", ".join(source.name for source in sources),
@@ -174,7 +160,7 @@ def imported(table: pd.DataFrame, *, sources: Sequence[Path], step: float, **abo
         hours=round(float((table["state"] == KEPT_ROWS).sum()) * step / 3600.0, 3),
         **about,
     )
-    return Imported(table, record)
+    return ImportedDrives(table, record)
 
 
 def paths_of(sources: Path | Sequence[Path]) -> list[Path]:
@@ -182,7 +168,7 @@ def paths_of(sources: Path | Sequence[Path]) -> list[Path]:
     return [sources] if isinstance(sources, Path) else list(sources)
 
 
-def import_each(files: Sequence[Path], read: Callable[[Path, str], Imported]) -> Imported:
+def import_each(files: Sequence[Path], read: Callable[[Path, str], ImportedDrives]) -> ImportedDrives:
     """One table and one record of one or several files, each read by its path and label."""
     parts = [read(file, label) for file, label in zip(files, file_labels(files), strict=True)]
     record = parts[0].provenance
@@ -199,15 +185,15 @@ def import_each(files: Sequence[Path], read: Callable[[Path, str], Imported]) ->
             hours=round(sum(part.provenance.hours for part in parts), 3),
             notes=tuple(note for part in parts for note in part.provenance.notes),
         )
-    return Imported(pd.concat([part.table for part in parts], ignore_index=True), record)
+    return ImportedDrives(pd.concat([part.table for part in parts], ignore_index=True), record)
 
 
-def importer(read: Callable[..., Imported]) -> Callable[..., Imported]:
+def importer(read: Callable[..., ImportedDrives]) -> Callable[..., ImportedDrives]:
     """Without the rows that are cut, unless they are kept (`keep_cut`); a source, however damaged, ends in one line
     that names it, never in a table of nonsense."""
 
     @wraps(read)
-    def within(source: Path | Sequence[Path], *args: Any, keep_cut: bool = False, **settings: Any) -> Imported:
+    def within(source: Path | Sequence[Path], *args: Any, keep_cut: bool = False, **settings: Any) -> ImportedDrives:
         path = paths_of(source)[0]
         with foreign_errors(path, "can't be imported"), np.errstate(all="ignore"):
             try:
@@ -223,7 +209,7 @@ def importer(read: Callable[..., Imported]) -> Callable[..., Imported]:
                 raise NotEnoughDataError(f"{first}: nothing is left of {len(table)} rows ({dict(record.rows)})")
             kept = kept.reset_index(drop=True)
             _refuse_nonsense(kept, path)
-        return Imported(kept, record)
+        return ImportedDrives(kept, record)
 
     return within
 
@@ -260,11 +246,11 @@ _POSITIONS = dict.fromkeys(("offset", "lane_width", "distance_left", "distance_r
 
 
 def as_imported(
-    made: Imported | pd.DataFrame, name: str, sources: Sequence[Path], options: Mapping[str, object]
-) -> Imported:
-    """What an importer gave: all of it, or a drive table alone, which gets its record here."""
-    if isinstance(made, Imported):
-        return made
+    made: ImportedDrives | pd.DataFrame, name: str, sources: tuple[Path, ...], options: Mapping[str, object]
+) -> ImportedDrives:
+    """What an importer gave, with what was read: all of it, or a drive table alone, which gets its record here."""
+    if isinstance(made, ImportedDrives):
+        return replace(made, sources=sources)
     table = made if "drive" in made.columns else made.assign(drive=file_label(sources[0]))
     recorded = imported(
         table.assign(state=KEPT_ROWS),
@@ -274,7 +260,7 @@ def as_imported(
         settings={name: str(value) if isinstance(value, Path) else value for name, value in options.items()},
         step=float(table.groupby("drive", sort=False)["time"].diff().median()),
     )
-    return Imported(table, recorded.provenance)
+    return replace(recorded, table=table, sources=sources)
 
 
 def hash_files(paths: Sequence[Path]) -> str:

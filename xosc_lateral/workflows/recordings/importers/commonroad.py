@@ -21,7 +21,7 @@ from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.files.xml import read_xml, root_tag
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
-from xosc_lateral.workflows.recordings.importers import Imported, import_each, importer, paths_of
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, import_each, importer, paths_of
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks, ground_speed, travel_heading
 from xosc_lateral.workflows.recordings.importers.tracks import import_placed, require_lanes
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
@@ -31,10 +31,10 @@ LICENCE = "that of the CommonRoad scenario and of the recording that it was made
 
 
 @importer
-def import_commonroad(sources: Path | Sequence[Path], settings: CutSettings = DEFAULT_CUTS) -> Imported:
+def import_commonroad(sources: Path | Sequence[Path], settings: CutSettings = DEFAULT_CUTS) -> ImportedDrives:
     """Read one or several scenarios. Raises `FormatError`, `NotEnoughDataError`."""
 
-    def read(path: Path, label: str) -> Imported:
+    def read(path: Path, label: str) -> ImportedDrives:
         tracks, shapes, graph, version = read_obstacles(path, label)
         placed = place_in_shapes(tracks, shapes, graph.left)
         require_lanes(placed, "its lanelets", path)

@@ -43,7 +43,7 @@ from xosc_lateral.workflows.recordings.cuts import (
     name_states,
     number_runs,
 )
-from xosc_lateral.workflows.recordings.importers import Imported, imported, importer
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer
 from xosc_lateral.workflows.recordings.lane_graph import find_neighbours
 from xosc_lateral.workflows.recordings.lanes_from_tracks import LaneCentreLine, fit_lane_centre
 from xosc_lateral.world.road.reference_line import ReferenceLine, fit_reference_line
@@ -70,7 +70,7 @@ LICENCE = (
 
 
 @importer
-def import_dlr_ht(source: Path, settings: CutSettings = DEFAULT_CUTS) -> Imported:
+def import_dlr_ht(source: Path, settings: CutSettings = DEFAULT_CUTS) -> ImportedDrives:
     """Read the trajectory CSV, the data set's zip or the wheel of `tasi` that holds it."""
     tracks = read_tracks(source)
     road, kind = find_lanes(tracks, settings), vehicle_classes(tracks)

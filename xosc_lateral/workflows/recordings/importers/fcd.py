@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 
-from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.columns import require_row_step
@@ -35,7 +34,7 @@ from xosc_lateral.files.sumo import (
     wrong_element,
 )
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS, is_right_to_left
-from xosc_lateral.workflows.recordings.importers import Imported, imported, importer
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph, neighbour_columns
 from xosc_lateral.workflows.recordings.roads_from_lanes import DrivenLane
@@ -49,7 +48,7 @@ REAR_FROM_FRONT = 0.8  # rear axle behind the front bumper, as a share of the le
 @importer
 def import_fcd(
     source: Path, *, net: str | Path | None = None, types: str | Path | None = None, lane_width: float = WIDTH
-) -> Imported:
+) -> ImportedDrives:
     """A drive for every vehicle of what ``--fcd-output`` wrote; it is a truck when its type's name or class says so.
 
     `net`: the road network, ``.net.xml``, for widths and counts of lanes, and for who is on the next edge. `types`:
@@ -59,8 +58,8 @@ def import_fcd(
     known = None if net is None else read_sumo_net(Path(net))
     vehicle_types = read_vehicle_types(None if types is None else Path(types))
     rows = pd.DataFrame(_rows(vehicles, source), columns=list(ROW))
-    is_inner = rows["lane"].astype(str).str.startswith(":")
-    rows = rows[~is_inner] if known is None else rows.assign(is_inner=is_inner)
+    rows["is_inner"] = rows["lane"].astype(str).str.startswith(":")
+    rows = rows[~rows["is_inner"]] if known is None else rows
     if rows.empty:
         raise NotEnoughDataError(f"{source}: no vehicle")
     rows = rows.sort_values(["name", "time"], kind="stable", ignore_index=True)
@@ -100,31 +99,7 @@ def _drive_table(
     kinds = [types.get(kind.partition("@")[0], (usual_length(kind), kind)) for kind in rows["kind"]]
     length = np.array([size for size, _ in kinds])
     is_truck = np.array([any(word in kind.lower() for word in TRUCKS) for _, kind in kinds])
-    numbers, graph, index, count = _lane_graph(net, left_hand)
-    piece = np.array([numbers.get(name, -1) for name in rows["lane"]])
-    passed = np.diff(time)[np.diff(vehicle) == 0]
-    step = float(np.median(passed)) if len(passed) else 1.0
-    require_row_step(step, source)
-    middle = rows["pos"].to_numpy() - 0.5 * length
-    near = neighbour_columns(graph, piece, middle, time, vehicle, step, speed, length, is_truck)
-    state = np.where(piece < 0, "no lane", KEPT_ROWS)
-    return pd.DataFrame({
-        "drive": np.asarray(names, dtype=object)[vehicle], "time": time,
-        "offset": (-side if left_hand else side) + 0.0, "speed": speed,
-        "lane_width": [net.lanes[name].width for name in rows["lane"]],
-        "lane_index": index[piece], "lane_count": count[piece], "is_truck": is_truck.astype(np.float64), **near,
-        "state": np.where(rows["is_inner"], "junction", state) if "is_inner" in rows else state,
-    })  # fmt: skip
-
-
-def _driving_lanes(net: SumoNet) -> tuple[dict[str, int], list[list[int]]]:
-    """Numbers of the lanes that vehicles drive on, and those that each leads to."""
-    numbers = {name: k for k, name in enumerate(name for name, lane in net.lanes.items() if lane.is_driving)}
-    return numbers, [[numbers[other] for other in net.following.get(name, ()) if other in numbers] for name in numbers]
-
-
-def _lane_graph(net: SumoNet, left_hand: bool) -> tuple[dict[str, int], LaneGraph, np.ndarray, np.ndarray]:
-    """Numbers of the driving lanes, how they hang together, and of each its index from the right and their count."""
+    # lanes of an edge lie side by side, counted from the right here
     numbers, following = _driving_lanes(net)
     edges: dict[str, list[int]] = {}
     for name in sorted(numbers, key=lambda name: net.lanes[name].index, reverse=left_hand):
@@ -132,7 +107,26 @@ def _lane_graph(net: SumoNet, left_hand: bool) -> tuple[dict[str, int], LaneGrap
     left, index, count = (np.full(len(numbers), value) for value in (-1, 0, 1))
     for lanes in edges.values():
         index[lanes], count[lanes], left[lanes] = np.arange(len(lanes)), len(lanes), [*lanes[1:], -1]
-    return numbers, LaneGraph(np.array([net.lanes[name].length for name in numbers]), left, following), index, count
+    graph = LaneGraph(np.array([net.lanes[name].length for name in numbers]), left, following)
+    piece = np.array([numbers.get(name, -1) for name in rows["lane"]])
+    passed = np.diff(time)[np.diff(vehicle) == 0]
+    step = float(np.median(passed)) if len(passed) else 1.0
+    require_row_step(step, source)
+    middle = rows["pos"].to_numpy() - 0.5 * length
+    near = neighbour_columns(graph, piece, middle, time, vehicle, step, speed, length, is_truck)
+    return pd.DataFrame({
+        "drive": np.asarray(names, dtype=object)[vehicle], "time": time,
+        "offset": (-side if left_hand else side) + 0.0, "speed": speed,
+        "lane_width": [net.lanes[name].width for name in rows["lane"]],
+        "lane_index": index[piece], "lane_count": count[piece], "is_truck": is_truck.astype(np.float64), **near,
+        "state": np.where(rows["is_inner"], "junction", np.where(piece < 0, "no lane", KEPT_ROWS)),
+    })  # fmt: skip
+
+
+def _driving_lanes(net: SumoNet) -> tuple[dict[str, int], list[list[int]]]:
+    """Numbers of the lanes that vehicles drive on, and those that each leads to."""
+    numbers = {name: k for k, name in enumerate(name for name, lane in net.lanes.items() if lane.is_driving)}
+    return numbers, [[numbers[other] for other in net.following.get(name, ()) if other in numbers] for name in numbers]
 
 
 def _net_of(rows: pd.DataFrame, width: float) -> SumoNet:
@@ -168,27 +162,22 @@ def lanes_of_net(net: SumoNet, path: Path) -> list[DrivenLane]:
     lanes = list[DrivenLane]()
     for name, onward in zip(numbers, following, strict=True):
         lane = net.lanes[name]
+        try:
+            points = np.array([point.split(",")[:2] for point in lane.shape.split()], dtype=np.float64)
+        except ValueError:
+            points = np.empty(0)
+        moved = np.hypot(*np.diff(points, axis=0).T) if points.ndim == 2 else np.empty(0)
+        if not (moved > 0.0).any() or not np.isfinite(points).all():
+            raise FormatError(f"shape={lane.shape[:40]!r} is no line", path=path, element=f"lane {name!r}")
+        points = points[np.r_[True, moved > 0.0]]
+        pieces = np.diff(points, axis=0)
+        normals = np.stack([-pieces[:, 1], pieces[:, 0]], axis=1) / np.hypot(*pieces.T)[:, None]
+        normal = np.concatenate([normals[:1], normals[:-1] + normals[1:], normals[-1:]])
+        normal[1:-1] /= 1.0 + (normals[:-1] * normals[1:]).sum(axis=1, keepdims=True)  # as far from both pieces
+        half = 0.5 * lane.width * normal
         on_left = f"{lane.edge}_{lane.index + (-1 if net.left_hand else 1)}"  # lanes count from the kerb
-        lanes.append(DrivenLane(*_sides(name, lane, path), numbers.get(on_left, -1), onward))
+        lanes.append(DrivenLane(points + half, points - half, numbers.get(on_left, -1), onward))
     return lanes
-
-
-def _sides(name: str, lane: SumoLane, path: Path) -> tuple[FloatArray, FloatArray]:
-    """Left and right line of a lane, whose shape is its middle."""
-    try:
-        points = np.array([point.split(",")[:2] for point in lane.shape.split()], dtype=np.float64)
-    except ValueError:
-        points = np.empty(0)
-    moved = np.hypot(*np.diff(points, axis=0).T) if points.ndim == 2 else np.empty(0)
-    if not (moved > 0.0).any() or not np.isfinite(points).all():
-        raise FormatError(f"shape={lane.shape[:40]!r} is no line", path=path, element=f"lane {name!r}")
-    points = points[np.r_[True, moved > 0.0]]
-    pieces = np.diff(points, axis=0)
-    normals = np.stack([-pieces[:, 1], pieces[:, 0]], axis=1) / np.hypot(*pieces.T)[:, None]
-    normal = np.concatenate([normals[:1], normals[:-1] + normals[1:], normals[-1:]])
-    normal[1:-1] /= 1.0 + (normals[:-1] * normals[1:]).sum(axis=1, keepdims=True)  # as far from both pieces
-    half = 0.5 * lane.width
-    return points + half * normal, points - half * normal
 
 
 def read_fcd(path: Path) -> Tracks:

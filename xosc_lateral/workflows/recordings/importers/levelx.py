@@ -30,7 +30,7 @@ from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.tables import read_table
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings, Rows, cut_table, require_lane_direction
-from xosc_lateral.workflows.recordings.importers import Imported, imported, importer
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer
 from xosc_lateral.workflows.recordings.lane_graph import NEIGHBOUR_DISTANCE, find_neighbours
 
 LICENCE = (
@@ -48,7 +48,7 @@ VEHICLES = ("car", "van", "truck", "bus", "motorcycle", "trailer")
 
 
 @importer
-def import_levelx(source: Path, settings: CutSettings = DEFAULT_CUTS) -> Imported:
+def import_levelx(source: Path, settings: CutSettings = DEFAULT_CUTS) -> ImportedDrives:
     """Read one recording (its ``XX_tracks.csv``) or a folder of them, of highD or exiD, told by their columns."""
     files = sorted(source.glob("*_tracks.csv")) if source.is_dir() else [source]
     if not files:

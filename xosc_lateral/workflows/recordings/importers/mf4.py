@@ -41,7 +41,7 @@ from xosc_lateral.files.mapping import ColumnSource, MappingLike, as_mapping, fa
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import LONGEST_MESSAGE, foreign_errors
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
-from xosc_lateral.workflows.recordings.importers import Imported, imported, importer, paths_of
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer, paths_of
 
 POSITIONS = (("offset", "lane_width"), ("distance_left", "distance_right"))
 LICENCE = "your own recording"
@@ -100,7 +100,7 @@ def import_mf4(
     *,
     step: float = 0.04,
     mapping: MappingLike | None = None,
-) -> Imported:
+) -> ImportedDrives:
     """Read mapped channels of bus logs at an even step, over the time that all position channels of a log cover.
 
     Each log is a drive called after its file. `channels`: words ``NAME=CHANNEL[:UNIT]``; `mapping`: more of them,
@@ -120,12 +120,10 @@ def import_mf4(
             notes += channel.notes
         tables.append(from_middle(_table(signals, file, label, step), saved, file))
     for table in tables:
-        known = {name: table[name].notna().mean() for name in wanted if name in table}
-        notes += [
-            f"{table['drive'].iloc[0]}: {name} is known in {100 * share:.0f} % of the time"
-            for name, share in known.items()
-            if share < 1.0 and name not in POSITIONS[0] + POSITIONS[1]
-        ]
+        for name in wanted:
+            share = table[name].notna().mean() if name in table else 1.0
+            if share < 1.0 and name not in POSITIONS[0] + POSITIONS[1]:
+                notes.append(f"{table['drive'].iloc[0]}: {name} is known in {100 * share:.0f} % of the time")
     every_unit = {name: " | ".join(sorted(words)) for name, words in units.items()}
     settings = {"step": step, "channels": list(channels), "units": every_unit}
     about = {"format": "mf4", "licence": LICENCE, "settings": settings, "notes": tuple(dict.fromkeys(notes))}
@@ -145,7 +143,7 @@ def channels_wanted(source: Path) -> str:
 
 
 def _names(log: Any) -> list[str]:
-    # Every group's time base is a channel as well; names such as CAN1.Speed repeat others with their bus.
+    """Of channels, without the time bases of groups; names such as CAN1.Speed repeat others with their bus."""
     masters = {log.groups[group].channels[index].name for group, index in log.masters_db.items()}
     return sorted(set(log.channels_db) - masters)
 
@@ -193,7 +191,7 @@ def _read_channel(
     notes = _of_one_name(signals, [group for group, _ in places], name, named, wrong)
     signal = max(signals, key=lambda signal: len(signal.samples))
     samples, stamps = signal.samples, np.asarray(signal.timestamps, dtype=np.float64)
-    kind, stated, is_quantity = samples.dtype.kind, str(signal.unit or ""), _is_quantity(name, "")
+    kind, stated, is_quantity = samples.dtype.kind, str(signal.unit or ""), _is_quantity(name)
     if kind in "SU":
         if is_quantity:
             raise wrong(" holds words, not numbers")
@@ -256,7 +254,7 @@ def _alike(log: Any, wanted: str) -> str:
     return f"; like it are {', '.join(close[:8])}" if close else f"; the log has {len(names)} others, none alike"
 
 
-def _is_quantity(name: str, unit: str) -> bool:
+def _is_quantity(name: str, unit: str = "") -> bool:
     """Whether a column holds a physical quantity: by the standard table, or by its unit."""
     known = (*POSITIONS[0], *POSITIONS[1], "time")
     return name in known or CONTEXT_UNITS.get(name, "-") != "-" or is_measured(spelled(unit.lstrip("-")) or "")

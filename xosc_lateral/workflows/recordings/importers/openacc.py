@@ -34,7 +34,7 @@ from xosc_lateral.drivers.drives.cleaning import RESOLUTION, RUN, VALID_BELOW
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import unpacked_text
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
-from xosc_lateral.workflows.recordings.importers import Imported, imported, importer, paths_of
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer, paths_of
 
 LICENCE = (
     "OpenACC, AstaZero campaign: (c) European Union, Joint Research Centre, CC BY 4.0 (doi:10.1016/j.trc.2021.103047). "
@@ -59,7 +59,7 @@ HEADER_LINES = 50  # lines before the header, at most: the campaign's files have
 
 
 @importer
-def import_openacc(source: Path | Sequence[Path], *, lane_width: float = LANE_WIDTH) -> Imported:
+def import_openacc(source: Path | Sequence[Path], *, lane_width: float = LANE_WIDTH) -> ImportedDrives:
     """A drive for each car of AstaZero's files (.csv, .csv.gz). `lane_width`: of the road, not measured. [m]"""
     paths = paths_of(source)
     cars = [car for path in paths for car in _cars(path)]

@@ -22,7 +22,7 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.opendrive.reader import parse_opendrive, read_opendrive
 from xosc_lateral.files.osi import osi
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, MOVING_SPEED, CutSettings
-from xosc_lateral.workflows.recordings.importers import Imported, import_each, importer, paths_of
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, import_each, importer, paths_of
 from xosc_lateral.workflows.recordings.importers.tracks import import_placed, place_on_road, require_lanes
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
 from xosc_lateral.workflows.recordings.lane_shapes import Strip, lane_graph, middle, place_in_shapes
@@ -40,7 +40,7 @@ def import_osi(
     host: str | None = None,
     road: Path | str | None = None,
     channel: str | None = None,
-) -> Imported:
+) -> ImportedDrives:
     """Read one or several traces of ground truth or sensor views.
 
     `host`: keep this vehicle alone: its identifier or name in the trace; "host": the trace's host vehicle. `road`:
@@ -48,7 +48,7 @@ def import_osi(
     """
     files = paths_of(sources)
 
-    def read(path: Path, label: str) -> Imported:
+    def read(path: Path, label: str) -> ImportedDrives:
         recorded = read_osi(path, channel)
         only = None if host is None else _named(recorded, host, path)
         if len(files) > 1:

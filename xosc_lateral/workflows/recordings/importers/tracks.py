@@ -27,7 +27,7 @@ from xosc_lateral.workflows.recordings.cuts import (
     cut_table,
     require_lane_direction,
 )
-from xosc_lateral.workflows.recordings.importers import Imported, imported, importer
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks, rate, read_tracks
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph, neighbour_columns
 from xosc_lateral.world.road.lanes import DRIVING, beside
@@ -46,7 +46,7 @@ def import_tracks(
     columns: Sequence[str] = (),
     mapping: MappingLike | None = None,
     settings: CutSettings = DEFAULT_CUTS,
-) -> Imported:
+) -> ImportedDrives:
     """Read tracks on a known road, an OpenDRIVE file.
 
     `source`: table of one row per vehicle and instant, or a log of esmini (``--csv_logger``); x and y are the vehicle's
@@ -149,7 +149,7 @@ def require_lanes(placed: PlacedTracks, where: str, path: Path) -> None:
 
 def import_placed(
     placed: PlacedTracks, graph: LaneGraph, settings: CutSettings, *, only: Collection[str] | None = None, **about: Any
-) -> Imported:
+) -> ImportedDrives:
     """Neighbours, cuts and record, see `imported`; of the vehicles in `only` alone, if it is given."""
     table = _drive_table(placed, graph, settings)
     if only is not None:
