@@ -75,7 +75,12 @@ def _read_road(
     rule = element.get("rule", "RHT").upper()
     if rule not in ("RHT", "LHT"):
         raise source.error(f"rule={element.get('rule')!r} is neither RHT nor LHT", element)
-    _check_places(element, plan, line, source)
+    for (s, piece, _), part in zip(plan, line, strict=True):
+        for ds in (0.0, 0.5 * piece, piece):
+            x, y, _ = part.at(ds)
+            if not max(abs(x), abs(y)) <= MAXIMUM_COORDINATE:
+                what = f"at s={s + ds:g} m the road lies at x={x:g}, y={y:g}; limit {MAXIMUM_COORDINATE:g} m"
+                raise source.error(what, element)
     sections, directions = read_sections(element, length, rule, source)
     junction = element.get("junction", "-1")
     return Road(
@@ -95,18 +100,6 @@ def _read_road(
         predecessor=_read_link(element, "predecessor"),
         successor=_read_link(element, "successor"),
     )
-
-
-def _check_places(
-    element: XmlElement, plan: Sequence[Record], line: tuple[ReferenceElement, ...], source: RoadFile
-) -> None:
-    for (s, length, _), part in zip(plan, line, strict=True):
-        for ds in (0.0, 0.5 * length, length):
-            x, y, _ = part.at(ds)
-            if not max(abs(x), abs(y)) <= MAXIMUM_COORDINATE:
-                raise source.error(
-                    f"at s={s + ds:g} m the road lies at x={x:g}, y={y:g}; limit {MAXIMUM_COORDINATE:g} m", element
-                )
 
 
 def _length(element: XmlElement, plan: Sequence[Record], source: RoadFile) -> float:

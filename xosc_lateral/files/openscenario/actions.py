@@ -186,10 +186,6 @@ def _read_init(element: XmlElement, context: Context) -> Init:
     return Init(tuple(global_actions), tuple(user_defined), tuple(privates))
 
 
-def _read_story(element: XmlElement, context: Context) -> Story:
-    return read_struct(Story, element.within(local_scope(element)), context)
-
-
 def _read_group(element: XmlElement, context: Context) -> ManeuverGroup:
     maneuvers = []
     for child in element.children("Maneuver", "CatalogReference"):
@@ -222,7 +218,7 @@ READERS: dict[object, Reader] = {
     Event: _read_event,
     Init: _read_init,
     ManeuverGroup: _read_group,
-    Story: _read_story,
+    Story: lambda e, context: read_struct(Story, e.within(local_scope(e)), context),
     TransitionDynamics: read_transition,
     Trigger: read_trigger,
 }

@@ -51,9 +51,7 @@ def _collision(e: XmlElement, context: Context) -> conditions.CollisionCondition
 def _time_to_collision(e: XmlElement, context: Context) -> conditions.TimeToCollisionCondition:
     owner = e.required("TimeToCollisionConditionTarget")
     reference = owner.child("EntityRef")
-    if reference is not None:
-        return read_struct(conditions.TimeToCollisionCondition, e, context, target=context.entity(reference))
-    target = read_position(owner.required("Position"), context)
+    target = read_position(owner.required("Position"), context) if reference is None else context.entity(reference)
     return read_struct(conditions.TimeToCollisionCondition, e, context, target=target)
 
 

@@ -50,7 +50,7 @@ class JobState(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class JobOutcome:
-    """What became of a job."""
+    """What became of a job, and its row of the manifest."""
 
     state: JobState
     row: ManifestRow
