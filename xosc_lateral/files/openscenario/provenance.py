@@ -21,9 +21,9 @@ from xosc_lateral.files.xml import line_of
 
 MARK = "xosc-lateral provenance: "
 HEADER_MARK = "[xosc-lateral: "
-CONTENT = "content_sha256"
+CONTENT_HASH_NAME = "content_sha256"
 """In the provenance: SHA-256 of the file without the provenance."""
-PENDING = "0" * 64
+PENDING_HASH = "0" * 64
 """In its place until it is known."""
 _COMMENT_START, _COMMENT_END = f"<!-- {MARK}".encode(), b"-->"
 
@@ -78,7 +78,7 @@ def without_provenance(data: bytes) -> bytes:
 
 
 def write_sealed(path: Path, pieces: Iterable[bytes], *, save: bool) -> tuple[str, str, bytes]:
-    """Write a document with the hash of its content in place of `PENDING`, which its provenance holds.
+    """Write a document with the hash of its content in place of `PENDING_HASH`, which its provenance holds.
 
     The provenance is in the first piece. SHA-256 of the file and of its content come back, and the file itself where it
     is not to be saved.
@@ -86,7 +86,7 @@ def write_sealed(path: Path, pieces: Iterable[bytes], *, save: bool) -> tuple[st
     rest = iter(pieces)
     first = next(rest)
     begin, end = _comment_in(first)
-    place = first.find(PENDING.encode(), begin, end)
+    place = first.find(PENDING_HASH.encode(), begin, end)
     digest = hashlib.sha256(first[:begin])
     digest.update(first[end:])
 

@@ -28,7 +28,7 @@ from xosc_lateral.workflows.batch.workers import WorkerDiedError, open_pool, run
 Converter = Callable[[Job], ManifestRow]
 """Makes a job's output and describes it; raises an `XoscLateralError` when the input is at fault."""
 
-STATE = ".xosc-lateral"
+STATE_FOLDER = ".xosc-lateral"
 """Folder inside the output folder, there only while a batch is unfinished: journal and lock."""
 
 _STOPPING = frozenset(
@@ -107,7 +107,7 @@ def convert_many(
         where = error.filename or batch.folder
         raise BatchStoppedError(f"{where}: {error.strerror or error}; {_GOES_ON}") from error
     finally:
-        _remove_empty([batch.folder / STATE, *new])
+        _remove_empty([batch.folder / STATE_FOLDER, *new])
 
 
 def _outcomes(
@@ -118,7 +118,7 @@ def _outcomes(
     keep_old: bool,
     notify: Callable[[str], None],
 ) -> Iterator[JobOutcome]:
-    state = batch.folder / STATE
+    state = batch.folder / STATE_FOLDER
     with folder_lock(state / "lock") as runs, ExitStack() as stack:
         stack.callback(_sweep, batch.folder, runs[:1])
         _sweep(batch.folder, runs[1:])

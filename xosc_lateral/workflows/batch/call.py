@@ -224,9 +224,9 @@ def _left_out(batch: Batch) -> str:
 
 
 # ---- index of pages ----
-INDEX = "index.html"
+INDEX_PAGE = "index.html"
 
-GAPS = ("smallest gap, nominal [m]", "smallest gap, enriched [m]")
+GAP_COLUMNS = ("smallest gap, nominal [m]", "smallest gap, enriched [m]")
 
 
 def write_batch_index(batch: Batch, folder: Path) -> Path:
@@ -235,7 +235,7 @@ def write_batch_index(batch: Batch, folder: Path) -> Path:
     rows = [row for row in read_manifest(batch.folder / MANIFEST) if row.output in pages]
     links = {row.output: quote(Path(os.path.relpath(pages[row.output], folder)).as_posix())
              for row in rows if not row.error}  # fmt: skip
-    return write_atomically(folder / INDEX, batch_page(rows, links, batch.folder.name))
+    return write_atomically(folder / INDEX_PAGE, batch_page(rows, links, batch.folder.name))
 
 
 def batch_page(rows: Sequence[ManifestRow], links: Mapping[str, str], name: str) -> str:
@@ -257,7 +257,7 @@ def batch_page(rows: Sequence[ManifestRow], links: Mapping[str, str], name: str)
         ]
     )
     tones: dict[int, Tone] = {k: "bad" for k, row in enumerate(ranked) if row.error or _has_new_contact(row)}
-    formats = dict.fromkeys(("std. deviation of offsets [m]", *GAPS), ".2f")
+    formats = dict.fromkeys(("std. deviation of offsets [m]", *GAP_COLUMNS), ".2f")
     page.table([_cells(row, links.get(row.output, "")) for row in ranked], "Outputs", formats=formats, tones=tones)
     return page.html({})
 
@@ -281,7 +281,7 @@ def _cells(row: ManifestRow, link: str) -> dict[str, object]:
         "output": Html(f"{anchor}{name}</a>" if link else name),
         "enriched": f"{len(row.enriched)} of {row.entities}" if done else None,
         "std. deviation of offsets [m]": row.offset_spread if done else None,
-        GAPS[0]: row.gap_before if done else None,
-        GAPS[1]: row.gap_after if done else None,
+        GAP_COLUMNS[0]: row.gap_before if done else None,
+        GAP_COLUMNS[1]: row.gap_after if done else None,
         "warnings": "; ".join(row.warnings) or "none" if done else f"failed: {row.error}",
     }

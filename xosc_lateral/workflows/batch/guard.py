@@ -43,10 +43,10 @@ def address_space(megabytes: float) -> Iterator[None]:
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
-POLL = 0.2
+WATCH_INTERVAL = 0.2
 """How often time and memory are looked at. [s]"""
 
-GRACE = 30.0
+ENDING_TIME = 30.0
 """A job that has not ended so long after it was told to takes its worker process with it. [s]"""
 
 _worker_may_die = False
@@ -111,10 +111,10 @@ class _Watch:
             self._ended.set()
             raise
         if self.why:  # raised already or about to be: here, and not somewhere after us
-            time.sleep(POLL)
+            time.sleep(WATCH_INTERVAL)
 
     def _run(self) -> None:
-        while not self._ended.wait(POLL):
+        while not self._ended.wait(WATCH_INTERVAL):
             why = self._exceeded()
             if not why:
                 continue
@@ -123,7 +123,7 @@ class _Watch:
                     return
                 self.why = why
                 ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(self._job), ctypes.py_object(_Interrupted))
-            if not self._ended.wait(GRACE) and _worker_may_die:
+            if not self._ended.wait(ENDING_TIME) and _worker_may_die:
                 os._exit(1)
             return
 

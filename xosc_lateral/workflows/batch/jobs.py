@@ -216,7 +216,7 @@ class Fingerprints:
         values["profile"] = self._profile(settings.profile, settings.library)
         values["entity"] = {name: self._profile(one, settings.library) for name, one in settings.entity.items()}
         for name, path in (("context", settings.context), ("road", settings.road)):
-            values[name] = None if path is None else _hash_or(path, MISSING)
+            values[name] = None if path is None else _hash_or(path, MISSING_HASH)
         return {name: json.dumps(value, sort_keys=True) for name, value in values.items()}
 
     def _profile(self, name: str | DriverProfile, libraries: tuple[Path, ...]) -> str:
@@ -226,9 +226,9 @@ class Fingerprints:
         if key not in self._profiles:
             try:  # "auto": that of what it chooses
                 path = find_profile(AUTO_PROFILE if name == AUTO else name, libraries)
-                self._profiles[key] = _hash_or(path, MISSING)
+                self._profiles[key] = _hash_or(path, MISSING_HASH)
             except (XoscLateralError, OSError):
-                self._profiles[key] = MISSING
+                self._profiles[key] = MISSING_HASH
         return self._profiles[key]
 
 
@@ -240,7 +240,7 @@ def _hash_or(path: Path, otherwise: str) -> str:
         return otherwise
 
 
-MISSING = "missing"
+MISSING_HASH = "missing"
 """In place of the hash of a file that can't be read: its conversion says why, and the others go on."""
 
 

@@ -15,7 +15,7 @@ from typing import Annotated, Any, NamedTuple
 from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.version import BEHAVIOUR
-from xosc_lateral.files.openscenario.provenance import CONTENT, content_hash, facts_in, without_provenance
+from xosc_lateral.files.openscenario.provenance import CONTENT_HASH_NAME, content_hash, facts_in, without_provenance
 from xosc_lateral.files.output_paths import claim, output_file, output_folder, path_below
 from xosc_lateral.files.profiles import profile_hash, read_profile
 from xosc_lateral.files.source import check_regular, file_hash, hash_of, read_source
@@ -242,7 +242,7 @@ def _made_otherwise(output: Path, data: bytes, origin: _Origin) -> list[Defect]:
     same = without_provenance(made) == without_provenance(data)
     problems = [] if same else [(Problem.DIFFERS, "another content comes out of what its provenance states")]
     names = sorted(name for name in stated.keys() | now.keys() if stated.get(name) != now.get(name))
-    names = [name for name in names if name not in (CONTENT, "package_version")]
+    names = [name for name in names if name not in (CONTENT_HASH_NAME, "package_version")]
     problems += [(Problem.EDITED, f"its provenance states another {name}") for name in names]
     return problems or [(Problem.EDITED, "its provenance is not as it was written")]
 
@@ -255,7 +255,7 @@ def _version_of(facts: Mapping[str, Any]) -> bytes:
 def _changes(data: bytes, origin: _Origin) -> list[Defect]:
     """What was edited in an output, and what would come out otherwise today, and why."""
     facts, problems = origin.facts, list[Defect]()
-    if facts.get(CONTENT) != content_hash(data):
+    if facts.get(CONTENT_HASH_NAME) != content_hash(data):
         problems.append((Problem.EDITED, "its content is not what was written"))
     if facts.get("behaviour") != BEHAVIOUR:
         made = f"behaviour {facts.get('behaviour')} of version {facts.get('package_version')}"

@@ -12,7 +12,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.version import BEHAVIOUR, __version__
-from xosc_lateral.files.openscenario.provenance import PENDING
+from xosc_lateral.files.openscenario.provenance import PENDING_HASH
 from xosc_lateral.files.openscenario.write.build import named
 from xosc_lateral.files.openscenario.write.draft import WrittenScenario
 from xosc_lateral.files.openscenario.write.fit import write_converted
@@ -95,7 +95,7 @@ def write_with(chains: Sequence[OffsetChain], plan: Plan, sampled: Enriched, veh
         version=named(plan.version),
         ego=tuple(plan.egos),
         modes={name: mode for name, mode in sorted(modes.items()) if sampled.entity(name).is_enriched},
-        content_sha256=PENDING,
+        content_sha256=PENDING_HASH,
     )
     names = ", ".join(sorted({name for name, _ in provenance.profiles.values()})) or "no profile"
     sensor = ", with sensor" if plan.settings.with_sensor else ""
