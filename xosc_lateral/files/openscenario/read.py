@@ -10,7 +10,6 @@ from lxml import etree
 from msgspec import Struct
 
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.openscenario.actions import READERS
 from xosc_lateral.files.openscenario.context import Context, read_struct
 from xosc_lateral.files.openscenario.element import XmlElement, local_name, means_true
 from xosc_lateral.files.openscenario.entities import read_entities
@@ -21,6 +20,7 @@ from xosc_lateral.files.openscenario.references import (
     read_declarations,
     read_variables,
 )
+from xosc_lateral.files.openscenario.storyboard import READERS
 from xosc_lateral.files.xml import document_of, read_document
 from xosc_lateral.world.scenario.parameters import Scope
 from xosc_lateral.world.scenario.place import Place, Unsupported
