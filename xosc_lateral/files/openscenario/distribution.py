@@ -15,18 +15,10 @@ import numpy as np
 from msgspec import Struct
 
 from xosc_lateral.base.limits import COMBINATIONS, DECIMAL_EXPONENT, DISTRIBUTION_TIME, PARAMETER_SETS
+from xosc_lateral.files.openscenario import references
 from xosc_lateral.files.openscenario.context import Context, read_struct
 from xosc_lateral.files.openscenario.element import XmlElement
 from xosc_lateral.files.openscenario.read import open_scenario, read_header
-from xosc_lateral.files.openscenario.references import (
-    Boundary,
-    Catalogs,
-    allowed_roots,
-    broken_constraint,
-    declared_values,
-    parameter_name,
-    value_of,
-)
 from xosc_lateral.files.xml import read_xml
 from xosc_lateral.world.scenario import distribution as spread
 from xosc_lateral.world.scenario.distribution import Deterministic, ParameterSet, SteppedRange, Stochastic, ValueSets
@@ -45,17 +37,10 @@ class LogicalScenario:
     scenario_file: Path  # the scenario that it varies
     distribution: Deterministic | Stochastic
     place: Place  # of the distribution
-    _scenario: XmlElement = field(repr=False)
+    _declared: Mapping[str, str] = field(repr=False)  # what the scenario declares
+    _constrained: list[XmlElement] = field(repr=False)  # those declarations that have a constraint group
     discarded: int = 0  # parameter sets left out so far because they violate the scenario's constraint groups
     _begin: float = field(init=False, repr=False, default=0.0)
-    _declared: dict[str, str] = field(init=False, repr=False)
-    _constrained: list[XmlElement] = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Find what the scenario declares, and which of it is constrained."""
-        self._declared = declared_values(self._scenario)
-        declared = self._scenario.listed("ParameterDeclarations", "ParameterDeclaration")
-        self._constrained = [item for item in declared if item.child("ConstraintGroup") is not None]
 
     def parameter_sets(self, seed: int = 0) -> Iterator[ParameterSet]:
         """Parameter sets that satisfy the scenario's constraint groups, in order, made when asked for.
@@ -105,32 +90,32 @@ class LogicalScenario:
         scope = Scope({**self._declared, **values})
         for declaration in self._constrained:
             item = declaration.within(scope)
-            if broken_constraint(item, value_of(item)):
+            if references.broken_constraint(item, references.value_of(item)):
                 self.discarded += 1
                 return False
         return True
 
 
 def read_distribution(path: Path | str, *, allowed: Iterable[Path] = ()) -> LogicalScenario:
-    """Read a ParameterValueDistribution file (1.1 and later); its scenario may lie in the `allowed` folders, too.
-
-    Raises `FormatError` with file, line and element; user-defined distributions among others.
-    """
+    """Read a ParameterValueDistribution file (1.1 and later); its scenario may lie in the `allowed` folders, too."""
     path = Path(path)
     document, _ = read_xml(path)
     root = open_scenario(document, path)
     header = read_header(root)
     owner = root.required("ParameterValueDistribution")
     reference = owner.required("ScenarioFile")
-    boundary = Boundary(path.parent, allowed_roots(path, allowed))
+    boundary = references.Boundary(path.parent, references.allowed_roots(path, allowed))
     scenario = boundary.inside(reference.text("filepath"), reference.place())
     if not scenario.is_file():
         reference.fail(f"scenario file '{reference.text('filepath')}' does not exist (looked for {scenario})")
     content = owner.required("Deterministic", "Stochastic")
-    context = Context(header.version, Catalogs({}, boundary, []), [], {})
+    context = Context(header.version, references.Catalogs({}, boundary, []), [], {})
     distribution = _deterministic(content) if content.tag == "Deterministic" else _stochastic(content, context)
-    inner, _ = read_xml(scenario)
-    return LogicalScenario(path, scenario, distribution, content.place(), open_scenario(inner, scenario))
+    inner = open_scenario(read_xml(scenario)[0], scenario)
+    declared = inner.listed("ParameterDeclarations", "ParameterDeclaration")
+    constrained = [item for item in declared if item.child("ConstraintGroup") is not None]
+    values = references.declared_values(inner)
+    return LogicalScenario(path, scenario, distribution, content.place(), values, constrained)
 
 
 def _deterministic(owner: XmlElement) -> Deterministic:
@@ -152,7 +137,7 @@ def _deterministic(owner: XmlElement) -> Deterministic:
 
 def _name_of(element: XmlElement, attribute: str) -> str:
     """Name of a parameter: never a reference, even where a file writes it with a ``$``."""
-    return parameter_name(element.raw(attribute) or element.text(attribute))
+    return references.parameter_name(element.raw(attribute) or element.text(attribute))
 
 
 def _single(item: XmlElement) -> ValueSets | SteppedRange:

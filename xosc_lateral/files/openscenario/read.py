@@ -10,16 +10,11 @@ from lxml import etree
 from msgspec import Struct
 
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.files.openscenario import references
 from xosc_lateral.files.openscenario.context import Context, read_struct
 from xosc_lateral.files.openscenario.element import XmlElement, local_name, means_true
 from xosc_lateral.files.openscenario.entities import read_entities
-from xosc_lateral.files.openscenario.references import (
-    Boundary,
-    Catalogs,
-    allowed_roots,
-    read_declarations,
-    read_variables,
-)
+from xosc_lateral.files.openscenario.references import Boundary
 from xosc_lateral.files.openscenario.storyboard import READERS
 from xosc_lateral.files.xml import document_of, read_document
 from xosc_lateral.world.scenario.parameters import Scope
@@ -116,11 +111,11 @@ def read_scenario(
             Unsupported("FileHeader", root.place(), f"version 1.{header.minor} is read as 1.{NEWEST_VERSION[1]}")
         )
     remarks.extend(remark_spellings(root))
-    scope, values = read_declarations(root, dict(parameters or {}), remarks)
+    scope, values = references.read_declarations(root, dict(parameters or {}), remarks)
     root = root.within(scope)
-    boundary = Boundary(path.parent, allowed_roots(path, allowed))
+    boundary = Boundary(path.parent, references.allowed_roots(path, allowed))
     locations = _catalog_locations(root)
-    catalogs = Catalogs(locations, boundary, remarks)
+    catalogs = references.Catalogs(locations, boundary, remarks)
     context = Context(
         header.version,
         catalogs,
@@ -145,7 +140,7 @@ def read_scenario(
         path=path,
         header=header,
         parameters=values,
-        variables=read_variables(root),
+        variables=references.read_variables(root),
         catalog_locations={kind: path.parent / written for kind, (written, _) in locations.items()},
         road_file=road_file,
         traffic_signal_controllers=controllers,

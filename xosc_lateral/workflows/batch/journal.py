@@ -16,17 +16,8 @@ from typing import IO, Any, Self
 
 from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.files.atomic import open_own
-from xosc_lateral.workflows.batch.manifest import (
-    MANIFEST,
-    TIMINGS,
-    ManifestRow,
-    Timing,
-    is_of_now,
-    read_manifest,
-    read_timings,
-    write_manifest,
-    write_timings,
-)
+from xosc_lateral.workflows.batch import manifest
+from xosc_lateral.workflows.batch.manifest import MANIFEST, TIMINGS, ManifestRow, Timing
 
 
 class FolderInUseError(XoscLateralError):
@@ -188,8 +179,9 @@ class Journal:
         """Write manifest and timings, sorted by output, if they change; then the journal goes, which says the same."""
         if self._changed:
             outputs, now = sorted(self._begin), time.time_ns()
-            write_timings(((output, _known(self._timings[output], now)) for output in outputs), self._folder / TIMINGS)
-            write_manifest(filter(None, map(self.row, outputs)), self._folder / MANIFEST)
+            timings = ((output, _known(self._timings[output], now)) for output in outputs)
+            manifest.write_timings(timings, self._folder / TIMINGS)
+            manifest.write_manifest(filter(None, map(self.row, outputs)), self._folder / MANIFEST)
         self._file.close()
         self._path.unlink()
 
@@ -212,12 +204,12 @@ class Journal:
         recovered = bool(self._begin)
         timings, timings_path, path = dict[str, Timing](), self._folder / TIMINGS, self._folder / MANIFEST
         with self._put_aside_if_damaged(TIMINGS):
-            timings = read_timings(timings_path)
+            timings = manifest.read_timings(timings_path)
         with self._put_aside_if_damaged(MANIFEST):
-            for row in read_manifest(path):
+            for row in manifest.read_manifest(path):
                 if row.output not in self._begin:
                     self.add(row, timings.get(row.output, Timing()))
-        self._changed = recovered or not (timings_path.exists() and path.exists() and is_of_now(path))
+        self._changed = recovered or not (timings_path.exists() and path.exists() and manifest.is_of_now(path))
 
     @contextmanager
     def _put_aside_if_damaged(self, name: str) -> Iterator[None]:
