@@ -35,10 +35,7 @@ def lane_departures(entity: EntityResult, network: RoadNetwork) -> Iterator[Lane
 
 
 def _lateral_within_a_lane(motion: EntityMotion) -> list[tuple[int, int]]:
-    """First and last row of lateral actions that keep to one lane: distances kept beside others, offsets in the lane.
-
-    Lane changes cross markings anyway.
-    """
+    """First and last row of lateral actions that keep to one lane; lane changes cross markings anyway."""
 
     def lateral(rows: slice) -> BoolArray:
         activity = motion.activity[rows]
@@ -53,10 +50,7 @@ def _lateral_within_a_lane(motion: EntityMotion) -> list[tuple[int, int]]:
 
 
 def stay_as_written(enriched: Enriched, continuous: Collection[str]) -> tuple[str, ...]:
-    """Which lane changes and lane offsets stay as written although they are to be lifelike, a line each.
-
-    `continuous`: entities whose movement goes on through them.
-    """
+    """Lane changes that stay as written although they are to be lifelike; `continuous`: who moves on through them."""
     lines = []
     for entity in enriched.entities:
         spans = (span for span in entity.spans if span.kind is SegmentKind.LATERAL_ACTION)

@@ -72,23 +72,19 @@ def enrich(
 ) -> Enriched:
     """Enrich a played scenario.
 
-    - `drivers`: per entity a profile, or the reason why it is not enriched; as one that is absent
-    - `seed`, `variant`, `seed_words`: with the entity's name they seed its own random numbers: adding an entity changes
-      no other's offsets; `seed_words` holds further words of each entity
+    - `drivers`: per entity a profile, or the reason why it is not enriched
+    - `seed`, `variant`, `seed_words`: with an entity's name they seed its own random numbers: another one changes none
     - `context`: what the scenario doesn't state, or replaces: times [s] and values, the same for all entities
     - `trailers`: entity that is pulled -> its tractor, in whose track it follows
-    - `attempts`: sample anew up to so many times while vehicles touch or leave their lane that nominally don't; the
-      best is kept
-    - `neighbours`: `borrow`: neighbours give way to each other by a population's law, too, where a profile's answer is
-      not known (`give_way`)
-    - `with_sensor`: add what the sensor added to the drives that each profile was fitted on. Nobody drives that: it is
-      added after drivers have given way and after what nobody could drive was smoothed
-    - `uncertain`: entities whose motion will be another one, since it depends on a vehicle under test or a controller:
-      nobody responds to where they nominally are, nor do they to others
+    - `attempts`: at most, while vehicles touch or leave their lane that nominally don't; the best is kept
+    - `neighbours`: `borrow`: a population's law of giving way, where a profile's answer is not known (`give_way`)
+    - `with_sensor`: add what the sensor added to the drives that each profile was fitted on: nobody drives that, so it
+      comes after drivers have given way and after what nobody could drive was smoothed
+    - `uncertain`: entities that will move otherwise, since they depend on a vehicle under test or a controller: nobody
+      responds to where they nominally are, nor do they to others
     - `heeds_controllers`: where a controller of the player steers, nothing is sampled
-    - `continuous`: entities whose movement goes on through lane changes and lane offsets (`movement_runs`); that of the
-      others leads from the segment before to the one behind
-    - `lane_changes`: the way across of those lane changes and lane offsets
+    - `continuous`: whose movement goes on through lane changes and lane offsets (`movement_runs`), across as
+      `lane_changes` says; that of the others leads from the segment before to the one behind
     - `least_time`: for which each segment is sampled, should it last longer in another run [s]
 
     Raises `DriverProfileError`: the sensor is asked for and a profile knows of none.

@@ -123,10 +123,3 @@ def road_network(path: Path) -> RoadNetwork:
 @lru_cache(maxsize=32)
 def _road_network(path: Path, _state: tuple[int, ...]) -> RoadNetwork:
     return read_opendrive(path)
-
-
-def read_output(data: bytes, output: Path, source: Scenario, *, allowed: Iterable[Path], roads: RoadSearch) -> Scenario:
-    """An output from its bytes, as seen from its place, with what its source was allowed to read."""
-    road = () if source.road_file is None else (source.road_file.parent,)
-    folders = (*allowed, *(path.parent for path in source.input_files), *road)
-    return read_scenario(output, allowed=folders, roads=roads, data=data)

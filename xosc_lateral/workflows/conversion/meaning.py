@@ -100,10 +100,7 @@ def _drives(speed: float) -> tuple[Speeds, ...]:
 
 
 class Meaning:
-    """What happens in a source, nominally and under other egos.
-
-    `played`: the source and its nominal run; `egos`: vehicles under test; `time_limit`: of playback. [s]
-    """
+    """What happens in a source, nominally and under other egos; `egos`: vehicles under test; `time_limit` [s]."""
 
     def __init__(self, played: Played, egos: tuple[str, ...], *, step: float, time_limit: float | None) -> None:
         self._played, self._egos, self._step = played, egos, step
@@ -225,10 +222,7 @@ def keep_meaning(
     motion: NominalMotion,
     attempt: Callable[[Sequence[OffsetChain]], tuple[Output, list[Comparison]]],
 ) -> tuple[Output, KeptChains]:
-    """Chains as large as leave what happens as it was, and the output with them.
-
-    `motion`, without offsets, says which chain comes before a conflict; `attempt` writes with some chains and plays.
-    """
+    """Chains as large as leave what happens as it was, and the output with them; `attempt` writes some and plays."""
     sizes: Sizes = {}
     trials = 1
 

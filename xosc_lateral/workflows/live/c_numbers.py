@@ -29,7 +29,7 @@ from xosc_lateral.drivers.model.seeds import AutoregressiveSeed, DriveSeed, TwoL
 from xosc_lateral.workflows.live import paths
 from xosc_lateral.world.motion.trajectory import SETTLING_TIME
 
-USUAL = {"speed": 30.0, "lane_count": 2.0, "friction": 1.0}
+USUAL_INPUTS = {"speed": 30.0, "lane_count": 2.0, "friction": 1.0}
 """Inputs that nobody sets; others are 0, of distances that nobody is there."""
 
 SHAPES = ("VALUE", "MAGNITUDE", "BEYOND", "SATURATING", "STEP_AT", "HINGE_AT", "EQUALS", "PRESENCE", "NEARNESS",
@@ -61,7 +61,7 @@ def usual(profile: DriverProfile, column: str) -> float:
     """Value of an input that nobody sets."""
     if column.endswith("_distance"):
         return np.inf
-    return {**USUAL, "lane_width": profile.lane_width}.get(column, 0.0)
+    return {**USUAL_INPUTS, "lane_width": profile.lane_width}.get(column, 0.0)
 
 
 # ---- the profile's numbers -------------------------------------------------------------------------------------------
@@ -85,8 +85,8 @@ def numbers_of(profile: DriverProfile) -> tuple[dict[str, int], list[str]]:
         "OWN_LANE_WIDTH": profile.lane_width, "WIDEST_LANE": np.inf if measured is None else measured[1],
         "FINE_WIDTH": fine_width, "RATED": int(rated), "LOG_LIMIT": LOG_LIMIT, "LONGEST_PAUSE": LIVE_PAUSE.value,
         "LATEST_TIME": TIME.value, "FARTHEST_POSITION": LIVE_RANGES["offset"].high, "MINIMUM_SPEED": MINIMUM_SPEED,
-        "SETTLING_TIME": SETTLING_TIME, "LARGEST_TURN": paths.LEADING_OVER * paths.TURN, "STEP_PEAK": paths.STEP_PEAK,
-        "STANDSTILL": paths.STANDSTILL, "NEGLIGIBLE_REST": paths.NEGLIGIBLE_REST,
+        "SETTLING_TIME": SETTLING_TIME, "LARGEST_TURN": paths.LEADING_OVER_SHARE * paths.LARGEST_TURN_RATE,
+        "STEP_PEAK": paths.STEP_PEAK, "STANDSTILL": paths.STANDSTILL, "NEGLIGIBLE_REST": paths.NEGLIGIBLE_REST,
         **seeds,
     }  # fmt: skip
     sizes |= core_sizes | {"HIDDEN": max(1, len(hidden))}
@@ -344,7 +344,7 @@ def _hidden_numbers(effect: kinds.HiddenEffect, step: float) -> tuple[str, list[
 
 
 # ---- numpy's normal and exponential numbers --------------------------------------------------------------------------
-LAYERS = 256
+ZIGGURAT_LAYERS = 256
 
 
 @cache
@@ -372,7 +372,7 @@ def ziggurats() -> tuple[str, ...]:
 def _ziggurat(name: str, tail: Decimal, beyond: Decimal, bits: int, density: Any, inverse: Any) -> list[str]:
     """Of a density whose tail has `beyond` times its height as area."""
     area, borders = density(tail) * (tail + beyond), [tail]
-    while len(borders) < LAYERS - 1:
+    while len(borders) < ZIGGURAT_LAYERS - 1:
         borders.insert(0, inverse(area / borders[0] + density(borders[0])))
     widths, scale = [area / density(tail), *borders], Decimal(2) ** bits
     inside = [tail / widths[0] * scale, 0, *(low / high * scale for low, high in pairwise(borders))]

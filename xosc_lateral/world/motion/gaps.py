@@ -143,20 +143,14 @@ _POSE, _SIZE = ("x", "y", "heading"), ("length", "width", "centre")
 
 
 def box_distance(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Distance between rectangles, row by row, shape (n,); 0 where they overlap. [m]
-
-    From their corners in order, shape (n, 4, 2). [m]
-    """
+    """Distance between rectangles from their corners in order, row by row, (n, 4, 2) to (n,); 0: they overlap. [m]"""
     from_a, apart_of_a = _beyond(a, b)
     from_b, apart_of_b = _beyond(b, a)
     return np.where(apart_of_a | apart_of_b, np.minimum(from_a, from_b), 0.0)
 
 
 def _beyond(box: FloatArray, corners: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """Distance of the nearest corner from a box that they are not in [m], and whether a side of it parts them from it.
-
-    Convex shapes are nearest to each other at a corner of one of them, and apart if a side of one parts them.
-    """
+    """Distance of the nearest corner from a box that they are not in [m], and whether a side of it parts them."""
     x, y = (np.ascontiguousarray(corners[..., k].T) - 0.5 * (box[:, 0, k] + box[:, 2, k]) for k in (0, 1))
     outside, parted = [], np.zeros(len(box), dtype=bool)
     for neighbour in (1, 3):

@@ -86,11 +86,7 @@ class SegmentRow(Struct, frozen=True):
 def cut_segments(
     motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool = False, heeds_controllers: bool = True
 ) -> tuple[SegmentSpan, ...]:
-    """Cut an entity's whole motion into segments, each row into exactly one; teleports always cut.
-
-    `is_trailer`: the entity is pulled by another, and has no driver; `heeds_controllers`: where one steers, no driver
-    does.
-    """
+    """Cut an entity's motion into segments, each row into exactly one; teleports cut, trailers have no driver."""
     firsts: list[tuple[int, int]] = []  # rows at which segments begin, and their kinds
     before = -1
     for rows in blocks(len(motion.time)):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.world.road.piecewise import PiecewiseCubic
 
-BEND_STEP = 1e-3
+GRADE_STEP = 1e-3
 """Step of differences of the grade. [m]"""
 
 
@@ -92,8 +92,8 @@ class Surface(Struct, frozen=True):
         """Change of the grade along s: the slope is a parabola, whose central difference is exact. [1/m]"""
         if self.elevation.is_zero:
             return 0.0
-        ahead, behind = (self.elevation.with_slope_at(s + ds)[1] for ds in (BEND_STEP, -BEND_STEP))
-        return (ahead - behind) / (2.0 * BEND_STEP)
+        ahead, behind = (self.elevation.with_slope_at(s + ds)[1] for ds in (GRADE_STEP, -GRADE_STEP))
+        return (ahead - behind) / (2.0 * GRADE_STEP)
 
     def lead_at(self, s: float, across: float) -> float:
         """How far along s a place lies from the foot of its s, `across` the line seen from above. [m]"""

@@ -23,7 +23,7 @@ from xosc_lateral.world.road.piecewise import IndexLike, Lookup, PiecewiseCubic
 from xosc_lateral.world.road.positions import Poses
 from xosc_lateral.world.road.reference_line import Frame, ReferenceLines
 from xosc_lateral.world.road.road import Road
-from xosc_lateral.world.road.surface import BEND_STEP
+from xosc_lateral.world.road.surface import GRADE_STEP
 
 
 class Cubics:
@@ -141,8 +141,16 @@ class NetworkTables(LaneTables):
         surface = self._surface(road, s, t, self._elevation.at(road, s))
         _, pitch, roll, _, drift, _ = surface
         heading = frame.heading if drift is None else frame.heading + np.arctan(drift)
-        if profile is not None:
-            heading, pitch, roll = _along_lane(profile, heading, pitch, roll)
+        if profile is not None:  # as the lane's traffic goes: turned by its slope, and round where it runs against s
+            if profile.slope.any():
+                turn = np.arctan(profile.slope)
+                if pitch.any() or roll.any():
+                    turn, pitch, roll = turned_in_surface(turn, pitch, roll)
+                heading = heading + turn
+            backwards = profile.direction < 0
+            if np.any(backwards):
+                heading = heading + np.pi * backwards
+                pitch, roll = pitch * profile.direction, roll * profile.direction
         # into [-pi, pi]
         heading = heading - (2.0 * np.pi) * np.rint(heading / (2.0 * np.pi))
         return *self._point(frame, surface, s, t, profile), heading, pitch, roll
@@ -186,8 +194,8 @@ class NetworkTables(LaneTables):
         lift, lift_along, lean = self._shaped(road, s, t)
         if not angles:
             return height + lift, nothing, nothing, shrink, None, lead
-        ahead, behind = (self._elevation.at(road, s + ds)[1] for ds in (BEND_STEP, -BEND_STEP))
-        bend = (ahead - behind) / (2.0 * BEND_STEP) * level * level
+        ahead, behind = (self._elevation.at(road, s + ds)[1] for ds in (GRADE_STEP, -GRADE_STEP))
+        bend = (ahead - behind) / (2.0 * GRADE_STEP) * level * level
         onward = 1.0 - t * (shrink * twist * steep + rise * level * bend)
         climb = grade + t * (shrink * twist * level - rise * steep * bend)
         drift = -t * rise * twist / onward
@@ -268,22 +276,6 @@ class NetworkTables(LaneTables):
 
         crossfall, grade = self._batch(evaluate, 2, road, s, lane=lane)
         return crossfall, grade
-
-
-def _along_lane(
-    profile: LaneProfile, heading: FloatArray, pitch: FloatArray, roll: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """As the lane's traffic goes: turned by its slope, and round where it runs against s. [rad]"""
-    if profile.slope.any():
-        turn = np.arctan(profile.slope)
-        if pitch.any() or roll.any():
-            turn, pitch, roll = turned_in_surface(turn, pitch, roll)
-        heading = heading + turn
-    backwards = profile.direction < 0
-    if np.any(backwards):
-        heading = heading + np.pi * backwards
-        pitch, roll = pitch * profile.direction, roll * profile.direction
-    return heading, pitch, roll
 
 
 def turned_in_surface(

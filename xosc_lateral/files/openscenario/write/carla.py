@@ -68,10 +68,7 @@ def start_of(item: Moving) -> tuple[build.Pose, float]:
 
 
 def add_drives(act: etree._Element, name: str, item: Moving, draft: Draft) -> None:
-    """Add a maneuver with an event for every drive of an entity: from where it is placed to where it is placed anew.
-
-    Without pitch, as everywhere in a scenario whose coordinates are not CARLA's own.
-    """
+    """Add a maneuver with an event per drive: from where an entity is placed to where it is placed anew; no pitch."""
     maneuver = build.maneuver(act, name, item.name)
     for number, pieces in enumerate(_drives(item.pieces), start=1):
         name = f"{item.name} trajectory {number}"

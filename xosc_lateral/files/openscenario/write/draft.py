@@ -65,16 +65,15 @@ def target(player: str = Player.STANDARD.value, version: str | None = None) -> T
 
 
 class Draft:
-    """The scenario's tree, changed step by step into the output's.
-
-    The bytes of the scenario are the starting point, so that comments, catalogs and vendor extensions survive. Raises
-    `FormatError` for a scenario that was converted before, `PlaybackError` for a run of 0 s.
-    """
+    """A scenario's tree, changed into the output's; `FormatError`: converted before; `PlaybackError`: a run of 0 s."""
 
     def __init__(self, scenario: Scenario, motion: NominalMotion, target: TargetPlayer = STANDARD) -> None:
         self.scenario, self.motion, self.player = scenario, motion, target.player
         self.root = parse_xml(scenario.source, scenario.path)
         refuse_converted(self.root, scenario.path)
+        board = child_of(self.root, "Storyboard")
+        assert board is not None
+        self.storyboard = board
         if motion.end_time <= 0.0:
             trigger = scenario.storyboard.stop_trigger
             place = scenario.storyboard.place if trigger is None else trigger.place
@@ -90,13 +89,6 @@ class Draft:
         """Controllers and actions that are no longer in the output although they are no motion, with reasons."""
         self.notes: list[str] = []
         """What else there is to say of the output, a line each."""
-
-    @property
-    def storyboard(self) -> etree._Element:
-        """In the tree."""
-        board = child_of(self.root, "Storyboard")
-        assert board is not None
-        return board
 
     @property
     def init_actions(self) -> etree._Element:

@@ -198,10 +198,7 @@ class _Acts:
         _add_speed(group, self._chain.entity, HALTING_SPEED, "falling")
 
     def _add_stop(self, act: etree._Element, name: str) -> None:
-        """By any lateral action that runs.
-
-        A condition that is looked at for the first time sees all that was before; the second one is true only later.
-        """
+        """By any lateral action that runs; the second condition is true later than what was before its first look."""
         trigger = None
         for item in self._items:
             if (item.path == self._chain.after and not item.repeats) or item.adds:

@@ -29,7 +29,7 @@ from xosc_lateral.world.scenario.dependence import refers_to
 from xosc_lateral.world.scenario.enums import StoryboardElementState
 from xosc_lateral.world.scenario.global_actions import AddEntityAction, DeleteEntityAction
 from xosc_lateral.world.scenario.private_actions import ConnectTrailerAction
-from xosc_lateral.world.scenario.scenario import Act, Condition, ManeuverGroup, Scenario, actors_of, conditions_of
+from xosc_lateral.world.scenario.scenario import Act, Condition, ManeuverGroup, Scenario, conditions_of
 
 STORY = "xosc-lateral trajectories"
 UNREACHED_TIME = 1e9
@@ -60,15 +60,12 @@ class Group(Struct, frozen=True):
 
     def element_of(self, content: StoryboardElementStateCondition) -> Path | None:
         """What a condition is about, if that is in the group or around it."""
-        return next((path for path in self._elements() if refers_to(content, path)), None)
-
-    def _elements(self) -> Iterator[Path]:
-        """The story, the act and the group, and all that is in the group."""
-        yield from (self.path[:1], self.path[:2], self.path)
-        yield from ((*self.path, maneuver.name) for maneuver in self.group.maneuvers)
+        paths = [self.path[:1], self.path[:2], self.path]
+        paths += [(*self.path, maneuver.name) for maneuver in self.group.maneuvers]
         for maneuver, event in self.group.events():
             path = (*self.path, maneuver.name, event.name)
-            yield from (path, *((*path, action.name) for action in event.actions))
+            paths += [path, *((*path, action.name) for action in event.actions)]
+        return next((path for path in paths if refers_to(content, path)), None)
 
 
 def groups_of(scenario: Scenario) -> list[Group]:
@@ -110,15 +107,14 @@ def separable(scenario: Scenario, wanted: Collection[str]) -> frozenset[str]:
 
 def _coupled(scenario: Scenario) -> set[str]:
     names = {name for entity in scenario.entities if entity.trailer for name in (entity.name, entity.trailer)}
-    for member in groups_of(scenario):
-        for _, event in member.group.events():
-            if member.group.actors.select_triggering_entities:
-                names |= set(actors_of(member.act, member.group, event))
-            for action in event.actions:
-                if isinstance(action.content, AddEntityAction | DeleteEntityAction):
-                    names.add(action.content.entity_ref)
-                elif isinstance(action.content, ConnectTrailerAction):
-                    names |= {action.content.trailer_ref, *member.actors}
+    for at in scenario.storyboard.events():
+        if at.group.actors.select_triggering_entities:
+            names |= set(at.actors)
+        for content in (action.content for action in at.event.actions):
+            if isinstance(content, AddEntityAction | DeleteEntityAction):
+                names.add(content.entity_ref)
+            elif isinstance(content, ConnectTrailerAction):
+                names |= {content.trailer_ref, *at.group.actors.entity_refs}
     return names
 
 

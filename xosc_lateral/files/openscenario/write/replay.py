@@ -50,10 +50,7 @@ def remove_controllers(draft: Draft, converted: Collection[str]) -> None:
 
 
 def rewrite_init(draft: Draft, starts: Mapping[str, tuple[build.Pose, float] | None]) -> None:
-    """Replace what moves the converted entities in init by a place and a speed; lights, visibility and others stay.
-
-    A start of None leaves init as it is: the entity is not there at the start.
-    """
+    """A place and a speed in place of what moves entities in init; a start of None (not there yet) changes nothing."""
     actions = draft.init_actions
     done: set[str] = set()
     # The reader's order is the file's: names need no parameters filled in again.
@@ -121,11 +118,7 @@ def kept_actions(draft: Draft, played: Iterable[PlayedAction], moving: Collectio
 def add_kept_actions(
     story: etree._Element, name: str, draft: Draft, played: Sequence[PlayedAction], poses: Mapping[int, build.Pose]
 ) -> None:
-    """Add an act with one event for each action that is not replaced, in the order of the run; none for no actions.
-
-    Each run of actions with the same actor has a maneuver group, so that the order holds across actors, too.
-    `poses`: of an AddEntityAction, by index in `played`: where the entity appears on its written path.
-    """
+    """Add an act with an event per action, in order, a group for each run of an actor's; `poses`: of those added."""
     if not played:
         return
     act = build.sub(story, "Act", name=name)

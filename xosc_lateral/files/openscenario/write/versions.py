@@ -42,10 +42,7 @@ def additions(minor: int, kind: str) -> Mapping[str, Any]:
 
 
 def fit_version(losses: Losses, source: Version, version: Version) -> None:
-    """Make a scenario one of another version; parts that were made for it are left as they are.
-
-    Raises `FormatError`: a condition or, if the scenario is reactive, a maneuver that the version does not know.
-    """
+    """Make a scenario one of another version; `FormatError` for a condition or a reactive maneuver that it lacks."""
     was_strict, is_strict = (one[1] >= _STRICT_SINCE_MINOR for one in (source, version))
     for item in elements(losses.root, "Orientation") if was_strict != is_strict else ():
         item.set("type", item.get("type") or ("relative" if was_strict else "absolute"))  # what it meant without
@@ -129,18 +126,14 @@ def _split_controller_action(item: etree._Element) -> None:
     for part in inactive:
         remove(part)
     for part in [part for part in parts if part not in inactive][1:]:
+        # Into a controller action of its own, right after the one that it was in.
         item.remove(part)
-        _move_out(part, parent_of(item))
-
-
-def _move_out(part: etree._Element, private: etree._Element) -> None:
-    """Into a controller action of its own, right after the one that it was in."""
-    after = another = private
-    if local_name(parent_of(private)) == "Action":
-        after = parent_of(private)
-        another = etree.Element("Action", {"name": f"{after.get('name')} {local_name(part)}"})
-        build.sub(another, "PrivateAction/ControllerAction").append(part)
-    else:
+        after = parent_of(item)
         another = etree.Element("PrivateAction")
-        build.sub(another, "ControllerAction").append(part)
-    build.insert_after(after, another)
+        holder = another
+        if local_name(parent_of(after)) == "Action":
+            after = parent_of(after)
+            another = etree.Element("Action", {"name": f"{after.get('name')} {local_name(part)}"})
+            holder = build.sub(another, "PrivateAction")
+        build.sub(holder, "ControllerAction").append(part)
+        build.insert_after(after, another)

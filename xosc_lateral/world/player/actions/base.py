@@ -16,7 +16,7 @@ from xosc_lateral.world.scenario.enums import StoryboardElementState as State
 from xosc_lateral.world.scenario.enums import StoryboardElementType
 from xosc_lateral.world.scenario.scenario import Action
 
-JUMP = 0.05
+JUMP_DISTANCE = 0.05
 """When an action puts the entity further away than this at once, the entity's motion is not continuous. [m]"""
 
 
@@ -154,7 +154,7 @@ class RunningPrivateAction(RunningAction):
 
     def _jumped(self, distance: float) -> None:
         """The actor was put so far away at once [m]: up to here and from here on, its path is another one."""
-        if abs(distance) > JUMP:
+        if abs(distance) > JUMP_DISTANCE:
             self.actor.activity |= Activity.TELEPORTED
 
 

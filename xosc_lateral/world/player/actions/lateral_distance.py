@@ -84,7 +84,6 @@ class BesideOnRoad:
         if self.is_unlimited:
             self._state.turn(0.0 if self._state.is_forward else pi)
 
-    # ---- in detail ---------------------------------------------------------------------------------------------------
     def _rest(self) -> float:
         """How far to go along +t of the own road. [m]"""
         state, other = self._state, self._other
@@ -137,7 +136,7 @@ MOST_ACCELERATION = 1000.0
 LEAST_RADIUS = 0.5
 """Of a turn towards the line. [m]"""
 
-PEAK = 1.5
+PEAK_CURVATURE_RATIO = 1.5
 """A turn with a smooth course has this much more curvature in its middle than a circle. [-]"""
 
 
@@ -183,10 +182,10 @@ class BesideEntity:
     def _heading(self, heading: float, other: float, delta: tuple[float, float], rest: float, step: float) -> float:
         speed = self._state.speed
         way = speed * step
-        radius = max(LEAST_RADIUS, PEAK * speed * speed / min(self._acceleration, MOST_ACCELERATION))
+        radius = max(LEAST_RADIUS, PEAK_CURVATURE_RATIO * speed * speed / min(self._acceleration, MOST_ACCELERATION))
         if rest < 0.5 * way - EPSILON and 0.5 * way > radius - EPSILON:
             return _onto_line(other, delta, way)
-        most = min(abs(speed / radius * step) * PEAK, pi - EPSILON)
+        most = min(abs(speed / radius * step) * PEAK_CURVATURE_RATIO, pi - EPSILON)
         towards = difference(atan2(delta[1], delta[0]), heading)
         if rest > radius - EPSILON:
             turn = towards

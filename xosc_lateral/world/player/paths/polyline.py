@@ -22,13 +22,13 @@ from xosc_lateral.world.player.paths.base import Path, PathPoint
 from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.road.positions import difference, wrap
 
-CORNER = 2.0
+CORNER_LENGTH = 2.0
 """Around a corner, the heading turns over this length before and after it (or half the piece). [m]"""
 
 SAME_HEADING = 0.1
 """Headings that differ by less count as one. [rad]"""
 
-STOP = 1.0
+STOP_DURATION = 1.0
 """A stop that is shorter is driven through where its vertices are merged. [s]"""
 
 
@@ -109,7 +109,6 @@ class PolylinePath(Path):
         following = self._speeds[i + 1] if self.follow or i + 2 < len(self.corners) else 0.0
         return self._speeds[i] + u * (following - self._speeds[i])
 
-    # ---- in detail ---------------------------------------------------------------------------------------------------
     def _angle(self, angles: tuple[float, ...], i: int, u: float) -> float:
         if i == len(angles) - 1:
             return angles[i]
@@ -119,7 +118,7 @@ class PolylinePath(Path):
 
     def _around_corners(self, headings: tuple[float, ...], i: int, along: float) -> float:
         length = self.spans[i]
-        radius = max(min(CORNER, 0.5 * length), EPSILON)
+        radius = max(min(CORNER_LENGTH, 0.5 * length), EPSILON)
         here = headings[i]
         if along < radius:
             if i == 0:
@@ -182,7 +181,7 @@ def merge_close(corners: Sequence[Corner], radius: float) -> tuple[Corner, ...]:
 
     The reference player does so, and its logs can't be met otherwise. The first and the last corner stay. Of a run of
     corners within `radius` [m] (and `SAME_HEADING`) of the first of them, that one alone is kept, or, when the next
-    corner beyond comes `STOP` later or more, that one twice: with its own time and with the last of the run.
+    corner beyond comes `STOP_DURATION` later or more, that one twice: with its own time and with the last of the run.
     """
     if len(corners) <= 2:
         return tuple(corners)
@@ -200,7 +199,7 @@ def merge_close(corners: Sequence[Corner], radius: float) -> tuple[Corner, ...]:
             i = last
             break
         beyond = corners[last + 1]
-        if beyond.time - first.time >= STOP + EPSILON:
+        if beyond.time - first.time >= STOP_DURATION + EPSILON:
             kept.append(replace(first, time=corners[last].time))
         kept.append(beyond)
         i = last + 2
