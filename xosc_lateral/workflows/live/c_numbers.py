@@ -16,9 +16,14 @@ from xosc_lateral.base.limits import DISTANCES, LIVE_PAUSE, LIVE_RANGES, TIME, c
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.model import effects as kinds
-from xosc_lateral.drivers.model.core.autoregressive.coarse import COARSE_EVERY, TICKS, phases
-from xosc_lateral.drivers.model.core.autoregressive.model import HEADROOM, KNEE, AutoregressiveModel
-from xosc_lateral.drivers.model.core.autoregressive.parameters import CANDIDATES, SLOW_CORRELATION_TIME
+from xosc_lateral.drivers.model.core.autoregressive.model import HEADROOM, KNEE_SHARE, AutoregressiveModel
+from xosc_lateral.drivers.model.core.autoregressive.parameters import (
+    CANDIDATES,
+    COARSE_EVERY,
+    SLOW_CORRELATION_TIME,
+    TICKS,
+    phases,
+)
 from xosc_lateral.drivers.model.core.two_level.model import TwoLevelModel
 from xosc_lateral.drivers.model.effects.base import LOG_LIMIT
 from xosc_lateral.drivers.model.effects.response import split_shift
@@ -164,7 +169,7 @@ def _autoregressive(model: AutoregressiveModel) -> tuple[dict[str, int], list[st
     variance = {"quick": [part.within for part in parts], "slow": [part.slow for part in parts]}
     between = np.array([part.between for part in parts])
     constants = {
-        "DRIVER_MEAN": model.mean, "DRIVER_BETWEEN": model.between_drivers, "DRIVER_ORDER": order, "KNEE": KNEE,
+        "DRIVER_MEAN": model.mean, "DRIVER_BETWEEN": model.between_drivers, "DRIVER_ORDER": order, "KNEE": KNEE_SHARE,
         "HEADROOM": HEADROOM, "CANDIDATES": CANDIDATES, "CORRELATION": model.correlation,
         "OTHER_SHARE": np.sqrt(1.0 - model.correlation**2), "VARIES_SLOWLY": int(any(variance["slow"])),
         "COARSE_NOISE": model.coarse.scale, "PHASE_STEPS": len(table),

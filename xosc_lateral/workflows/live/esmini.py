@@ -19,7 +19,7 @@ from xosc_lateral.base.arrays import IntArray
 from xosc_lateral.base.errors import FormatError, SimulationError
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.live.esmini_library import ObjectState, Player, StoryboardCallback

@@ -16,7 +16,7 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.world.motion.trajectory import SETTLING_TIME, settle, smoother_step
 from xosc_lateral.world.surroundings.around import smooth_step
-from xosc_lateral.world.surroundings.context import STEERING
+from xosc_lateral.world.surroundings.context import STEERING_DURATION
 
 LARGEST_TURN_RATE = 0.03
 """Change of heading per time that nobody takes for a corner of the path: 0.3 mrad in a step of 0.01 s. [rad/s]"""
@@ -127,12 +127,12 @@ def _pace(speed: FloatArray) -> FloatArray:
 
 
 def _move_aside(state: NDArray[Any], passed: FloatArray) -> None:
-    """Two equal first-order lags towards what is wanted, solved exactly; drivers respond within `STEERING`."""
-    keep = np.exp(-passed / STEERING)
+    """Two equal first-order lags towards what is wanted, solved exactly; drivers respond within `STEERING_DURATION`."""
+    keep = np.exp(-passed / STEERING_DURATION)
     gap = state["aside"] - state["wanted"]
-    drift = state["aside_rate"] + gap / STEERING
+    drift = state["aside_rate"] + gap / STEERING_DURATION
     state["aside"] = state["wanted"] + (gap + drift * passed) * keep
-    state["aside_rate"] = (drift - (gap + drift * passed) / STEERING) * keep
+    state["aside_rate"] = (drift - (gap + drift * passed) / STEERING_DURATION) * keep
 
 
 def _lead_over(state: NDArray[Any], which: BoolArray, gap: FloatArray, rate: FloatArray, speed: FloatArray) -> None:

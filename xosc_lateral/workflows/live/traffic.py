@@ -26,7 +26,7 @@ from xosc_lateral.drivers.model.stream import sealed, unsealed
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.conversion.seen import mirrored_context, sides_known
 from xosc_lateral.workflows.live.paths import DRIVER, SPEEDS_REMEMBERED, Moves, drive_on
-from xosc_lateral.world.surroundings.context import STEERING
+from xosc_lateral.world.surroundings.context import STEERING_DURATION
 from xosc_lateral.world.surroundings.give_way import Response, give_way_now
 from xosc_lateral.world.surroundings.moment import Places, Roads, look_around
 
@@ -210,7 +210,7 @@ class Traffic:
     def _width(self, drivers: list[int], width: FloatArray) -> FloatArray:
         """The lane's, a first-order lag behind what it is: a border of two widths is no jump of the path. [m]"""
         before = np.where(self._state["width"][drivers] > 0.0, self._state["width"][drivers], width)
-        self._state["width"][drivers] = width + (before - width) * np.exp(-self._step / STEERING)
+        self._state["width"][drivers] = width + (before - width) * np.exp(-self._step / STEERING_DURATION)
         return np.asarray(self._state["width"][drivers])
 
     def _aside(self, moment: Moment, there: IntArray, drivers: IntArray) -> FloatArray:
