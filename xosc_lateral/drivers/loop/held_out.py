@@ -12,8 +12,7 @@ from msgspec import structs
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.base.rows import true_slices
-from xosc_lateral.drivers.drives.cuts import MIN_RUN
-from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.drives.drive import MIN_RUN, Run
 from xosc_lateral.drivers.drives.filters import filtered
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.evaluation.metrics import (

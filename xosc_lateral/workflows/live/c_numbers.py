@@ -16,9 +16,14 @@ from xosc_lateral.base.limits import DISTANCES, LIVE_PAUSE, LIVE_RANGES, TIME, c
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.model import effects as kinds
-from xosc_lateral.drivers.model.core.autoregressive.coarse import COARSE_EVERY, TICKS, phases
-from xosc_lateral.drivers.model.core.autoregressive.model import HEADROOM, KNEE, AutoregressiveModel
-from xosc_lateral.drivers.model.core.autoregressive.parameters import CANDIDATES, SLOW_CORRELATION_TIME
+from xosc_lateral.drivers.model.core.autoregressive.model import HEADROOM, KNEE_SHARE, AutoregressiveModel
+from xosc_lateral.drivers.model.core.autoregressive.parameters import (
+    CANDIDATES,
+    COARSE_EVERY,
+    SLOW_CORRELATION_TIME,
+    TICKS,
+    phases,
+)
 from xosc_lateral.drivers.model.core.two_level.model import TwoLevelModel
 from xosc_lateral.drivers.model.effects.base import LOG_LIMIT
 from xosc_lateral.drivers.model.effects.response import split_shift
@@ -70,7 +75,13 @@ def numbers_of(profile: DriverProfile) -> tuple[dict[str, int], list[str]]:
     columned = [effect for effect in profile.effects if isinstance(effect, kinds.ColumnEffect)]
     hidden = [effect for effect in profile.effects if isinstance(effect, kinds.HiddenEffect)]
     sizes, lines = _effects(profile, columned)
-    core_sizes, core = _core(profile)
+    match profile.model:
+        case TwoLevelModel():
+            core_sizes, core = _two_level(profile.model)
+        case AutoregressiveModel():
+            core_sizes, core = _autoregressive(profile.model)
+        case _:
+            raise DriverProfileError(f"profile {profile.name}: the C driver has no core model {profile.model.kind!r}")
     hidden_lines = _hidden(profile, hidden)
     rated = any(effect.acts is kinds.Acts.RATE for effect in columned) or any(
         isinstance(effect, kinds.Adapted) and effect.rate != 1.0 for effect in hidden
@@ -147,15 +158,6 @@ def _array(name: str, values: Iterable[Any], kind: str = "double") -> str:
 
 
 # ---- core models -----------------------------------------------------------------------------------------------------
-def _core(profile: DriverProfile) -> tuple[dict[str, int], list[str]]:
-    model = profile.model
-    if isinstance(model, TwoLevelModel):
-        return _two_level(model)
-    if isinstance(model, AutoregressiveModel):
-        return _autoregressive(model)
-    raise DriverProfileError(f"profile {profile.name}: the C driver has no core model {model.kind!r}")
-
-
 def _autoregressive(model: AutoregressiveModel) -> tuple[dict[str, int], list[str]]:
     table, order, half = phases(), model.coarse.order, len(model.kernel) // 2
     first = max(half, COARSE_EVERY * TICKS)
@@ -167,7 +169,7 @@ def _autoregressive(model: AutoregressiveModel) -> tuple[dict[str, int], list[st
     variance = {"quick": [part.within for part in parts], "slow": [part.slow for part in parts]}
     between = np.array([part.between for part in parts])
     constants = {
-        "DRIVER_MEAN": model.mean, "DRIVER_BETWEEN": model.between_drivers, "DRIVER_ORDER": order, "KNEE": KNEE,
+        "DRIVER_MEAN": model.mean, "DRIVER_BETWEEN": model.between_drivers, "DRIVER_ORDER": order, "KNEE": KNEE_SHARE,
         "HEADROOM": HEADROOM, "CANDIDATES": CANDIDATES, "CORRELATION": model.correlation,
         "OTHER_SHARE": np.sqrt(1.0 - model.correlation**2), "VARIES_SLOWLY": int(any(variance["slow"])),
         "COARSE_NOISE": model.coarse.scale, "PHASE_STEPS": len(table),
@@ -219,7 +221,9 @@ def components_of(effect: kinds.ColumnEffect) -> list[tuple[Shape, ...]]:
     if type(effect) not in kinds.EFFECTS:
         raise DriverProfileError(f"the C driver has no effect {effect.kind!r}")
     if isinstance(effect, kinds.Product):
-        return [tuple(_factor(factor) for factor in effect.factors)]
+        angles = (kinds.Form.SINE, kinds.Form.COSINE)
+        at = [2.0 * np.pi / factor.at if factor.form in angles else factor.at for factor in effect.factors]
+        return [tuple((factor.form.name, factor.column, k, 0.0) for factor, k in zip(effect.factors, at, strict=True))]
     column = effect.columns[0]
     match effect:
         case kinds.Linear():
@@ -243,11 +247,6 @@ def components_of(effect: kinds.ColumnEffect) -> list[tuple[Shape, ...]]:
         case _:
             raise DriverProfileError(f"the C driver has no effect {effect.kind!r}")
     return [((name, column, first, second),) for name, first, second in shapes]
-
-
-def _factor(factor: kinds.Factor) -> Shape:
-    at = 2.0 * np.pi / factor.at if factor.form in (kinds.Form.SINE, kinds.Form.COSINE) else factor.at
-    return factor.form.name, factor.column, at, 0.0
 
 
 def _effects(profile: DriverProfile, columned: Sequence[kinds.ColumnEffect]) -> tuple[dict[str, int], list[str]]:
