@@ -113,7 +113,7 @@ def test_a_floor_is_the_standard_error_of_a_mean_over_independent_blocks() -> No
     for _ in range(12):
         offset = np.repeat(0.2 * rng.normal(size=40), N // 40)
         statistics = statistics_of(timeline(offset), {"x": column})
-        splits = half_samples(statistics, offset, blocks, rng, 8)
+        splits = half_samples(statistics, offset, blocks, rng)
         sizes.append(np.mean([np.mean(split["mean by x"] ** 2) for split in splits]))
     assert np.sqrt(np.mean(sizes)) == pytest.approx(0.2 / np.sqrt(40), rel=0.2)
 
@@ -121,7 +121,7 @@ def test_a_floor_is_the_standard_error_of_a_mean_over_independent_blocks() -> No
 def test_a_drive_that_is_the_same_everywhere_differs_from_itself_by_nothing() -> None:
     blocks = np.repeat(np.arange(40), N // 40)
     statistics = statistics_of(timeline(np.ones(N)), {"x": np.tile(np.repeat([0.0, 1.0], 150), 40)})
-    halves = half_samples(statistics, np.ones(N), blocks, np.random.default_rng(1), 4)
+    halves = half_samples(statistics, np.ones(N), blocks, np.random.default_rng(1))
     assert max(size_of(half) for half in halves) == pytest.approx(0.0, abs=1e-12)
 
 
