@@ -13,7 +13,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.version import BEHAVIOUR, __version__
 from xosc_lateral.files.openscenario.provenance import PENDING
-from xosc_lateral.files.openscenario.write.build import named
+from xosc_lateral.files.openscenario.write.build import version_text
 from xosc_lateral.files.openscenario.write.draft import WrittenScenario
 from xosc_lateral.files.openscenario.write.fit import write_converted
 from xosc_lateral.files.openscenario.write.lane_offset_scenario import LateralAction
@@ -84,7 +84,7 @@ def write(plan: Plan, sampled: Enriched) -> Written:
         profiles={name: (profile.name, profile_hash(profile)) for name, profile in profiles.items()},
         options=plan.settings.record(folder),
         variant=plan.variant_index + 1,
-        version=named(plan.version),
+        version=version_text(plan.version),
         ego=tuple(plan.egos),
         modes={},
         content_sha256=PENDING,
