@@ -74,15 +74,6 @@ def derive(
     *,
     base: Annotated[str, typer.Argument(metavar="[BASE]", help="Profile that gives what is not stated.")] = "motorway",
     output: Annotated[str, typer.Option("--output", "-o", help="File, folder/ or -.")] = "-",
-    sdlp: Annotated[float | None, typer.Option(help="Standard deviation of lateral position. [m]")] = None,
-    mean: Annotated[float | None, typer.Option(help="Mean offset, positive left. [m]")] = None,
-    restlessness: Annotated[float | None, typer.Option(help="Standard deviation of lateral speed. [m/s]")] = None,
-    memory: Annotated[float | None, typer.Option(help="After which the autocorrelation is 1/e. [s]")] = None,
-    near_line: Annotated[float | None,
-        typer.Option(help="Share of time with a side within 0.2 m of a marking. [0 to 1]")] = None,
-    speed: Annotated[float | None, typer.Option(help="At which the figures hold; default 26.4. [m/s]")] = None,
-    vehicle: Annotated[str | None, typer.Option("--class", metavar="truck",
-        help="What the base knows of trucks.")] = None,
     options: Annotated[Options, profiles.derive_profile],
     reply: Written,
 ) -> None:
@@ -93,11 +84,9 @@ def derive(
     from xosc_lateral.files.output_paths import STDOUT, output_file
     from xosc_lateral.files.profiles import profile_bytes
 
-    figures: Options = {"sdlp": sdlp, "mean": mean, "restlessness": restlessness}
-    figures |= {"memory": memory, "near_line": near_line, "speed": speed, "vehicle": vehicle}
     if not options["name"] and output.endswith(".json"):
         options["name"] = output_file(output, "", (".json",)).stem
-    made = profiles.derive_profile(base, **options, **figures)
+    made = profiles.derive_profile(base, **options)
     if output == STDOUT:
         write_stdout(profile_bytes(made.profile))
         return

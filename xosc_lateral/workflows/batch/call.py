@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
@@ -23,30 +23,40 @@ from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, read_ma
 from xosc_lateral.workflows.batch.progress import Display, Summary, follow
 from xosc_lateral.workflows.batch.request import read_request_table
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
-from xosc_lateral.workflows.options import spelled_out
+from xosc_lateral.workflows.options import declare_options, flag, process_count, spelled_out
 from xosc_lateral.workflows.result import PathLike, Result
 
 if TYPE_CHECKING:
     ScenariosLike = PathLike | pd.DataFrame | Sequence[PathLike]
 
 
+BATCH = "Batches"
+"""Heading of their options on the command line."""
+
+
 @spelled_out(ConvertSettings)
+@declare_options
 def convert_many(
     scenarios: ScenariosLike,
-    output: PathLike,
-    *,
-    variants: int = 1,
-    report: PathLike | None = None,
-    workers: int = 1,
-    cluster: str | None = None,
-    job_timeout: float = JOB_TIMEOUT.value,
-    job_memory: float = JOB_MEMORY.value,
-    keep_old: bool = False,
+    output: PathLike, *,
+    variants: Annotated[int, flag(help="Number of outputs, each with different offsets.", min=1)] = 1,
+    report: Annotated[PathLike | None, flag(kind=str | None, metavar="PAGE.html",
+        help="Page that shows what was added; for a batch, a folder of pages.")] = None,
+    workers: Annotated[int, flag("--jobs", read=process_count, help="Number of processes; -1: one per core.",
+        rich_help_panel=BATCH)] = 1,
+    job_timeout: Annotated[float, flag(help="Time limit per scenario [s].", min=1, max=86_400,
+        rich_help_panel=BATCH)] = JOB_TIMEOUT.value,
+    job_memory: Annotated[float, flag(help="Memory limit per scenario [MB].", min=100, max=1e6,
+        rich_help_panel=BATCH)] = JOB_MEMORY.value,
+    cluster: Annotated[str | None, flag(metavar="ADDRESS", help="Address of a dask scheduler.",
+        rich_help_panel=BATCH)] = None,
+    keep_old: Annotated[bool, flag("--keep-old", help="Leave outputs of older inputs or versions alone.",
+        rich_help_panel=BATCH)] = False,
     force: bool = False,
     show: Literal["auto", "quiet", "json", "nothing"] = "nothing",
     on_outcome: Callable[[Mapping[str, Any]], None] | None = None,
     **options: Unpack[ConvertKeywords],
-) -> BatchResult:
+) -> BatchResult:  # fmt: skip
     """Convert many scenarios into a folder; what is up to date there already is left alone.
 
     Parameters
@@ -56,14 +66,8 @@ def convert_many(
         if wanted `variants`, `profile:ENTITY`, `parameter:NAME` and names of options; or several of them.
     output : str or Path
         Folder; it mirrors the inputs, and holds `manifest.parquet` at the end.
-    variants : int
-        Outputs per scenario, each with offsets of its own.
     report : str or Path, optional
         Folder for a page per output, and an ``index.html`` that lists what needs attention first.
-    workers : int
-        Processes; -1: one per core.
-    cluster : str, optional
-        Address of a dask.distributed scheduler to work on.
     job_timeout, job_memory : float
         What one scenario may take; one that takes more fails. [s], [MB]
     keep_old : bool

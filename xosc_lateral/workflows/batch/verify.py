@@ -27,7 +27,7 @@ from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, read_ma
 from xosc_lateral.workflows.batch.workers import WorkerDiedError, open_pool, run_tasks
 from xosc_lateral.workflows.conversion.convert import convert_scenario
 from xosc_lateral.workflows.conversion.settings import AUTO, AUTO_PROFILE, ConvertSettings
-from xosc_lateral.workflows.options import declare_options, flag
+from xosc_lateral.workflows.options import declare_options, flag, process_count
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths
 
 
@@ -289,7 +289,9 @@ def reproduce(
     library: Paths = (),
     allow: Paths = (),
     road_path: Paths = (),
-    workers: int = 1,
+    workers: Annotated[
+        int, flag("--jobs", read=process_count, help="Of a folder: number of processes; -1: one per core.")
+    ] = 1,
     force: bool = False,
 ) -> Verification:
     """Make an output again from what it carries, or all outputs of a folder with a manifest, and compare the content.

@@ -21,7 +21,7 @@ Rows = NDArray[np.int64]
 ROW_STEP = 0.1
 """Rows that are drawn. [s]"""
 
-MARGIN = 30.0
+ROAD_MARGIN = 30.0
 """Road that is drawn before and after the paths. [m]"""
 
 MOST_ROADS = 3
@@ -30,7 +30,7 @@ MOST_ROADS = 3
 MOST_NAMED = 12
 """Entities up to which a figure of all has a legend."""
 
-COMFORTABLE = 0.5
+USUAL_ACCELERATION = 0.5
 """Lateral acceleration that real drivers seldom exceed while they keep their lane, beyond what the road asks. [m/s2]"""
 
 
@@ -77,7 +77,7 @@ def paths_stretched(enriched: Enriched) -> Figure | None:
         return None
     figure = Figure(len(roads), height=185.0, legend=len(enriched.entities) <= MOST_NAMED)
     for panel, (road, (first, last)) in zip(figure.panels, roads, strict=True):
-        panel.x.limits, panel.y.limits = (first - MARGIN, last + MARGIN), _shown_t(enriched, road)
+        panel.x.limits, panel.y.limits = (first - ROAD_MARGIN, last + ROAD_MARGIN), _shown_t(enriched, road)
         for kind, s, right, left in lane_surfaces(enriched.network, road, *panel.x.limits):
             if kind in DRIVING:
                 panel.band(s, right, left, SHADE)
@@ -205,16 +205,16 @@ def accelerations_over_time(enriched: Enriched, entities: Sequence[EntityResult]
     for panel, entity in zip(figure.panels, entities, strict=True):
         rows = shown_rows(entity.motion)
         time, added = entity.motion.time[rows], entity.lateral_acceleration()[rows]
-        for bound in (-COMFORTABLE, COMFORTABLE):
+        for bound in (-USUAL_ACCELERATION, USUAL_ACCELERATION):
             panel.level(bound, color=NOMINAL, dashes=DASHED)
         panel.line(time, added, color_of(_number_of(enriched, entity)), label="added")
     return figure
 
 
-PEAKS = (0.52, 0.95)
+PEAK_SPEEDS = (0.52, 0.95)
 """Largest lateral speed of real lane changes, 5 and 95 % of 323 on vehicle motorway. [m/s]"""
 
-SHOWN_BESIDE = 3.0
+SHOWN_TIME_BESIDE = 3.0
 """Time before and after a lane change that is drawn with it. [s]"""
 
 
@@ -224,9 +224,9 @@ def lane_changes_over_time(enriched: Enriched, chosen: Sequence[tuple[EntityResu
     for panel, (entity, crossing) in zip(figure.panels, chosen, strict=True):
         time, side = entity.motion.time, np.sign(crossing.way[-1])
         begin, end = time[crossing.first], time[crossing.last]
-        rows = slice(*np.searchsorted(time, (begin - SHOWN_BESIDE, end + SHOWN_BESIDE)))
+        rows = slice(*np.searchsorted(time, (begin - SHOWN_TIME_BESIDE, end + SHOWN_TIME_BESIDE)))
         way = np.interp(time[rows], time[crossing.first : crossing.last + 1], crossing.way)
-        panel.band(time[rows], PEAKS[0], PEAKS[1], SHADE)
+        panel.band(time[rows], PEAK_SPEEDS[0], PEAK_SPEEDS[1], SHADE)
         for added, style in ((0.0, {"dashes": DASHED}), (entity.deviation[rows], {})):
             color = color_of(_number_of(enriched, entity)) if not style else NOMINAL
             panel.line(time[rows], side * np.gradient(way + added, time[rows]), color, **style)

@@ -23,24 +23,15 @@ def view_page(
 ) -> str:
     """HTML page with the player, self-contained; same input, same bytes.
 
-    Parameters
-    ----------
-    motion : NominalMotion
-        As played.
-    network : RoadNetwork
-        That it was played on.
-    source : str
-        File name, for the reader.
-    provenance : mapping
-        Shown in the footer.
-    converted : mapping, optional
-        What the file says of its conversion, if it was converted.
+    `source`: file name, for the reader; `provenance`: for the footer; `converted`: what the file says of its
+    conversion, if it was converted.
     """
-    page = Page(Path(source).name)
+    page, profiles = Page(Path(source).name), (converted or {}).get("profiles")
+    drivers = ", ".join(sorted(profiles)) if isinstance(profiles, Mapping) and profiles else "nobody"
     count = len(motion.entities)
     page.lead(
         f"{count} {'entity' if count == 1 else 'entities'}, {motion.end_time:.1f} s (ended by the {motion.ended_by}). "
-        + (NOT_CONVERTED if converted is None else _conversion_in_words(converted))
+        + (NOT_CONVERTED if converted is None else f"Converted by xosc-lateral, with lateral movement of {drivers}.")
     )
     page.section(
         "Player",
@@ -60,13 +51,6 @@ def view_page(
 
 
 NOT_CONVERTED = "The maneuvers are played as the scenario states them; no lateral movement was added to them."
-
-
-def _conversion_in_words(facts: Mapping[str, Any]) -> str:
-    """Whose lateral movement a converted scenario has."""
-    profiles = facts.get("profiles")
-    vehicles = ", ".join(sorted(profiles)) if isinstance(profiles, Mapping) else ""
-    return "Converted by xosc-lateral, with lateral movement " + (f"of {vehicles}." if vehicles else "of nobody.")
 
 
 def add_notes(page: Page, notes: Sequence[Note]) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.texts import aligned
 from xosc_lateral.drivers.evaluation.lane_keeping import HIGHWAY_DRIVES, HIGHWAY_SPEED
 from xosc_lateral.drivers.evaluation.metrics import METRICS
 from xosc_lateral.drivers.evaluation.profile_comparison import Compared, ComparedProfile
@@ -21,25 +22,19 @@ from xosc_lateral.files.profiles import profile_hash
 from xosc_lateral.workflows.profiles.cards import figures_record
 
 SHOWN_S = 120.0  # Length of the sample paths in the figure. [s]
-SPACING = 0.8  # Between the zero lines of two sample paths. [m]
+PATH_SPACING = 0.8  # Between the zero lines of two sample paths. [m]
 MAXIMUM_DRAWN = 12  # So many profiles are drawn at most; the distances are of all.
 
 
 def comparison_text(compared: Compared) -> str:
     """A table of the profiles, and one of their pairs: verdict, distance, what they differ by."""
-    lines = [*_table([_row(each) for each in compared.profiles]), f"{FIGURES_NOTE}.", "", *_table(_pairs(compared))]
-    lines.append(f"{_distance_note(compared)}.")
+    profiles, pairs = (
+        aligned([list(rows[0]), *(list(row.values()) for row in rows)])
+        for rows in ([_row(each) for each in compared.profiles], _pairs(compared))
+    )
+    lines = [*profiles, f"{FIGURES_NOTE}.", "", *pairs, f"{_distance_note(compared)}."]
     lines += [f"alike: {', '.join(group)}" for group in compared.groups if len(group) > 1]
     return "\n".join(lines)
-
-
-def _table(rows: list[dict[str, str]]) -> list[str]:
-    """Aligned columns under their names."""
-    widths = [max(len(column), *(len(row[column]) for row in rows)) for column in rows[0]]
-    return [
-        "  ".join(f"{text:<{width}}" for text, width in zip(texts, widths, strict=True)).rstrip()
-        for texts in (list(rows[0]), *(list(row.values()) for row in rows))
-    ]
 
 
 FIGURES_NOTE = (
@@ -163,12 +158,12 @@ def comparison_figure(compared: Compared) -> Figure:
         heights, edges = np.histogram(each.runs, np.linspace(-1.0, 1.0, 81), density=True)
         place.line(0.5 * (edges[1:] + edges[:-1]), heights, color, label=name)
         power.line(each.spectrum.frequency, each.spectrum.density, color, label=name)
-        run = each.runs[0][: round(SHOWN_S / step)] + SPACING * (len(shown) - number)
+        run = each.runs[0][: round(SHOWN_S / step)] + PATH_SPACING * (len(shown) - number)
         paths.line(step * np.arange(len(run)), run, color, label=name)
     power.x.log = power.y.log = True
     place.title, place.x.label, place.y.label = "Distribution", "offset [m], positive to the left", "density [1/m]"
     power.title, power.x.label, power.y.label = "Spectrum", "frequency [Hz]", "power density [m²/Hz]"
-    paths.title, paths.x.label, paths.y.ticks = f"Sample paths, {SPACING:g} m apart", "time [s]", []
+    paths.title, paths.x.label, paths.y.ticks = f"Sample paths, {PATH_SPACING:g} m apart", "time [s]", []
     return figure
 
 

@@ -66,13 +66,12 @@ class ProfileUse:
     is_current: bool | None  # it is the same now; None: there is no profile of this id any more
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class ProfileUses(Result):
     """Which outputs used a profile."""
 
-    __slots__ = ("name", "uses")
-
-    def __init__(self, name: str, uses: Sequence[ProfileUse]) -> None:
-        self.name, self.uses = name, tuple(uses)
+    name: str
+    uses: tuple[ProfileUse, ...]
 
     def headline(self) -> str:
         """One line."""
@@ -129,4 +128,4 @@ def find_uses(name: str, outputs: Paths, library: Paths = ()) -> ProfileUses:
                 sha256 = row.profile_sha256.get(name, "")
                 is_current = None if now is None else sha256 == now
                 uses.append(ProfileUse(manifest.parent / row.output, entities, sha256, is_current))
-    return ProfileUses(name, uses)
+    return ProfileUses(name, tuple(uses))

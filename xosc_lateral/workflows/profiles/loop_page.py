@@ -34,7 +34,7 @@ from xosc_lateral.workflows.profiles.loop_words import (
     size_words,
     taken_back_words,
 )
-from xosc_lateral.workflows.profiles.violins import LABELS, violin_figure
+from xosc_lateral.workflows.profiles.violins import METRIC_WORDS, violin_figure
 
 NAMED_DRIVES = 3  # So many drives are named in the title; more are counted.
 LEFT_ROWS = 8  # Rows of the table of what is left.
@@ -255,7 +255,7 @@ def _add_movement(page: Page, result: LoopResult) -> None:
     before, after, floor = scores.before.by_metric, scores.after.by_metric, scores.floor.by_metric
     page.table(
         [
-            {"metric": LABELS[name], "before": before[name], "after": after[name], "between halves": floor[name]}
+            {"metric": METRIC_WORDS[name], "before": before[name], "after": after[name], "between halves": floor[name]}
             for name in before
         ],
         f"Ten metrics of snippets of {seconds:g} s: distance from the measured ones, in standard deviations of these",

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -72,15 +73,21 @@ def write_card(profile: DriverProfile, path: PathLike, *, force: bool = False) -
 
 @declare_options
 def derive_profile(
-    base: ProfileLike = "motorway",
-    *,
+    base: ProfileLike = "motorway", *,
+    preset: Annotated[str | None,
+        flag(help="alcohol-0.5, drowsy or truck: figures with a source, as changes of the base's.")] = None,
+    sdlp: Annotated[float | None, flag(help="Standard deviation of lateral position. [m]")] = None,
+    mean: Annotated[float | None, flag(help="Mean offset, positive left. [m]")] = None,
+    restlessness: Annotated[float | None, flag(help="Standard deviation of lateral speed. [m/s]")] = None,
+    memory: Annotated[float | None, flag(help="After which the autocorrelation is 1/e. [s]")] = None,
+    near_line: Annotated[float | None,
+        flag(help="Share of time with a side within 0.2 m of a marking. [0 to 1]")] = None,
+    speed: Annotated[float | None, flag(help="At which the figures hold; default 26.4. [m/s]")] = None,
+    vehicle: Annotated[str | None, flag("--class", metavar="truck", help="What the base knows of trucks.")] = None,
     name: Annotated[str, flag(help="Id of the new profile.")] = "",
-    preset: Annotated[
-        str | None, flag(help="alcohol-0.5, drowsy or truck: figures with a source, as changes of the base's.")
-    ] = None,
     library: Paths = (),
-    **asked: float | str | None,
-) -> Derived:
+    **asked: float | None,
+) -> Derived:  # fmt: skip
     """A driver from stated figures: what a profile does, made larger, slower or elsewhere until it has them.
 
     Raises `DriverProfileError`: If figures contradict each other, are too far from the base's, or no car could drive
@@ -93,7 +100,7 @@ def derive_profile(
     name : str
         Id of the new profile; else the preset's or the base's name with ``-derived``.
     **asked
-        Fields of `fitting.derive.Asked`: ``sdlp=0.25``.
+        Other fields of `fitting.derive.Asked`: ``sdlp_change=0.03``.
     """
     from dataclasses import replace
 
@@ -104,7 +111,8 @@ def derive_profile(
 
     known = given_profile(base, library)
     chosen = None if preset is None else preset_called(preset)
-    stated = {key: value for key, value in asked.items() if value is not None}
+    asked |= {"sdlp": sdlp, "mean": mean, "restlessness": restlessness, "memory": memory, "near_line": near_line}
+    stated = {key: value for key, value in {**asked, "speed": speed, "vehicle": vehicle}.items() if value is not None}
     figures = Asked(**stated) if chosen is None else replace(chosen.asked, **stated)  # type: ignore[arg-type]
     made = derive(known, figures, name or preset or f"{known.name}-derived", preset=chosen)
     origin = made.profile.provenance
@@ -127,7 +135,7 @@ def list_profiles(
     from xosc_lateral.files.profiles import matching, read_library
 
     entries = read_library(as_paths(library))
-    return ProfileList(matching(entries, tags, where or {}) if tags or where else entries)
+    return ProfileList(tuple(matching(entries, tags, where or {}) if tags or where else entries))
 
 
 @declare_options
@@ -200,13 +208,11 @@ def compare_profiles(*profiles: ProfileLike, library: Paths = (), seed: int = 0)
     return ProfileComparison(compare([given_profile(profile, library) for profile in profiles], seed))
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class ProfileList(Result):
     """Profiles of a library; those that can't be read among them, with the reason."""
 
-    __slots__ = ("entries",)
-
-    def __init__(self, entries: Sequence[Entry]) -> None:
-        self.entries = tuple(entries)
+    entries: tuple[Entry, ...]
 
     def __iter__(self) -> Iterator[Entry]:
         return iter(self.entries)
@@ -240,13 +246,11 @@ class ProfileList(Result):
         return {"profiles": list_record(self.entries)}
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class ProfileComparison(Result):
     """Profiles side by side."""
 
-    __slots__ = ("_compared",)
-
-    def __init__(self, compared: Compared) -> None:
-        self._compared = compared
+    _compared: Compared
 
     def headline(self) -> str:
         """One line."""

@@ -32,7 +32,7 @@ LICENCE = "that of the CommonRoad scenario and of the recording that it was made
 
 @importer
 def import_commonroad(sources: Path | Sequence[Path], settings: CutSettings = DEFAULT_CUTS) -> ImportedDrives:
-    """Read one or several scenarios. Raises `FormatError`, `NotEnoughDataError`."""
+    """CommonRoad scenarios (extra `commonroad`): recorded obstacles between the bounds of their lanelets."""
 
     def read(path: Path, label: str) -> ImportedDrives:
         tracks, shapes, graph, version = read_obstacles(path, label)

@@ -23,8 +23,9 @@ from __future__ import annotations
 import io
 import re
 import zipfile
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,7 @@ from xosc_lateral.base.lazy import pd
 from xosc_lateral.drivers.drives.cleaning import RESOLUTION, RUN, VALID_BELOW
 from xosc_lateral.drivers.drives.filters import filtered, low_pass_between
 from xosc_lateral.files.source import open_source
+from xosc_lateral.workflows.options import flag
 from xosc_lateral.workflows.recordings.cuts import (
     DEFAULT_CUTS,
     CutSettings,
@@ -70,8 +72,16 @@ LICENCE = (
 
 
 @importer
-def import_dlr_ht(source: Path, settings: CutSettings = DEFAULT_CUTS) -> ImportedDrives:
-    """Read the trajectory CSV, the data set's zip or the wheel of `tasi` that holds it."""
+def import_dlr_ht(
+    source: Path,
+    settings: CutSettings = DEFAULT_CUTS,
+    *,
+    max_gap: Annotated[
+        float, flag(help="Longest gap between two cameras that is kept [s].", min=0, max=60)
+    ] = DEFAULT_CUTS.max_gap,
+) -> ImportedDrives:
+    """DLR Highway Traffic: the wheel of tasi 0.15.4, the data set's zip, or its trajectory CSV."""
+    settings = replace(settings, max_gap=max_gap) if settings is DEFAULT_CUTS else settings
     tracks = read_tracks(source)
     road, kind = find_lanes(tracks, settings), vehicle_classes(tracks)
     vehicle, time, length = (tracks[name].to_numpy() for name in ("vehicle", "time", "dimension_length"))

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,7 @@ from xosc_lateral.files.drives import file_labels, from_middle
 from xosc_lateral.files.mapping import ColumnSource, MappingLike, as_mapping, factor, is_measured, parse_map, spelled
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import LONGEST_MESSAGE, foreign_errors
+from xosc_lateral.workflows.options import MAPPING, flag
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
 from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer, paths_of
 
@@ -96,15 +97,16 @@ class Channel:
 @importer
 def import_mf4(
     sources: Path | Sequence[Path],
-    channels: Sequence[str] = (),
-    *,
-    step: float = 0.04,
-    mapping: MappingLike | None = None,
-) -> ImportedDrives:
-    """Read mapped channels of bus logs at an even step, over the time that all position channels of a log cover.
+    channels: Annotated[Sequence[str], flag("--map", kind=list[str] | None, metavar="NAME=CHANNEL[:UNIT]",
+        help="Channel of a column, e.g. speed=v_veh:km/h; default unit: the file's.")] = (), *,
+    mapping: Annotated[MappingLike | None, MAPPING] = None,
+    step: Annotated[float, flag(help="Time step of the table, to which channels are interpolated [s].", min=0.001,
+        max=1)] = 0.04,
+) -> ImportedDrives:  # fmt: skip
+    """ASAM MDF bus logs (extra `mdf`). They need a channel map, since signal names differ from car to car.
 
-    Each log is a drive called after its file. `channels`: words ``NAME=CHANNEL[:UNIT]``; `mapping`: more of them,
-    saved. `step`: of the table [s]. Messages that stay away for longer than `fit` bridges leave a gap.
+    Mapped channels are read at an even step, over the time that all position channels of a log cover. Each log is a
+    drive called after its file. Messages that stay away for longer than `fit` bridges leave a gap.
     """
     files, saved = paths_of(sources), as_mapping(mapping)
     wanted = {**saved.columns, **parse_map(channels)}
