@@ -17,8 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from laboratory.markers import show
-from xosc_lateral.drivers.drives.cuts import all_runs
-from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.drives.drive import Drive, all_runs
 from xosc_lateral.drivers.evaluation.realism import ConditionScores, Realism, score_realism
 from xosc_lateral.drivers.fitting.fitting import fit_profile
 from xosc_lateral.drivers.model.core.base import ModelKind

@@ -85,7 +85,7 @@ def sumo(
 def stdio(
     *, profile: str = "motorway", seed: int = 0,
     road: Annotated[Path | None, typer.Option(help="OpenDRIVE file that vehicles' places are on.")] = None,
-    library: Paths = (),
+    library: Paths = (), verbose: Verbose = False,
 ) -> None:
     """Answer lines on standard input, as docs/schemas/live.json has them, until there are no more."""
     import os

@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.live.scene import Scene
     from xosc_lateral.world.scenario.entity import Entity
 
-STATES = ("time", "name", "x", "y", "h", "speed", "road", "lane", "s", "offset", "driver", "steered")
+STATE_COLUMNS = ("time", "name", "x", "y", "h", "speed", "road", "lane", "s", "offset", "driver", "steered")
 """Columns of a run: where vehicles are; offset from the lane's centre, positive left; the driver's; if it counts."""
 
-EXTERNAL = (1, 11)
+EXTERNAL_CONTROLLERS = (1, 11)
 """Controllers of esmini that wait for somebody else: external, UDP driver (`Controller::Type`)."""
 
-ROW = (*STATES, "z", "pitch", "roll")
+TRACE_COLUMNS = (*STATE_COLUMNS, "z", "pitch", "roll")
 """The same with what only a trace has."""
 
 
@@ -92,7 +92,7 @@ def live_esmini(
                 place = (state.road, state.lane, state.s, traffic.offset_of(state))
                 pose = (state.x, state.y, state.h, state.speed)
                 rows.append((time, name, *pose, *place, *move, state.z, state.p, state.r))
-                if state.ctrl_type in EXTERNAL:
+                if state.ctrl_type in EXTERNAL_CONTROLLERS:
                     waiting.setdefault(name, set()).add(pose[:2])
             if player.SE_GetQuitFlag() == 1 or k == round(duration / step):
                 break
@@ -198,7 +198,7 @@ class LiveRun(Result):
         events: Sequence[tuple[float, str, int]] = (),
         scene: Scene | None = None,
     ) -> None:
-        self._rows = pd.DataFrame(rows, columns=list(ROW))
+        self._rows = pd.DataFrame(rows, columns=list(TRACE_COLUMNS))
         self._settings, self._scene = dict(settings), scene
         self.warnings = tuple(warnings)
         """What a user has to know, a line each."""
@@ -217,8 +217,8 @@ class LiveRun(Result):
         return "\n".join([self.headline(), *(f"  warning: {warning}" for warning in self.warnings)])
 
     def to_frame(self) -> pd.DataFrame:
-        """One row per vehicle and step, see `STATES`; SI units, offsets positive left of travel."""
-        return self._rows[list(STATES)]
+        """One row per vehicle and step, see `STATE_COLUMNS`; SI units, offsets positive left of travel."""
+        return self._rows[list(STATE_COLUMNS)]
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them: what ran, without its rows."""

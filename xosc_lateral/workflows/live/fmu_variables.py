@@ -14,14 +14,14 @@ from xosc_lateral.workflows.live.c_numbers import inputs_of, usual
 ABSENT_DISTANCE = 1000.0
 """Distances from here on mean that nobody is there: files of FMI have no infinity that every tool reads. [m]"""
 
-UNITS: dict[str, dict[str, float]] = {
+BASE_UNITS: dict[str, dict[str, float]] = {
     "m": {"m": 1}, "m/s": {"m": 1, "s": -1}, "m/s2": {"m": 1, "s": -2}, "1/m": {"m": -1}, "rad": {"rad": 1},
     "%": {"factor": 0.01}, "h": {"s": 1, "factor": 3600.0}, "mm/h": {"m": 1, "s": -1, "factor": 1e-3 / 3600.0},
     "deg": {"rad": 1, "factor": float(np.pi / 180.0)}, "lx": {"cd": 1, "m": -2}, "-": {},
 }  # fmt: skip
 """Units of inputs and outputs in base units."""
 
-WORDS = {
+DESCRIPTIONS_OF_VARIABLES = {
     "offset": "From the lane's centre, positive left", "rate": "Change of the offset per time",
     "heading": "Relative to the lane, positive left", "position": "Where the vehicle is while it does not follow",
     "following": "It follows the road; while not, `position` is where it is.",
@@ -56,7 +56,7 @@ class Variable:
     @property
     def words(self) -> str:
         """For the description."""
-        return WORDS.get(self.name, self.name)
+        return DESCRIPTIONS_OF_VARIABLES.get(self.name, self.name)
 
 
 def variables_of(profile: DriverProfile) -> list[Variable]:
@@ -77,5 +77,5 @@ def add_units(root: Element, names: set[str]) -> Element:
     definitions = SubElement(root, "UnitDefinitions")
     for name in sorted(names):
         unit = SubElement(definitions, "Unit", name=name)
-        SubElement(unit, "BaseUnit", {key: f"{value:.16g}" for key, value in UNITS[name].items()})
+        SubElement(unit, "BaseUnit", {key: f"{value:.16g}" for key, value in BASE_UNITS[name].items()})
     return definitions

@@ -23,10 +23,10 @@ from xosc_lateral.drivers.model.seeds import child
 from xosc_lateral.files.atomic import write_atomically
 from xosc_lateral.files.profiles import profile_hash, read_profile, write_profile
 from xosc_lateral.workflows.live.c_numbers import inputs_of
-from xosc_lateral.workflows.live.fmu_variables import ABSENT_DISTANCE, UNITS, Variable, add_units, variables_of
+from xosc_lateral.workflows.live.fmu_variables import ABSENT_DISTANCE, BASE_UNITS, Variable, add_units, variables_of
 from xosc_lateral.workflows.live.traffic import Moment, Traffic
 
-NEEDS = (
+HOST_REQUIREMENT = (
     f"Needs a host with Python {sys.version_info.major}.{sys.version_info.minor} in its process, and xosc-lateral in "
     "that; others can't load it (undefined symbol: _Py_NoneStruct)"
 )
@@ -119,7 +119,7 @@ class Unit:
         self._variables = variables_of(self._own)
         self._columns = inputs_of(self._own)
         self.description = f"Driver {self._own.name} of xosc-lateral {__version__}: lateral offset in the lane, "
-        self.description += f"positive left. {NEEDS}"
+        self.description += f"positive left. {HOST_REQUIREMENT}"
         self.author, self.profile = "xosc-lateral", ""
         self._traffic: _OneDriver | None = None
         self._has_begun = False
@@ -245,7 +245,7 @@ class Unit3(Unit):
 
     def _add_more(self) -> None:
         unit = import_module("pythonfmu3").Unit
-        self.register_units([unit(name, **base) for name, base in UNITS.items()])  # type: ignore[attr-defined]
+        self.register_units([unit(name, **base) for name, base in BASE_UNITS.items()])  # type: ignore[attr-defined]
         self.time = 0.0
         self._add("Float64", "time", "independent", "continuous")
 

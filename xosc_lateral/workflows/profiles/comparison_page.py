@@ -14,7 +14,7 @@ from xosc_lateral.drivers.evaluation.lane_keeping import HIGHWAY_DRIVES, HIGHWAY
 from xosc_lateral.drivers.evaluation.metrics import METRICS
 from xosc_lateral.drivers.evaluation.profile_comparison import Compared, ComparedProfile
 from xosc_lateral.drivers.evaluation.scores import SNIPPET
-from xosc_lateral.drivers.evaluation.sizes import FAST_S, LEVEL, QUANTITIES, SLOW_S, Difference, surest
+from xosc_lateral.drivers.evaluation.sizes import FAST_S, QUANTITIES, SIGNIFICANCE_LEVEL, SLOW_S, Difference, surest
 from xosc_lateral.files.pages.chart import color_of
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import Page
@@ -52,7 +52,7 @@ def _distance_note(compared: Compared) -> str:
         f"differ: {scale['mean']:.2f} m in their mean, {scale['std']:.2f} m in their standard deviation. Mean offset: "
         f"the second's less the first's; movement, slow (beyond {SLOW_S:g} s) and fast (from {FAST_S:g} s): the "
         f"second's over the first's; 95 % intervals by the drives of the fits. Told apart is what has a p below "
-        f"{LEVEL:g}, all three considered; of others, what as much driving would show in 4 of 5 cases"
+        f"{SIGNIFICANCE_LEVEL:g}, all three considered; of others, what as much driving would show in 4 of 5 cases"
     )
 
 
@@ -73,7 +73,7 @@ def _pairs(compared: Compared) -> list[dict[str, str]]:
 def _verdict(parts: Sequence[Difference]) -> str:
     """What tells two profiles apart; else what would, in as much driving as there was."""
     p_value = surest(parts)
-    if p_value <= LEVEL:
+    if p_value <= SIGNIFICANCE_LEVEL:
         surely = "p < 1e-06" if p_value < 1e-6 else f"p = {p_value:.1g}"
         return f"differ in {min(parts, key=lambda part: part.p_value).quantity}, {surely}"
     least = (f"{np.exp(part.least):.1f} times" if part.is_factor else f"{part.least:.2f} m" for part in parts)

@@ -54,7 +54,7 @@ def evaluate(
     classify : bool
         Train classifiers to separate sampled and measured (extra `classifier`; a minute or two for some hours).
     """
-    from xosc_lateral.drivers.drives.cuts import all_runs
+    from xosc_lateral.drivers.drives.drive import all_runs
     from xosc_lateral.drivers.evaluation.scores import score_profile
 
     driver = given_profile(profile, library)

@@ -97,13 +97,13 @@ def fit(
         raise DriverProfileError(f"model {model}: only the two-level model has a corrected fit")
     tables = given_drives(drives, columns).valid_below(valid_below)
     by_default = isinstance(prior, str) and prior == PRIOR_PROFILE
-    known = Provenance(
-        source=source or ", ".join(tables.inputs),
-        licence=licence,
-        inputs=dict(tables.inputs),
-        fit=dict(summary_of(tables.drives)),
-    )
     with naming(tables):
+        known = Provenance(
+            source=source or ", ".join(tables.inputs),
+            licence=licence,
+            inputs=dict(tables.inputs),
+            fit=dict(summary_of(tables.drives)),
+        )
         profile = fit_profile(
             tables.drives,
             name=name or (tables.files[0].name.split(".")[0] if tables.files else "profile"),
@@ -122,6 +122,6 @@ def fit(
 
 def fit_warnings(profile: DriverProfile, sensor_noise: float | None = None) -> list[str]:
     """What to know about a fitted profile, and the error of its sensor as far as it was given [m], in lines."""
-    from xosc_lateral.drivers.fitting import warnings
+    from xosc_lateral.drivers.fitting import fitting
 
-    return warnings.fit_warnings(profile, sensor_noise, given_profile(PRIOR_PROFILE))
+    return fitting.fit_warnings(profile, sensor_noise, given_profile(PRIOR_PROFILE))

@@ -33,7 +33,7 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.limits import CLOCK_ROWS, TIME
 from xosc_lateral.base.segment import CONTEXT_UNITS
-from xosc_lateral.drivers.drives.cuts import JUMP, MAX_GAP
+from xosc_lateral.drivers.drives.drive import LANE_JUMP_SHARE, MAX_GAP
 from xosc_lateral.drivers.drives.resampling import average, resample
 from xosc_lateral.files.columns import refuse_marker
 from xosc_lateral.files.drives import file_labels, from_middle
@@ -275,11 +275,11 @@ def _table(signals: dict[str, Channel], source: Path, drive: str, step: float) -
     width = sum(float(np.median(signals[name].values)) for name in sides)
     columns: dict[str, NDArray[Any]] = {}
     for name, channel in signals.items():
-        broken = channel.breaks(JUMP * width if name in position and name != "lane_width" else np.inf)
+        broken = channel.breaks(LANE_JUMP_SHARE * width if name in position and name != "lane_width" else np.inf)
         columns[name] = channel.at(time, broken, is_position=name in position)
     unknown = np.any([np.isnan(columns[name]) for name in position], axis=0)
     if "distance_left" in position:  # one side has jumped, the other not yet
-        unknown |= np.abs(columns["distance_left"] + columns["distance_right"] - width) > JUMP * width
+        unknown |= np.abs(columns["distance_left"] + columns["distance_right"] - width) > LANE_JUMP_SHARE * width
     state = np.where(unknown, "gap", KEPT_ROWS)
     if "speed" in columns:
         state = np.where((state == KEPT_ROWS) & np.isnan(columns["speed"]), "no speed", state)
