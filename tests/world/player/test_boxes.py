@@ -22,8 +22,7 @@ from xosc_lateral.world.player.distances import (
     holds_point,
     overlap,
 )
-from xosc_lateral.world.player.simulation import TrafficSignals
-from xosc_lateral.world.player.values import Values, holds
+from xosc_lateral.world.player.simulation import TrafficSignals, Values, holds
 from xosc_lateral.world.road.positions import Pose
 from xosc_lateral.world.scenario.entity import BoundingBox, Performance
 from xosc_lateral.world.scenario.enums import ParameterType, Rule

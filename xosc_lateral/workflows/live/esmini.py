@@ -19,7 +19,7 @@ from xosc_lateral.base.arrays import IntArray
 from xosc_lateral.base.errors import FormatError, SimulationError
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.live.esmini_library import ObjectState, Player, StoryboardCallback
@@ -51,15 +51,14 @@ _VEHICLE_TYPE, _TRUCK_CATEGORIES, _PULLED_CATEGORIES = 1, (2, 3, 4, 5), (3, 4)
 
 
 class _Lane(NamedTuple):
-    """A lane where a vehicle is: road and id, if there is one and if it is for driving, +1 where +t is to the left of
-    where the vehicle drives (else -1), width [m], heading of travel [rad]."""
+    """Where a vehicle is."""
 
-    place: tuple[int, int]
+    place: tuple[int, int]  # Road and lane.
     is_lane: bool
     is_driving: bool
-    direction: float
-    width: float
-    heading: float
+    direction: float  # +1 where +t is to the left of where the vehicle drives, else -1.
+    width: float  # [m]
+    heading: float  # Of travel. [rad]
 
 
 @dataclass(slots=True)

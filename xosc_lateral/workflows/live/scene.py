@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from xosc_lateral.base.errors import SimulationError
-from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.entity import BoundingBox, Entity

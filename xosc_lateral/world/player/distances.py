@@ -44,16 +44,13 @@ class Spot(Struct, frozen=True):
 
 
 class RoadGap(Struct, frozen=True):
-    """From one place to another along the roads, seen there.
+    """From one place to another along the roads, seen there."""
 
-    [m], lanes (positive to +t, lane 0 not counted), whether on the other side of lane 0, whether s runs the other way.
-    """
-
-    ds: float
-    dt: float
-    lanes: int
-    opposite: bool
-    is_turned: bool = False
+    ds: float  # [m]
+    dt: float  # [m]
+    lanes: int  # positive to +t, lane 0 not counted
+    opposite: bool  # on the other side of lane 0
+    is_turned: bool = False  # s runs the other way
 
 
 def ahead_and_left(state: EntityState, x: float, y: float) -> tuple[float, float]:

@@ -143,10 +143,10 @@ class HeaderOffset(Struct, frozen=True):
 
     def undo(self, x: Place, y: Place) -> tuple[Place, Place]:
         """Coordinates of the file of an inertial place, or of several. [m]"""
-        c, s = cos(self.heading), sin(self.heading)
-        return c * x + s * y - self.x, c * y - s * x - self.y
+        x, y = self.turned_back(x, y)
+        return x - self.x, y - self.y
 
-    def turned_back(self, dx: float, dy: float) -> tuple[float, float]:
+    def turned_back(self, dx: Place, dy: Place) -> tuple[Place, Place]:
         """An inertial direction along the axes of the file. [m]"""
         c, s = cos(self.heading), sin(self.heading)
         return c * dx + s * dy, c * dy - s * dx

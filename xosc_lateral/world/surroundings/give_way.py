@@ -81,15 +81,17 @@ def give_way(
     left, right, none = empty((count, n)), empty((count, n)), np.zeros(n)
     kinds = (np.float64, np.float64, np.float64, np.float64, bool, bool)
     tables = [empty((count, n), kind) for kind in kinds]  # x, y, heading, deviation, can_move, present
+    left_hand = np.zeros(count, dtype=bool)
     for k, samples in enumerate(sampled):
         entity, box, heading = samples.motion, samples.motion.entity.bounding_box, samples.motion.heading[rows]
         x = entity.x[rows] + box.center_x * np.cos(heading)
         y = entity.y[rows] + box.center_x * np.sin(heading)
+        on_road = np.flatnonzero(entity.road[rows] >= 0)  # the first road says whether it drives where one keeps left
+        left_hand[k] = bool(len(on_road)) and network.roads[int(entity.road[rows[on_road[0]]])].rule == "LHT"
         present = ((entity.activity[rows] & Activity.ACTIVE) != 0) & entity.entity.is_vehicle
         columns = (none, none, x, y, heading, samples.deviation, samples.can_move, present)
         for table, values in zip((left, right, *tables), columns, strict=True):
             put(table, slice(k, k + 1), np.asarray(values))
-    left_hand = np.array(_left_hand(network, sampled, rows), dtype=bool)
     there_x, there_y = (
         (np.where(there, row, np.nan) for row, there in zip(table, tables[-1], strict=True)) for table in tables[:2]
     )
@@ -236,13 +238,3 @@ def _smoothed(values: FloatArray, width: float) -> FloatArray:
     half = min(int(np.ceil(4.0 * width)), max(len(values) - 1, 0))
     kernel = np.exp(-0.5 * (np.arange(-half, half + 1) / width) ** 2)
     return np.asarray(np.convolve(np.pad(values, half, mode="edge"), kernel / kernel.sum(), "valid"))
-
-
-def _left_hand(network: RoadNetwork, sampled: Sequence[SampledVehicle], rows: IntArray) -> list[bool]:
-    """Whether each vehicle drives where one keeps left: the first road that it is on says so."""
-    nearest = []
-    for entity in sampled:
-        road = entity.motion.road[rows]
-        on = np.flatnonzero(road >= 0)
-        nearest.append(bool(len(on)) and network.roads[int(road[on[0]])].rule == "LHT")
-    return nearest

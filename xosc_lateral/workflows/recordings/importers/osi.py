@@ -19,7 +19,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.opendrive import parse_opendrive, read_opendrive
+from xosc_lateral.files.opendrive.reader import parse_opendrive, read_opendrive
 from xosc_lateral.files.osi import osi
 from xosc_lateral.workflows.options import flag
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, MOVING_SPEED, CutSettings

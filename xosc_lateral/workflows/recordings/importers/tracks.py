@@ -18,7 +18,7 @@ from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.mapping import MappingLike
-from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.workflows.options import MAPPING, flag
 from xosc_lateral.workflows.recordings.cuts import (
     DEFAULT_CUTS,

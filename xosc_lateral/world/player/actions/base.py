@@ -30,12 +30,10 @@ class Domain(IntFlag):
 
 
 class RunningAction(StoryboardElement):
-    """One action of one actor (or of none): a leaf of the storyboard.
+    """One action of one actor (an `EntityState`), or of none: a leaf of the storyboard.
 
     A kind of action says what it does in `_prepare`, `_begin`, `_act` and `_finish`; one that has done its work calls
     `end`.
-
-    `source`: as read; `actor`: who acts (an `EntityState`); None for global and user-defined actions.
     """
 
     domains: Domain = Domain.NONE

@@ -10,6 +10,7 @@ from math import acos, atan2, copysign, cos, hypot, inf, pi, sin, sqrt
 
 from xosc_lateral.world.motion.nominal import Activity
 from xosc_lateral.world.player.actions.base import Domain, Maker, RunningPrivateAction
+from xosc_lateral.world.player.actions.longitudinal import STIFFNESS
 from xosc_lateral.world.player.distances import ahead_and_left, road_gap, spot_of
 from xosc_lateral.world.player.drive import move_along_lane
 from xosc_lateral.world.player.state import NO_ROAD, EntityState, free
@@ -17,9 +18,6 @@ from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.road.positions import Pose, difference
 from xosc_lateral.world.scenario.enums import CoordinateSystem, LateralDisplacement
 from xosc_lateral.world.scenario.private_actions import DynamicConstraints, LateralDistanceAction
-
-STIFFNESS = 0.4
-"""Of the spring that pulls towards the distance, per acceleration available. [1/m]"""
 
 
 class BesideOnRoad:

@@ -43,11 +43,7 @@ class Control(Struct, frozen=True):
 
 
 class NurbsPath(Path):
-    """A NURBS curve of order `order` (degree + 1).
-
-    `controls`: at least `order`; `knots`: as many as control points and order together, none smaller than the one
-    before, spanning a curve.
-    """
+    """A NURBS curve of an order (degree + 1), with as many knots as control points and order together."""
 
     def __init__(self, controls: Sequence[Control], knots: Sequence[float], order: int) -> None:
         from scipy.interpolate import BSpline  # takes a while to import, and few scenarios have a curve

@@ -33,13 +33,7 @@ STOP_DURATION = 1.0
 
 
 class Corner(Struct, frozen=True):
-    """A vertex: [m], [rad], [s].
-
-    NaN in `heading` and `pitch`: the pieces'; in `z` and `roll`: the road's; in `time`: none.
-
-    `road_z` is the height of the road here, for a piece that begins on it and ends above; `is_fixed` tells whether the
-    vertex has a place of its own, not one relative to an entity.
-    """
+    """A vertex [m], [rad], [s]; NaN: heading and pitch of the pieces, z and roll of the road, no time."""
 
     x: float
     y: float
@@ -48,16 +42,12 @@ class Corner(Struct, frozen=True):
     pitch: float = nan
     roll: float = nan
     time: float = nan
-    road_z: float = nan
-    is_fixed: bool = True
+    road_z: float = nan  # height of the road here, for a piece that begins on it and ends above
+    is_fixed: bool = True  # it has a place of its own, not one relative to an entity
 
 
 class PolylinePath(Path):
-    """A polyline.
-
-    `corners`: at least one; `follow`: follow mode, else position mode; `initial_speed`: with which the entity comes
-    (follow mode needs it). [m/s]
-    """
+    """A polyline in follow mode (the entity comes with `initial_speed` [m/s]) or in position mode."""
 
     def __init__(self, corners: Sequence[Corner], *, follow: bool = False, initial_speed: float = 0.0) -> None:
         self.corners = _lifted(corners)
