@@ -10,7 +10,7 @@ import typer
 import xosc_lateral as xl
 from xosc_lateral.cli import VERBS, group_of_verbs
 from xosc_lateral.cli.words import Options, Printing, Written, command, say_json, write_stdout
-from xosc_lateral.workflows.profiles import keeping, profiles
+from xosc_lateral.workflows.profiles import profiles
 
 Name = Annotated[str, typer.Argument(metavar="NAME|PATH", help="Driver profile.", show_default=False)]
 Names = Annotated[list[str], typer.Argument(metavar="NAME|PATH...", help="Driver profiles.", show_default=False)]
@@ -118,19 +118,19 @@ def tag(
 
 
 @command(group, "remove", "Delete profiles from a library.", "profiles remove mine --library team/")
-def remove(names: Names, *, options: Annotated[Options, keeping.remove_profiles], reply: Printing) -> None:
+def remove(names: Names, *, options: Annotated[Options, profiles.remove_profiles], reply: Printing) -> None:
     """Delete the files of profiles of your own, all or none; `profiles uses` says which outputs used them."""
-    reply.say_written(keeping.remove_profiles(names, **options))
+    reply.say_written(profiles.remove_profiles(names, **options))
 
 
 @command(group, "rename", "Give a profile another id.", "profiles rename mine night-driver --library team/")
 def rename(
     name: Name,
     new: Annotated[str, typer.Argument(metavar="NEW", help="Its new id.", show_default=False)],
-    *, options: Annotated[Options, keeping.rename_profile], reply: Written,
+    *, options: Annotated[Options, profiles.rename_profile], reply: Written,
 ) -> None:
     """Change a profile's id, in its file and as the file's name. Its hash changes with it."""
-    path = keeping.rename_profile(name, new, **options, force=reply.force)
+    path = profiles.rename_profile(name, new, **options, force=reply.force)
     reply.say_written(path, id=path.stem)
 
 
@@ -138,10 +138,10 @@ def rename(
 def uses(
     name: Annotated[str, typer.Argument(metavar="ID", help="Profile, in the library or no longer.")],
     outputs: Annotated[list[Path], typer.Argument(metavar="FOLDER...", help="Of batches, or their manifests.")],
-    *, options: Annotated[Options, keeping.find_uses], reply: Printing,
+    *, options: Annotated[Options, profiles.find_uses], reply: Printing,
 ) -> None:
     """Which outputs of batches have offsets of a profile, of which vehicles, and whether it is the same now."""
-    reply.say(keeping.find_uses(name, outputs, **options))
+    reply.say(profiles.find_uses(name, outputs, **options))
 
 
 @command(

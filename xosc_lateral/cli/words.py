@@ -6,7 +6,7 @@ import json
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, is_dataclass, replace
+from dataclasses import dataclass, is_dataclass
 from functools import wraps
 from inspect import Parameter, Signature, signature
 from pathlib import Path
@@ -189,14 +189,6 @@ def _fields(group: type) -> list[Parameter]:
     return sorted(parameters, key=lambda parameter: parameter.name != "force")
 
 
-def _options_of(source: Any) -> dict[str, Option]:
-    """What can be set of a call or of settings, where they have only its name with what all verbs say of it."""
-    return {
-        name: replace(SHARED[name], read=option.read) if option.kind is None and name in SHARED else option
-        for name, option in options_of(source).items()
-    }
-
-
 def _parameters(source: Any, options: Mapping[str, Option]) -> Iterator[Parameter]:
     """The command line's options for them."""
     defaults = signature(source).parameters
@@ -262,7 +254,7 @@ def with_options(verb: Callable[..., Any]) -> Callable[..., None]:
             added = _fields(source)
             groups[name] = [option.name for option in added]
         else:
-            sources[name] = {key: option for key, option in _options_of(source).items() if key not in declared}
+            sources[name] = {key: option for key, option in options_of(source).items() if key not in declared}
             added = list(_parameters(source, sources[name]))
         parameters += [option.replace(kind=Parameter.KEYWORD_ONLY) for option in added]
 

@@ -115,8 +115,8 @@ def declare_options(call: Verb) -> Verb:
 
 def documented(settings: Settings) -> Settings:
     """Settings whose docstring has an entry for each."""
-    options = {name: SHARED[name] if known.kind is None else known for name, known in options_of(settings).items()}
-    settings.__doc__ = _documented(settings.__doc__ or "", options, {one.name: one.type for one in settable(settings)})
+    kinds = {item.name: item.type for item in settable(settings)}
+    settings.__doc__ = _documented(settings.__doc__ or "", options_of(settings), kinds)
     return settings
 
 
@@ -143,9 +143,13 @@ def settable(settings: type) -> list[Field[Any]]:
 
 def options_of(source: Callable[..., Any]) -> dict[str, Option]:
     """What users can set of some settings, or of a call, by name."""
-    if isinstance(source, type):
-        return {item.name: item.metadata["option"] for item in settable(source)}
-    return dict(source.__options__)  # type: ignore[attr-defined]
+    if not isinstance(source, type):
+        return dict(source.__options__)  # type: ignore[attr-defined]
+    options = {item.name: item.metadata["option"] for item in settable(source)}
+    for name, option in options.items():
+        if option.kind is None and (shared := SHARED.get(name)) is not None:
+            options[name] = replace(option, flags=shared.flags, kind=shared.kind, words=shared.words)
+    return options
 
 
 def values_of(settings: type, stated: Mapping[str, Any]) -> dict[str, Any]:
@@ -310,12 +314,8 @@ class Part(StrEnum):
 
 
 PROFILE = flag("--profile", "-p", kind=str, metavar="NAME|PATH", help="Driver profile.")
-MAPPING = flag(
-    "--mapping",
-    kind=Path | None,
-    metavar="FILE.toml",
-    help="Saved mapping of columns (import table --propose FILE...).",
-)
+MAPPING = flag("--mapping", kind=Path | None, metavar="FILE.toml",
+    help="Saved mapping of columns (import table --propose FILE...).")  # fmt: skip
 
 # fmt: off
 SHARED: Mapping[str, Option] = {

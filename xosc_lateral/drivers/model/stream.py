@@ -254,14 +254,9 @@ class OffsetStream:
 
 
 def sealed(values: Mapping[str, Any], form: str = FORMAT) -> dict[str, Any]:
-    """A state's plain values with format, version and the hash of all of it."""
+    """A state's plain values with format, version and the SHA-256 of all of it, whatever its order and layout."""
     state = {"format": form, "version": VERSION, **values}
-    return {**state, "sha256": _hash(state)}
-
-
-def _hash(state: Mapping[str, Any]) -> str:
-    """SHA-256 of a state, whatever the order and the layout of its JSON."""
-    return hashlib.sha256(json.dumps(state, sort_keys=True).encode()).hexdigest()
+    return {**state, "sha256": hashlib.sha256(json.dumps(state, sort_keys=True).encode()).hexdigest()}
 
 
 def unsealed(state: Mapping[str, Any], form: str = FORMAT) -> dict[str, Any]:
@@ -277,10 +272,10 @@ def unsealed(state: Mapping[str, Any], form: str = FORMAT) -> dict[str, Any]:
             f"a state written by another version of xosc-lateral (format {state.get('version')!r}; this one reads "
             f"{VERSION})"
         )
-    written = {name: value for name, value in state.items() if name != "sha256"}
-    if state.get("sha256") != _hash(written):
+    values = {name: value for name, value in state.items() if name not in ("format", "version", "sha256")}
+    if state.get("sha256") != sealed(values, form)["sha256"]:
         raise DriverProfileError(f"the state of {form.removeprefix('xosc-lateral ')} is damaged: its sha256 is another")
-    return {name: value for name, value in written.items() if name not in ("format", "version")}
+    return values
 
 
 def _steps_per_model_step(rate: float | None, step: float) -> int:

@@ -10,8 +10,7 @@ import numpy as np
 from xosc_lateral.files.pages.page import KeyFigure, Page, Tone
 from xosc_lateral.workflows.conversion.result import MODE_WORDS, ConvertedScenario, Enriched, EntityResult
 from xosc_lateral.workflows.playing import figures as figures
-from xosc_lateral.workflows.playing.figures import USUAL_ACCELERATION
-from xosc_lateral.workflows.playing.page import add_notes
+from xosc_lateral.workflows.playing.figures import USUAL_ACCELERATION, add_notes
 from xosc_lateral.workflows.playing.scene import scene_of
 from xosc_lateral.world.motion.gaps import MAXIMUM_GAP, Following, closest_following, road_path
 

@@ -75,7 +75,13 @@ def numbers_of(profile: DriverProfile) -> tuple[dict[str, int], list[str]]:
     columned = [effect for effect in profile.effects if isinstance(effect, kinds.ColumnEffect)]
     hidden = [effect for effect in profile.effects if isinstance(effect, kinds.HiddenEffect)]
     sizes, lines = _effects(profile, columned)
-    core_sizes, core = _core(profile)
+    match profile.model:
+        case TwoLevelModel():
+            core_sizes, core = _two_level(profile.model)
+        case AutoregressiveModel():
+            core_sizes, core = _autoregressive(profile.model)
+        case _:
+            raise DriverProfileError(f"profile {profile.name}: the C driver has no core model {profile.model.kind!r}")
     hidden_lines = _hidden(profile, hidden)
     rated = any(effect.acts is kinds.Acts.RATE for effect in columned) or any(
         isinstance(effect, kinds.Adapted) and effect.rate != 1.0 for effect in hidden
@@ -152,15 +158,6 @@ def _array(name: str, values: Iterable[Any], kind: str = "double") -> str:
 
 
 # ---- core models -----------------------------------------------------------------------------------------------------
-def _core(profile: DriverProfile) -> tuple[dict[str, int], list[str]]:
-    model = profile.model
-    if isinstance(model, TwoLevelModel):
-        return _two_level(model)
-    if isinstance(model, AutoregressiveModel):
-        return _autoregressive(model)
-    raise DriverProfileError(f"profile {profile.name}: the C driver has no core model {model.kind!r}")
-
-
 def _autoregressive(model: AutoregressiveModel) -> tuple[dict[str, int], list[str]]:
     table, order, half = phases(), model.coarse.order, len(model.kernel) // 2
     first = max(half, COARSE_EVERY * TICKS)
@@ -224,7 +221,9 @@ def components_of(effect: kinds.ColumnEffect) -> list[tuple[Shape, ...]]:
     if type(effect) not in kinds.EFFECTS:
         raise DriverProfileError(f"the C driver has no effect {effect.kind!r}")
     if isinstance(effect, kinds.Product):
-        return [tuple(_factor(factor) for factor in effect.factors)]
+        angles = (kinds.Form.SINE, kinds.Form.COSINE)
+        at = [2.0 * np.pi / factor.at if factor.form in angles else factor.at for factor in effect.factors]
+        return [tuple((factor.form.name, factor.column, k, 0.0) for factor, k in zip(effect.factors, at, strict=True))]
     column = effect.columns[0]
     match effect:
         case kinds.Linear():
@@ -248,11 +247,6 @@ def components_of(effect: kinds.ColumnEffect) -> list[tuple[Shape, ...]]:
         case _:
             raise DriverProfileError(f"the C driver has no effect {effect.kind!r}")
     return [((name, column, first, second),) for name, first, second in shapes]
-
-
-def _factor(factor: kinds.Factor) -> Shape:
-    at = 2.0 * np.pi / factor.at if factor.form in (kinds.Form.SINE, kinds.Form.COSINE) else factor.at
-    return factor.form.name, factor.column, at, 0.0
 
 
 def _effects(profile: DriverProfile, columned: Sequence[kinds.ColumnEffect]) -> tuple[dict[str, int], list[str]]:

@@ -51,15 +51,14 @@ _VEHICLE_TYPE, _TRUCK_CATEGORIES, _PULLED_CATEGORIES = 1, (2, 3, 4, 5), (3, 4)
 
 
 class _Lane(NamedTuple):
-    """A lane where a vehicle is: road and id, if there is one and if it is for driving, +1 where +t is to the left of
-    where the vehicle drives (else -1), width [m], heading of travel [rad]."""
+    """Where a vehicle is."""
 
-    place: tuple[int, int]
+    place: tuple[int, int]  # Road and lane.
     is_lane: bool
     is_driving: bool
-    direction: float
-    width: float
-    heading: float
+    direction: float  # +1 where +t is to the left of where the vehicle drives, else -1.
+    width: float  # [m]
+    heading: float  # Of travel. [rad]
 
 
 @dataclass(slots=True)

@@ -21,8 +21,7 @@ from xosc_lateral.drivers.model.profile import DriverProfile, sampling_hash
 from xosc_lateral.files.atomic import write_atomically
 from xosc_lateral.workflows.live.c_driver import c_sources, filled, identifier
 from xosc_lateral.workflows.live.c_numbers import inputs_of
-from xosc_lateral.workflows.live.fmu_variables import ABSENT_DISTANCE, Variable, add_units, variables_of
-from xosc_lateral.workflows.live.python_fmu import export_python_fmu
+from xosc_lateral.workflows.live.python_fmu import ABSENT_DISTANCE, Variable, add_units, export_python_fmu, variables_of
 
 HOST_COMPILERS = ("cc", "gcc", "clang")
 """What is looked for where no compiler is named; the first that is there."""

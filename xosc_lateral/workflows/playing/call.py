@@ -174,7 +174,7 @@ class Playback(Result):
     def page(self) -> str:
         """A self-contained HTML page that plays the scenario."""
         from xosc_lateral.files.openscenario.provenance import facts_in
-        from xosc_lateral.workflows.playing.page import view_page
+        from xosc_lateral.workflows.playing.figures import view_page
 
         motion, network = self._played.motion, self._played.network
         converted = facts_in(self.scenario.read_bytes())

@@ -1,8 +1,10 @@
-"""Figures of a scenario: paths over the road, and what happens over time."""
+"""Figures of a scenario, paths over the road and what happens over time, and the page of one that was played."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +12,13 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.files.pages.chart import DASHED, GRID, MUTED, NOMINAL, SHADE, Panel, color_of, label_of
 from xosc_lateral.files.pages.figure import Figure
+from xosc_lateral.files.pages.page import Page
 from xosc_lateral.workflows.conversion.result import Enriched, EntityResult
-from xosc_lateral.workflows.playing.scene import lane_surfaces, markings
-from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
+from xosc_lateral.workflows.playing.scene import lane_surfaces, markings, scene_of
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion, Note
 from xosc_lateral.world.motion.segments import Crossing
 from xosc_lateral.world.road.lanes import DRIVING
+from xosc_lateral.world.road.network import RoadNetwork
 
 Rows = NDArray[np.int64]
 
@@ -248,3 +252,57 @@ def timeline(enriched: Enriched) -> Figure:
     panel.y.limits, panel.y.grid = (count - 0.5, -0.5), False
     panel.x.label = "time [s]"
     return figure
+
+
+# ---- The page of a played scenario, before anything is converted ----
+def view_page(
+    motion: NominalMotion,
+    network: RoadNetwork,
+    *,
+    source: str,
+    provenance: Mapping[str, object],
+    converted: Mapping[str, Any] | None = None,
+) -> str:
+    """HTML page with the player, self-contained; same input, same bytes.
+
+    `source`: file name, for the reader; `provenance`: for the footer; `converted`: what the file says of its
+    conversion, if it was converted.
+    """
+    page, profiles = Page(Path(source).name), (converted or {}).get("profiles")
+    drivers = ", ".join(sorted(profiles)) if isinstance(profiles, Mapping) and profiles else "nobody"
+    count = len(motion.entities)
+    page.lead(
+        f"{count} {'entity' if count == 1 else 'entities'}, {motion.end_time:.1f} s (ended by the {motion.ended_by}). "
+        + (NOT_CONVERTED if converted is None else f"Converted by xosc-lateral, with lateral movement of {drivers}.")
+    )
+    page.section(
+        "Player",
+        "The scenario from above. A lateral stretch above 1 widens the road. Click a vehicle to follow it, point at it "
+        "for its values, drag to look elsewhere.",
+    )
+    page.player(scene_of(motion, network), "Scenario from above")
+    page.section("Speed")
+    page.figure(
+        speeds_over_time(motion),
+        "Speed over time. Click to take the player to that time.",
+        "Speed over time of every entity",
+        over_time=True,
+    )
+    add_notes(page, motion.notes)
+    return page.html(provenance)
+
+
+NOT_CONVERTED = "The maneuvers are played as the scenario states them; no lateral movement was added to them."
+
+
+def add_notes(page: Page, notes: Sequence[Note]) -> None:
+    """The section on what was not played as the scenario states it."""
+    page.section("Not played as written")
+    if not notes:
+        page.text("Nothing: every action and condition was played as the scenario states it.")
+        return
+    rows = [
+        {"what": note.what, "element": note.element, "file": Path(note.path).name, "line": str(note.line or "")}
+        for note in notes
+    ]
+    page.table(rows, "What was left out or played differently")
