@@ -43,7 +43,9 @@ def test_between_few_drives_nothing_is_compared() -> None:
 
 def test_it_is_taken_back_with_its_reason() -> None:
     coarse = population(2, between=-0.2)
-    selection = select(Search.over(coarse, [Column("x", Values.NUMBER, False)], np.random.SeedSequence(1), ERROR_BUDGET))
+    selection = select(
+        Search.over(coarse, [Column("x", Values.NUMBER, False)], np.random.SeedSequence(1), ERROR_BUDGET)
+    )
     assert not [one for one in selection.accepted if isinstance(one.term, SpreadTerm)]
     (rejected,) = [one for one in selection.rejected if one.was_found]
     assert (rejected.component, rejected.columns, rejected.why) == ("spread", ("x",), UNDONE)
