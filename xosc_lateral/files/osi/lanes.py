@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -108,14 +109,9 @@ def write_lanes(message: Any, ids: RoadIds) -> None:
             about.left_lane_boundary_id.add().value = edge
         for edge in right_edges:
             about.right_lane_boundary_id.add().value = edge
-        _pair(about, ids, (road, k, name), lane)
-
-
-def _pair(about: Any, ids: RoadIds, piece: Piece, lane: Lane) -> None:
-    """One entry per way through: OSI pairs where a lane comes from with where it leads."""
-    before, after = ([*_next(ids, piece, lane, side)] for side in (-lane.direction, lane.direction))
-    for antecessor in before or [0]:  # 0 is nobody's
-        for successor in after or [0]:
+        # one entry per way through: OSI pairs where a lane comes from with where it leads; 0 is nobody's
+        before, after = ([*_next(ids, (road, k, name), lane, side)] for side in (-lane.direction, lane.direction))
+        for antecessor, successor in product(before or [0], after or [0]):
             if antecessor or successor:
                 pair = about.lane_pairing.add()
                 if antecessor:
